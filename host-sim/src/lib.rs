@@ -1,0 +1,2 @@
+//! The simulated XYZ stage and the experiments run on it.
+#![forbid(unsafe_code)]

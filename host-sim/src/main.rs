@@ -1,0 +1,3 @@
+//! The command `quadrant`.
+#![forbid(unsafe_code)]
+fn main() {}

@@ -1,0 +1,3 @@
+//! Quadrant: servo control that removes friction's quadrant glitches.
+#![no_std]
+#![forbid(unsafe_code)]
