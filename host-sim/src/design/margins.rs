@@ -1,0 +1,371 @@
+//! Gain margin, phase margin and the peaks of sensitivity, by root bracketing.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use num_complex::Complex64;
+
+use super::loop_shape::OpenLoop;
+
+/// How far a stable loop is from instability.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Margins {
+    /// The smallest factor on the loop's gain that makes it unstable, dB. Above zero.
+    pub gain_margin_db: f64,
+    /// Where: the frequency at which the loop then oscillates, Hz.
+    pub phase_crossover_hz: f64,
+    /// The smallest turn of the loop's phase that makes it unstable, deg. Above zero.
+    pub phase_margin_deg: f64,
+    /// Where: the frequency at which the loop's gain is one, Hz.
+    pub gain_crossover_hz: f64,
+    /// The peak of `|S| = |1 / (1 + L)|`, dimensionless.
+    pub sensitivity_peak: f64,
+    /// The frequency of that peak, Hz.
+    pub sensitivity_peak_hz: f64,
+    /// The peak of `|T| = |L / (1 + L)|`, dimensionless.
+    pub complementary_peak: f64,
+    /// The frequency of that peak, Hz.
+    pub complementary_peak_hz: f64,
+}
+
+/// Why a loop has no margins.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MarginError {
+    /// The gain is above one, or below one, in the whole band.
+    NoGainCrossover,
+    /// No gain makes the loop unstable in the band.
+    NoPhaseCrossover,
+    /// The closed loop is unstable as it is.
+    Unstable,
+    /// The response is not a number somewhere in the band.
+    NotFinite,
+}
+
+impl fmt::Display for MarginError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::NoGainCrossover => "the open loop's gain never crosses one in the band",
+            Self::NoPhaseCrossover => {
+                "the open loop's phase never crosses -180 degrees in the band"
+            }
+            Self::Unstable => "the closed loop is unstable",
+            Self::NotFinite => "the open loop's response is not finite everywhere in the band",
+        })
+    }
+}
+
+impl std::error::Error for MarginError {}
+
+/// Points, even on a log scale, between which crossings and peaks are bracketed.
+const BRACKETS: usize = 4000;
+
+/// Margins and peaks of a loop, or why it has none.
+///
+/// Stability is read by Nyquist's criterion from the crossings of the negative real axis beyond -1, counted with their
+/// direction, for an open loop without unstable poles and with at most three integrators.
+pub fn margins(open_loop: &impl OpenLoop) -> Result<Margins, MarginError> {
+    let scan = Scan::new(open_loop)?;
+    let phase_crossovers = scan.phase_crossovers();
+    let gain_crossovers = scan.gain_crossovers();
+    if scan.encirclements(&phase_crossovers) != 0 {
+        return Err(MarginError::Unstable);
+    }
+    let (gain_margin, phase_crossover) = phase_crossovers
+        .iter()
+        .map(|&omega| (open_loop.response(omega).norm().recip(), omega))
+        .filter(|&(factor, _)| factor > 1.0)
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .ok_or(MarginError::NoPhaseCrossover)?;
+    let (phase_margin, gain_crossover) = gain_crossovers
+        .iter()
+        .map(|&omega| ((-open_loop.response(omega)).arg().abs(), omega))
+        .min_by(|a, b| a.0.total_cmp(&b.0))
+        .ok_or(MarginError::NoGainCrossover)?;
+    let (sensitivity_peak, sensitivity_omega) = scan.peak(|l| (l + 1.0).norm().recip());
+    let (complementary_peak, complementary_omega) = scan.peak(|l| (l / (l + 1.0)).norm());
+    Ok(Margins {
+        gain_margin_db: 20.0 * gain_margin.log10(),
+        phase_crossover_hz: phase_crossover / TAU,
+        phase_margin_deg: phase_margin.to_degrees(),
+        gain_crossover_hz: gain_crossover / TAU,
+        sensitivity_peak,
+        sensitivity_peak_hz: sensitivity_omega / TAU,
+        complementary_peak,
+        complementary_peak_hz: complementary_omega / TAU,
+    })
+}
+
+/// The lowest frequency at which the loop's phase falls through -180 degrees, rad/s.
+pub(super) fn falling_phase_crossover(open_loop: &impl OpenLoop) -> Result<f64, MarginError> {
+    let scan = Scan::new(open_loop)?;
+    let falls = |&omega: &f64| scan.direction(omega) < 0;
+    let first = scan.phase_crossovers().into_iter().find(falls);
+    first.ok_or(MarginError::NoPhaseCrossover)
+}
+
+/// A loop's response over its band, coarsely.
+struct Scan<'a, L: OpenLoop> {
+    open_loop: &'a L,
+    points: Vec<(f64, Complex64)>,
+}
+
+impl<'a, L: OpenLoop> Scan<'a, L> {
+    fn new(open_loop: &'a L) -> Result<Self, MarginError> {
+        let (lowest, highest) = open_loop.band_rad_s();
+        let ratio = highest / lowest;
+        let points: Vec<_> = (0..=BRACKETS)
+            .map(|i| lowest * ratio.powf(i as f64 / BRACKETS as f64))
+            .map(|omega| (omega, open_loop.response(omega)))
+            .collect();
+        let finite = points
+            .iter()
+            .all(|(omega, l)| omega.is_finite() && l.is_finite());
+        finite
+            .then_some(Self { open_loop, points })
+            .ok_or(MarginError::NotFinite)
+    }
+
+    /// Frequencies at which the response is real and negative, ascending.
+    fn phase_crossovers(&self) -> Vec<f64> {
+        self.roots(|l| l.im, |l| l.re < 0.0)
+    }
+
+    /// Frequencies at which the gain is one, ascending.
+    fn gain_crossovers(&self) -> Vec<f64> {
+        self.roots(|l| l.norm_sqr() - 1.0, |_| true)
+    }
+
+    /// The roots of a function of the response, ascending, where `counts` holds at both ends of the bracket.
+    fn roots(
+        &self,
+        function: impl Fn(Complex64) -> f64,
+        counts: impl Fn(Complex64) -> bool,
+    ) -> Vec<f64> {
+        let brackets = self.points.windows(2).filter(|pair| {
+            let ends = [pair[0].1, pair[1].1];
+            ends.into_iter().all(&counts) && (function(ends[0]) < 0.0) != (function(ends[1]) < 0.0)
+        });
+        brackets
+            .map(|pair| {
+                let negative_below = function(pair[0].1) < 0.0;
+                bisect(pair[0].0, pair[1].0, |omega| {
+                    (function(self.open_loop.response(omega)) < 0.0) == negative_below
+                })
+            })
+            .collect()
+    }
+
+    /// Whether the phase rises (+1) or falls (-1) through -180 degrees at a phase crossover.
+    fn direction(&self, omega: f64) -> i32 {
+        let above = self.open_loop.response(omega * (1.0 + 1e-7));
+        if above.im > 0.0 { -1 } else { 1 }
+    }
+
+    /// Half the encirclements of -1: those of positive frequencies.
+    fn encirclements(&self, phase_crossovers: &[f64]) -> i32 {
+        // Two integrators and any lag, or three, start below -180 degrees: the arc at infinity has crossed the axis.
+        let start = self.points[0].1;
+        let on_the_arc = if start.re < 0.0 && start.im > 0.0 {
+            -1
+        } else {
+            0
+        };
+        let beyond = |omega: &&f64| self.open_loop.response(**omega).norm() > 1.0;
+        let crossings = phase_crossovers.iter().filter(beyond);
+        on_the_arc + crossings.map(|&omega| self.direction(omega)).sum::<i32>()
+    }
+
+    /// The largest value of a function of the response, and its frequency in rad/s.
+    fn peak(&self, function: impl Fn(Complex64) -> f64) -> (f64, f64) {
+        let values = self.points.iter().map(|&(_, l)| function(l));
+        let highest = values
+            .enumerate()
+            .max_by(|a, b| a.1.total_cmp(&b.1))
+            .map_or(0, |(index, _)| index);
+        let last = self.points.len() - 1;
+        let mut low = self.points[highest.saturating_sub(1)].0;
+        let mut high = self.points[(highest + 1).min(last)].0;
+        let at = |omega: f64| function(self.open_loop.response(omega));
+        // Golden section: the function has one peak between the neighbours of the highest point.
+        let golden = (5.0_f64.sqrt() - 1.0) / 2.0;
+        for _ in 0..60 {
+            let width = golden * (high - low);
+            if at(high - width) < at(low + width) {
+                low = high - width;
+            } else {
+                high = low + width;
+            }
+        }
+        let omega = 0.5 * (low + high);
+        (at(omega), omega)
+    }
+}
+
+/// Where `below`, true at `low` and false at `high`, changes, to the last bit but a few.
+pub(super) fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
+    for _ in 0..80 {
+        let middle = 0.5 * (low + high);
+        if below(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    0.5 * (low + high)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::fixtures::{X_GAINS, X_PLANT};
+    use crate::design::{ContinuousLoop, SampledLoop};
+    use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+
+    const CONTINUOUS: ContinuousLoop = ContinuousLoop {
+        plant: X_PLANT,
+        gains: X_GAINS,
+    };
+
+    fn near(value: f64, expected: f64, tolerance: f64) {
+        assert!(
+            (value - expected).abs() < tolerance,
+            "{value}, expected {expected}"
+        );
+    }
+
+    #[test]
+    fn x_axis_has_the_printed_margins_of_the_thesis() {
+        let margins = margins(&CONTINUOUS).unwrap();
+        assert_eq!(format!("{:.1}", margins.gain_margin_db), "9.9");
+        assert_eq!(format!("{:.0}", margins.phase_crossover_hz), "194");
+        assert_eq!(format!("{:.1}", margins.phase_margin_deg), "54.2");
+        assert_eq!(format!("{:.1}", margins.gain_crossover_hz), "64.9");
+    }
+
+    #[test]
+    fn x_axis_peaks_are_those_of_its_model_not_the_printed_ones() {
+        // The thesis prints 1.76 and 1.25, very likely of the measured response.
+        let margins = margins(&CONTINUOUS).unwrap();
+        near(margins.sensitivity_peak, 1.624, 0.001);
+        near(margins.sensitivity_peak_hz, 133.3, 0.1);
+        near(margins.complementary_peak, 1.112, 0.001);
+        near(margins.complementary_peak_hz, 50.3, 0.1);
+    }
+
+    #[test]
+    fn sampling_the_x_axis_at_10_khz_costs_a_third_of_a_decibel_and_a_degree() {
+        let margins = margins(&SampledLoop::new(&X_PLANT, &X_GAINS, 1e-4, 0.0)).unwrap();
+        near(margins.gain_margin_db, 9.543, 0.001);
+        near(margins.phase_crossover_hz, 186.42, 0.01);
+        near(margins.phase_margin_deg, 53.049, 0.001);
+        near(margins.gain_crossover_hz, 64.891, 0.001);
+        near(margins.sensitivity_peak, 1.6627, 0.0001);
+        near(margins.complementary_peak, 1.1279, 0.0001);
+    }
+
+    #[test]
+    fn response_at_the_crossovers_is_real_or_of_unit_gain() {
+        let margins = margins(&CONTINUOUS).unwrap();
+        let real = CONTINUOUS.response(TAU * margins.phase_crossover_hz);
+        near(real.im / real.re, 0.0, 1e-12);
+        let unit = CONTINUOUS.response(TAU * margins.gain_crossover_hz);
+        near(unit.norm(), 1.0, 1e-12);
+    }
+
+    #[test]
+    fn too_much_gain_is_unstable() {
+        let gains = PidGains {
+            kp_v_per_mm: 4.0 * X_GAINS.kp_v_per_mm,
+            kd_v_s_per_mm: 4.0 * X_GAINS.kd_v_s_per_mm,
+            ..X_GAINS
+        };
+        let plant = X_PLANT;
+        assert_eq!(
+            margins(&ContinuousLoop { plant, gains }),
+            Err(MarginError::Unstable)
+        );
+    }
+
+    #[test]
+    fn too_much_integral_action_is_unstable() {
+        let gains = PidGains {
+            ki_v_per_mm_s: 700.0,
+            ..X_GAINS
+        };
+        let plant = X_PLANT;
+        assert_eq!(
+            margins(&ContinuousLoop { plant, gains }),
+            Err(MarginError::Unstable)
+        );
+    }
+
+    #[test]
+    fn two_or_three_integrators_with_enough_lead_are_stable() {
+        let plant = PlantModel {
+            stiffness_per_s2: 0.0,
+            ..X_PLANT
+        };
+        let gains = PidGains {
+            ki_v_per_mm_s: 0.7,
+            ..X_GAINS
+        };
+        assert!(margins(&ContinuousLoop { plant, gains }).is_ok());
+        // Without the plant's own damping there are three, and the phase starts near -270 degrees.
+        let undamped = PlantModel {
+            damping_per_s: 0.0,
+            ..plant
+        };
+        let sluggish = PidGains {
+            ki_v_per_mm_s: 600.0,
+            ..X_GAINS
+        };
+        assert!(
+            margins(&ContinuousLoop {
+                plant: undamped,
+                gains
+            })
+            .is_ok()
+        );
+        let unstable = ContinuousLoop {
+            plant: undamped,
+            gains: sluggish,
+        };
+        assert_eq!(margins(&unstable), Err(MarginError::Unstable));
+    }
+
+    #[test]
+    fn loops_without_crossovers_say_so() {
+        let prompt = PlantModel {
+            delay_s: 0.0,
+            ..X_PLANT
+        };
+        let open_loop = ContinuousLoop {
+            plant: prompt,
+            gains: X_GAINS,
+        };
+        assert_eq!(margins(&open_loop), Err(MarginError::NoPhaseCrossover));
+        let spring = PlantModel {
+            stiffness_per_s2: 1e6,
+            damping_per_s: 1e4,
+            ..X_PLANT
+        };
+        let weak = PidGains {
+            kd_v_s_per_mm: 0.0,
+            ..X_GAINS
+        };
+        let open_loop = ContinuousLoop {
+            plant: spring,
+            gains: weak,
+        };
+        assert_eq!(margins(&open_loop), Err(MarginError::NoGainCrossover));
+        let broken = PlantModel {
+            gain_mm_per_v_s2: f64::NAN,
+            ..X_PLANT
+        };
+        let open_loop = ContinuousLoop {
+            plant: broken,
+            gains: X_GAINS,
+        };
+        assert_eq!(margins(&open_loop), Err(MarginError::NotFinite));
+    }
+}

@@ -1,0 +1,191 @@
+//! Proportional and derivative gain from a gain margin and a phase margin.
+
+use std::fmt;
+
+use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+
+use super::loop_shape::{ContinuousLoop, OpenLoop};
+use super::margins::{MarginError, bisect, falling_phase_crossover, margins};
+
+/// Why no gains have the margins asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShapingError {
+    /// The plant has no delay, so that no gain margin is finite.
+    NoDelay,
+    /// With the gain margin asked for, no derivative gain has the phase margin: they lie between these.
+    OutOfReach {
+        /// The smallest phase margin found, deg.
+        smallest_deg: f64,
+        /// The largest phase margin found, deg.
+        largest_deg: f64,
+    },
+}
+
+impl fmt::Display for ShapingError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::NoDelay => {
+                f.write_str("a plant without delay has no finite gain margin to shape")
+            }
+            Self::OutOfReach {
+                smallest_deg,
+                largest_deg,
+            } => write!(
+                f,
+                "with this gain margin the phase margin can only lie between {smallest_deg:.1} and {largest_deg:.1} deg"
+            ),
+        }
+    }
+}
+
+impl std::error::Error for ShapingError {}
+
+/// The ratio Kd/Kp, over the plant's delay, at which the search starts: the derivative acts above all frequencies of
+/// interest.
+const SMALLEST_RATIO: f64 = 0.03;
+/// And at which it ends: the derivative dominates the loop.
+const LARGEST_RATIO: f64 = 300.0;
+/// Points of the search, even on a log scale.
+const RATIOS: usize = 60;
+
+/// The PD gains with which the continuous loop has both margins, at whatever frequencies come out; Ki is zero.
+///
+/// The two equations are solved as one: at a given ratio Kd/Kp the frequency of the gain margin is fixed and Kp follows
+/// from it, so that the phase margin is a function of the ratio alone. Where several ratios fit, the largest is taken,
+/// on the branch where more derivative means more phase margin.
+///
+/// `derivative_filter_s` is the time constant of the derivative's filter, s; `gain_margin_db` in dB and
+/// `phase_margin_deg` in deg are above zero.
+pub fn shape_to_margins(
+    plant: &PlantModel,
+    derivative_filter_s: f64,
+    gain_margin_db: f64,
+    phase_margin_deg: f64,
+) -> Result<PidGains, ShapingError> {
+    if plant.delay_s <= 0.0 {
+        return Err(ShapingError::NoDelay);
+    }
+    let gains_at = |ratio_s: f64| {
+        let unit = PidGains {
+            kp_v_per_mm: 1.0,
+            ki_v_per_mm_s: 0.0,
+            kd_v_s_per_mm: ratio_s,
+            derivative_filter_s,
+        };
+        scale_to_gain_margin(plant, &unit, gain_margin_db)
+    };
+    let phase_margin_at = |ratio_s: f64| {
+        let gains = gains_at(ratio_s)?;
+        margins(&ContinuousLoop {
+            plant: *plant,
+            gains,
+        })
+        .map(|m| m.phase_margin_deg)
+    };
+    // A ratio without margins counts as one without phase margin.
+    let falls_short = |ratio_s: f64| phase_margin_at(ratio_s).unwrap_or(0.0) < phase_margin_deg;
+
+    let span = LARGEST_RATIO / SMALLEST_RATIO;
+    let ratios: Vec<f64> = (0..RATIOS)
+        .map(|i| SMALLEST_RATIO * span.powf(i as f64 / (RATIOS - 1) as f64) * plant.delay_s)
+        .collect();
+    let bracket = ratios
+        .windows(2)
+        .rev()
+        .find(|pair| falls_short(pair[0]) && !falls_short(pair[1]));
+    let out_of_reach = || {
+        let found: Vec<f64> = ratios
+            .iter()
+            .filter_map(|&ratio| phase_margin_at(ratio).ok())
+            .collect();
+        ShapingError::OutOfReach {
+            smallest_deg: found.iter().copied().fold(180.0, f64::min),
+            largest_deg: found.iter().copied().fold(0.0, f64::max),
+        }
+    };
+    let bracket = bracket.ok_or_else(out_of_reach)?;
+    let ratio_s = bisect(bracket[0], bracket[1], falls_short);
+    gains_at(ratio_s).map_err(|_| out_of_reach())
+}
+
+/// Scales a controller so that the loop has a gain margin.
+fn scale_to_gain_margin(
+    plant: &PlantModel,
+    gains: &PidGains,
+    gain_margin_db: f64,
+) -> Result<PidGains, MarginError> {
+    let open_loop = ContinuousLoop {
+        plant: *plant,
+        gains: *gains,
+    };
+    let crossover = falling_phase_crossover(&open_loop)?;
+    let factor = 10.0_f64.powf(-gain_margin_db / 20.0) / open_loop.response(crossover).norm();
+    Ok(PidGains {
+        kp_v_per_mm: gains.kp_v_per_mm * factor,
+        ki_v_per_mm_s: gains.ki_v_per_mm_s * factor,
+        kd_v_s_per_mm: gains.kd_v_s_per_mm * factor,
+        ..*gains
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
+
+    #[test]
+    fn x_axis_gains_come_out_of_their_own_margins() {
+        let open_loop = ContinuousLoop {
+            plant: X_PLANT,
+            gains: X_GAINS,
+        };
+        let margins = margins(&open_loop).unwrap();
+        let shaped = shape_to_margins(
+            &X_PLANT,
+            FILTER_S,
+            margins.gain_margin_db,
+            margins.phase_margin_deg,
+        )
+        .unwrap();
+        assert!((shaped.kp_v_per_mm / X_GAINS.kp_v_per_mm - 1.0).abs() < 1e-9);
+        assert!((shaped.kd_v_s_per_mm / X_GAINS.kd_v_s_per_mm - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn y_and_z_axes_are_shaped_to_the_margins_of_x() {
+        for (plant, kp, kd) in [(Y_PLANT, 1.310, 0.006275), (Z_PLANT, 1.669, 0.007301)] {
+            let gains = shape_to_margins(&plant, FILTER_S, 9.9, 54.2).unwrap();
+            let margins = margins(&ContinuousLoop { plant, gains }).unwrap();
+            assert!((margins.gain_margin_db - 9.9).abs() < 1e-9);
+            assert!((margins.phase_margin_deg - 54.2).abs() < 1e-9);
+            assert!((gains.kp_v_per_mm / kp - 1.0).abs() < 5e-4);
+            assert!((gains.kd_v_s_per_mm / kd - 1.0).abs() < 5e-4);
+        }
+    }
+
+    #[test]
+    fn margins_that_exclude_each_other_name_what_is_possible() {
+        for impossible_deg in [10.0, 100.0] {
+            let error = shape_to_margins(&X_PLANT, FILTER_S, 9.9, impossible_deg).unwrap_err();
+            let ShapingError::OutOfReach {
+                smallest_deg,
+                largest_deg,
+            } = error
+            else {
+                panic!("{error}");
+            };
+            assert!((18.0..20.0).contains(&smallest_deg), "{smallest_deg}");
+            assert!((78.0..80.0).contains(&largest_deg), "{largest_deg}");
+        }
+    }
+
+    #[test]
+    fn a_plant_without_delay_is_refused() {
+        let plant = PlantModel {
+            delay_s: 0.0,
+            ..X_PLANT
+        };
+        let error = shape_to_margins(&plant, FILTER_S, 9.9, 54.2).unwrap_err();
+        assert_eq!(error, ShapingError::NoDelay);
+    }
+}

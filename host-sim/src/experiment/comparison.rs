@@ -1,0 +1,225 @@
+//! The thesis' comparison: {PID, N-PID} x {no, static, GMS, combined feedforward} on a sine of 30 mm at three
+//! velocities.
+
+use indicatif::ProgressBar;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::link::lockstep::Job;
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::scalar::Scalar;
+use quadrant::settings::{PlanSettings, StageSettings};
+use rayon::prelude::*;
+
+use super::compensator::Knowledge;
+use super::metrics::{Score, change_percent, score};
+use super::run::{AxisTrace, RunError, run};
+use super::thesis::Metric;
+use crate::machine::Machine;
+use crate::plant::{SimulatedStage, StageTruth};
+
+/// Amplitude of the sine, mm.
+pub const AMPLITUDE_MM: f64 = 30.0;
+/// Its largest velocities, mm/s.
+pub const VELOCITIES_MM_S: [f64; 3] = [5.0, 10.0, 15.0];
+/// Cycles at full speed, of which the last whole ones count.
+const CYCLES: f64 = 2.25;
+/// Cycles that count.
+const SCORED_CYCLES: usize = 2;
+/// Lead-in and lead-out, s.
+const LEAD_S: f64 = 0.5;
+/// Room for GMS elements: the matched compensator has the plant's ten.
+pub const ELEMENTS: usize = 10;
+
+/// A feedback law.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Controller {
+    /// PID.
+    Pid,
+    /// PID behind the nonlinear gain.
+    NPid,
+}
+
+/// Feedback and feedforward together.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Configuration {
+    /// Feedback.
+    pub controller: Controller,
+    /// Feedforward.
+    pub feedforward: FeedforwardKind,
+}
+
+impl Configuration {
+    /// All eight, in the order of the thesis' tables.
+    pub fn all() -> Vec<Self> {
+        [Controller::Pid, Controller::NPid]
+            .into_iter()
+            .flat_map(|controller| {
+                FeedforwardKind::ALL.map(|feedforward| Self {
+                    controller,
+                    feedforward,
+                })
+            })
+            .collect()
+    }
+
+    /// Its name in tables.
+    pub fn name(self) -> String {
+        let controller = match self.controller {
+            Controller::Pid => "PID",
+            Controller::NPid => "N-PID",
+        };
+        match self.feedforward {
+            FeedforwardKind::None => controller.to_owned(),
+            FeedforwardKind::Static => format!("{controller} + static"),
+            FeedforwardKind::Gms => format!("{controller} + GMS"),
+            FeedforwardKind::Combined => format!("{controller} + static + GMS"),
+        }
+    }
+
+    /// Sets the stage up for it.
+    pub fn apply(self, stage: &mut StageSettings) {
+        for axis in &mut stage.axes {
+            if self.controller == Controller::Pid {
+                axis.feedback.nonlinear = None;
+            }
+            axis.feedforward.kind = self.feedforward;
+        }
+    }
+}
+
+/// What one configuration did at one velocity.
+#[derive(Clone, Debug)]
+pub struct Outcome {
+    /// Who ran.
+    pub configuration: Configuration,
+    /// What the compensator knew.
+    pub knowledge: Knowledge,
+    /// Largest velocity of the sine, mm/s.
+    pub velocity_mm_s: f64,
+    /// What it scored.
+    pub score: Score,
+    /// The last scored cycle.
+    pub last_cycle: AxisTrace,
+}
+
+/// The x axis three times, one for each velocity, and the sines they run.
+fn job(configuration: Configuration, knowledge: Knowledge) -> Job {
+    let mut stage = knowledge.settings();
+    let x = stage.axes[0].clone();
+    stage.axes = [x.clone(), x.clone(), x];
+    configuration.apply(&mut stage);
+    Job {
+        stage,
+        plan: PlanSettings {
+            motions: VELOCITIES_MM_S.map(|velocity| {
+                MotionSettings::Harmonic(HarmonicSettings::with_velocity(
+                    AMPLITUDE_MM,
+                    velocity,
+                    CYCLES,
+                    LEAD_S,
+                ))
+            }),
+        },
+    }
+}
+
+/// Runs one configuration at all velocities, side by side, in the arithmetic of `S`.
+///
+/// # Errors
+/// Refused settings or a fault.
+pub fn run_configuration<S: Scalar>(
+    configuration: Configuration,
+    knowledge: Knowledge,
+    seed: u64,
+) -> Result<[Outcome; 3], RunError> {
+    let job = job(configuration, knowledge);
+    let rate_hz = job.stage.rate_hz;
+    let [x, ..] = knowledge.truth().axes;
+    let resolution_mm = [x.resolution_mm; 3];
+    let truth = StageTruth {
+        axes: [x.clone(), x.clone(), x],
+    };
+    let mut plant = SimulatedStage::new(&truth, rate_hz, seed);
+    let mut machine = Machine::<S, ELEMENTS>::new(&job)?;
+    let cycle_s = |velocity: f64| std::f64::consts::TAU * AMPLITUDE_MM / velocity;
+    let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(VELOCITIES_MM_S[0]);
+    let traces = run(
+        &mut machine,
+        &mut plant,
+        resolution_mm,
+        (longest_s * rate_hz) as usize,
+    )?;
+    let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
+    let mut velocities = VELOCITIES_MM_S.into_iter();
+    Ok(traces.map(|trace| {
+        let velocity_mm_s = velocities.next().unwrap_or_default();
+        let cycle = samples(cycle_s(velocity_mm_s));
+        let end = samples(LEAD_S) + samples(CYCLES * cycle_s(velocity_mm_s));
+        let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
+        Outcome {
+            configuration,
+            knowledge,
+            velocity_mm_s,
+            score: score(&scored.reference_mm, &scored.error_mm, cycle),
+            last_cycle: scored.slice((SCORED_CYCLES - 1) * cycle..SCORED_CYCLES * cycle),
+        }
+    }))
+}
+
+/// Number of runs in [`run_all`].
+pub const RUNS: u64 = 16;
+
+/// The whole comparison, in parallel; the same seed gives the same outcomes. `progress` advances by one a run.
+///
+/// # Errors
+/// The first refused setting or fault.
+pub fn run_all<S: Scalar>(seed: u64, progress: &ProgressBar) -> Result<Vec<Outcome>, RunError> {
+    let runs: Vec<_> = Knowledge::ALL
+        .into_iter()
+        .flat_map(|knowledge| Configuration::all().into_iter().map(move |c| (c, knowledge)))
+        .collect();
+    let outcomes: Result<Vec<_>, _> = runs
+        .into_par_iter()
+        .map(|(configuration, knowledge)| {
+            let outcomes = run_configuration::<S>(configuration, knowledge, seed);
+            progress.inc(1);
+            outcomes
+        })
+        .collect();
+    Ok(outcomes?.into_iter().flatten().collect())
+}
+
+/// The score of a configuration at a velocity.
+pub fn find(
+    outcomes: &[Outcome],
+    configuration: Configuration,
+    knowledge: Knowledge,
+    velocity_mm_s: f64,
+) -> Option<&Outcome> {
+    outcomes.iter().find(|outcome| {
+        outcome.configuration == configuration
+            && outcome.knowledge == knowledge
+            && outcome.velocity_mm_s == velocity_mm_s
+    })
+}
+
+/// The change of a metric from one configuration to another, mean over the velocities, %.
+pub fn mean_change_percent(
+    outcomes: &[Outcome],
+    knowledge: Knowledge,
+    metric: Metric,
+    from: Configuration,
+    to: Configuration,
+) -> Option<f64> {
+    let value = |configuration, velocity| {
+        find(outcomes, configuration, knowledge, velocity).map(|outcome| match metric {
+            Metric::TrackingError => outcome.score.largest_mm,
+            Metric::Glitch => outcome.score.glitch_mm,
+        })
+    };
+    let changes: Option<Vec<f64>> = VELOCITIES_MM_S
+        .into_iter()
+        .map(|velocity| Some(change_percent(value(from, velocity)?, value(to, velocity)?)))
+        .collect();
+    let changes = changes?;
+    Some(changes.iter().sum::<f64>() / changes.len() as f64)
+}

@@ -1,0 +1,11 @@
+//! Experiments on the simulated stage, and what they measure.
+
+pub mod circle;
+pub mod comparison;
+pub mod compensator;
+pub mod metrics;
+//pub mod recorded;
+mod run;
+pub mod thesis;
+
+pub use run::{AxisTrace, run};

@@ -1,0 +1,91 @@
+//! One run: a machine on a simulated stage, and the traces of its axes.
+
+use quadrant::link::lockstep::InputRecord;
+use quadrant::safety::SafetyState;
+use quadrant::scalar::Scalar;
+
+use crate::machine::{Machine, Operator};
+use crate::plant::SimulatedStage;
+
+/// What one axis did, a sample a control period from the start of the motion.
+#[derive(Clone, Debug, Default)]
+pub struct AxisTrace {
+    /// Reference, mm.
+    pub reference_mm: Vec<f64>,
+    /// Reference minus true position, mm.
+    pub error_mm: Vec<f64>,
+    /// Controller output, V.
+    pub output_v: Vec<f64>,
+}
+
+impl AxisTrace {
+    /// The samples of a range, of every signal.
+    pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
+        let part = |signal: &[f64]| signal[range.clone()].to_vec();
+        Self {
+            reference_mm: part(&self.reference_mm),
+            error_mm: part(&self.error_mm),
+            output_v: part(&self.output_v),
+        }
+    }
+}
+
+/// Why a run gives no traces.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum RunError {
+    /// The settings are refused.
+    #[error("settings refused: {0}")]
+    Settings(#[from] quadrant::settings::SettingsError),
+    /// The stage switched off.
+    #[error("fault {number} on {axis} at tick {tick}: {cause}; {remedy}", number = .0.code.number(),
+        axis = .0.axis.map_or("the stage", quadrant::safety::AxisName::as_str), tick = .0.tick,
+        cause = .0.code.cause(), remedy = .0.code.remedy())]
+    Fault(quadrant::safety::Fault),
+    /// The motion did not end.
+    #[error("the motion has not ended after {0} ticks")]
+    Endless(usize),
+}
+
+/// Runs the machine's plan from its start to its end. `most_ticks` bounds a plan without an end;
+/// `resolution_mm` is the axes' encoder resolution.
+///
+/// # Errors
+/// A fault, or a motion that does not end in time.
+pub fn run<S: Scalar, const N: usize>(
+    machine: &mut Machine<S, N>,
+    plant: &mut SimulatedStage,
+    resolution_mm: [f64; 3],
+    most_ticks: usize,
+) -> Result<[AxisTrace; 3], RunError> {
+    let mut operator = Operator::runs_the_plan();
+    let mut traces: [AxisTrace; 3] = Default::default();
+    let mut started = false;
+    for tick in 0..most_ticks {
+        let outputs = machine.tick(&InputRecord {
+            counts: plant.read_counters(),
+            request: operator.request(tick as u32),
+        });
+        let state = machine.state();
+        if let SafetyState::Faulted(fault) = state.safety() {
+            return Err(RunError::Fault(fault));
+        }
+        if state.is_running() {
+            started = true;
+        } else if started {
+            return Ok(traces);
+        }
+        if started {
+            for (index, trace) in traces.iter_mut().enumerate() {
+                let telemetry = state.axes()[index].telemetry();
+                let reference = telemetry.reference.to_mm(resolution_mm[index]);
+                trace.reference_mm.push(reference);
+                trace
+                    .error_mm
+                    .push(reference - plant.axes()[index].position_mm());
+                trace.output_v.push(f64::from(telemetry.output_v()));
+            }
+        }
+        plant.step(&outputs);
+    }
+    Err(RunError::Endless(most_ticks))
+}

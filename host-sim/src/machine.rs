@@ -1,0 +1,115 @@
+//! The firmware's application on the host: control tick and supervisor in the order in which the target runs them.
+
+use std::collections::VecDeque;
+
+use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::safety::Command;
+use quadrant::scalar::Scalar;
+use quadrant::settings::SettingsError;
+use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
+use quadrant::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
+
+/// Control law, supervisor, and what passes between them.
+#[derive(Clone, Debug)]
+pub struct Machine<S: Scalar, const N: usize> {
+    stage: Stage<S, N>,
+    plan: Plan<S>,
+    state: StageState<S, N>,
+    supervisor: Supervisor,
+    requests: VecDeque<Command>,
+    command: Option<Command>,
+    events: Vec<(u32, Event)>,
+}
+
+impl<S: Scalar, const N: usize> Machine<S, N> {
+    /// A machine that is to run `job`.
+    ///
+    /// # Errors
+    /// The first of the job's settings that is refused.
+    pub fn new(job: &Job) -> Result<Self, SettingsError> {
+        Ok(Self::with_plan(
+            job.stage.build()?,
+            job.plan.build(&job.stage)?,
+        ))
+    }
+
+    /// A machine on built settings, with a plan that settings cannot hold, such as a recorded table.
+    pub fn with_plan(stage: Stage<S, N>, plan: Plan<S>) -> Self {
+        Self {
+            stage,
+            plan,
+            state: StageState::default(),
+            supervisor: Supervisor::default(),
+            requests: VecDeque::new(),
+            command: None,
+            events: Vec::new(),
+        }
+    }
+
+    /// The control law's memory.
+    pub fn state(&self) -> &StageState<S, N> {
+        &self.state
+    }
+
+    /// What the supervisor logged, with the control tick.
+    pub fn events(&self) -> &[(u32, Event)] {
+        &self.events
+    }
+
+    /// One control period.
+    pub fn tick(&mut self, input: &InputRecord) -> Outputs {
+        let outputs = self.stage.tick(
+            &self.plan,
+            &mut self.state,
+            &Inputs {
+                counts: input.counts,
+                command: self.command.take(),
+                settings_changed: false,
+                deadline_missed: false,
+            },
+        );
+        self.requests.extend(input.request);
+        if self.state.tick() % PERIOD_TICKS == 0 {
+            self.supervise();
+        }
+        outputs
+    }
+
+    fn supervise(&mut self) {
+        let view = StageView {
+            safety: self.state.safety(),
+            running: self.state.is_running(),
+        };
+        let decision = self.supervisor.step(view, self.requests.pop_front());
+        self.command = decision.command;
+        let tick = self.state.tick();
+        self.events
+            .extend(decision.events.into_iter().flatten().map(|event| (tick, event)));
+    }
+}
+
+/// Requests at their ticks: what a person at the console would do.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Operator {
+    script: VecDeque<(u32, Command)>,
+}
+
+/// Tick at which [`Operator::runs_the_plan`] enables, and at which it starts the plan.
+const ENABLE_TICK: u32 = 100;
+const RUN_TICK: u32 = 200;
+
+impl Operator {
+    /// Enables, and starts the plan.
+    pub fn runs_the_plan() -> Self {
+        Self {
+            script: VecDeque::from([(ENABLE_TICK, Command::Enable), (RUN_TICK, Command::Run)]),
+        }
+    }
+
+    /// The request at a tick; ticks are asked for in order.
+    pub fn request(&mut self, tick: u32) -> Option<Command> {
+        self.script
+            .pop_front_if(|(due, _)| *due <= tick)
+            .map(|(_, command)| command)
+    }
+}

@@ -1,0 +1,136 @@
+//! One simulated axis.
+
+use std::collections::VecDeque;
+use std::f64::consts::TAU;
+
+use quadrant::friction::Direction;
+use quadrant::friction::gms::{Gms, GmsState};
+use quadrant::friction::stribeck::SlidingTable;
+use quadrant::units::DacCode;
+use rand::SeedableRng;
+use rand_distr::{Distribution, StandardNormal};
+use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::{AxisTruth, TRUTH_ELEMENTS};
+
+/// Steps of the integration in a control period.
+const SUBSTEPS: usize = 4;
+
+/// One simulated axis in motion.
+#[derive(Clone, Debug)]
+pub struct SimulatedAxis {
+    truth: AxisTruth,
+    step_s: f64,
+    volts_per_code: f64,
+    /// Amplifier voltages on their way, one a substep: the plant's delay.
+    pipeline: VecDeque<f64>,
+    gms: Gms<f64, TRUTH_ELEMENTS>,
+    surface: SlidingTable<f64>,
+    friction: GmsState<f64, TRUTH_ELEMENTS>,
+    friction_v: f64,
+    load_v: f64,
+    position_mm: f64,
+    velocity_mm_s: f64,
+    noise: Xoshiro256PlusPlus,
+}
+
+impl SimulatedAxis {
+    /// An axis at rest at zero, sampled at `rate_hz`; `seed` decides its noise.
+    pub fn new(truth: AxisTruth, rate_hz: f64, seed: u64) -> Self {
+        let step_s = 1.0 / (rate_hz * SUBSTEPS as f64);
+        let delay = (truth.delay_s / step_s).round() as usize;
+        Self {
+            step_s,
+            volts_per_code: truth.full_scale_v / DacCode::FULL_SCALE,
+            pipeline: VecDeque::from(vec![0.0; delay]),
+            gms: Gms::build(&truth.gms.elements),
+            surface: SlidingTable::build(
+                &truth.friction.map(|model| model.curve),
+                truth.gms.attraction_v_s,
+                step_s,
+            ),
+            friction: GmsState::default(),
+            friction_v: 0.0,
+            load_v: 0.0,
+            position_mm: 0.0,
+            velocity_mm_s: 0.0,
+            noise: Xoshiro256PlusPlus::seed_from_u64(seed),
+            truth,
+        }
+    }
+
+    /// The true position, mm.
+    pub fn position_mm(&self) -> f64 {
+        self.position_mm
+    }
+
+    /// The true velocity, mm/s.
+    pub fn velocity_mm_s(&self) -> f64 {
+        self.velocity_mm_s
+    }
+
+    /// The friction at this moment, V at the amplifier input.
+    pub fn friction_v(&self) -> f64 {
+        self.friction_v
+    }
+
+    /// Sets an external load (a cutting force, say), in V at the amplifier input; positive loads push towards larger
+    /// positions.
+    pub fn set_load_v(&mut self, load_v: f64) {
+        self.load_v = load_v;
+    }
+
+    /// What the encoder's 32-bit counter shows: noisy, quantised, wrapped.
+    pub fn read_counter(&mut self) -> u32 {
+        let deviation = self.truth.imperfections.encoder_noise_mm;
+        let noise = if deviation > 0.0 {
+            let normal: f64 = StandardNormal.sample(&mut self.noise);
+            deviation * normal
+        } else {
+            0.0
+        };
+        ((self.position_mm + noise) / self.truth.resolution_mm).floor() as i64 as u32
+    }
+
+    /// One control period with the converter at `code` (or the amplifier disabled).
+    pub fn step(&mut self, code: DacCode, enabled: bool) {
+        let Self { truth, .. } = self;
+        let imperfections = &truth.imperfections;
+        let limit = truth.full_scale_v;
+        let driven = if enabled {
+            (f64::from(code.0) * self.volts_per_code + imperfections.offset_v).clamp(-limit, limit)
+        } else {
+            0.0
+        };
+        // The screw turns by a thousandth in a control period: its force is taken once.
+        let ripple = if imperfections.ripple_v > 0.0 {
+            imperfections.ripple_v * (TAU * self.position_mm / imperfections.lead_mm).sin()
+        } else {
+            0.0
+        };
+        let external = self.load_v - ripple;
+        for _ in 0..SUBSTEPS {
+            self.pipeline.push_back(driven);
+            let arriving = self.pipeline.pop_front().unwrap_or(driven);
+            self.substep(arriving + external);
+        }
+    }
+
+    fn substep(&mut self, force_v: f64) {
+        let truth = &self.truth;
+        let acceleration = truth.gain_mm_per_v_s2 * (force_v - self.friction_v)
+            - truth.damping_per_s * self.velocity_mm_s
+            - truth.stiffness_per_s2 * self.position_mm;
+        self.velocity_mm_s += acceleration * self.step_s;
+        let displacement = self.velocity_mm_s * self.step_s;
+        self.position_mm += displacement;
+        let direction = if displacement < 0.0 {
+            Direction::Negative
+        } else {
+            Direction::Positive
+        };
+        let sliding = self.surface.at(self.velocity_mm_s.abs(), direction);
+        self.friction_v = self.gms.step(&mut self.friction, displacement, sliding)
+            + truth.friction.of(direction).viscous_v_s_per_mm * self.velocity_mm_s;
+    }
+}

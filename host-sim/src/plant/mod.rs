@@ -1,0 +1,12 @@
+//! The simulated XYZ stage: what is on the other side of the converters and the encoders.
+//!
+//! The truth is in `f64` and sub-stepped. Its friction is the library's own GMS model, with more elements and other
+//! parameters than the control law has.
+
+mod axis;
+mod stage;
+mod truth;
+
+pub use axis::SimulatedAxis;
+pub use stage::SimulatedStage;
+pub use truth::{AxisTruth, Imperfections, StageTruth, TRUTH_ELEMENTS, virgin_curve_elements};

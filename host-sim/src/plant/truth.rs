@@ -1,0 +1,192 @@
+//! What the simulated axes really are. Every number here is chosen, none measured.
+
+use heapless::Vec;
+use quadrant::friction::PerDirection;
+use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
+use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+
+/// GMS elements of the simulated axes' friction.
+pub const TRUTH_ELEMENTS: usize = 10;
+
+/// One simulated axis: `x'' = A (u(t - Td) - F) - B x' - C x`, friction `F` explicit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisTruth {
+    /// A, mm/(V s^2).
+    pub gain_mm_per_v_s2: f64,
+    /// B without the viscous friction that `friction` carries, 1/s.
+    pub damping_per_s: f64,
+    /// C, 1/s^2: zero for a stage, which has no spring to ground.
+    pub stiffness_per_s2: f64,
+    /// Td, s.
+    pub delay_s: f64,
+    /// Stribeck curve and viscous friction, each way.
+    pub friction: PerDirection<StaticFriction>,
+    /// Pre-sliding friction.
+    pub gms: GmsParameters,
+    /// Length of an encoder count, mm.
+    pub resolution_mm: f64,
+    /// Voltage of the converter's largest code, V; the amplifier saturates there.
+    pub full_scale_v: f64,
+    /// What a real axis has and its model leaves out.
+    pub imperfections: Imperfections,
+}
+
+/// What a real axis has and its model leaves out; all zero for an ideal one.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Imperfections {
+    /// Standard deviation of the encoder's noise, mm, before it is quantised.
+    pub encoder_noise_mm: f64,
+    /// Offset of converter and amplifier, V.
+    pub offset_v: f64,
+    /// Amplitude of a force that repeats with every turn of the screw, V.
+    pub ripple_v: f64,
+    /// Lead of the screw, mm.
+    pub lead_mm: f64,
+}
+
+/// The three axes of the simulated stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageTruth {
+    /// x, y, z.
+    pub axes: [AxisTruth; 3],
+}
+
+/// The elements whose virgin curve is `Fs (1 - exp(-4 x / range))`, scaled to reach Fs at the end of the pre-sliding
+/// range and cut into straight pieces at knots that are denser near zero:
+/// `k_i = S_i - S_(i+1)`, `alpha_i = k_i x_i / Fs`.
+pub fn virgin_curve_elements(
+    breakaway_v: f64,
+    range_mm: f64,
+    count: usize,
+) -> Vec<GmsElement, MAX_ELEMENTS> {
+    let force = |x: f64| breakaway_v * (1.0 - (-4.0 * x / range_mm).exp()) / (1.0 - (-4.0f64).exp());
+    let knot = |index: usize| range_mm * (index as f64 / count as f64).powi(2);
+    let slope = |index: usize| {
+        if index < count {
+            (force(knot(index + 1)) - force(knot(index))) / (knot(index + 1) - knot(index))
+        } else {
+            0.0
+        }
+    };
+    (1..=count)
+        .map(|index| {
+            let stiffness = slope(index - 1) - slope(index);
+            GmsElement {
+                stiffness_v_per_mm: stiffness,
+                weight: stiffness * knot(index) / breakaway_v,
+            }
+        })
+        .collect()
+}
+
+/// Friction of one sense of motion relative to the axis' mean.
+fn directed(mean: &StaticFriction, factor: f64) -> StaticFriction {
+    StaticFriction {
+        curve: StribeckCurve {
+            coulomb_v: mean.curve.coulomb_v * factor,
+            breakaway_v: mean.curve.breakaway_v * factor,
+            ..mean.curve
+        },
+        ..*mean
+    }
+}
+
+/// What tells one simulated axis from another.
+struct Character {
+    gain_mm_per_v_s2: f64,
+    linear_damping_per_s: f64,
+    delay_s: f64,
+    mean: StaticFriction,
+    asymmetry: f64,
+    presliding_mm: f64,
+    imperfections: Imperfections,
+}
+
+fn axis(character: &Character) -> AxisTruth {
+    let Character { mean, .. } = character;
+    AxisTruth {
+        gain_mm_per_v_s2: character.gain_mm_per_v_s2,
+        // The viscous part of the linear model's damping is carried by friction.
+        damping_per_s: character.linear_damping_per_s
+            - character.gain_mm_per_v_s2 * mean.viscous_v_s_per_mm,
+        stiffness_per_s2: 0.0,
+        delay_s: character.delay_s,
+        friction: PerDirection {
+            positive: directed(mean, 1.0 + character.asymmetry),
+            negative: directed(mean, 1.0 - character.asymmetry),
+        },
+        gms: GmsParameters {
+            elements: virgin_curve_elements(
+                mean.curve.breakaway_v,
+                character.presliding_mm,
+                TRUTH_ELEMENTS,
+            ),
+            attraction_v_s: 5.0,
+        },
+        resolution_mm: 5e-4,
+        full_scale_v: 10.0,
+        imperfections: character.imperfections,
+    }
+}
+
+impl StageTruth {
+    /// The simulated stage with everything a real one has. x is the axis of `thesis.md`'s chosen parameters; y and z
+    /// are plausible companions, chosen too.
+    pub fn real() -> Self {
+        let mean = |coulomb_v, breakaway_v, stribeck_velocity_mm_s| StaticFriction {
+            curve: StribeckCurve {
+                coulomb_v,
+                breakaway_v,
+                stribeck_velocity_mm_s,
+                exponent: 1.0,
+            },
+            viscous_v_s_per_mm: 0.001,
+        };
+        let imperfections = |offset_v, ripple_v| Imperfections {
+            encoder_noise_mm: 1.5e-4,
+            offset_v,
+            ripple_v,
+            lead_mm: 10.0,
+        };
+        Self {
+            axes: [
+                axis(&Character {
+                    gain_mm_per_v_s2: 69_390.0,
+                    linear_damping_per_s: 144.8,
+                    delay_s: 1.20e-3,
+                    mean: mean(0.120, 0.150, 1.0),
+                    asymmetry: 0.03,
+                    presliding_mm: 0.030,
+                    imperfections: imperfections(0.003, 0.002),
+                }),
+                axis(&Character {
+                    gain_mm_per_v_s2: 61_200.0,
+                    linear_damping_per_s: 151.0,
+                    delay_s: 1.20e-3,
+                    mean: mean(0.140, 0.170, 1.2),
+                    asymmetry: -0.02,
+                    presliding_mm: 0.034,
+                    imperfections: imperfections(-0.002, 0.003),
+                }),
+                axis(&Character {
+                    gain_mm_per_v_s2: 48_500.0,
+                    linear_damping_per_s: 172.0,
+                    delay_s: 1.30e-3,
+                    mean: mean(0.160, 0.200, 0.9),
+                    asymmetry: 0.04,
+                    presliding_mm: 0.026,
+                    imperfections: imperfections(0.004, 0.003),
+                }),
+            ],
+        }
+    }
+
+    /// The same stage without the imperfections that no model of the control law knows.
+    pub fn ideal() -> Self {
+        let mut stage = Self::real();
+        for axis in &mut stage.axes {
+            axis.imperfections = Imperfections::default();
+        }
+        stage
+    }
+}

@@ -1,0 +1,229 @@
+//! One axis, one tick: counts in, a converter's word out.
+
+use crate::control::npid::NonlinearGainTable;
+use crate::control::pid::{Pid, PidState};
+use crate::encoder::{Encoder, EncoderState};
+use crate::feedforward::{Feedforward, ReferenceStep};
+use crate::friction::gms::GmsState;
+use crate::reference::{Motion, MotionState, ReferenceSample};
+use crate::scalar::{Quantity, Scalar};
+use crate::telemetry::{AxisTelemetry, LimitedBy};
+use crate::units::{DacCode, Position};
+
+/// Ticks that the feedforward can look ahead at most: 3.1 ms at 10 kHz.
+pub const MAX_PREVIEW_TICKS: usize = 31;
+
+/// Room for the reference positions between the feedforward's tick and the feedback's; a power of two.
+const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 1;
+
+/// The output stage of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Amplifier<S: Scalar> {
+    pub(crate) limit: S,
+    pub(crate) codes_per_volt: S::Gain,
+    pub(crate) offset_code: i32,
+}
+
+impl<S: Scalar> Amplifier<S> {
+    #[inline(always)]
+    fn code(&self, output: S) -> DacCode {
+        DacCode::saturating(
+            output
+                .round_scaled(self.codes_per_volt)
+                .saturating_add(self.offset_code),
+        )
+    }
+}
+
+/// An axis ready for the tick; `N` is the room for GMS elements. Made by
+/// [`StageSettings::build`](crate::settings::StageSettings::build).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Axis<S: Scalar, const N: usize> {
+    pub(crate) encoder: Encoder,
+    pub(crate) unit_mm: S::Gain,
+    pub(crate) nonlinear: Option<NonlinearGainTable<S>>,
+    pub(crate) pid: Pid<S>,
+    pub(crate) feedforward: Feedforward<S, N>,
+    pub(crate) preview_ticks: usize,
+    pub(crate) amplifier: Amplifier<S>,
+    pub(crate) following_error_limit: S,
+    pub(crate) transfer_decay: S,
+}
+
+/// The memory of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisState<S: Scalar, const N: usize> {
+    encoder: EncoderState,
+    motion: MotionState,
+    running: bool,
+    /// The reference at the feedforward's tick, ahead of the feedback's.
+    ahead: Position,
+    preview: [Position; PREVIEW_ROOM],
+    pid: PidState<S>,
+    gms: GmsState<S, N>,
+    transfer: S,
+    last_output: S,
+    telemetry: AxisTelemetry<S>,
+}
+
+impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
+    fn default() -> Self {
+        Self {
+            encoder: EncoderState::default(),
+            motion: MotionState::default(),
+            running: false,
+            ahead: Position::ZERO,
+            preview: [Position::ZERO; PREVIEW_ROOM],
+            pid: PidState::default(),
+            gms: GmsState::default(),
+            transfer: S::ZERO,
+            last_output: S::ZERO,
+            telemetry: AxisTelemetry::default(),
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> AxisState<S, N> {
+    /// What the last tick computed.
+    pub fn telemetry(&self) -> &AxisTelemetry<S> {
+        &self.telemetry
+    }
+
+    /// Whether a motion is under way.
+    pub fn is_running(&self) -> bool {
+        self.running
+    }
+}
+
+impl<S: Scalar, const N: usize> Axis<S, N> {
+    /// Takes the encoder's raw count; says whether it is plausible.
+    #[inline(always)]
+    pub(crate) fn measure(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
+        let plausible = self.encoder.update(&mut state.encoder, raw);
+        state.telemetry.measured = state.encoder.count();
+        plausible
+    }
+
+    /// Prepares to hold the measured position.
+    pub(crate) fn enable(&self, state: &mut AxisState<S, N>) {
+        let here = Position::from_counts(state.encoder.count());
+        *state = AxisState {
+            encoder: state.encoder.clone(),
+            ahead: here,
+            preview: [here; PREVIEW_ROOM],
+            telemetry: state.telemetry,
+            ..AxisState::default()
+        };
+        self.pid.reset(&mut state.pid, S::ZERO);
+    }
+
+    /// Starts a motion from where the reference stands.
+    #[inline(always)]
+    pub(crate) fn run(&self, state: &mut AxisState<S, N>) {
+        state.motion = MotionState::start(state.ahead);
+        state.running = true;
+    }
+
+    /// Advances the reference and forms the error; says whether the axis follows. `tick` numbers the ticks.
+    #[inline(always)]
+    pub(crate) fn refer(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        tick: u32,
+    ) -> (ReferenceStep<S>, bool) {
+        let ahead = if state.running {
+            let sample = motion.step(&mut state.motion);
+            state.running = !motion.finished(&state.motion);
+            sample
+        } else {
+            ReferenceSample {
+                position: state.ahead,
+                ..ReferenceSample::default()
+            }
+        };
+        let displacement = (ahead.position - state.ahead).clipped();
+        state.ahead = ahead.position;
+
+        // The feedback's reference is what the feedforward's was `preview_ticks` ago.
+        let slot = tick as usize % PREVIEW_ROOM;
+        state.preview[slot] = ahead.position;
+        let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
+        let reference = state.preview[delayed];
+
+        let measured = Position::from_counts(state.encoder.count());
+        let error = S::scale_wide((reference - measured).0, self.unit_mm);
+        state.telemetry.reference = reference;
+        state.telemetry.error = error;
+        let step = ReferenceStep {
+            displacement: S::scale_integer(displacement, self.unit_mm),
+            velocity: ahead.velocity,
+            acceleration: ahead.acceleration,
+        };
+        (step, error.magnitude() <= self.following_error_limit)
+    }
+
+    /// Computes the output. `changed` says that the settings are new in this tick: the output then starts from where
+    /// it was, and the difference fades.
+    #[inline(always)]
+    pub(crate) fn drive(
+        &self,
+        state: &mut AxisState<S, N>,
+        reference: ReferenceStep<S>,
+        changed: bool,
+    ) -> DacCode {
+        let error = state.telemetry.error;
+        let scaled = match &self.nonlinear {
+            Some(gain) => gain.scaled_error(error),
+            None => error,
+        };
+        let feedforward = self.feedforward.step(&mut state.gms, reference);
+        let limit = self.amplifier.limit;
+        if changed {
+            // What the new settings would put out, computed on a copy, decides the offset.
+            let base = feedforward.total();
+            let mut trial = state.pid.clone();
+            let terms = self
+                .pid
+                .step(&mut trial, scaled, -limit - base, limit - base);
+            state.transfer = state.last_output - (terms.output + base);
+        }
+        let base = feedforward.total() + state.transfer;
+        let feedback = self
+            .pid
+            .step(&mut state.pid, scaled, -limit - base, limit - base);
+        let output = (feedback.output + base).limit(-limit, limit);
+        state.transfer = state
+            .transfer
+            .times(self.transfer_decay, Quantity::Fraction);
+        state.last_output = output;
+        let code = self.amplifier.code(output);
+        state.telemetry = AxisTelemetry {
+            feedback,
+            feedforward,
+            transfer: state.transfer,
+            output,
+            code,
+            limited_by: if feedback.saturated {
+                LimitedBy::OutputLimit
+            } else {
+                LimitedBy::Nothing
+            },
+            ..state.telemetry
+        };
+        code
+    }
+
+    /// Shows an axis whose outputs are off.
+    #[inline(always)]
+    pub(crate) fn rest(&self, state: &mut AxisState<S, N>) {
+        let measured = state.encoder.count();
+        state.running = false;
+        state.last_output = S::ZERO;
+        state.telemetry = AxisTelemetry {
+            reference: Position::from_counts(measured),
+            measured,
+            ..AxisTelemetry::default()
+        };
+    }
+}

@@ -1,0 +1,58 @@
+//! Friction models.
+//!
+//! Each is used twice, from one source: as feedforward in the control law, driven by the reference, and as the truth
+//! in the simulated stage, driven by its motion. Friction is in volts at the amplifier input: force divided by the
+//! motor constant.
+
+pub mod gms;
+pub mod stribeck;
+
+use serde::{Deserialize, Serialize};
+
+/// A sense of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Direction {
+    /// Towards larger positions.
+    Positive,
+    /// Towards smaller positions.
+    Negative,
+}
+
+/// A pair of things, one for each sense of motion: friction is rarely the same both ways.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct PerDirection<T> {
+    /// For motion towards larger positions.
+    pub positive: T,
+    /// For motion towards smaller positions.
+    pub negative: T,
+}
+
+impl<T> PerDirection<T> {
+    /// The same thing both ways.
+    pub fn both(value: T) -> Self
+    where
+        T: Clone,
+    {
+        Self {
+            positive: value.clone(),
+            negative: value,
+        }
+    }
+
+    /// The thing for one sense of motion.
+    #[inline(always)]
+    pub fn of(&self, direction: Direction) -> &T {
+        match direction {
+            Direction::Positive => &self.positive,
+            Direction::Negative => &self.negative,
+        }
+    }
+
+    /// Each thing turned into another.
+    pub fn map<U>(&self, mut change: impl FnMut(&T) -> U) -> PerDirection<U> {
+        PerDirection {
+            positive: change(&self.positive),
+            negative: change(&self.negative),
+        }
+    }
+}

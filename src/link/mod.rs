@@ -1,0 +1,3 @@
+//! What crosses the border of the target: frames and messages.
+
+pub mod lockstep;

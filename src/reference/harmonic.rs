@@ -1,0 +1,268 @@
+//! Sinusoidal motion, and the circle that two of them make.
+//!
+//! The phase is a 64-bit integer, so it neither drifts nor loses resolution. Its speed rises and falls smoothly at
+//! the ends, so the axis starts and stops on the curve without a step of velocity or acceleration.
+
+use core::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use super::sine::{cosine, sine};
+use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
+use crate::scalar::{Quantity, Scalar};
+use crate::units::{POSITION_FRACTION_BITS, Position};
+
+/// A sine as a person writes it: `amplitude sin(2 pi frequency t + phase)` about its centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct HarmonicSettings {
+    /// Half the travel, mm.
+    pub amplitude_mm: f64,
+    /// Cycles per second at full speed, Hz.
+    pub frequency_hz: f64,
+    /// Phase at which the full-speed cycles begin, rad. The centre is where the start puts it.
+    pub phase_rad: f64,
+    /// Cycles at full speed; `None` goes on for ever.
+    pub cycles: Option<f64>,
+    /// Duration of the lead-in and of the lead-out, s.
+    pub lead_s: f64,
+}
+
+impl HarmonicSettings {
+    /// The sine whose largest velocity is `velocity_mm_s`.
+    pub fn with_velocity(amplitude_mm: f64, velocity_mm_s: f64, cycles: f64, lead_s: f64) -> Self {
+        Self {
+            amplitude_mm,
+            frequency_hz: velocity_mm_s / (TAU * amplitude_mm),
+            phase_rad: 0.0,
+            cycles: Some(cycles),
+            lead_s,
+        }
+    }
+
+    /// The largest velocity (mm/s) and acceleration (mm/s^2), lead-in included.
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let velocity = self.amplitude_mm * TAU * self.frequency_hz;
+        // Phase speed rises at most at 3/2 of its mean rate; the two parts of the acceleration are in quadrature.
+        let along = 1.5 * velocity / self.lead_s;
+        let across = velocity * TAU * self.frequency_hz;
+        (velocity, libm::hypot(along, across))
+    }
+}
+
+/// A plane of the stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Plane {
+    /// x and y.
+    Xy,
+    /// y and z.
+    Yz,
+    /// z and x.
+    Zx,
+}
+
+impl Plane {
+    /// The indices of the plane's first and second axis.
+    pub const fn axes(self) -> (usize, usize) {
+        match self {
+            Self::Xy => (0, 1),
+            Self::Yz => (1, 2),
+            Self::Zx => (2, 0),
+        }
+    }
+}
+
+/// A sense of rotation, seen with the plane's first axis to the right and the second up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sense {
+    /// Counter-clockwise, G3.
+    CounterClockwise,
+    /// Clockwise, G2.
+    Clockwise,
+}
+
+/// The three axes' motions of a circle: radius in mm, feed in mm/s along the path, the angle (rad, from the plane's
+/// first axis) at which the full-speed turns begin, the number of turns, and the duration of lead-in and lead-out.
+pub fn circle(
+    plane: Plane,
+    sense: Sense,
+    radius_mm: f64,
+    feed_mm_s: f64,
+    start_rad: f64,
+    turns: f64,
+    lead_s: f64,
+) -> [MotionSettings; 3] {
+    let sine = HarmonicSettings::with_velocity(radius_mm, feed_mm_s, turns, lead_s);
+    let quarter = TAU / 4.0;
+    // cos(a) = sin(a + 90 deg); clockwise, the angle runs backwards: cos(-a) = sin(90 deg + a - 2 start), and so on.
+    let (first, second) = match sense {
+        Sense::CounterClockwise => (start_rad + quarter, start_rad),
+        Sense::Clockwise => (quarter - start_rad, 2.0 * quarter - start_rad),
+    };
+    let mut motions = [MotionSettings::Hold; 3];
+    let (first_axis, second_axis) = plane.axes();
+    motions[first_axis] = MotionSettings::Harmonic(HarmonicSettings {
+        phase_rad: first,
+        ..sine
+    });
+    motions[second_axis] = MotionSettings::Harmonic(HarmonicSettings {
+        phase_rad: second,
+        ..sine
+    });
+    motions
+}
+
+/// A sine ready for the tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Harmonic<S: Scalar> {
+    amplitude_counts: i64,
+    amplitude_fraction: i64,
+    start_phase: u32,
+    start_sine: i64,
+    phase_per_tick: u64,
+    lead_ticks: u32,
+    lead_step: u64,
+    cruise_ticks: Option<u32>,
+    velocity: S::Gain,
+    centripetal: S::Gain,
+    tangential: S::Gain,
+    q30: S::Gain,
+}
+
+/// One, as a Q31 phase speed or lead progress.
+const ONE: u64 = 1 << 31;
+
+/// A sine or cosine in Q31 times an amplitude split in counts and 2^-16 counts, in 2^-16 counts.
+#[inline(always)]
+fn swing(sine: i64, counts: i64, fraction: i64) -> i64 {
+    const SHIFT: u32 = 31 - POSITION_FRACTION_BITS;
+    ((sine * counts + (1 << (SHIFT - 1))) >> SHIFT) + ((sine * fraction + (1 << 30)) >> 31)
+}
+
+/// `rate` times a Q31 factor.
+#[inline(always)]
+fn scaled_phase(rate: u64, factor: u64) -> u64 {
+    (((rate >> 32) * factor) << 1) + (((rate & 0xFFFF_FFFF) * factor) >> 31)
+}
+
+impl<S: Scalar> Harmonic<S> {
+    /// Builds the sine from validated settings. Settings time only.
+    pub(super) fn build(settings: &HarmonicSettings, scale: MotionScale) -> Self {
+        let amplitude = Position::from_mm(settings.amplitude_mm, scale.resolution_mm).0;
+        let turns_per_tick = settings.frequency_hz / scale.rate_hz;
+        let phase_per_tick = libm::round(libm::scalbn(turns_per_tick, 64)) as u64;
+        let ticks = |seconds: f64| libm::round(seconds * scale.rate_hz) as u32;
+        let lead_ticks = ticks(settings.lead_s).max(1);
+        // The lead-in covers half of what full speed would.
+        let lead_turns = 0.5 * f64::from(lead_ticks) * turns_per_tick;
+        let start_turns = settings.phase_rad / TAU - lead_turns;
+        let start_turns = start_turns - libm::floor(start_turns);
+        let start_phase = libm::round(libm::scalbn(start_turns, 32)) as u64 as u32;
+        let angular = TAU * settings.frequency_hz;
+        let unit = 1.0 / ONE as f64;
+        let lead_s = f64::from(lead_ticks) / scale.rate_hz;
+        let gain = |value: f64, to| S::gain(value * unit, Quantity::Integer, to);
+        Self {
+            amplitude_counts: amplitude >> POSITION_FRACTION_BITS,
+            amplitude_fraction: amplitude & ((1 << POSITION_FRACTION_BITS) - 1),
+            start_phase,
+            start_sine: i64::from(sine(start_phase)),
+            phase_per_tick,
+            lead_ticks,
+            lead_step: (1 << 62) / u64::from(lead_ticks),
+            cruise_ticks: settings
+                .cycles
+                .map(|cycles| ticks(cycles / settings.frequency_hz)),
+            velocity: gain(settings.amplitude_mm * angular, Quantity::Velocity),
+            centripetal: gain(
+                -settings.amplitude_mm * angular * angular,
+                Quantity::Acceleration,
+            ),
+            tangential: gain(
+                6.0 * settings.amplitude_mm * angular / lead_s,
+                Quantity::Acceleration,
+            ),
+            q30: S::gain(2.0 * unit, Quantity::Integer, Quantity::Fraction),
+        }
+    }
+
+    /// The phase speed as Q31 of full speed, the progress of the lead (Q31) while in one, and the lead's sign.
+    #[inline(always)]
+    fn speed(&self, elapsed: u32) -> (u64, Option<(u64, bool)>) {
+        let (tick, leaving) = match self.cruise_ticks {
+            _ if elapsed < self.lead_ticks => (elapsed, false),
+            Some(cruise) if elapsed - self.lead_ticks >= cruise => {
+                let past = elapsed - self.lead_ticks - cruise;
+                if past >= self.lead_ticks {
+                    return (0, None);
+                }
+                (self.lead_ticks - 1 - past, true)
+            }
+            _ => return (ONE, None),
+        };
+        // The middle of the tick, so that lead-in and lead-out are mirror images. lead_ticks fits 31 bits.
+        let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
+        let square = (progress * progress) >> 31;
+        let smooth = (square * (3 * ONE - 2 * progress)) >> 31;
+        (smooth, Some((progress, leaving)))
+    }
+
+    #[inline(always)]
+    pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
+        let (speed, lead) = self.speed(state.elapsed);
+        let advance = if speed == ONE {
+            self.phase_per_tick
+        } else {
+            scaled_phase(self.phase_per_tick, speed)
+        };
+        state.phase = state.phase.wrapping_add(advance);
+        let phase = ((state.phase >> 32) as u32).wrapping_add(self.start_phase);
+        let (sine, cosine) = (sine(phase), cosine(phase));
+
+        let position = Position(swing(
+            i64::from(sine) - self.start_sine,
+            self.amplitude_counts,
+            self.amplitude_fraction,
+        ));
+        let velocity = S::scale_integer(cosine, self.velocity);
+        let acceleration = S::scale_integer(sine, self.centripetal);
+        if speed == ONE {
+            return ReferenceSample {
+                position,
+                velocity,
+                acceleration,
+            };
+        }
+        let unit = self.q30;
+        let ratio = S::scale_integer((speed >> 1) as i32, unit);
+        let velocity = velocity.times(ratio, Quantity::Fraction);
+        let mut acceleration = acceleration
+            .times(ratio, Quantity::Fraction)
+            .times(ratio, Quantity::Fraction);
+        if let Some((progress, leaving)) = lead {
+            // The slope of the smooth step, 6 p (1 - p).
+            let slope = (progress * (ONE - progress)) >> 31;
+            let along = S::scale_integer(cosine, self.tangential).times(
+                S::scale_integer((slope >> 1) as i32, unit),
+                Quantity::Fraction,
+            );
+            acceleration = if leaving {
+                acceleration - along
+            } else {
+                acceleration + along
+            };
+        }
+        ReferenceSample {
+            position,
+            velocity,
+            acceleration,
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn finished(&self, state: &MotionState) -> bool {
+        match self.cruise_ticks {
+            Some(cruise) => state.elapsed >= cruise.saturating_add(2 * self.lead_ticks),
+            None => false,
+        }
+    }
+}

@@ -1,0 +1,115 @@
+//! `f32` for the target and `f64` for the host. Plain IEEE operations in a fixed order: no fused multiply-add and no
+//! platform library, so that host and target agree to the bit.
+
+use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
+
+macro_rules! float_scalar {
+    ($float:ty, $bits:ty, $mantissa_bits:expr, $half:expr) => {
+        impl Scalar for $float {
+            type Gain = $float;
+            type Sum = $float;
+
+            const ZERO: Self = 0.0;
+
+            fn quantise(value: f64, _: Quantity) -> Self {
+                if value.is_nan() { 0.0 } else { value as $float }
+            }
+
+            #[inline(always)]
+            fn to_f32(self, _: Quantity) -> f32 {
+                self as f32
+            }
+
+            fn to_f64(self, _: Quantity) -> f64 {
+                f64::from(self)
+            }
+
+            fn gain(value: f64, _: Quantity, _: Quantity) -> Self::Gain {
+                value as $float
+            }
+
+            #[inline(always)]
+            fn scale(self, gain: Self::Gain) -> Self {
+                self * gain
+            }
+
+            #[inline(always)]
+            fn scale_integer(value: i32, gain: Self::Gain) -> Self {
+                value as $float * gain
+            }
+
+            #[inline(always)]
+            fn scale_wide(value: i64, gain: Self::Gain) -> Self {
+                const LIMIT: i64 = 1 << 40;
+                let value = value.clamp(-LIMIT, LIMIT);
+                // Two exact halves: a 64-bit conversion is a library call on the target.
+                let high = (value >> 20) as i32;
+                let low = (value & 0xF_FFFF) as i32;
+                (high as $float * 1_048_576.0 + low as $float) * gain
+            }
+
+            #[inline(always)]
+            fn round_scaled(self, gain: Self::Gain) -> i32 {
+                let scaled = self * gain;
+                let half = if scaled < 0.0 { -$half } else { $half };
+                (scaled + half) as i32
+            }
+
+            #[inline(always)]
+            fn times(self, factor: Self, _: Quantity) -> Self {
+                self * factor
+            }
+
+            #[inline(always)]
+            fn limit(self, low: Self, high: Self) -> Self {
+                if self <= high {
+                    if self >= low { self } else { low }
+                } else if self > high {
+                    high
+                } else {
+                    0.0
+                }
+            }
+
+            #[inline(always)]
+            fn magnitude(self) -> Self {
+                // Clears the sign bit; the same on both sides, also for NaN.
+                Self::from_bits(self.to_bits() & (<$bits>::MAX >> 1))
+            }
+
+            #[inline(always)]
+            fn octave(self, start: OctaveStart<Self>) -> (usize, Self) {
+                if self < start.bound {
+                    return (0, self * start.below);
+                }
+                const SHIFT: u32 = $mantissa_bits - OCTAVE_INTERVAL_BITS;
+                const PLACE: $float = 1.0 / (1u64 << SHIFT) as $float;
+                let bits = self.to_bits();
+                let interval = (bits >> SHIFT) as u32 - start.key;
+                let place = (bits & ((1 << SHIFT) - 1)) as i32 as $float * PLACE;
+                (interval as usize + 1, place)
+            }
+
+            #[inline(always)]
+            fn accumulate(self, sum: Self::Sum, gain: Self::Gain) -> Self::Sum {
+                sum + self * gain
+            }
+
+            #[inline(always)]
+            fn total(sum: Self::Sum) -> Self {
+                sum
+            }
+
+            #[inline(always)]
+            fn into_sum(self) -> Self::Sum {
+                self
+            }
+        }
+    };
+}
+
+float_scalar!(f32, u32, 23, 0.5);
+
+// The host's reference; kept off the target, where a double-precision operation is a library call.
+#[cfg(not(target_os = "none"))]
+float_scalar!(f64, u64, 52, 0.5);

@@ -1,0 +1,96 @@
+//! From checked settings to what the tick reads.
+
+use super::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+use crate::axis::{Amplifier, Axis};
+use crate::control::npid::NonlinearGainTable;
+use crate::control::pid::Pid;
+use crate::encoder::Encoder;
+use crate::feedforward::Feedforward;
+use crate::reference::{Motion, MotionScale};
+use crate::scalar::{Quantity, Scalar};
+use crate::stage::{Plan, Stage};
+use crate::units::{DacCode, POSITION_UNITS_PER_COUNT};
+
+impl StageSettings {
+    /// Checks the settings and builds the stage, with room for `N` GMS elements. Slow: tables are filled and the
+    /// Popov bound is searched.
+    ///
+    /// # Errors
+    /// The first field that is refused; see [`StageSettings::validate`].
+    pub fn build<S: Scalar, const N: usize>(&self) -> Result<Stage<S, N>, SettingsError> {
+        self.validate(N)?;
+        let period_s = 1.0 / self.rate_hz;
+        let [x, y, z] = &self.axes;
+        Ok(Stage {
+            axes: [x.build(period_s), y.build(period_s), z.build(period_s)],
+        })
+    }
+
+    /// The scale of the motions of axis `index` (0 to 2).
+    pub fn motion_scale(&self, index: usize) -> MotionScale {
+        MotionScale {
+            resolution_mm: self.axes[index].encoder.resolution_mm,
+            rate_hz: self.rate_hz,
+        }
+    }
+}
+
+impl AxisSettings {
+    fn build<S: Scalar, const N: usize>(&self, period_s: f64) -> Axis<S, N> {
+        let (encoder, amplifier) = (&self.encoder, &self.amplifier);
+        let (feedback, feedforward) = (&self.feedback, &self.feedforward);
+        let largest_step = 2.0 * self.limits.max_velocity_mm_s * period_s / encoder.resolution_mm;
+        let sign = if amplifier.reversed { -1.0 } else { 1.0 };
+        let codes_per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
+        Axis {
+            encoder: Encoder::new(
+                encoder.counter_bits.into(),
+                encoder.reversed,
+                // One count more: a slow axis still steps by whole counts, and noise adds one.
+                libm::ceil(largest_step) as i32 + 1,
+            ),
+            unit_mm: S::gain(
+                encoder.resolution_mm / POSITION_UNITS_PER_COUNT,
+                Quantity::Integer,
+                Quantity::Length,
+            ),
+            nonlinear: feedback.nonlinear.as_ref().map(NonlinearGainTable::build),
+            pid: Pid::build(&feedback.pid, feedback.integral_limit_v, period_s),
+            feedforward: Feedforward::build(
+                feedforward.kind,
+                &feedforward.gains,
+                &self.friction.sliding,
+                &self.friction.gms,
+                period_s,
+            ),
+            preview_ticks: libm::round(feedforward.preview_s / period_s) as usize,
+            amplifier: Amplifier {
+                limit: S::quantise(amplifier.output_limit_v, Quantity::Voltage),
+                codes_per_volt: S::gain(
+                    sign * codes_per_volt,
+                    Quantity::Voltage,
+                    Quantity::Integer,
+                ),
+                offset_code: libm::round(amplifier.offset_v * codes_per_volt) as i32,
+            },
+            following_error_limit: S::quantise(self.limits.following_error_mm, Quantity::Length),
+            transfer_decay: S::quantise(
+                libm::exp(-period_s / feedback.transfer_s),
+                Quantity::Fraction,
+            ),
+        }
+    }
+}
+
+impl PlanSettings {
+    /// Checks the motions against the stage's limits and builds them.
+    ///
+    /// # Errors
+    /// The first field that is refused; see [`PlanSettings::validate`].
+    pub fn build<S: Scalar>(&self, stage: &StageSettings) -> Result<Plan<S>, SettingsError> {
+        self.validate(stage)?;
+        Ok(core::array::from_fn(|index| {
+            Motion::build(&self.motions[index], stage.motion_scale(index))
+        }))
+    }
+}

@@ -1,0 +1,183 @@
+//! The simulated stage's axes as a control engineer would set them up. Every number is chosen, none measured; see
+//! `docs/parameters.md` for the reasons.
+
+use heapless::Vec;
+
+use super::{
+    AmplifierSettings, AxisSettings, EncoderSettings, FeedbackSettings, FeedforwardSettings,
+    FrictionSettings, LimitSettings, StageSettings,
+};
+use crate::control::npid::NonlinearGain;
+use crate::control::plant_model::PlantModel;
+use crate::control::popov::PidGains;
+use crate::feedforward::{FeedforwardGains, FeedforwardKind};
+use crate::friction::PerDirection;
+use crate::friction::gms::{GmsElement, GmsParameters};
+use crate::friction::stribeck::{StaticFriction, StribeckCurve};
+
+/// What tells one default axis from another.
+struct Character {
+    plant: PlantModel,
+    pid: PidGains,
+    nonlinear: NonlinearGain,
+    coulomb_v: f64,
+    breakaway_v: f64,
+    stribeck_velocity_mm_s: f64,
+    viscous_v_s_per_mm: f64,
+    presliding_mm: f64,
+}
+
+/// Break points of the virgin curve as shares of the pre-sliding range, and the weights that break there.
+const VIRGIN_CURVE: [(f64, f64); 4] = [(0.07, 0.30), (0.20, 0.30), (0.47, 0.25), (1.0, 0.15)];
+
+fn axis(character: &Character) -> AxisSettings {
+    let elements: Vec<GmsElement, _> = VIRGIN_CURVE
+        .iter()
+        .map(|&(place, weight)| GmsElement {
+            stiffness_v_per_mm: weight * character.breakaway_v / (place * character.presliding_mm),
+            weight,
+        })
+        .collect();
+    AxisSettings {
+        encoder: EncoderSettings {
+            resolution_mm: 5e-4,
+            counter_bits: 32,
+            reversed: false,
+        },
+        amplifier: AmplifierSettings {
+            full_scale_v: 10.0,
+            output_limit_v: 10.0,
+            offset_v: 0.0,
+            reversed: false,
+        },
+        feedback: FeedbackSettings {
+            pid: character.pid,
+            integral_limit_v: 2.0,
+            nonlinear: Some(character.nonlinear),
+            transfer_s: 0.05,
+        },
+        friction: FrictionSettings {
+            sliding: PerDirection::both(StaticFriction {
+                curve: StribeckCurve {
+                    coulomb_v: character.coulomb_v,
+                    breakaway_v: character.breakaway_v,
+                    stribeck_velocity_mm_s: character.stribeck_velocity_mm_s,
+                    exponent: 1.0,
+                },
+                viscous_v_s_per_mm: character.viscous_v_s_per_mm,
+            }),
+            gms: GmsParameters {
+                elements,
+                attraction_v_s: 5.0,
+            },
+        },
+        feedforward: FeedforwardSettings {
+            kind: FeedforwardKind::Combined,
+            gains: FeedforwardGains {
+                level: 1.0,
+                viscous: 1.0,
+                gms: 1.0,
+                inertia_v_s2_per_mm: 0.0,
+            },
+            preview_s: character.plant.delay_s,
+        },
+        limits: LimitSettings {
+            max_velocity_mm_s: 250.0,
+            max_acceleration_mm_s2: 2000.0,
+            following_error_mm: 1.0,
+        },
+        plant: Some(character.plant),
+    }
+}
+
+/// The x axis: the model and the gains of `thesis.md`'s chosen parameters.
+pub fn x_axis() -> AxisSettings {
+    axis(&Character {
+        plant: PlantModel {
+            gain_mm_per_v_s2: 69_390.0,
+            damping_per_s: 144.8,
+            stiffness_per_s2: 166.6,
+            delay_s: 1.20e-3,
+        },
+        pid: PidGains {
+            kp_v_per_mm: 1.118,
+            ki_v_per_mm_s: 0.74,
+            kd_v_s_per_mm: 0.005_537,
+            derivative_filter_s: 52e-6,
+        },
+        nonlinear: NonlinearGain {
+            rate_per_mm: 15.0,
+            range_mm: 0.1,
+        },
+        coulomb_v: 0.120,
+        breakaway_v: 0.150,
+        stribeck_velocity_mm_s: 1.0,
+        // sigma and B / A: what a run at constant velocity cannot tell apart.
+        viscous_v_s_per_mm: 144.8 / 69_390.0,
+        presliding_mm: 0.030,
+    })
+}
+
+/// The y axis: carries x, so it is heavier.
+pub fn y_axis() -> AxisSettings {
+    axis(&Character {
+        plant: PlantModel {
+            gain_mm_per_v_s2: 61_200.0,
+            damping_per_s: 151.0,
+            stiffness_per_s2: 148.0,
+            delay_s: 1.20e-3,
+        },
+        pid: PidGains {
+            kp_v_per_mm: 1.310,
+            ki_v_per_mm_s: 1.1,
+            kd_v_s_per_mm: 0.006_275,
+            derivative_filter_s: 52e-6,
+        },
+        nonlinear: NonlinearGain {
+            rate_per_mm: 15.0,
+            range_mm: 0.1,
+        },
+        coulomb_v: 0.140,
+        breakaway_v: 0.170,
+        stribeck_velocity_mm_s: 1.2,
+        viscous_v_s_per_mm: 151.0 / 61_200.0,
+        presliding_mm: 0.034,
+    })
+}
+
+/// The z axis: vertical and counterbalanced, with the largest friction.
+pub fn z_axis() -> AxisSettings {
+    axis(&Character {
+        plant: PlantModel {
+            gain_mm_per_v_s2: 48_500.0,
+            damping_per_s: 172.0,
+            stiffness_per_s2: 205.0,
+            delay_s: 1.30e-3,
+        },
+        pid: PidGains {
+            kp_v_per_mm: 1.669,
+            ki_v_per_mm_s: 1.3,
+            kd_v_s_per_mm: 0.007_301,
+            derivative_filter_s: 52e-6,
+        },
+        nonlinear: NonlinearGain {
+            rate_per_mm: 15.0,
+            range_mm: 0.1,
+        },
+        coulomb_v: 0.160,
+        breakaway_v: 0.200,
+        stribeck_velocity_mm_s: 0.9,
+        viscous_v_s_per_mm: 172.0 / 48_500.0,
+        presliding_mm: 0.026,
+    })
+}
+
+impl Default for StageSettings {
+    /// The simulated XYZ stage at 10 kHz, N-PID with combined feedforward.
+    fn default() -> Self {
+        Self {
+            rate_hz: 10e3,
+            axes: [x_axis(), y_axis(), z_axis()],
+        }
+    }
+}

@@ -1,0 +1,95 @@
+//! What is wrong with a set of settings, in words that say what to change.
+
+use core::fmt;
+
+use crate::safety::AxisName;
+
+/// Why a value is refused.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Reason {
+    /// It is not a finite number.
+    NotFinite,
+    /// It lies outside the allowed range.
+    OutOfRange {
+        /// Smallest allowed value.
+        least: f64,
+        /// Largest allowed value.
+        most: f64,
+    },
+    /// The weights of the GMS elements do not sum to one.
+    WeightsSum,
+    /// More elements than the firmware has room for.
+    TooManyElements {
+        /// The room.
+        room: usize,
+    },
+    /// The nonlinear gain's largest value exceeds what the Popov criterion allows for the plant and the PID.
+    BeyondPopov {
+        /// The bound.
+        bound: f64,
+    },
+    /// The table made from the curve errs by more than 0.1 % of the breakaway level.
+    TableError,
+    /// The pre-sliding spring on the plant's inertia swings too fast for the control rate.
+    TooStiffForRate {
+        /// Largest stiffness, V/mm.
+        most: f64,
+    },
+    /// The sliding friction follows the Stribeck curve faster than the control rate resolves.
+    TooFastForRate {
+        /// Largest value, V/s.
+        most: f64,
+    },
+}
+
+/// A refused value: which field of which axis, what it holds, and why that cannot be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettingsError {
+    /// The axis, unless the field belongs to the stage.
+    pub axis: Option<AxisName>,
+    /// Path of the field below the axis or the stage.
+    pub field: &'static str,
+    /// What it holds.
+    pub value: f64,
+    /// Why that is refused.
+    pub reason: Reason,
+}
+
+impl fmt::Display for SettingsError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(axis) = self.axis {
+            write!(f, "{axis}.")?;
+        }
+        write!(f, "{} = {}", self.field, self.value)?;
+        match self.reason {
+            Reason::NotFinite => f.write_str(" is not a finite number"),
+            Reason::OutOfRange { least, most } => {
+                write!(f, " is outside {least} to {most}")
+            }
+            Reason::WeightsSum => f.write_str(": the weights of all elements must sum to 1 within 1e-6"),
+            Reason::TooManyElements { room } => {
+                write!(f, " elements do not fit: this build has room for {room}")
+            }
+            Reason::BeyondPopov { bound } => write!(
+                f,
+                ": cosh(rate * range) exceeds {bound:.3}, the Popov bound of this PID on this plant; \
+                 lower the rate, the range or the PID's gains"
+            ),
+            Reason::TableError => f.write_str(
+                ": the curve bends too sharply near zero for its table (error above 0.1 % of the breakaway level); \
+                 raise the exponent or bring coulomb_v and breakaway_v closer",
+            ),
+            Reason::TooStiffForRate { most } => write!(
+                f,
+                ": the elements' summed stiffness exceeds {most:.4} V/mm, beyond which the pre-sliding resonance \
+                 on this plant is not resolved at the control rate"
+            ),
+            Reason::TooFastForRate { most } => write!(
+                f,
+                " exceeds {most:.4} V/s, beyond which sliding friction changes within one control period"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SettingsError {}

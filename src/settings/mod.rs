@@ -1,0 +1,135 @@
+//! The tree a person edits, in SI units and millimetres.
+//!
+//! Settings are checked as a whole ([`StageSettings::validate`]) and built as a whole ([`StageSettings::build`]) by
+//! slow code; the tick reads only what was built. An error names the field, the value and what is allowed.
+
+mod build;
+mod defaults;
+mod error;
+mod validate;
+
+pub use defaults::{x_axis, y_axis, z_axis};
+pub use error::{Reason, SettingsError};
+
+use serde::{Deserialize, Serialize};
+
+use crate::control::npid::NonlinearGain;
+use crate::control::plant_model::PlantModel;
+use crate::control::popov::PidGains;
+use crate::feedforward::{FeedforwardGains, FeedforwardKind};
+use crate::friction::PerDirection;
+use crate::friction::gms::GmsParameters;
+use crate::friction::stribeck::StaticFriction;
+use crate::reference::MotionSettings;
+
+/// Everything the stage's control law is made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct StageSettings {
+    /// Control rate, Hz; 1000 to 100 000.
+    pub rate_hz: f64,
+    /// The axes.
+    pub axes: [AxisSettings; 3],
+}
+
+/// Everything one axis' control law is made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AxisSettings {
+    /// The encoder.
+    pub encoder: EncoderSettings,
+    /// The amplifier and the converter that drives it.
+    pub amplifier: AmplifierSettings,
+    /// The feedback law.
+    pub feedback: FeedbackSettings,
+    /// The friction models that the feedforward uses.
+    pub friction: FrictionSettings,
+    /// The feedforward.
+    pub feedforward: FeedforwardSettings,
+    /// What the axis may do.
+    pub limits: LimitSettings,
+    /// The linear model of the axis, if known: with it, the nonlinear gain is held to the Popov bound.
+    pub plant: Option<PlantModel>,
+}
+
+/// An incremental encoder.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct EncoderSettings {
+    /// Length of one count, mm; 1e-6 to 1.
+    pub resolution_mm: f64,
+    /// Width of the hardware counter: 8 to 32.
+    pub counter_bits: u8,
+    /// The counter runs backwards when the axis moves to larger positions.
+    pub reversed: bool,
+}
+
+/// An amplifier input driven by a 16-bit converter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct AmplifierSettings {
+    /// Voltage of the converter's largest code, V; 0.1 to 20.
+    pub full_scale_v: f64,
+    /// Largest output, V; above zero, at most the full scale.
+    pub output_limit_v: f64,
+    /// Voltage at which the motor gives no force, V; it is added to every output. Within +-10 % of the full scale.
+    pub offset_v: f64,
+    /// A positive voltage moves the axis to smaller positions.
+    pub reversed: bool,
+}
+
+/// The feedback law.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FeedbackSettings {
+    /// The PID's gains.
+    pub pid: PidGains,
+    /// The integral stays within plus and minus this, V; above zero, at most the output limit.
+    pub integral_limit_v: f64,
+    /// The nonlinear gain that makes the PID an N-PID.
+    pub nonlinear: Option<NonlinearGain>,
+    /// Time constant with which the offset of a bumpless change of settings fades, s; 0.001 to 10.
+    pub transfer_s: f64,
+}
+
+/// The friction of an axis, as identified.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FrictionSettings {
+    /// The static model, for each sense of motion.
+    pub sliding: PerDirection<StaticFriction>,
+    /// The GMS model.
+    pub gms: GmsParameters,
+}
+
+/// The feedforward.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct FeedforwardSettings {
+    /// Which friction models act.
+    pub kind: FeedforwardKind,
+    /// How much of each.
+    pub gains: FeedforwardGains,
+    /// How far ahead of the feedback's reference the feedforward looks, s: the plant's delay. 0 to 31 control periods.
+    pub preview_s: f64,
+}
+
+/// What an axis may do.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct LimitSettings {
+    /// Largest velocity of any reference, mm/s; the encoder may move at twice this before it counts as faulty.
+    pub max_velocity_mm_s: f64,
+    /// Largest acceleration of any reference, mm/s^2.
+    pub max_acceleration_mm_s2: f64,
+    /// Largest tracking error, mm; beyond it the stage is switched off.
+    pub following_error_mm: f64,
+}
+
+/// The motions of the three axes, started together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanSettings {
+    /// One motion an axis.
+    pub motions: [MotionSettings; 3],
+}
