@@ -180,6 +180,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let feedforward = self.feedforward.step(&mut state.gms, reference);
         let limit = self.amplifier.limit;
         if changed {
+            self.pid.take_over(&mut state.pid, scaled);
             // What the new settings would put out, computed on a copy, decides the offset.
             let base = feedforward.total();
             let mut trial = state.pid.clone();

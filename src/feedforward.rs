@@ -55,6 +55,7 @@ impl FeedforwardKind {
 
 /// How much of each effect is fed forward.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct FeedforwardGains {
     /// Share of `s(v) sgn(v)`, 0..=2; 1 is the identified value.
     pub level: f64,
@@ -169,11 +170,8 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
         }
         let sliding = match self.kind {
-            FeedforwardKind::None => return terms,
             FeedforwardKind::Gms => *self.breakaway.of(direction),
-            FeedforwardKind::Static | FeedforwardKind::Combined => {
-                self.surface.at(reference.velocity.magnitude(), direction)
-            }
+            _ => self.surface.at(reference.velocity.magnitude(), direction),
         };
         if self.kind.has_static_level() && reference.velocity != S::ZERO {
             let level = sliding.level.scale(self.level_gain);
@@ -182,8 +180,9 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
                 Direction::Negative => -level,
             };
         }
+        // The elements move with any kind: their springs are loaded when a change of settings makes them act.
+        let force = self.gms.step(state, reference.displacement, sliding);
         if self.kind.has_gms() {
-            let force = self.gms.step(state, reference.displacement, sliding);
             terms.gms = force.scale(self.gms_gain);
         }
         terms

@@ -111,7 +111,11 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
                 tick,
             });
         }
-        if let Some(command) = inputs.command {
+        // A reset is for a fault that was there to be seen, not for one of this tick.
+        let early_reset = was_enabled && inputs.command == Some(Command::ResetFault);
+        if let Some(command) = inputs.command
+            && !early_reset
+        {
             let moving = axes.iter().any(|(_, _, _, memory, _)| memory.is_running());
             if state.safety.apply(command) {
                 for (_, axis, _, memory, _) in &mut axes {

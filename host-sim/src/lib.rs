@@ -4,3 +4,6 @@ pub mod design;
 pub mod experiment;
 pub mod machine;
 pub mod plant;
+pub mod presentation;
+pub mod record;
+pub mod report;

@@ -83,8 +83,13 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
         let decision = self.supervisor.step(view, self.requests.pop_front());
         self.command = decision.command;
         let tick = self.state.tick();
-        self.events
-            .extend(decision.events.into_iter().flatten().map(|event| (tick, event)));
+        self.events.extend(
+            decision
+                .events
+                .into_iter()
+                .flatten()
+                .map(|event| (tick, event)),
+        );
     }
 }
 

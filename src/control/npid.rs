@@ -10,6 +10,7 @@ use crate::table::{OctaveTable, interpolation_error};
 
 /// The nonlinear gain as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct NonlinearGain {
     /// ko, the rate of variation, 1/mm.
     pub rate_per_mm: f64,

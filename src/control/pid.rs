@@ -15,6 +15,8 @@ pub struct Pid<S: Scalar> {
     integral_per_tick: S::Gain,
     derivative: S::Gain,
     derivative_pole: S,
+    /// The change of the scaled error in a tick that keeps a derivative as it is.
+    steady_change: S::Gain,
     integral_limit: S,
     error_limit: S,
 }
@@ -51,6 +53,8 @@ impl<S: Scalar> Pid<S> {
     pub fn build(gains: &PidGains, integral_limit_v: f64, period_s: f64) -> Self {
         let filter = 2.0 * gains.derivative_filter_s + period_s;
         let gain = |value| S::gain(value, Quantity::Length, Quantity::Voltage);
+        // Finite without a derivative, too, where it does not matter.
+        let steady_change = (period_s / gains.kd_v_s_per_mm).min(1e6);
         Self {
             proportional: gain(gains.kp_v_per_mm),
             integral_per_tick: gain(gains.ki_v_per_mm_s * period_s),
@@ -59,6 +63,7 @@ impl<S: Scalar> Pid<S> {
                 (2.0 * gains.derivative_filter_s - period_s) / filter,
                 Quantity::Fraction,
             ),
+            steady_change: S::gain(steady_change, Quantity::Voltage, Quantity::Length),
             integral_limit: S::quantise(integral_limit_v, Quantity::Voltage),
             error_limit: S::quantise(ERROR_LIMIT_MM, Quantity::Length),
         }
@@ -70,6 +75,14 @@ impl<S: Scalar> Pid<S> {
             last_error: error.limit(-self.error_limit, self.error_limit),
             ..PidState::default()
         };
+    }
+
+    /// Takes over the memory of a PID with other gains, or of one that saw another scaled error: the next step, from
+    /// the scaled error given, leaves the derivative as it is.
+    #[inline(always)]
+    pub fn take_over(&self, state: &mut PidState<S>, error: S) {
+        let error = error.limit(-self.error_limit, self.error_limit);
+        state.last_error = error - state.derivative.scale(self.steady_change);
     }
 
     /// One control period. `error` is the scaled error f(e) in mm; the output stays within `low..=high` (V), which

@@ -21,6 +21,7 @@ pub const MAX_ELEMENTS: usize = 10;
 
 /// One block of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GmsElement {
     /// k_i, the spring of the block, V/mm; positive.
     pub stiffness_v_per_mm: f64,
@@ -30,6 +31,7 @@ pub struct GmsElement {
 
 /// The GMS model as a person writes it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct GmsParameters {
     /// The blocks, one to [`MAX_ELEMENTS`].
     pub elements: Vec<GmsElement, MAX_ELEMENTS>,
@@ -149,8 +151,10 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
                 *force = along(share + distance.times(sliding.decay, Quantity::Fraction));
             } else {
                 let trial = *force + displacement.scale(element.stiffness);
-                *slipping = along(trial) >= share;
-                *force = if *slipping { along(share) } else { trial };
+                // Not so if the trial is not a number.
+                let sticks = along(trial) < share;
+                *slipping = !sticks;
+                *force = if sticks { trial } else { along(share) };
             }
         }
     }

@@ -20,6 +20,7 @@ pub enum Direction {
 
 /// A pair of things, one for each sense of motion: friction is rarely the same both ways.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PerDirection<T> {
     /// For motion towards larger positions.
     pub positive: T,

@@ -12,6 +12,7 @@ use crate::table::{OctaveTable, interpolation_error};
 
 /// The Stribeck curve of one sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StribeckCurve {
     /// Fc, the level at high velocity, V.
     pub coulomb_v: f64,
@@ -47,6 +48,7 @@ impl StribeckCurve {
 
 /// The static friction model of one sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct StaticFriction {
     /// s(v).
     pub curve: StribeckCurve,

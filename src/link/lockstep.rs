@@ -143,9 +143,14 @@ impl OutputRecord {
 
     /// The record as words.
     #[inline(always)]
-    pub fn encode(&self) -> [u8; Self::BYTES] {
+    pub fn words(&self) -> [u32; 2] {
         let [x, y, z] = self.outputs.codes.map(|code| u32::from(code.0 as u16));
-        words([x | y << 16, z | u32::from(self.outputs.enabled) << 16])
+        [x | y << 16, z | u32::from(self.outputs.enabled) << 16]
+    }
+
+    /// The record as bytes.
+    pub fn encode(&self) -> [u8; Self::BYTES] {
+        words(self.words())
     }
 
     /// The record of words.

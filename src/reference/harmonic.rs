@@ -14,6 +14,7 @@ use crate::units::{POSITION_FRACTION_BITS, Position};
 
 /// A sine as a person writes it: `amplitude sin(2 pi frequency t + phase)` about its centre.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct HarmonicSettings {
     /// Half the travel, mm.
     pub amplitude_mm: f64,
@@ -178,7 +179,7 @@ impl<S: Scalar> Harmonic<S> {
                 Quantity::Acceleration,
             ),
             tangential: gain(
-                6.0 * settings.amplitude_mm * angular / lead_s,
+                1.5 * settings.amplitude_mm * angular / lead_s,
                 Quantity::Acceleration,
             ),
             q30: S::gain(2.0 * unit, Quantity::Integer, Quantity::Fraction),
@@ -239,8 +240,8 @@ impl<S: Scalar> Harmonic<S> {
             .times(ratio, Quantity::Fraction)
             .times(ratio, Quantity::Fraction);
         if let Some((progress, leaving)) = lead {
-            // The slope of the smooth step, 6 p (1 - p).
-            let slope = (progress * (ONE - progress)) >> 31;
+            // The slope of the smooth step over its largest, 4 p (1 - p).
+            let slope = (progress * (ONE - progress)) >> 29;
             let along = S::scale_integer(cosine, self.tangential).times(
                 S::scale_integer((slope >> 1) as i32, unit),
                 Quantity::Fraction,

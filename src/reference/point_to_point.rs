@@ -13,6 +13,7 @@ use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// A move as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct PointToPointSettings {
     /// Signed distance, mm.
     pub distance_mm: f64,
@@ -43,13 +44,18 @@ impl PointToPointSettings {
             libm::cbrt(distance / (2.0 * jerk)).min(libm::sqrt(self.max_velocity_mm_s / jerk));
         [distance / (jerk * time * time), time, time]
     }
+
+    /// How long the move takes, s, but for rounding to whole ticks.
+    pub(crate) fn duration_s(&self) -> f64 {
+        self.durations_s().iter().sum()
+    }
 }
 
 /// Fraction bits of the sums beyond those of a [`Position`].
 const FRACTION_BITS: u32 = 64;
 /// Bits dropped from the sums before they become a velocity and an acceleration.
 const VELOCITY_SHIFT: u32 = 52;
-const ACCELERATION_SHIFT: u32 = 44;
+const ACCELERATION_SHIFT: u32 = 48;
 
 /// The running sums of a move, from jerk to position, and the next impulse.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -76,9 +82,13 @@ impl<S: Scalar> PointToPoint<S> {
     /// Builds the move from validated settings. Settings time only.
     pub(super) fn build(settings: &PointToPointSettings, scale: MotionScale) -> Self {
         let target = Position::from_mm(settings.distance_mm, scale.resolution_mm);
-        let ticks = settings
+        let [velocity, acceleration, jerk] = settings
             .durations_s()
             .map(|seconds| (libm::ceil(seconds * scale.rate_hz) as u32).max(1));
+        // Rounded up one by one, they could overlap by a tick, and their jerks add.
+        let acceleration = acceleration.max(jerk);
+        let velocity = velocity.max(acceleration + jerk);
+        let ticks = [velocity, acceleration, jerk];
         let mut impulses = [(0, true); 8];
         for (subset, impulse) in impulses.iter_mut().enumerate() {
             for (index, length) in ticks.iter().enumerate() {

@@ -79,6 +79,7 @@ impl<S: Scalar> RecordedTable<S> {
 
     #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
-        (state.phase >> 32) as usize + 1 >= self.samples.len()
+        // The last sample has been put out.
+        state.phase > (self.samples.len().saturating_sub(1) as u64) << 32
     }
 }

@@ -60,7 +60,10 @@ mod tests {
             let mut last = sine(crest - 2000);
             for phase in crest - 2000..crest + 2000 {
                 let value = sine(phase);
-                assert!(value.abs_diff(last) < 16, "at {phase:#x}: {last} to {value}");
+                assert!(
+                    value.abs_diff(last) < 16,
+                    "at {phase:#x}: {last} to {value}"
+                );
                 last = value;
             }
         }

@@ -126,7 +126,7 @@ impl Scalar for Fixed {
 
     #[inline(always)]
     fn scale_wide(value: i64, gain: FixedGain) -> Self {
-        const LIMIT: i64 = 1 << 40;
+        const LIMIT: i64 = (1 << 40) - 1;
         let value = value.clamp(-LIMIT, LIMIT);
         // 40 bits of value and 23 of mantissa fit 64; the last 7 bits of the mantissa weigh 1e-7 of a position error.
         const DROPPED: u32 = 8;
@@ -178,8 +178,9 @@ impl Scalar for Fixed {
         let key = (exponent << OCTAVE_INTERVAL_BITS)
             | ((normal >> (31 - OCTAVE_INTERVAL_BITS)) & ((1 << OCTAVE_INTERVAL_BITS) - 1));
         let place = (normal << (1 + OCTAVE_INTERVAL_BITS)) >> 2;
+        // The sum may pass the table's end, not wrap: a key is below 2^9.
         (
-            key.saturating_sub(start.key) as usize + 1,
+            key.wrapping_sub(start.key) as usize + 1,
             Self(place as i32),
         )
     }

@@ -4,7 +4,7 @@
 use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
 
 macro_rules! float_scalar {
-    ($float:ty, $bits:ty, $mantissa_bits:expr, $half:expr) => {
+    ($float:ty, $bits:ty, $place:ty, $mantissa_bits:expr, $half:expr) => {
         impl Scalar for $float {
             type Gain = $float;
             type Sum = $float;
@@ -40,7 +40,7 @@ macro_rules! float_scalar {
 
             #[inline(always)]
             fn scale_wide(value: i64, gain: Self::Gain) -> Self {
-                const LIMIT: i64 = 1 << 40;
+                const LIMIT: i64 = (1 << 40) - 1;
                 let value = value.clamp(-LIMIT, LIMIT);
                 // Two exact halves: a 64-bit conversion is a library call on the target.
                 let high = (value >> 20) as i32;
@@ -86,7 +86,7 @@ macro_rules! float_scalar {
                 const PLACE: $float = 1.0 / (1u64 << SHIFT) as $float;
                 let bits = self.to_bits();
                 let interval = (bits >> SHIFT) as u32 - start.key;
-                let place = (bits & ((1 << SHIFT) - 1)) as i32 as $float * PLACE;
+                let place = (bits & ((1 << SHIFT) - 1)) as $place as $float * PLACE;
                 (interval as usize + 1, place)
             }
 
@@ -108,8 +108,8 @@ macro_rules! float_scalar {
     };
 }
 
-float_scalar!(f32, u32, 23, 0.5);
+float_scalar!(f32, u32, i32, 23, 0.5);
 
 // The host's reference; kept off the target, where a double-precision operation is a library call.
 #[cfg(not(target_os = "none"))]
-float_scalar!(f64, u64, 52, 0.5);
+float_scalar!(f64, u64, i64, 52, 0.5);

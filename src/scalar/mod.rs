@@ -133,11 +133,12 @@ pub trait Scalar:
 /// Where a logarithmic table starts: the first octave's lower bound, a power of two.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OctaveStart<S: Scalar> {
-    /// The key (exponent and leading mantissa bits) of the first octave's lower bound.
+    /// The key (exponent and leading mantissa bits) of the first octave's lower bound; negative, wrapped, when that lies
+    /// below a fixed-point format's step.
     pub(crate) key: u32,
     /// Turns a signal below the first octave into a place within the first interval.
     pub(crate) below: S::Gain,
-    /// The first octave's lower bound.
+    /// The first octave's lower bound, or the format's step if that is larger.
     pub(crate) bound: S,
 }
 
@@ -147,7 +148,12 @@ pub(crate) const OCTAVE_INTERVAL_BITS: u32 = 4;
 impl<S: Scalar> OctaveStart<S> {
     /// The start at `2^exponent` of a signal of the given quantity. Settings time only.
     pub(crate) fn new(exponent: i32, quantity: Quantity) -> Self {
-        let bound = S::quantise(libm::exp2(f64::from(exponent)), quantity);
+        // The first octaves of a curve over small values may lie below the step of a fixed-point format.
+        let quantise = |exponent: i32| S::quantise(libm::exp2(f64::from(exponent)), quantity);
+        let held = (exponent..0)
+            .find(|&e| quantise(e).to_f64(quantity) == libm::exp2(f64::from(e)))
+            .unwrap_or(exponent);
+        let bound = quantise(held);
         let below = S::gain(
             libm::exp2(f64::from(-exponent)),
             quantity,
@@ -160,8 +166,9 @@ impl<S: Scalar> OctaveStart<S> {
         };
         // Interval 1 starts at the bound, so a table based at key zero says which key the bound has.
         let (interval, _) = bound.octave(origin);
+        let skipped = ((held - exponent) as u32) << OCTAVE_INTERVAL_BITS;
         Self {
-            key: interval as u32 - 1,
+            key: (interval as u32 - 1).wrapping_sub(skipped),
             ..origin
         }
     }

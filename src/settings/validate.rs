@@ -1,6 +1,6 @@
 //! Checks of settings: each field's range, and what fields must hold together.
 
-use super::{AxisSettings, LimitSettings, PlanSettings, Reason, SettingsError, StageSettings};
+use super::{AxisSettings, PlanSettings, Reason, SettingsError, StageSettings};
 use crate::axis::MAX_PREVIEW_TICKS;
 use crate::control::popov::sector_bound;
 use crate::friction::stribeck::StaticFriction;
@@ -42,6 +42,16 @@ impl Place {
 
 /// The largest product of control period and pre-sliding resonance, rad.
 const RESOLVED_RESONANCE: f64 = 0.5;
+/// The fastest reference, in counts per tick: what the formats of the moves' velocity and of the displacement hold.
+const MOST_COUNTS_PER_TICK: f64 = 4096.0;
+/// The largest acceleration of a reference, in counts per tick squared: what the format of the moves' holds.
+const MOST_COUNTS_PER_TICK_SQUARED: f64 = 256.0;
+/// The largest limit of the tracking error, in counts: half of where the error saturates.
+const MOST_ERROR_COUNTS: f64 = 8_388_608.0;
+/// The longest travel of a motion, in counts: what the references' products hold.
+const MOST_TRAVEL_COUNTS: f64 = 1_073_741_824.0;
+/// The longest motion that ends, in ticks: half of what the tick counter holds.
+const MOST_TICKS: f64 = 2e9;
 /// The tables' largest error over the breakaway level.
 const TABLE_TOLERANCE: f64 = 1e-3;
 
@@ -97,27 +107,28 @@ impl AxisSettings {
 
     fn validate_limits(&self, at: Place, period_s: f64) -> Result<(), SettingsError> {
         let limits = &self.limits;
+        let resolution = self.encoder.resolution_mm;
         // The encoder may move twice as far, within half of its counter's range, or its direction is lost.
-        let bits = i32::from(self.encoder.counter_bits).min(24);
-        let half_range = libm::scalbn(1.0, bits - 1) * self.encoder.resolution_mm;
-        let fastest = (0.5 * half_range / period_s).min(1e3);
+        let half_range = libm::scalbn(0.5, self.encoder.counter_bits.into());
+        let fastest = (0.5 * half_range).min(MOST_COUNTS_PER_TICK) * resolution / period_s;
+        let most_acceleration = MOST_COUNTS_PER_TICK_SQUARED * resolution / (period_s * period_s);
         at.within(
             "limits.max_velocity_mm_s",
             limits.max_velocity_mm_s,
             1e-3,
-            fastest,
+            fastest.min(1e3),
         )?;
         at.within(
             "limits.max_acceleration_mm_s2",
             limits.max_acceleration_mm_s2,
             1e-3,
-            3e4,
+            most_acceleration.min(3e4),
         )?;
         at.within(
             "limits.following_error_mm",
             limits.following_error_mm,
-            self.encoder.resolution_mm,
-            20.0,
+            resolution,
+            (MOST_ERROR_COUNTS * resolution).min(20.0),
         )
     }
 
@@ -306,7 +317,7 @@ impl PlanSettings {
             validate_motion(
                 Place { axis: Some(name) },
                 motion,
-                &axis.limits,
+                axis,
                 stage.rate_hz,
             )?;
         }
@@ -320,9 +331,11 @@ const LONGEST_TRAVEL_MM: f64 = 1e4;
 fn validate_motion(
     at: Place,
     motion: &MotionSettings,
-    limits: &LimitSettings,
+    axis: &AxisSettings,
     rate_hz: f64,
 ) -> Result<(), SettingsError> {
+    let limits = &axis.limits;
+    let longest = (MOST_TRAVEL_COUNTS * axis.encoder.resolution_mm).min(LONGEST_TRAVEL_MM);
     match motion {
         MotionSettings::Hold => return Ok(()),
         MotionSettings::Harmonic(sine) => {
@@ -330,7 +343,7 @@ fn validate_motion(
                 "motion.amplitude_mm",
                 sine.amplitude_mm,
                 1e-6,
-                LONGEST_TRAVEL_MM,
+                longest,
             )?;
             at.within(
                 "motion.frequency_hz",
@@ -340,8 +353,7 @@ fn validate_motion(
             )?;
             at.within("motion.phase_rad", sine.phase_rad, -100.0, 100.0)?;
             if let Some(cycles) = sine.cycles {
-                // Half of what the tick counter holds.
-                let most = 2e9 / rate_hz * sine.frequency_hz;
+                let most = MOST_TICKS / rate_hz * sine.frequency_hz;
                 at.within("motion.cycles", cycles, 0.0, most)?;
             }
             at.within("motion.lead_s", sine.lead_s, 1.0 / rate_hz, 100.0)?;
@@ -350,8 +362,8 @@ fn validate_motion(
             at.within(
                 "motion.distance_mm",
                 to.distance_mm,
-                -LONGEST_TRAVEL_MM,
-                LONGEST_TRAVEL_MM,
+                -longest,
+                longest,
             )?;
             at.within("motion.max_jerk_mm_s3", to.max_jerk_mm_s3, 1e-3, 1e9)?;
             at.within("motion.max_velocity_mm_s", to.max_velocity_mm_s, 1e-6, 1e3)?;
@@ -361,6 +373,8 @@ fn validate_motion(
                 1e-3,
                 3e4,
             )?;
+            let most = MOST_TICKS / rate_hz;
+            at.within("motion (duration, s)", to.duration_s(), 0.0, most)?;
         }
     }
     let (velocity, acceleration) = motion.peaks();

@@ -1,3 +1,143 @@
-//! The project's chores.
+//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `count`, `prove-no-panic`, `test`.
 #![forbid(unsafe_code)]
-fn main() {}
+
+mod attribution;
+mod call_graph;
+mod command;
+mod count;
+mod emulate;
+mod emulator;
+mod image;
+mod listing;
+mod prove;
+mod setup;
+mod stages;
+mod test;
+mod toolchain;
+mod twin;
+
+use std::process::ExitCode;
+
+use anyhow::Result;
+use clap::{Args, Parser, Subcommand};
+
+use crate::image::{Board, Scalar, Target};
+use crate::toolchain::{Choice, Toolchain};
+
+/// The project's chores.
+#[derive(Parser)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask")]
+struct Cli {
+    /// How the firmware is compiled [default: what `setup` chose last]
+    #[arg(long, global = true, env = "QUADRANT_TOOLCHAIN", value_enum)]
+    toolchain: Option<Choice>,
+
+    #[command(subcommand)]
+    verb: Verb,
+}
+
+/// What to do.
+#[derive(Subcommand)]
+enum Verb {
+    /// Find or install what building and emulating the firmware take
+    Setup,
+    /// Build a release image and print how much flash and RAM it uses
+    Build(TargetArgs),
+    /// Run the image in QEMU, in lockstep with a simulated stage
+    Emulate(EmulateArgs),
+    /// Count the instructions of one control tick, stage by stage
+    Count(CountArgs),
+    /// Prove from the linked image that the control tick cannot panic
+    ProveNoPanic(TargetArgs),
+    /// Set up, then run every check there is
+    Test,
+}
+
+/// Which image.
+#[derive(Args, Clone, Copy)]
+struct TargetArgs {
+    /// The machine
+    #[arg(long, value_enum, default_value_t = Board::Mps2)]
+    board: Board,
+    /// The firmware's number type
+    #[arg(long, value_enum, default_value_t = Scalar::F32)]
+    scalar: Scalar,
+}
+
+impl From<TargetArgs> for Target {
+    fn from(args: TargetArgs) -> Self {
+        Self {
+            board: args.board,
+            scalar: args.scalar,
+        }
+    }
+}
+
+/// How to emulate.
+#[derive(Args)]
+struct EmulateArgs {
+    /// The firmware's number type
+    #[arg(long, value_enum, default_value_t = Scalar::F32)]
+    scalar: Scalar,
+    /// How long, in seconds of the firmware's time
+    #[arg(long, default_value_t = 10.0)]
+    seconds: f64,
+    /// Let the hardware timer fire the control interrupt, on recorded inputs
+    #[arg(long)]
+    paced: bool,
+}
+
+/// What to count.
+#[derive(Args)]
+struct CountArgs {
+    /// The firmware's number type
+    #[arg(long, value_enum, default_value_t = Scalar::F32)]
+    scalar: Scalar,
+    /// Control ticks to run
+    #[arg(long, default_value_t = 2000)]
+    ticks: u32,
+    /// Write the figures to the file that later runs are held against
+    #[arg(long)]
+    overwrite_expected: bool,
+}
+
+fn main() -> ExitCode {
+    let cli = Cli::parse();
+    match run(cli) {
+        Ok(true) => ExitCode::SUCCESS,
+        // What failed was said when it did.
+        Ok(false) => ExitCode::FAILURE,
+        Err(error) => {
+            eprintln!("error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+/// Does what was asked for and returns whether it went well.
+fn run(cli: Cli) -> Result<bool> {
+    // Setup looks at what is there; everything else takes what setup chose.
+    let toolchain = || Toolchain::chosen(cli.toolchain);
+    match cli.verb {
+        Verb::Setup => {
+            setup::run(cli.toolchain.unwrap_or(Choice::Auto))?;
+        }
+        Verb::Build(args) => {
+            let image = image::build(toolchain()?, args.into())?;
+            println!("{}", image.path.display());
+            println!("{}", image.footprint()?);
+        }
+        Verb::Emulate(args) => emulate::run(toolchain()?, args.scalar, args.seconds, args.paced)?,
+        Verb::Count(args) => {
+            count::run(
+                toolchain()?,
+                args.scalar,
+                args.ticks,
+                args.overwrite_expected,
+            )?;
+        }
+        Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
+        Verb::Test => return test::run(cli.toolchain.unwrap_or(Choice::Auto)),
+    }
+    Ok(true)
+}

@@ -103,7 +103,11 @@ pub fn run_circles<S: Scalar>(
             };
             let turn_s = std::f64::consts::TAU * RADIUS_MM / FEED_MM_S;
             let longest_s = 2.0 + 2.0 * LEAD_S + TURNS * turn_s;
-            let resolution_mm = job.stage.axes.each_ref().map(|axis| axis.encoder.resolution_mm);
+            let resolution_mm = job
+                .stage
+                .axes
+                .each_ref()
+                .map(|axis| axis.encoder.resolution_mm);
             let mut machine = Machine::<S, ELEMENTS>::new(&job)?;
             let mut plant = SimulatedStage::new(&knowledge.truth(), rate_hz, seed);
             let [x, y, _] = run(

@@ -175,7 +175,11 @@ pub const RUNS: u64 = 16;
 pub fn run_all<S: Scalar>(seed: u64, progress: &ProgressBar) -> Result<Vec<Outcome>, RunError> {
     let runs: Vec<_> = Knowledge::ALL
         .into_iter()
-        .flat_map(|knowledge| Configuration::all().into_iter().map(move |c| (c, knowledge)))
+        .flat_map(|knowledge| {
+            Configuration::all()
+                .into_iter()
+                .map(move |c| (c, knowledge))
+        })
         .collect();
     let outcomes: Result<Vec<_>, _> = runs
         .into_par_iter()

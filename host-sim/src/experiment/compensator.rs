@@ -96,8 +96,7 @@ impl Knowledge {
 /// can tell from it.
 fn with_total_damping(model: &StaticFriction, truth: &AxisTruth) -> StaticFriction {
     StaticFriction {
-        viscous_v_s_per_mm: model.viscous_v_s_per_mm
-            + truth.damping_per_s / truth.gain_mm_per_v_s2,
+        viscous_v_s_per_mm: model.viscous_v_s_per_mm + truth.damping_per_s / truth.gain_mm_per_v_s2,
         ..*model
     }
 }

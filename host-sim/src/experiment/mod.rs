@@ -4,7 +4,7 @@ pub mod circle;
 pub mod comparison;
 pub mod compensator;
 pub mod metrics;
-//pub mod recorded;
+pub mod recorded;
 mod run;
 pub mod thesis;
 

@@ -180,6 +180,15 @@ fn emps_axis() -> Result<Axis, ShapingError> {
     Ok(Axis { settings, truth })
 }
 
+/// Time from the start of the record that is not scored, s: a record may begin in the middle of a motion.
+pub const SETTLING_S: f64 = 0.5;
+
+/// The part of an error that is scored.
+fn settled(mut error_mm: Vec<f64>, period_s: f64) -> Vec<f64> {
+    error_mm.drain(..error_mm.len().min((SETTLING_S / period_s).round() as usize));
+    error_mm
+}
+
 /// What one configuration did on the record.
 #[derive(Clone, Debug)]
 pub struct RecordedOutcome {
@@ -189,7 +198,7 @@ pub struct RecordedOutcome {
     pub largest_mm: f64,
     /// RMS of e, mm.
     pub rms_mm: f64,
-    /// The error over the record, mm, a sample a `period_s`.
+    /// The error over the scored part of the record, mm, a sample a `period_s`.
     pub error_mm: Vec<f64>,
     /// Time between samples of the error, s.
     pub period_s: f64,
@@ -261,6 +270,7 @@ pub fn replay<S: Scalar>(
             .zip(position)
             .map(|(reference, position)| reference - position)
             .collect();
+        let error_mm = settled(error_mm, record.sample_time_s);
         RecordedOutcome {
             configuration: None,
             largest_mm: largest(&error_mm),
@@ -272,8 +282,13 @@ pub fn replay<S: Scalar>(
     let ours: Result<Vec<_>, ReplayError> = Configuration::all()
         .into_par_iter()
         .map(|configuration| {
-            let outcome =
-                run_record::<S>(configuration, &axis, positions, ticks_per_sample as u32, seed);
+            let outcome = run_record::<S>(
+                configuration,
+                &axis,
+                positions,
+                ticks_per_sample as u32,
+                seed,
+            );
             progress.inc(1);
             outcome
         })
@@ -299,14 +314,19 @@ fn run_record<S: Scalar>(
         [Motion::Recorded(table), Motion::Hold, Motion::Hold],
     );
     let mut plant = SimulatedStage::new(&truth, settings.rate_hz, seed);
-    let resolution_mm = settings.axes.each_ref().map(|axis| axis.encoder.resolution_mm);
+    let resolution_mm = settings
+        .axes
+        .each_ref()
+        .map(|axis| axis.encoder.resolution_mm);
     let most_ticks = positions.len() * ticks_per_sample as usize + 10_000;
     let [trace, ..] = run(&mut machine, &mut plant, resolution_mm, most_ticks)?;
+    let period_s = 1.0 / settings.rate_hz;
+    let error_mm = settled(trace.error_mm, period_s);
     Ok(RecordedOutcome {
         configuration: Some(configuration),
-        largest_mm: largest(&trace.error_mm),
-        rms_mm: rms(&trace.error_mm),
-        error_mm: trace.error_mm,
-        period_s: 1.0 / settings.rate_hz,
+        largest_mm: largest(&error_mm),
+        rms_mm: rms(&error_mm),
+        error_mm,
+        period_s,
     })
 }

@@ -14,8 +14,6 @@ pub struct AxisTrace {
     pub reference_mm: Vec<f64>,
     /// Reference minus true position, mm.
     pub error_mm: Vec<f64>,
-    /// Controller output, V.
-    pub output_v: Vec<f64>,
 }
 
 impl AxisTrace {
@@ -25,7 +23,6 @@ impl AxisTrace {
         Self {
             reference_mm: part(&self.reference_mm),
             error_mm: part(&self.error_mm),
-            output_v: part(&self.output_v),
         }
     }
 }
@@ -82,7 +79,6 @@ pub fn run<S: Scalar, const N: usize>(
                 trace
                     .error_mm
                     .push(reference - plant.axes()[index].position_mm());
-                trace.output_v.push(f64::from(telemetry.output_v()));
             }
         }
         plant.step(&outputs);

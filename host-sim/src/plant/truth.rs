@@ -59,7 +59,8 @@ pub fn virgin_curve_elements(
     range_mm: f64,
     count: usize,
 ) -> Vec<GmsElement, MAX_ELEMENTS> {
-    let force = |x: f64| breakaway_v * (1.0 - (-4.0 * x / range_mm).exp()) / (1.0 - (-4.0f64).exp());
+    let force =
+        |x: f64| breakaway_v * (1.0 - (-4.0 * x / range_mm).exp()) / (1.0 - (-4.0f64).exp());
     let knot = |index: usize| range_mm * (index as f64 / count as f64).powi(2);
     let slope = |index: usize| {
         if index < count {

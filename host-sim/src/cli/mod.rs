@@ -1,0 +1,35 @@
+//! The command line.
+
+mod compare;
+mod output;
+mod replay;
+
+use clap::{Parser, Subcommand};
+
+/// Servo control that removes friction's quadrant glitches: the simulated stage and the experiments on it.
+///
+/// Without a command, `compare` runs.
+#[derive(Debug, Parser)]
+#[command(version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Run the thesis' comparison on the simulated stage: PID and N-PID with every feedforward, three velocities, and a
+    /// circle.
+    Compare(compare::Arguments),
+    /// Run our controllers over a recorded reference, beside what the recorded machine did.
+    Replay(replay::Arguments),
+}
+
+/// Does what the command line asks for.
+pub(crate) fn run() -> anyhow::Result<()> {
+    match Arguments::parse().command {
+        None => compare::run(&compare::Arguments::default()),
+        Some(Command::Compare(arguments)) => compare::run(&arguments),
+        Some(Command::Replay(arguments)) => replay::run(&arguments),
+    }
+}

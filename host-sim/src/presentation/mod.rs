@@ -1,0 +1,32 @@
+//! From outcomes to tables and figures: what a person reads of an experiment.
+
+mod circle;
+mod comparison;
+mod recorded;
+
+pub use comparison::{comparison_page, comparison_tables};
+pub use recorded::{recorded_page, recorded_table};
+
+use crate::report::{Provenance, Series, Style};
+
+/// mm to um.
+const UM_PER_MM: f64 = 1e3;
+
+/// How a page came about: the command line as a reader would repeat it, the seed, this program's version.
+pub fn provenance(command: &str, seed: u64) -> Provenance {
+    Provenance {
+        command: command.to_owned(),
+        seed: Some(seed),
+        version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}
+
+/// An error in mm over time, as a curve in um; samples are `period_s` apart.
+fn error_curve(name: String, error_mm: &[f64], period_s: f64, style: Style) -> Series {
+    Series {
+        name,
+        x: (0..error_mm.len()).map(|k| k as f64 * period_s).collect(),
+        y: error_mm.iter().map(|error| error * UM_PER_MM).collect(),
+        style,
+    }
+}

@@ -1,0 +1,231 @@
+//! From bytes to columns of finite numbers.
+
+use super::{MIN_ROWS, RecordError};
+use csv::{ByteRecord, ReaderBuilder};
+use std::path::Path;
+
+/// The columns of a record, as labelled.
+#[derive(Debug)]
+pub(super) struct Columns {
+    pub(super) time: Column,
+    pub(super) reference: Column,
+    pub(super) position: Option<Column>,
+    pub(super) voltage: Option<Column>,
+}
+
+/// One column.
+#[derive(Debug)]
+pub(super) struct Column {
+    pub(super) name: &'static str,
+    /// Millimetres in one unit of a position column; 1 for others.
+    pub(super) mm_per_unit: f64,
+    pub(super) values: Vec<f64>,
+    /// Line of each value, by runs: blank lines and quoted line breaks make lines and rows differ.
+    lines: Vec<(usize, u64)>,
+}
+
+impl Column {
+    pub(super) fn into_mm(self) -> Vec<f64> {
+        let Self {
+            mm_per_unit,
+            mut values,
+            ..
+        } = self;
+        values.iter_mut().for_each(|value| *value *= mm_per_unit);
+        values
+    }
+
+    /// The line in the file that holds value `index`.
+    pub(super) fn line(&self, index: usize) -> u64 {
+        let run = self
+            .lines
+            .partition_point(|(first, _)| *first <= index)
+            .saturating_sub(1);
+        self.lines
+            .get(run)
+            .map_or(0, |(first, line)| line + (index - first) as u64)
+    }
+
+    fn push(&mut self, value: f64, line: u64) {
+        let index = self.values.len();
+        if self.lines.is_empty() || self.line(index) != line {
+            self.lines.push((index, line));
+        }
+        self.values.push(value);
+    }
+}
+
+/// A name a header can have, and the scale of its unit.
+type Name = (&'static str, f64);
+
+const TIME: &[Name] = &[("t_s", 1.0)];
+const REFERENCE: &[Name] = &[("reference_m", 1e3), ("reference_mm", 1.0)];
+const POSITION: &[Name] = &[("position_m", 1e3), ("position_mm", 1.0)];
+const VOLTAGE: &[Name] = &[("voltage_v", 1.0)];
+
+pub(super) fn read(path: &Path) -> Result<Columns, RecordError> {
+    let mut reader = ReaderBuilder::new()
+        .from_path(path)
+        .map_err(|error| refuse(path, error))?;
+    let header = reader
+        .byte_headers()
+        .map_err(|error| refuse(path, error))?
+        .clone();
+    let header = Header {
+        path,
+        names: header
+            .iter()
+            .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+            .collect(),
+    };
+
+    let mut time = header.required("t_s", TIME)?;
+    let mut reference = header.required("reference_m (or reference_mm)", REFERENCE)?;
+    let mut position = header.optional("position", POSITION)?;
+    let mut voltage = header.optional("voltage", VOLTAGE)?;
+
+    let mut row = ByteRecord::new();
+    while reader
+        .read_byte_record(&mut row)
+        .map_err(|error| refuse(path, error))?
+    {
+        let line = row.position().map_or(0, csv::Position::line);
+        for (column, index) in [
+            Some(&mut time),
+            Some(&mut reference),
+            position.as_mut(),
+            voltage.as_mut(),
+        ]
+        .into_iter()
+        .flatten()
+        {
+            let value = number(path, column.name, line, &row[*index])?;
+            column.push(value, line);
+        }
+    }
+    let rows = time.0.values.len();
+    if rows < MIN_ROWS {
+        return Err(RecordError::TooFewRows {
+            path: path.to_owned(),
+            rows,
+        });
+    }
+    Ok(Columns {
+        time: time.0,
+        reference: reference.0,
+        position: position.map(|c| c.0),
+        voltage: voltage.map(|c| c.0),
+    })
+}
+
+fn number(path: &Path, column: &str, line: u64, cell: &[u8]) -> Result<f64, RecordError> {
+    let refused = |expected| RecordError::Cell {
+        path: path.to_owned(),
+        line,
+        column: column.to_owned(),
+        value: String::from_utf8_lossy(cell).into_owned(),
+        expected,
+    };
+    let text = str::from_utf8(cell)
+        .map_err(|_| refused("text in UTF-8"))?
+        .trim();
+    let value: f64 = text
+        .parse()
+        .map_err(|_| refused("a number such as 0.012 or 1.2e-2"))?;
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(refused("a finite number"))
+    }
+}
+
+/// The CSV reader's complaints, which name lines, as ours, which name the file too.
+fn refuse(path: &Path, error: csv::Error) -> RecordError {
+    let path = path.to_owned();
+    let line = error.position().map(csv::Position::line);
+    match error.into_kind() {
+        csv::ErrorKind::Io(source) => RecordError::Read { path, source },
+        csv::ErrorKind::UnequalLengths {
+            pos,
+            expected_len,
+            len,
+        } => {
+            let line = pos.map(|pos| pos.line()).or(line).unwrap_or(0);
+            let message = format!(
+                "line {line} has {len} cells, the header has {expected_len}; every row needs as many"
+            );
+            RecordError::Malformed { path, message }
+        }
+        other => RecordError::Malformed {
+            path,
+            message: format!("line {}: not CSV: {other:?}", line.unwrap_or(0)),
+        },
+    }
+}
+
+struct Header<'a> {
+    path: &'a Path,
+    names: Vec<String>,
+}
+
+/// A column to be filled, and its place in a row.
+type Place = (Column, usize);
+
+impl Header<'_> {
+    fn required(&self, needed: &'static str, names: &[Name]) -> Result<Place, RecordError> {
+        self.optional(names[0].0, names)?
+            .ok_or_else(|| RecordError::MissingColumn {
+                path: self.path.to_owned(),
+                needed,
+                found: self.found(),
+                hint: self.hint(),
+            })
+    }
+
+    fn optional(
+        &self,
+        quantity: &'static str,
+        names: &[Name],
+    ) -> Result<Option<Place>, RecordError> {
+        let mut matches = self.names.iter().enumerate().filter_map(|(index, found)| {
+            let (name, mm_per_unit) = *names.iter().find(|(name, _)| name == found)?;
+            Some((
+                Column {
+                    name,
+                    mm_per_unit,
+                    values: Vec::new(),
+                    lines: Vec::new(),
+                },
+                index,
+            ))
+        });
+        let first = matches.next();
+        match (&first, matches.next()) {
+            (Some((first, _)), Some((second, _))) => Err(RecordError::AmbiguousColumn {
+                path: self.path.to_owned(),
+                quantity,
+                first: first.name.to_owned(),
+                second: second.name.to_owned(),
+            }),
+            _ => Ok(first),
+        }
+    }
+
+    fn found(&self) -> String {
+        if self.names.iter().all(String::is_empty) {
+            "no header".to_owned()
+        } else {
+            self.names.join(", ")
+        }
+    }
+
+    fn hint(&self) -> &'static str {
+        match self.names.as_slice() {
+            [only] if only.contains([';', '\t']) => ". Cells must be separated by commas",
+            names if !names.is_empty() && names.iter().all(|name| name.parse::<f64>().is_ok()) => {
+                ". The first line must name the columns"
+            }
+            _ => "",
+        }
+    }
+}

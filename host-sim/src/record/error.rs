@@ -1,0 +1,281 @@
+//! Why a record is refused, in words that lead to the fault.
+
+use super::MIN_ROWS;
+use std::fmt;
+use std::path::PathBuf;
+
+/// A record that cannot be used. Lines are those of an editor: the header is line 1.
+#[derive(Debug, thiserror::Error)]
+pub enum RecordError {
+    /// The file cannot be opened or read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The file is no CSV: rows of different length, or bytes that are no text.
+    #[error("{}: {message}", path.display())]
+    Malformed {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong where.
+        message: String,
+    },
+    /// A column is not there.
+    #[error(
+        "{}: no column {needed}; found {found}. Needed: t_s, and reference_m or reference_mm; optional: position_m or \
+         position_mm, voltage_v{hint}", path.display()
+    )]
+    MissingColumn {
+        /// The file.
+        path: PathBuf,
+        /// The column, or its alternatives.
+        needed: &'static str,
+        /// The header's names.
+        found: String,
+        /// A guess at the reason, or nothing.
+        hint: &'static str,
+    },
+    /// Two columns claim to be the same quantity.
+    #[error("{}: columns {first} and {second} both hold the {quantity}; keep one", path.display())]
+    AmbiguousColumn {
+        /// The file.
+        path: PathBuf,
+        /// What they hold.
+        quantity: &'static str,
+        /// One of them.
+        first: String,
+        /// The other.
+        second: String,
+    },
+    /// A cell is not a finite number.
+    #[error("{}, line {line}, column {column}: {value:?} is not {expected}", path.display())]
+    Cell {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// The column.
+        column: String,
+        /// The cell as it stands.
+        value: String,
+        /// What is allowed.
+        expected: &'static str,
+    },
+    /// There is no motion in so little.
+    #[error("{}: {rows} rows of data; at least {MIN_ROWS} are needed", path.display())]
+    TooFewRows {
+        /// The file.
+        path: PathBuf,
+        /// Rows after the header.
+        rows: usize,
+    },
+    /// Time does not run as a clock does.
+    #[error("{}, line {line}, column t_s: {value} s {fault}", path.display())]
+    Time {
+        /// The file.
+        path: PathBuf,
+        /// The line.
+        line: u64,
+        /// The time there.
+        value: f64,
+        /// What is wrong with it.
+        fault: TimeFault,
+    },
+    /// The sample rate is not one that anything is controlled at.
+    #[error(
+        "{}, column t_s: the sample time is {} s ({} Hz); 100 Hz to 100 kHz are allowed{hint}",
+        path.display(), Brief(*sample_time_s), Brief(*rate_hz)
+    )]
+    SampleRate {
+        /// The file.
+        path: PathBuf,
+        /// Median time from row to row.
+        sample_time_s: f64,
+        /// Its inverse.
+        rate_hz: f64,
+        /// A guess at the reason, or nothing.
+        hint: &'static str,
+    },
+    /// Numbers that the axis cannot have made, or not in this unit.
+    #[error("{}, column {column}: {fault}", path.display())]
+    Unit {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: String,
+        /// What does not fit.
+        fault: UnitFault,
+    },
+}
+
+/// How a time column fails.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeFault {
+    /// The same time twice.
+    Repeated,
+    /// Earlier than the row before.
+    Backwards {
+        /// Time in the row before, s.
+        previous: f64,
+    },
+    /// A step unlike the others.
+    Step {
+        /// Time since the row before, s.
+        step: f64,
+        /// Median step, s.
+        median: f64,
+    },
+}
+
+impl fmt::Display for TimeFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Repeated => write!(
+                f,
+                "repeats the row before; time must increase by the sample time in every row"
+            ),
+            Self::Backwards { previous } => {
+                write!(
+                    f,
+                    "comes after {previous} s; time must increase by the sample time in every row"
+                )
+            }
+            Self::Step { step, median } => write!(
+                f,
+                "is {} s after the row before, the sample time is {} s; steps must be equal within 1 %{}",
+                Brief(*step),
+                Brief(*median),
+                if *step > 1.5 * median {
+                    " (rows are missing here)"
+                } else {
+                    ""
+                }
+            ),
+        }
+    }
+}
+
+/// How a column's numbers contradict its unit or the axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum UnitFault {
+    /// Further, faster or harder than the axis can.
+    Exceeds {
+        /// "travel", "speed" or "acceleration".
+        what: &'static str,
+        /// Of the record.
+        value: f64,
+        /// Of the axis.
+        limit: f64,
+        /// Unit of both.
+        unit: &'static str,
+        /// A thousandth of the record would fit in every respect.
+        looks_like_mm: bool,
+    },
+    /// So little motion in a column of millimetres that it must be metres.
+    LooksLikeMetres {
+        /// Travel as labelled, mm.
+        travel_mm: f64,
+        /// The axis' travel, mm.
+        limit_mm: f64,
+    },
+    /// The motion is lost in the encoder's resolution.
+    Still {
+        /// Travel, mm.
+        travel_mm: f64,
+        /// Travel in counts.
+        counts: f64,
+    },
+    /// The measured motion is nothing like the one asked for.
+    Disagrees {
+        /// Measured travel, mm.
+        travel_mm: f64,
+        /// Travel asked for, mm.
+        reference_mm: f64,
+    },
+}
+
+impl fmt::Display for UnitFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Exceeds {
+                what,
+                value,
+                limit,
+                unit,
+                looks_like_mm,
+            } => write!(
+                f,
+                "its {what} is {} {unit}, the axis allows {} {unit}{}",
+                Brief(*value),
+                Brief(*limit),
+                if *looks_like_mm {
+                    "; a thousandth of it would fit: this looks like millimetres in a column named _m"
+                } else {
+                    ""
+                }
+            ),
+            Self::LooksLikeMetres {
+                travel_mm,
+                limit_mm,
+            } => write!(
+                f,
+                "it moves {} mm in all, less than a thousandth of the axis' travel of {} mm: this looks like metres in a \
+                 column named _mm. A motion that is so small must be given in metres",
+                Brief(*travel_mm),
+                Brief(*limit_mm)
+            ),
+            Self::Still { travel_mm, counts } => write!(
+                f,
+                "it moves {} mm in all, {} counts of the encoder; a motion takes at least 10 counts",
+                Brief(*travel_mm),
+                Brief(*counts)
+            ),
+            Self::Disagrees {
+                travel_mm,
+                reference_mm,
+            } => write!(
+                f,
+                "it moves {} mm, the reference {} mm; one of the two columns is not in the unit of its name",
+                Brief(*travel_mm),
+                Brief(*reference_mm)
+            ),
+        }
+    }
+}
+
+/// What looks odd but can be true.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Doubt {
+    /// The measured position runs ahead of the reference: the two columns may be swapped.
+    PositionLeads {
+        /// By how much, s.
+        lead_s: f64,
+    },
+}
+
+impl fmt::Display for Doubt {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PositionLeads { lead_s } => write!(
+                f,
+                "the position runs {} ms ahead of the reference; are the two columns swapped?",
+                Brief(lead_s * 1e3)
+            ),
+        }
+    }
+}
+
+/// A number with four significant digits, and no more of them than it needs.
+struct Brief(f64);
+
+impl fmt::Display for Brief {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match format!("{:.3e}", self.0).parse::<f64>() {
+            Ok(rounded) => write!(f, "{rounded}"),
+            Err(_) => write!(f, "{}", self.0),
+        }
+    }
+}

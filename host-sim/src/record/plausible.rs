@@ -1,0 +1,172 @@
+//! Can the axis have made these numbers, in the unit their column names?
+
+use super::columns::{Column, Columns};
+use super::{AxisLimits, Doubt, RecordError, UnitFault};
+use std::path::Path;
+
+/// Fewest encoder counts that are a motion.
+const MIN_COUNTS: f64 = 10.0;
+/// Time over which speed and acceleration are taken, s: from sample to sample, the steps of a quantised
+/// reference would look like both.
+const WINDOW_S: f64 = 0.005;
+/// Ratio of measured travel to travel asked for beyond which no controller is that bad: half way, in decades, to the factor
+/// of a thousand that is looked for.
+const MAX_DISAGREEMENT: f64 = 30.0;
+/// Lead of the position, in samples, that is worth a word.
+const MIN_LEAD_SAMPLES: f64 = 2.0;
+
+pub(super) fn check(
+    path: &Path,
+    columns: &Columns,
+    sample_time_s: f64,
+    limits: &AxisLimits,
+) -> Result<(), RecordError> {
+    let refuse = |column: &Column, fault| {
+        Err(RecordError::Unit {
+            path: path.to_owned(),
+            column: column.name.to_owned(),
+            fault,
+        })
+    };
+    let reference = &columns.reference;
+    let motion = Motion::of(reference, sample_time_s, limits);
+    if let Some(fault) = motion.excess(limits, reference.mm_per_unit > 1.0) {
+        return refuse(reference, fault);
+    }
+    if reference.mm_per_unit == 1.0
+        && motion.travel_mm > 0.0
+        && motion.travel_mm * 1e3 < limits.travel_mm
+    {
+        let fault = UnitFault::LooksLikeMetres {
+            travel_mm: motion.travel_mm,
+            limit_mm: limits.travel_mm,
+        };
+        return refuse(reference, fault);
+    }
+    let counts = motion.travel_mm / limits.resolution_mm;
+    if counts < MIN_COUNTS {
+        return refuse(
+            reference,
+            UnitFault::Still {
+                travel_mm: motion.travel_mm,
+                counts,
+            },
+        );
+    }
+    if let Some(position) = &columns.position {
+        let travel_mm = travel_mm(position);
+        let ratio = travel_mm / motion.travel_mm;
+        if !(1.0 / MAX_DISAGREEMENT..=MAX_DISAGREEMENT).contains(&ratio) {
+            return refuse(
+                position,
+                UnitFault::Disagrees {
+                    travel_mm,
+                    reference_mm: motion.travel_mm,
+                },
+            );
+        }
+    }
+    Ok(())
+}
+
+/// What a reference asks of an axis.
+struct Motion {
+    travel_mm: f64,
+    velocity_mm_s: f64,
+    acceleration_mm_s2: f64,
+}
+
+impl Motion {
+    fn of(reference: &Column, sample_time_s: f64, limits: &AxisLimits) -> Self {
+        let values = &reference.values;
+        let span = ((WINDOW_S / sample_time_s).round() as usize).clamp(1, (values.len() - 1) / 2);
+        let span_s = span as f64 * sample_time_s;
+        let largest = |differences: &mut dyn Iterator<Item = f64>| {
+            reference.mm_per_unit * differences.fold(0.0_f64, |largest, d| largest.max(d.abs()))
+        };
+        let first = largest(&mut values.iter().zip(&values[span..]).map(|(a, b)| b - a));
+        let middle = values[span..].iter();
+        let second = largest(
+            &mut values
+                .iter()
+                .zip(middle)
+                .zip(&values[2 * span..])
+                .map(|((a, b), c)| a - 2.0 * b + c),
+        );
+        Self {
+            travel_mm: travel_mm(reference),
+            velocity_mm_s: first / span_s,
+            // Rounding to counts alone makes second differences of up to two counts.
+            acceleration_mm_s2: (second - 2.0 * limits.resolution_mm).max(0.0) / (span_s * span_s),
+        }
+    }
+
+    fn excess(&self, limits: &AxisLimits, in_metres: bool) -> Option<UnitFault> {
+        let demands = [
+            ("travel", self.travel_mm, limits.travel_mm, "mm"),
+            (
+                "speed",
+                self.velocity_mm_s,
+                limits.max_velocity_mm_s,
+                "mm/s",
+            ),
+            (
+                "acceleration",
+                self.acceleration_mm_s2,
+                limits.max_acceleration_mm_s2,
+                "mm/s²",
+            ),
+        ];
+        let looks_like_mm = in_metres
+            && demands
+                .iter()
+                .all(|(_, value, limit, _)| value * 1e-3 <= *limit);
+        let (what, value, limit, unit) = demands
+            .into_iter()
+            .find(|(_, value, limit, _)| value > limit)?;
+        Some(UnitFault::Exceeds {
+            what,
+            value,
+            limit,
+            unit,
+            looks_like_mm,
+        })
+    }
+}
+
+fn travel_mm(column: &Column) -> f64 {
+    let (low, high) = column
+        .values
+        .iter()
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+            (low.min(*value), high.max(*value))
+        });
+    (high - low) * column.mm_per_unit
+}
+
+/// Swapped columns cannot be proved: with preview an axis can lead its reference. But as a rule it lags.
+pub(super) fn doubts(
+    reference_mm: &[f64],
+    position_mm: Option<&[f64]>,
+    sample_time_s: f64,
+) -> Vec<Doubt> {
+    let lead = position_mm.and_then(|position| lead_s(reference_mm, position, sample_time_s));
+    lead.filter(|lead| *lead > MIN_LEAD_SAMPLES * sample_time_s)
+        .map(|lead_s| Doubt::PositionLeads { lead_s })
+        .into_iter()
+        .collect()
+}
+
+/// The lead that explains most of the error, by least squares: error = -lead * velocity, where that explains more
+/// than half of the error at all.
+fn lead_s(reference: &[f64], position: &[f64], sample_time_s: f64) -> Option<f64> {
+    let (mut vv, mut ve, mut ee) = (0.0, 0.0, 0.0);
+    for (r, p) in reference.windows(3).zip(&position[1..]) {
+        let velocity = (r[2] - r[0]) / (2.0 * sample_time_s);
+        let error = r[1] - p;
+        vv += velocity * velocity;
+        ve += velocity * error;
+        ee += error * error;
+    }
+    (ve * ve > 0.5 * vv * ee).then(|| -ve / vv)
+}

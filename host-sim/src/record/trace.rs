@@ -1,0 +1,68 @@
+//! Traces of our own runs, as CSV.
+
+use std::fs::File;
+use std::io::{self, BufWriter, Write};
+use std::path::{Path, PathBuf};
+
+/// A trace that was not written.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// The columns differ in length.
+    #[error(
+        "column {column} has {found} values, column {first} has {expected}; all columns of a trace need as many"
+    )]
+    Length {
+        /// The first column.
+        first: String,
+        /// Its length.
+        expected: usize,
+        /// The first that differs.
+        column: String,
+        /// Its length.
+        found: usize,
+    },
+    /// The file cannot be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: io::Error,
+    },
+}
+
+/// Writes named columns of one length, every number in full, so that reading them back gives the same bits.
+pub fn write_trace(path: impl AsRef<Path>, columns: &[(&str, &[f64])]) -> Result<(), TraceError> {
+    let path = path.as_ref();
+    if let Some((first, values)) = columns.first()
+        && let Some((column, other)) = columns
+            .iter()
+            .find(|(_, other)| other.len() != values.len())
+    {
+        return Err(TraceError::Length {
+            first: (*first).to_owned(),
+            expected: values.len(),
+            column: (*column).to_owned(),
+            found: other.len(),
+        });
+    }
+    write_columns(path, columns).map_err(|source| TraceError::Write {
+        path: path.to_owned(),
+        source,
+    })
+}
+
+fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(BufWriter::new(File::create(path)?));
+    csv.write_record(columns.iter().map(|(name, _)| name))?;
+    let mut cell = Vec::new();
+    for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {
+        for (_, values) in columns {
+            cell.clear();
+            write!(cell, "{}", values[row])?;
+            csv.write_field(&cell)?;
+        }
+        csv.write_record(None::<&[u8]>)?;
+    }
+    csv.flush()
+}

@@ -1,0 +1,60 @@
+//! What can be wrong with a report's data.
+
+use std::path::PathBuf;
+
+/// A report that cannot be built or written.
+#[derive(Debug, thiserror::Error)]
+pub enum ReportError {
+    /// An id that would not work as a link target or a file name.
+    #[error("id {id:?}: use ASCII letters, digits, '-' and '_', beginning with a letter")]
+    BadId {
+        /// The id.
+        id: String,
+    },
+    /// Two parts of one page with one id.
+    #[error("id {id:?} is used twice on one page")]
+    DuplicateId {
+        /// The id.
+        id: String,
+    },
+    /// A table row that does not have one cell per column.
+    #[error("table {table:?}, row {row}: {found} cells for {expected} columns")]
+    RowLength {
+        /// The table's id.
+        table: String,
+        /// The row, counted from 1.
+        row: usize,
+        /// Cells in it.
+        found: usize,
+        /// Columns of the table.
+        expected: usize,
+    },
+    /// A series whose two coordinates differ in length.
+    #[error("figure {figure:?}, series {series:?}: {x} abscissas for {y} ordinates")]
+    SeriesLength {
+        /// The figure's id.
+        figure: String,
+        /// The series' name.
+        series: String,
+        /// Length of the first coordinate.
+        x: usize,
+        /// Length of the second coordinate.
+        y: usize,
+    },
+    /// A circle without a usable radius.
+    #[error("figure {figure:?}: nominal radius {radius_mm} mm; it must be positive and finite")]
+    Radius {
+        /// The figure's id.
+        figure: String,
+        /// The radius given.
+        radius_mm: f64,
+    },
+    /// The file could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+}

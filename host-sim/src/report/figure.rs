@@ -1,0 +1,319 @@
+//! Figures, and their translation into plotly's description.
+
+use super::polar::{PolarDeviation, rounded};
+use super::{Colour, ReportError, decimate, palette};
+use plotly::common::{Anchor, DashType, Font, Line, Mode, Orientation, Title};
+use plotly::layout::{Axis, DragMode, HoverMode, Layout, Legend, Margin, TicksDirection};
+use plotly::{Plot as Plotly, Scatter};
+
+/// A drawing with its caption.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Figure {
+    /// Unique on its page; also the name of the image a reader saves.
+    pub id: String,
+    /// What the figure shows.
+    pub caption: String,
+    /// The drawing.
+    pub plot: Plot,
+}
+
+/// The kinds of drawing.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Plot {
+    /// Curves over a common axis, or paths in a plane.
+    Lines(Lines),
+    /// Radial deviation from a circle.
+    PolarDeviation(PolarDeviation),
+}
+
+/// Curves over a common axis, or paths in a plane.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Lines {
+    /// Horizontal axis, with its unit.
+    pub x_label: String,
+    /// Vertical axis, with its unit.
+    pub y_label: String,
+    /// The curves; later ones are drawn over earlier ones.
+    pub series: Vec<Series>,
+}
+
+/// One curve. Samples that are not finite are gaps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Series {
+    /// For the legend.
+    pub name: String,
+    /// Abscissas.
+    pub x: Vec<f64>,
+    /// Ordinates, as many.
+    pub y: Vec<f64>,
+    /// How it is drawn.
+    pub style: Style,
+}
+
+/// How a curve is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Style {
+    /// Its colour.
+    pub colour: Colour,
+    /// Its dashes.
+    pub dash: Dash,
+}
+
+/// The dashes of a line. Colour alone does not carry meaning in print.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Dash {
+    /// Unbroken.
+    Solid,
+    /// Dashed.
+    Dashed,
+    /// Dotted.
+    Dotted,
+}
+
+impl Style {
+    /// An unbroken line.
+    #[must_use]
+    pub const fn solid(colour: Colour) -> Self {
+        Self {
+            colour,
+            dash: Dash::Solid,
+        }
+    }
+
+    /// A dashed line.
+    #[must_use]
+    pub const fn dashed(colour: Colour) -> Self {
+        Self {
+            colour,
+            dash: Dash::Dashed,
+        }
+    }
+
+    /// The style of the `index`th of several equal curves: all colours unbroken first, then dashed, then dotted.
+    #[must_use]
+    pub fn nth(index: usize) -> Self {
+        let colours = Colour::CYCLE.len();
+        let dash = [Dash::Solid, Dash::Dashed, Dash::Dotted][index / colours % 3];
+        Self {
+            colour: Colour::CYCLE[index % colours],
+            dash,
+        }
+    }
+}
+
+impl Figure {
+    /// Name and style of every curve, in drawing order.
+    pub(super) fn legend(&self) -> Vec<(&str, Style)> {
+        match &self.plot {
+            Plot::Lines(lines) => lines
+                .series
+                .iter()
+                .map(|s| (s.name.as_str(), s.style))
+                .collect(),
+            Plot::PolarDeviation(circle) => circle
+                .traces
+                .iter()
+                .map(|t| (t.name.as_str(), t.style))
+                .collect(),
+        }
+    }
+
+    /// What follows the caption because the drawing cannot be read without it.
+    pub(super) fn note(&self) -> Option<String> {
+        match &self.plot {
+            Plot::Lines(_) => None,
+            Plot::PolarDeviation(circle) => Some(circle.scale_note()),
+        }
+    }
+
+    pub(super) fn check(&self) -> Result<(), ReportError> {
+        let series: Vec<(&str, usize, usize)> = match &self.plot {
+            Plot::Lines(lines) => lines
+                .series
+                .iter()
+                .map(|s| (s.name.as_str(), s.x.len(), s.y.len()))
+                .collect(),
+            Plot::PolarDeviation(circle) => {
+                if !(circle.radius_mm.is_finite() && circle.radius_mm > 0.0) {
+                    return Err(ReportError::Radius {
+                        figure: self.id.clone(),
+                        radius_mm: circle.radius_mm,
+                    });
+                }
+                let traces = circle.traces.iter();
+                traces
+                    .map(|t| (t.name.as_str(), t.angle_rad.len(), t.deviation_um.len()))
+                    .collect()
+            }
+        };
+        match series.into_iter().find(|(_, x, y)| x != y) {
+            None => Ok(()),
+            Some((name, x, y)) => Err(ReportError::SeriesLength {
+                figure: self.id.clone(),
+                series: name.to_owned(),
+                x,
+                y,
+            }),
+        }
+    }
+
+    pub(super) fn to_plotly(&self, points_per_series: usize) -> Plotly {
+        match &self.plot {
+            Plot::Lines(lines) => lines.to_plotly(points_per_series),
+            Plot::PolarDeviation(circle) => circle.to_plotly(points_per_series),
+        }
+    }
+}
+
+impl Lines {
+    fn to_plotly(&self, points_per_series: usize) -> Plotly {
+        let mut plot = Plotly::new();
+        // A hundred-thousandth of what an axis spans is a hundredth of a pixel: digits beyond it only cost bytes. The
+        // abscissas keep one digit more, for zooming into a long run.
+        let x_step = 1e-6 * span(self.series.iter().flat_map(|s| &s.x));
+        let y_step = 1e-5 * span(self.series.iter().flat_map(|s| &s.y));
+        for series in &self.series {
+            let kept = decimate(&series.x, &series.y, points_per_series);
+            let x: Vec<f64> = kept.iter().map(|&i| rounded(series.x[i], x_step)).collect();
+            let y: Vec<f64> = kept.iter().map(|&i| rounded(series.y[i], y_step)).collect();
+            plot.add_trace(
+                Scatter::new(x, y)
+                    .mode(Mode::Lines)
+                    .name(&series.name)
+                    .line(trace_line(series.style)),
+            );
+        }
+        let layout = layout()
+            .x_axis(
+                axis(&self.x_label)
+                    .show_grid(false)
+                    .zero_line_color(palette::RULE.0)
+                    .ticks(TicksDirection::Outside),
+            )
+            .y_axis(axis(&self.y_label).zero_line_color(palette::RULE.0))
+            .drag_mode(DragMode::Zoom)
+            .hover_mode(HoverMode::Closest);
+        plot.set_layout(layout);
+        plot
+    }
+}
+
+fn span<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
+    let (low, high) = values
+        .filter(|v| v.is_finite())
+        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
+            (low.min(*v), high.max(*v))
+        });
+    high - low
+}
+
+/// The line of a curve.
+pub(super) fn trace_line(style: Style) -> Line {
+    let dash = match style.dash {
+        Dash::Solid => DashType::Solid,
+        Dash::Dashed => DashType::Dash,
+        Dash::Dotted => DashType::Dot,
+    };
+    Line::new()
+        .width(1.3)
+        .color(style.colour.light())
+        .dash(dash)
+        // Curves are thinned here, and to the eye; the library's own thinning makes smooth ones angular.
+        .simplify(false)
+}
+
+/// What all axes share.
+pub(super) fn axis(label: &str) -> Axis {
+    Axis::new()
+        .title(Title::with_text(label).font(Font::new().size(13).color(palette::INK.0)))
+        .tick_font(Font::new().size(11).color(palette::LABEL.0))
+        .tick_color(palette::RULE.0)
+        .grid_color(palette::GRID.0)
+        .show_line(true)
+        .line_color(palette::RULE.0)
+        .auto_margin(true)
+}
+
+/// What all drawings share.
+pub(super) fn layout() -> Layout {
+    Layout::new()
+        .font(
+            Font::new()
+                .family("system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif")
+                .color(palette::INK.0),
+        )
+        .paper_background_color("rgba(0,0,0,0)")
+        .plot_background_color("rgba(0,0,0,0)")
+        .margin(Margin::new().left(56).right(12).top(8).bottom(44))
+        // The page has a legend of its own, which wraps on a narrow screen; saved images get this one.
+        .show_legend(false)
+        .legend(
+            Legend::new()
+                .orientation(Orientation::Horizontal)
+                .x(0.0)
+                .x_anchor(Anchor::Left)
+                .y(1.02)
+                .y_anchor(Anchor::Bottom)
+                .font(Font::new().size(12).color(palette::INK.0)),
+        )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Dash, Figure, Lines, Plot, Series, Style};
+    use crate::report::{Colour, ReportError};
+
+    fn figure(x: Vec<f64>, y: Vec<f64>) -> Figure {
+        let series = vec![Series {
+            name: "PID".into(),
+            x,
+            y,
+            style: Style::nth(0),
+        }];
+        let plot = Plot::Lines(Lines {
+            x_label: "Time (s)".into(),
+            y_label: "Error (µm)".into(),
+            series,
+        });
+        Figure {
+            id: "error".into(),
+            caption: String::new(),
+            plot,
+        }
+    }
+
+    #[test]
+    fn series_of_unequal_length_are_named() {
+        let error = figure(vec![1.0, 2.0], vec![1.0]).check().unwrap_err();
+        assert!(
+            matches!(&error, ReportError::SeriesLength { series, x: 2, y: 1, .. } if series == "PID")
+        );
+    }
+
+    #[test]
+    fn numbers_are_short_and_gaps_are_null() {
+        let json = figure(
+            vec![0.0, 0.1 + 0.2, 1.0],
+            vec![0.123_456_789, f64::NAN, 1.0],
+        )
+        .to_plotly(100)
+        .to_json();
+        assert!(json.contains("\"x\":[0.0,0.3,1.0]"), "{json}");
+        assert!(json.contains("\"y\":[0.123457,null,1.0]"), "{json}");
+    }
+
+    #[test]
+    fn styles_do_not_repeat_before_eighteen_curves() {
+        let styles: Vec<Style> = (0..18).map(Style::nth).collect();
+        for (i, style) in styles.iter().enumerate() {
+            assert!(!styles[..i].contains(style), "{i}");
+        }
+        assert_eq!(
+            styles[0],
+            Style {
+                colour: Colour::Blue,
+                dash: Dash::Solid
+            }
+        );
+    }
+}

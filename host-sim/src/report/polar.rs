@@ -1,0 +1,302 @@
+//! The circle test, drawn as a ball-bar instrument draws it.
+
+use super::figure::{Style, trace_line};
+use super::{decimate, palette};
+use plotly::common::{Anchor, DashType, Font, HoverInfo, Mode};
+use plotly::layout::{
+    Annotation, Axis, DragMode, HoverMode, Layout, Shape, ShapeLayer, ShapeLine, ShapeType,
+    TicksDirection,
+};
+use plotly::{Plot as Plotly, Scatter};
+use std::f64::consts::TAU;
+
+/// Largest share of the radius that the magnified deviation may take.
+const DEVIATION_SHARE: f64 = 0.3;
+/// Most division circles on either side of the nominal circle.
+const DIVISIONS: f64 = 3.0;
+
+/// Radial deviation from a circle, magnified.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PolarDeviation {
+    /// Radius of the nominal circle, mm.
+    pub radius_mm: f64,
+    /// Horizontal axis, with its unit.
+    pub x_label: String,
+    /// Vertical axis, with its unit.
+    pub y_label: String,
+    /// The measured circles.
+    pub traces: Vec<DeviationTrace>,
+}
+
+/// One measured circle.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DeviationTrace {
+    /// For the legend.
+    pub name: String,
+    /// Angle of each sample from the horizontal axis, rad.
+    pub angle_rad: Vec<f64>,
+    /// Radius less the nominal one, um.
+    pub deviation_um: Vec<f64>,
+    /// How it is drawn.
+    pub style: Style,
+}
+
+/// How far a polar figure magnifies, in round numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Magnification {
+    /// Drawn deviation over true deviation.
+    pub factor: f64,
+    /// Distance between two division circles, um.
+    pub division_um: f64,
+    /// Division circles inside and outside of the nominal one.
+    pub divisions: usize,
+}
+
+impl PolarDeviation {
+    /// The largest round magnification (1, 2, 5 times a power of ten) that leaves the circle a circle.
+    #[must_use]
+    pub fn magnification(&self) -> Magnification {
+        let largest_um = self
+            .traces
+            .iter()
+            .flat_map(|trace| &trace.deviation_um)
+            .filter(|d| d.is_finite())
+            .fold(0.0_f64, |largest, d| largest.max(d.abs()))
+            // A perfect circle still needs a scale: that of a nanometre.
+            .max(1e-3);
+        // Rounding to the next step down wins back what rounding to the next division takes.
+        let division_um = round_up(largest_um / DIVISIONS);
+        let divisions = (largest_um / division_um).ceil().max(1.0);
+        let factor = round_down(DEVIATION_SHARE * self.radius_mm * 1e3 / (divisions * division_um));
+        Magnification {
+            factor,
+            division_um,
+            divisions: divisions as usize,
+        }
+    }
+
+    /// What the reader must know to read the figure.
+    pub(super) fn scale_note(&self) -> String {
+        let Magnification {
+            factor,
+            division_um,
+            ..
+        } = self.magnification();
+        format!(
+            "Radial deviation magnified {factor} times, {division_um}\u{a0}µm per division; dashed: the nominal circle, \
+             radius {}\u{a0}mm.",
+            self.radius_mm
+        )
+    }
+
+    pub(super) fn to_plotly(&self, points_per_series: usize) -> Plotly {
+        let scale = self.magnification();
+        let mut plot = Plotly::new();
+        for trace in &self.traces {
+            let kept = decimate(&trace.angle_rad, &trace.deviation_um, points_per_series);
+            let drawn = |axis: fn(f64) -> f64| -> Vec<f64> {
+                let place = |&i: &usize| {
+                    let radius = self.radius_mm + scale.factor * trace.deviation_um[i] * 1e-3;
+                    rounded(radius * axis(trace.angle_rad[i]), self.radius_mm * 1e-5)
+                };
+                kept.iter().map(place).collect()
+            };
+            let deviation: Vec<f64> = kept
+                .iter()
+                .map(|&i| rounded(trace.deviation_um[i], scale.division_um * 1e-3))
+                .collect();
+            plot.add_trace(
+                Scatter::new(drawn(f64::cos), drawn(f64::sin))
+                    .mode(Mode::Lines)
+                    .name(&trace.name)
+                    .line(trace_line(trace.style))
+                    .custom_data(deviation)
+                    .hover_info(HoverInfo::All)
+                    .hover_template("%{customdata} µm"),
+            );
+        }
+        plot.set_layout(self.layout(scale));
+        plot
+    }
+
+    fn layout(&self, scale: Magnification) -> Layout {
+        let reach = scale.divisions as isize;
+        let offset_mm = |division: isize| scale.factor * scale.division_um * 1e-3 * division as f64;
+        let circles = (-reach..=reach).map(|division| {
+            let r = self.radius_mm + offset_mm(division);
+            let line = match division {
+                0 => ShapeLine::new()
+                    .color(palette::LABEL.0)
+                    .width(1.0)
+                    .dash(DashType::Dash),
+                _ => ShapeLine::new().color(palette::GRID.0).width(1.0),
+            };
+            Shape::new()
+                .shape_type(ShapeType::Circle)
+                .layer(ShapeLayer::Below)
+                .x0(-r)
+                .x1(r)
+                .y0(-r)
+                .y1(r)
+                .line(line)
+        });
+        // The scale stands where ball-bar plots have it: in the empty centre.
+        let centre = Annotation::new()
+            .text(format!(
+                "× {}<br>{} µm/div",
+                scale.factor, scale.division_um
+            ))
+            .x(0.0)
+            .y(0.0)
+            .show_arrow(false)
+            .font(Font::new().size(12).color(palette::LABEL.0));
+        // Divisions are labelled on the diagonal, away from the axes, where the quadrant glitches are.
+        let labels = [-reach, reach].into_iter().map(|division| {
+            let place = (self.radius_mm + offset_mm(division)) * (TAU / 8.0).cos();
+            let um = division as f64 * scale.division_um;
+            Annotation::new()
+                .text(format!("{um:+} µm").replace('-', "\u{2212}"))
+                .x(place)
+                .y(place)
+                .x_anchor(if division < 0 {
+                    Anchor::Right
+                } else {
+                    Anchor::Left
+                })
+                .y_anchor(if division < 0 {
+                    Anchor::Top
+                } else {
+                    Anchor::Bottom
+                })
+                .show_arrow(false)
+                .font(Font::new().size(10).color(palette::LABEL.0))
+        });
+        let range = 1.06 * (self.radius_mm + offset_mm(reach));
+        let axis = |label: &str| {
+            super::figure::axis(label)
+                .range(vec![-range, range])
+                .show_grid(false)
+                .ticks(TicksDirection::Outside)
+                .tick_values(vec![-self.radius_mm, 0.0, self.radius_mm])
+                .zero_line_color(palette::GRID.0)
+        };
+        super::figure::layout()
+            .x_axis(axis(&self.x_label))
+            .y_axis(Axis::scale_anchor(axis(&self.y_label), "x"))
+            .drag_mode(DragMode::Zoom)
+            .hover_mode(HoverMode::Closest)
+            .shapes(circles.collect())
+            .annotations(std::iter::once(centre).chain(labels).collect())
+    }
+}
+
+/// `value` rounded to a decimal grid no coarser than `step`: shorter on the page, and the same to the eye.
+pub(super) fn rounded(value: f64, step: f64) -> f64 {
+    let digits = -step.log10().floor();
+    if digits > 0.0 && digits < 300.0 {
+        // Scaling by a whole power of ten and back yields the double nearest to the short decimal.
+        let scale = 10f64.powf(digits).round();
+        (value * scale).round() / scale
+    } else {
+        value
+    }
+}
+
+/// The steps of a readable scale.
+const STEPS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
+
+fn decade(value: f64) -> f64 {
+    10f64.powf(value.log10().floor())
+}
+
+/// The next 1, 2 or 5 times a power of ten at or above `value`.
+fn round_up(value: f64) -> f64 {
+    let decade = decade(value);
+    let steps = STEPS.into_iter().map(|step| tidy(step * decade));
+    steps
+        .into_iter()
+        .find(|step| *step >= value * (1.0 - 1e-12))
+        .unwrap_or(10.0 * decade)
+}
+
+/// The next 1, 2 or 5 times a power of ten at or below `value`.
+fn round_down(value: f64) -> f64 {
+    let decade = decade(value);
+    let steps = STEPS.into_iter().rev().map(|step| tidy(step * decade));
+    steps
+        .into_iter()
+        .find(|step| *step <= value * (1.0 + 1e-12))
+        .unwrap_or(decade)
+}
+
+/// The decimal number that `value` stands for, so that it prints as 0.2 and not as 0.20000000000000001.
+fn tidy(value: f64) -> f64 {
+    format!("{value:.0e}").parse().unwrap_or(value)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{
+        DeviationTrace, Magnification, PolarDeviation, Style, round_down, round_up, rounded,
+    };
+
+    fn circle(radius_mm: f64, deviation_um: Vec<f64>) -> PolarDeviation {
+        let angle_rad = (0..deviation_um.len()).map(|i| i as f64).collect();
+        let trace = DeviationTrace {
+            name: "PID".into(),
+            angle_rad,
+            deviation_um,
+            style: Style::nth(0),
+        };
+        PolarDeviation {
+            radius_mm,
+            x_label: "x (mm)".into(),
+            y_label: "y (mm)".into(),
+            traces: vec![trace],
+        }
+    }
+
+    #[test]
+    fn scales_are_round() {
+        assert_eq!((round_up(0.00031), round_down(0.00031)), (0.0005, 0.0002));
+        assert_eq!((round_up(2.0), round_down(2.0)), (2.0, 2.0));
+        assert_eq!((round_up(700.0), round_down(999.0)), (1000.0, 500.0));
+    }
+
+    #[test]
+    fn the_magnified_trace_stays_within_its_share_of_the_radius() {
+        for (radius, largest) in [
+            (30.0, 4.1),
+            (30.0, 14.9),
+            (5.0, 0.3),
+            (100.0, 2000.0),
+            (0.01, 1.0),
+        ] {
+            let scale = circle(radius, vec![0.1 * largest, -largest]).magnification();
+            let reach_um = scale.divisions as f64 * scale.division_um;
+            assert!(reach_um >= largest && scale.divisions <= 3, "{scale:?}");
+            let share = scale.factor * reach_um * 1e-3 / radius;
+            assert!(
+                share <= 0.3 + 1e-9 && share > 0.1,
+                "{share} of the radius with {scale:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn perfect_and_broken_circles_have_a_scale_too() {
+        let expected = Magnification {
+            factor: 5e6,
+            division_um: 5e-4,
+            divisions: 2,
+        };
+        assert_eq!(circle(30.0, vec![0.0, f64::NAN]).magnification(), expected);
+    }
+
+    #[test]
+    fn rounding_shortens_without_moving() {
+        assert_eq!(rounded(0.123_456_789, 1e-4), 0.1235);
+        assert_eq!(rounded(1234.567, 1.0), 1234.567);
+        assert!(rounded(f64::NAN, 1e-3).is_nan());
+    }
+}

@@ -1,0 +1,214 @@
+//! The page is complete, closed to the network, and the same for the same data.
+
+use quadrant_sim::report::{
+    Block, Cell, Colour, Column, DeviationTrace, Figure, Lines, Page, Plot, PolarDeviation,
+    Provenance, ReportError, Section, Series, Style, Table,
+};
+
+fn lines(id: &str, series: usize, samples: usize) -> Figure {
+    let x: Vec<f64> = (0..samples).map(|i| i as f64 * 1e-4).collect();
+    let series = (0..series)
+        .map(|s| Series {
+            name: format!("law {s} </script><b>"),
+            x: x.clone(),
+            y: x.iter()
+                .map(|t| (t * 7.0 + s as f64).sin() * 12.345_678_9)
+                .collect(),
+            style: Style::nth(s),
+        })
+        .collect();
+    let plot = Plot::Lines(Lines {
+        x_label: "Time (s)".into(),
+        y_label: "Error (µm)".into(),
+        series,
+    });
+    Figure {
+        id: id.into(),
+        caption: "Error over time.".into(),
+        plot,
+    }
+}
+
+fn circle() -> Figure {
+    let angle_rad: Vec<f64> = (0..10_000).map(|i| i as f64 * 1e-3).collect();
+    let deviation_um = angle_rad.iter().map(|a| 4.0 * (2.0 * a).sin()).collect();
+    let trace = DeviationTrace {
+        name: "PID".into(),
+        angle_rad,
+        deviation_um,
+        style: Style::solid(Colour::Blue),
+    };
+    let plot = PolarDeviation {
+        radius_mm: 30.0,
+        x_label: "x (mm)".into(),
+        y_label: "y (mm)".into(),
+        traces: vec![trace],
+    };
+    Figure {
+        id: "circle".into(),
+        caption: "Circle.".into(),
+        plot: Plot::PolarDeviation(plot),
+    }
+}
+
+fn table(id: &str) -> Table {
+    Table {
+        id: id.into(),
+        caption: "Errors & glitches.".into(),
+        columns: vec![Column::new("Law"), Column::with_unit("Error", "µm")],
+        rows: vec![
+            vec![Cell::text("N-PID"), Cell::number(1.25, 1)],
+            vec![Cell::text("<none>"), Cell::Missing],
+        ],
+    }
+}
+
+fn page(blocks: Vec<Block>) -> Page {
+    Page {
+        title: "Friction compensation".into(),
+        subtitle: "A sample.".into(),
+        provenance: Provenance {
+            command: "quadrant --seed 7".into(),
+            seed: Some(7),
+            version: "0.1.0".into(),
+        },
+        sections: vec![Section {
+            id: "section".into(),
+            heading: "Tracking".into(),
+            prose: vec!["Plain text, <b>not</b> markup.".into()],
+            blocks,
+        }],
+    }
+}
+
+fn sample() -> Page {
+    page(vec![
+        Block::Table(table("errors")),
+        Block::Figure(lines("error", 2, 5000)),
+        Block::Figure(circle()),
+    ])
+}
+
+/// What the page says besides the plotting library.
+fn own_part(html: &str) -> String {
+    let (before, rest) = html
+        .split_once("<script type=\"text/javascript\">")
+        .expect("the library is embedded");
+    let (library, after) = rest.split_once("</script>").unwrap();
+    assert!(
+        library.contains("plotly.js v"),
+        "the library keeps its licence notice"
+    );
+    format!("{before}{after}")
+}
+
+#[test]
+fn the_same_data_give_the_same_bytes() {
+    assert_eq!(sample().to_html().unwrap(), sample().to_html().unwrap());
+}
+
+#[test]
+fn the_page_asks_no_network_for_anything() {
+    let html = sample().to_html().unwrap();
+    assert!(html.contains("default-src 'none'"));
+    let own = own_part(&html);
+    for remote in ["http:", "https:", "src=\"//", "@import", "url("] {
+        assert!(!own.contains(remote), "{remote}");
+    }
+}
+
+#[test]
+fn the_library_is_embedded_once_and_without_the_formula_renderer() {
+    let page = page(
+        (0..6)
+            .map(|i| Block::Figure(lines(&format!("figure-{i}"), 1, 100)))
+            .collect(),
+    );
+    let html = page.to_html().unwrap();
+    assert_eq!(html.matches("<script type=\"text/javascript\">").count(), 1);
+    assert!(!html.contains("MathJax.loader"));
+    assert!(html.len() < 5_000_000, "{} bytes", html.len());
+}
+
+#[test]
+fn long_traces_leave_the_page_below_eight_megabytes() {
+    let blocks = (0..12)
+        .map(|i| Block::Figure(lines(&format!("figure-{i}"), 8, 100_000)))
+        .collect();
+    let size = page(blocks).to_html().unwrap().len();
+    assert!(size < 8_000_000, "{size} bytes");
+}
+
+#[test]
+fn texts_are_escaped_everywhere() {
+    let own = own_part(&sample().to_html().unwrap());
+    assert!(own.contains("&lt;b&gt;not&lt;/b&gt; markup") && own.contains("&lt;none&gt;"));
+    assert!(
+        own.contains("law 0 \\u003c/script>"),
+        "series names cannot end their script element"
+    );
+}
+
+#[test]
+fn tables_and_figures_are_numbered_listed_and_downloadable() {
+    let own = own_part(&sample().to_html().unwrap());
+    for label in ["Table 1", "Figure 1", "Figure 2"] {
+        assert_eq!(
+            own.matches(label).count(),
+            2,
+            "{label} in the contents and in its caption"
+        );
+    }
+    assert!(own.contains("href=\"#errors\"") && own.contains("id=\"errors\""));
+    assert!(own.contains("download=\"errors.csv\" href=\"data:text/csv;charset=utf-8,Law%2CError"));
+    assert!(
+        own.contains("times, 2\u{a0}µm per division"),
+        "the circle states its scale"
+    );
+}
+
+#[test]
+fn every_curve_is_in_the_legend_in_both_colours() {
+    let own = own_part(&sample().to_html().unwrap());
+    assert_eq!(own.matches("aria-pressed=\"true\"").count(), 3);
+    assert!(own.contains("light-dark(#0072b2,#3f9fe0)"));
+}
+
+#[test]
+fn ids_are_checked() {
+    let twice = page(vec![
+        Block::Table(table("errors")),
+        Block::Figure(lines("errors", 1, 10)),
+    ]);
+    assert!(matches!(twice.to_html(), Err(ReportError::DuplicateId { id }) if id == "errors"));
+    for bad in ["", "1st", "a b", "ä", "a\"b"] {
+        let page = page(vec![Block::Table(table(bad))]);
+        assert!(
+            matches!(page.to_html(), Err(ReportError::BadId { .. })),
+            "{bad:?}"
+        );
+    }
+}
+
+#[test]
+fn a_circle_without_a_radius_is_refused() {
+    let mut figure = circle();
+    if let Plot::PolarDeviation(circle) = &mut figure.plot {
+        circle.radius_mm = 0.0;
+    }
+    assert!(matches!(
+        page(vec![Block::Figure(figure)]).to_html(),
+        Err(ReportError::Radius { .. })
+    ));
+}
+
+#[test]
+fn a_page_that_cannot_be_written_is_named() {
+    let error = page(vec![])
+        .write_html("no/such/folder/report.html")
+        .unwrap_err();
+    assert!(
+        error.to_string().contains("no/such/folder/report.html"),
+        "{error}"
+    );
+}

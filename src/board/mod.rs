@@ -1,0 +1,46 @@
+//! The machines the firmware runs on. Registers and `unsafe` live here and nowhere else.
+//!
+//! Each board offers the same small set of pieces, so one RTIC application serves them all:
+//!
+//! - `device`: what RTIC needs to know of the chip, with interrupts named by their *role*
+//!   (`CONTROL_TICK`, `DISPATCHER_0`..`DISPATCHER_2`) instead of by the peripheral behind them;
+//! - `Board::init`, which starts the chip and hands out `encoders`, `operator`, `amplifiers`, `tick` and `idle`;
+//! - `job`, what a host has left to run, if there is one;
+//! - `outputs_off`, which makes the machine safe from any context without owning anything;
+//! - `halt`, which never returns.
+
+#[cfg(all(feature = "board-mps2", feature = "board-nucleo-f446re"))]
+compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not both");
+
+mod fault;
+
+#[cfg(feature = "board-mps2")]
+mod mps2;
+#[cfg(feature = "board-mps2")]
+pub(crate) use mps2::*;
+
+#[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
+mod ad5754r;
+#[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
+mod nucleo_f446re;
+#[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
+pub(crate) use nucleo_f446re::*;
+
+/// What [`Idle::turn`] reports when the machine has run all it was asked to.
+///
+/// Only the emulated machine ever finishes.
+pub(crate) struct Finished {
+    /// Control ticks that ran.
+    pub(crate) ticks: u32,
+    /// Time since the control timer was started, in microseconds of the firmware's own clock.
+    pub(crate) microseconds: u64,
+}
+
+/// How a program ends.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Outcome {
+    /// It did all it was asked to.
+    Done,
+    /// It met a panic or a fault.
+    Failed,
+}

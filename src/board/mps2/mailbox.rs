@@ -1,0 +1,76 @@
+//! The firmware's side of the memory shared with the host.
+
+use core::sync::atomic::{Ordering, fence};
+
+use quadrant::link::lockstep::{BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS};
+
+/// Where the machine's PSRAM is, which the host backs by a shared file.
+const BASE: usize = 0x2100_0000;
+
+/// What the host asked for.
+#[derive(Clone, Copy)]
+pub(super) struct Boot {
+    /// How to run.
+    pub(super) mode: Mode,
+    /// How many ticks to run; in lockstep the host decides and this is zero.
+    pub(super) ticks: u32,
+    /// The job as the host encoded it.
+    pub(super) job: &'static [u8],
+}
+
+/// Reads a word.
+#[inline(always)]
+pub(super) fn read(offset: usize) -> u32 {
+    debug_assert!(offset.is_multiple_of(4) && offset < MEMORY_BYTES);
+    // SAFETY: an aligned address inside the PSRAM, which no Rust object occupies; the host may write to it at any
+    // time, hence volatile.
+    unsafe { core::ptr::read_volatile((BASE + offset) as *const u32) }
+}
+
+/// Writes a word.
+#[inline(always)]
+pub(super) fn write(offset: usize, word: u32) {
+    debug_assert!(offset.is_multiple_of(4) && offset < MEMORY_BYTES);
+    // SAFETY: as in `read`.
+    unsafe { core::ptr::write_volatile((BASE + offset) as *mut u32, word) }
+}
+
+/// Reads a sequence number; what it announces can be read after it.
+#[inline(always)]
+pub(super) fn read_sequence(offset: usize) -> u32 {
+    let sequence = read(offset);
+    fence(Ordering::Acquire);
+    sequence
+}
+
+/// Writes a sequence number; what it announces was written before it.
+#[inline(always)]
+pub(super) fn write_sequence(offset: usize, sequence: u32) {
+    fence(Ordering::Release);
+    write(offset, sequence);
+}
+
+/// Reads the boot block. Panics when no host has written one, or one that makes no sense.
+pub(super) fn boot() -> Boot {
+    let mut bytes = [0; BootBlock::BYTES];
+    for (index, word) in bytes.chunks_exact_mut(4).enumerate() {
+        word.copy_from_slice(&read(BOOT + 4 * index).to_le_bytes());
+    }
+    let Some(block) = BootBlock::decode(&bytes) else {
+        panic!("no host has prepared the memory: start this image with `cargo xtask emulate`");
+    };
+    assert!(
+        block.mode == Mode::Lockstep || (1..=RECORDED_TICKS).contains(&(block.ticks as usize)),
+        "{} ticks asked for, but a record holds 1 to {RECORDED_TICKS}",
+        block.ticks
+    );
+    // SAFETY: inside the PSRAM, as the block's decoding has checked the length; the host writes the job before it
+    // starts the machine and not again while it runs.
+    let job =
+        unsafe { core::slice::from_raw_parts((BASE + JOB) as *const u8, block.job_bytes as usize) };
+    Boot {
+        mode: block.mode,
+        ticks: block.ticks,
+        job,
+    }
+}

@@ -1,0 +1,277 @@
+//! The emulated machine: Arm MPS2 with the AN386 image (Cortex-M4F) or AN385 (Cortex-M3), as QEMU has them.
+//!
+//! There are no encoders and no amplifiers: counts come from, and codes go to, memory shared with a process on the
+//! host. See `quadrant::link::lockstep` for its map and the ways to run.
+
+pub(crate) mod device;
+mod mailbox;
+mod timer;
+
+use core::sync::atomic::{AtomicU32, Ordering};
+
+use cortex_m::peripheral::NVIC;
+use cortex_m_semihosting::debug;
+use defmt_semihosting as _;
+
+use quadrant::hal;
+use quadrant::safety::Command;
+use quadrant::stage::Outputs;
+use quadrant::units::DacCode;
+
+use super::{Finished, Outcome};
+use quadrant::link::lockstep::{
+    self, END_OF_RUN, InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS,
+    RECORDED_TICKS,
+};
+
+/// Control ticks begun. Written by [`Tick::acknowledge`] alone.
+static TICKS: AtomicU32 = AtomicU32::new(0);
+
+/// The machine, started, in pieces.
+pub(crate) struct Board {
+    /// Three position encoders.
+    pub(crate) encoders: Encoders,
+    /// What the operator asks for.
+    pub(crate) operator: Operator,
+    /// Three amplifiers.
+    pub(crate) amplifiers: Amplifiers,
+    /// The control tick.
+    pub(crate) tick: Tick,
+    /// What the idle loop does.
+    pub(crate) idle: Idle,
+}
+
+impl Board {
+    /// Starts the machine with `rate_hz` control ticks per second.
+    pub(crate) fn init(_core: cortex_m::Peripherals, rate_hz: u32) -> Self {
+        let boot = mailbox::boot();
+        let period = timer::CLOCK_HZ / rate_hz;
+        timer::CLOCK.start(u32::MAX, false);
+        if boot.mode == Mode::Paced {
+            timer::CONTROL.start(period - 1, true);
+        }
+        Self {
+            encoders: Encoders { mode: boot.mode },
+            operator: Operator { mode: boot.mode },
+            amplifiers: Amplifiers { mode: boot.mode },
+            tick: Tick {
+                mode: boot.mode,
+                period,
+                last: boot.ticks,
+            },
+            idle: Idle {
+                mode: boot.mode,
+                last: boot.ticks,
+                sequence: 0,
+                seen: 0,
+                clock: u32::MAX,
+                cycles: 0,
+            },
+        }
+    }
+}
+
+/// The job that the host has left, if it has.
+pub(crate) fn job() -> Option<&'static [u8]> {
+    let job = mailbox::boot().job;
+    (!job.is_empty()).then_some(job)
+}
+
+/// Where this tick's inputs are.
+#[inline(always)]
+fn input(mode: Mode) -> usize {
+    match mode {
+        Mode::Lockstep => lockstep::INPUT,
+        Mode::Paced | Mode::Unpaced => RECORDED_INPUTS + InputRecord::BYTES * record(),
+    }
+}
+
+/// The index of this tick's record, which stays inside the memory whatever happens.
+#[inline(always)]
+fn record() -> usize {
+    TICKS
+        .load(Ordering::Relaxed)
+        .wrapping_sub(1)
+        .min(RECORDED_TICKS as u32 - 1) as usize
+}
+
+/// Three position encoders.
+pub(crate) struct Encoders {
+    mode: Mode,
+}
+
+impl hal::Encoders for Encoders {
+    #[inline(always)]
+    fn counts(&mut self) -> [u32; 3] {
+        let at = input(self.mode);
+        [
+            mailbox::read(at),
+            mailbox::read(at + 4),
+            mailbox::read(at + 8),
+        ]
+    }
+}
+
+/// What the operator asks for.
+pub(crate) struct Operator {
+    mode: Mode,
+}
+
+impl Operator {
+    /// What is asked for in this tick.
+    #[inline(always)]
+    pub(crate) fn request(&mut self) -> Option<Command> {
+        Command::from_number(mailbox::read(input(self.mode) + 12))
+    }
+}
+
+/// Three amplifiers.
+pub(crate) struct Amplifiers {
+    mode: Mode,
+}
+
+impl hal::Amplifiers for Amplifiers {
+    /// Hands this tick's codes to the host.
+    #[inline(always)]
+    fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
+        let answer = OutputRecord {
+            outputs: Outputs { codes, enabled },
+        };
+        let [low, high] = answer.words();
+        match self.mode {
+            Mode::Lockstep => {
+                let tick = TICKS.load(Ordering::Relaxed);
+                mailbox::write(lockstep::OUTPUT, low);
+                mailbox::write(lockstep::OUTPUT + 4, high);
+                mailbox::write(lockstep::OUTPUT + 8, tick);
+                // One tick per exchange, so the tick is the number of the inputs that are answered.
+                mailbox::write_sequence(lockstep::OUTPUT_SEQUENCE, tick);
+            }
+            Mode::Paced | Mode::Unpaced => {
+                let at = RECORDED_OUTPUTS + OutputRecord::BYTES * record();
+                mailbox::write(at, low);
+                mailbox::write(at + 4, high);
+            }
+        }
+    }
+}
+
+/// The control tick.
+pub(crate) struct Tick {
+    mode: Mode,
+    period: u32,
+    last: u32,
+}
+
+impl Tick {
+    /// Begins a tick: clears its interrupt and counts it.
+    #[inline(always)]
+    pub(crate) fn acknowledge(&mut self) {
+        let ticks = TICKS.load(Ordering::Relaxed).wrapping_add(1);
+        TICKS.store(ticks, Ordering::Relaxed);
+        if self.mode == Mode::Paced {
+            timer::CONTROL.acknowledge();
+            if ticks == self.last {
+                timer::CONTROL.stop();
+            }
+        }
+    }
+
+    /// Cycles between two ticks.
+    #[inline(always)]
+    pub(crate) fn period_cycles(&self) -> u32 {
+        self.period
+    }
+
+    /// Cycles since this tick was due; [`Tick::period_cycles`] when the next one is due already.
+    ///
+    /// Only the hardware timer makes a tick due: in the other modes this is zero.
+    #[inline(always)]
+    pub(crate) fn elapsed_cycles(&self) -> u32 {
+        if self.mode != Mode::Paced {
+            return 0;
+        }
+        let left = timer::CONTROL.value();
+        // Asked after the value was read: a reload in between is seen.
+        if timer::CONTROL.is_due() {
+            self.period
+        } else {
+            (self.period - 1).saturating_sub(left)
+        }
+    }
+}
+
+/// What the idle loop does.
+pub(crate) struct Idle {
+    mode: Mode,
+    last: u32,
+    sequence: u32,
+    seen: u32,
+    clock: u32,
+    cycles: u64,
+}
+
+impl Idle {
+    /// One turn of the idle loop; something is returned when the run is over.
+    ///
+    /// It never sleeps: with WFI the emulator's time would no longer follow the instructions executed.
+    pub(crate) fn turn(&mut self) -> Option<Finished> {
+        let over = match self.mode {
+            Mode::Lockstep => {
+                let sequence = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
+                if sequence != self.sequence && sequence != END_OF_RUN {
+                    self.sequence = sequence;
+                    pend_tick();
+                }
+                sequence == END_OF_RUN
+            }
+            Mode::Paced => {
+                let ticks = TICKS.load(Ordering::Relaxed);
+                // Once a tick is often enough to see every wrap, and the emulator is slow at reading timers.
+                if ticks != self.seen {
+                    self.seen = ticks;
+                    let value = timer::CLOCK.value();
+                    self.cycles += u64::from(self.clock.wrapping_sub(value));
+                    self.clock = value;
+                }
+                ticks == self.last
+            }
+            Mode::Unpaced => {
+                let over = TICKS.load(Ordering::Relaxed) == self.last;
+                if !over {
+                    pend_tick();
+                }
+                over
+            }
+        };
+        over.then(|| Finished {
+            ticks: TICKS.load(Ordering::Relaxed),
+            microseconds: self.cycles / u64::from(timer::CLOCK_HZ / 1_000_000),
+        })
+    }
+}
+
+/// Runs the control interrupt now.
+fn pend_tick() {
+    NVIC::pend(device::Interrupt::CONTROL_TICK);
+    // The interrupt is taken before anything below is executed.
+    cortex_m::asm::dsb();
+    cortex_m::asm::isb();
+}
+
+/// Zero codes, amplifiers disabled, from any context.
+pub(crate) fn outputs_off() {
+    timer::CONTROL.stop();
+    mailbox::write(lockstep::OUTPUT, 0);
+    mailbox::write(lockstep::OUTPUT + 4, 0);
+}
+
+/// Ends the emulator with an exit code that says how it went.
+pub(crate) fn halt(outcome: Outcome) -> ! {
+    loop {
+        debug::exit(match outcome {
+            Outcome::Done => debug::EXIT_SUCCESS,
+            Outcome::Failed => debug::EXIT_FAILURE,
+        });
+    }
+}

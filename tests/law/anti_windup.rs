@@ -1,0 +1,127 @@
+//! Recovery from a load that the output limit cannot hold.
+
+use quadrant::control::npid::NonlinearGainTable;
+use quadrant::control::pid::{Pid, PidGains, PidState};
+use quadrant::settings::x_axis;
+
+const PERIOD_S: f64 = 1e-4;
+const LIMIT_V: f64 = 1.0;
+const LOAD_V: f64 = 1.05;
+const LOAD_S: f64 = 0.5;
+
+/// The x axis' linear model without its spring, under a PID with a strong integral.
+struct Loop {
+    pid: Pid<f64>,
+    nonlinear: Option<NonlinearGainTable<f64>>,
+    memory: PidState<f64>,
+    place_mm: f64,
+    velocity_mm_s: f64,
+    delay: [f64; 12],
+    tick: usize,
+}
+
+impl Loop {
+    fn new(nonlinear: bool) -> Self {
+        let axis = x_axis();
+        let gains = PidGains {
+            ki_v_per_mm_s: 40.0,
+            ..axis.feedback.pid
+        };
+        let shape = axis.feedback.nonlinear.expect("an N-PID by default");
+        Self {
+            pid: Pid::build(&gains, LIMIT_V, PERIOD_S),
+            nonlinear: nonlinear.then(|| NonlinearGainTable::build(&shape)),
+            memory: PidState::default(),
+            place_mm: 0.0,
+            velocity_mm_s: 0.0,
+            delay: [0.0; 12],
+            tick: 0,
+        }
+    }
+
+    /// One control period under a load; the error.
+    fn step(&mut self, load_v: f64) -> f64 {
+        let error = -self.place_mm;
+        let scaled = self
+            .nonlinear
+            .as_ref()
+            .map_or(error, |k| k.scaled_error(error));
+        let output = self
+            .pid
+            .step(&mut self.memory, scaled, -LIMIT_V, LIMIT_V)
+            .output;
+        let slot = self.tick % self.delay.len();
+        let drive = core::mem::replace(&mut self.delay[slot], output) + load_v;
+        self.tick += 1;
+        for _ in 0..10 {
+            let step = PERIOD_S / 10.0;
+            self.velocity_mm_s += step * (69_390.0 * drive - 144.8 * self.velocity_mm_s);
+            self.place_mm += step * self.velocity_mm_s;
+        }
+        error
+    }
+
+    /// The errors of `seconds` without load.
+    fn recover(&mut self, seconds: f64) -> Vec<f64> {
+        (0..(seconds / PERIOD_S) as usize)
+            .map(|_| self.step(0.0))
+            .collect()
+    }
+}
+
+/// The overshoot past zero and the time in s from which the error stays within 10 um.
+fn overshoot_and_settling(errors: &[f64]) -> (f64, f64) {
+    let sign = errors[0].signum();
+    let overshoot = errors
+        .iter()
+        .fold(0.0f64, |most, error| most.max(-sign * error));
+    let last = errors
+        .iter()
+        .rposition(|error| error.abs() > 0.01)
+        .unwrap_or(0);
+    (overshoot, (last + 1) as f64 * PERIOD_S)
+}
+
+fn check(nonlinear: bool) {
+    let mut overshoots = vec![];
+    for sign in [1.0, -1.0] {
+        let mut windup = Loop::new(nonlinear);
+        for _ in 0..(LOAD_S / PERIOD_S) as usize {
+            windup.step(sign * LOAD_V);
+        }
+        let pushed_mm = windup.place_mm;
+        assert!(
+            pushed_mm * sign > 5.0,
+            "the load overpowers the output: {pushed_mm} mm"
+        );
+        // The same place and speed with nothing remembered of the load.
+        let mut fresh = Loop::new(nonlinear);
+        (fresh.place_mm, fresh.velocity_mm_s) = (windup.place_mm, windup.velocity_mm_s);
+        fresh.pid.reset(&mut fresh.memory, -fresh.place_mm);
+        fresh.delay = [-sign * LIMIT_V; 12];
+
+        let (overshoot, settled_s) = overshoot_and_settling(&windup.recover(2.0));
+        let (unloaded, unloaded_s) = overshoot_and_settling(&fresh.recover(2.0));
+        println!(
+            "nonlinear {nonlinear}, load {sign:+}: overshoot {overshoot:.3} mm in {settled_s:.3} s, \
+             without the load's history {unloaded:.3} mm in {unloaded_s:.3} s"
+        );
+        assert!(settled_s < 0.5, "{settled_s} s");
+        assert!(
+            overshoot < unloaded + 0.3 * pushed_mm.abs(),
+            "{overshoot} {unloaded}"
+        );
+        overshoots.push(overshoot);
+    }
+    assert_eq!(overshoots[0], overshoots[1], "both signs alike");
+}
+
+#[test]
+fn pid_recovers_from_a_saturating_load_of_either_sign() {
+    check(false);
+}
+
+#[test]
+fn npid_recovers_from_a_saturating_load_of_either_sign() {
+    check(true);
+}

@@ -1,0 +1,124 @@
+//! What several tests share.
+
+use proptest::prelude::*;
+use proptest::test_runner::{Config, RngSeed};
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::safety::Command;
+use quadrant::scalar::Scalar;
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
+
+/// A property test of `cases` cases that is the same on every run.
+pub(crate) fn repeatable(cases: u32) -> Config {
+    Config {
+        cases,
+        failure_persistence: None,
+        rng_seed: RngSeed::Fixed(0x5155_4144),
+        ..Config::default()
+    }
+}
+
+/// Every `f32` there is, the special ones more often than chance would have it.
+pub(crate) fn any_f32() -> impl Strategy<Value = f32> {
+    prop_oneof![
+        6 => any::<u32>().prop_map(f32::from_bits),
+        2 => -40.0f32..40.0,
+        1 => prop::sample::select(vec![
+            f32::NAN,
+            -f32::NAN,
+            f32::INFINITY,
+            f32::NEG_INFINITY,
+            f32::MAX,
+            f32::MIN,
+            f32::MIN_POSITIVE,
+            f32::from_bits(1),
+            0.0,
+            -0.0,
+        ]),
+    ]
+}
+
+/// A small generator of the same noise on every machine (xorshift).
+pub(crate) struct Noise(u64);
+
+impl Noise {
+    pub(crate) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    pub(crate) fn bits(&mut self) -> u64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        self.0
+    }
+
+    /// One of `-most..=most`.
+    pub(crate) fn counts(&mut self, most: i64) -> i64 {
+        (self.bits() >> 16) as i64 % (2 * most + 1) - most
+    }
+}
+
+/// The default stage with one change to its x axis.
+pub(crate) fn with_x(change: impl FnOnce(&mut quadrant::settings::AxisSettings)) -> StageSettings {
+    let mut settings = StageSettings::default();
+    change(&mut settings.axes[0]);
+    settings
+}
+
+/// A sine on x alone.
+pub(crate) fn sine_on_x(amplitude_mm: f64, velocity_mm_s: f64) -> PlanSettings {
+    let mut plan = PlanSettings::default();
+    plan.motions[0] = MotionSettings::Harmonic(HarmonicSettings {
+        cycles: None,
+        ..HarmonicSettings::with_velocity(amplitude_mm, velocity_mm_s, 1.0, 0.1)
+    });
+    plan
+}
+
+/// A stage with its memory and the inputs of its next tick.
+pub(crate) struct Rig<S: Scalar> {
+    pub(crate) stage: Stage<S, 4>,
+    pub(crate) plan: Plan<S>,
+    pub(crate) state: StageState<S, 4>,
+    pub(crate) inputs: Inputs,
+}
+
+impl<S: Scalar> Rig<S> {
+    pub(crate) fn new(settings: &StageSettings, plan: &PlanSettings) -> Self {
+        Self {
+            stage: settings.build().expect("valid settings"),
+            plan: plan.build(settings).expect("valid plan"),
+            state: StageState::default(),
+            inputs: Inputs::default(),
+        }
+    }
+
+    /// One tick; commands and flags act once, counts stay.
+    pub(crate) fn tick(&mut self) -> Outputs {
+        let inputs = self.inputs;
+        self.inputs = Inputs {
+            counts: inputs.counts,
+            ..Inputs::default()
+        };
+        self.stage.tick(&self.plan, &mut self.state, &inputs)
+    }
+
+    pub(crate) fn command(&mut self, command: Command) -> Outputs {
+        self.inputs.command = Some(command);
+        self.tick()
+    }
+
+    /// Reads the encoders once, enables, and starts the plan.
+    pub(crate) fn start(&mut self) {
+        self.tick();
+        self.command(Command::Enable);
+        self.command(Command::Run);
+    }
+
+    /// Goes over to other settings at the next tick.
+    pub(crate) fn exchange(&mut self, settings: &StageSettings) {
+        self.stage = settings.build().expect("valid settings");
+        self.inputs.settings_changed = true;
+    }
+}

@@ -1,0 +1,207 @@
+//! No stored parameter is inert: each changes the outputs, brings about a fault, or decides whether settings and plan
+//! are accepted.
+
+use quadrant::control::popov::sector_bound;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::safety::SafetyState;
+use quadrant::scalar::{Quantity, Scalar};
+use quadrant::settings::{PlanSettings, StageSettings};
+use serde_json::Value;
+
+use crate::common::{Noise, Rig};
+
+/// Outputs of every tick, in volts as bits and in codes, and the state at the end.
+type Trace = (Vec<([u64; 3], [i16; 3])>, SafetyState);
+
+/// The plan's peak acceleration is just within the default limit.
+fn plan() -> PlanSettings {
+    let sine = HarmonicSettings::with_velocity(0.5, 31.4, 2.0, 0.2);
+    PlanSettings {
+        motions: [MotionSettings::Harmonic(sine); 3],
+    }
+}
+
+/// A motion both ways with noise, an error beyond emax, a stretch that saturates, a change of settings, and in the end
+/// a jump of half a 32-bit counter's range and one beyond the plausible.
+fn run<S: Scalar>(settings: &StageSettings, jumping: usize) -> Option<Trace> {
+    if settings.validate(4).is_err() || plan().validate(settings).is_err() {
+        return None;
+    }
+    let mut weaker = settings.clone();
+    for axis in &mut weaker.axes {
+        axis.feedback.pid.kp_v_per_mm *= 0.5;
+    }
+    let mut rig = Rig::<S>::new(&weaker, &plan());
+    let mut noise = Noise::new(11);
+    let mut trace = vec![];
+    rig.start();
+    for tick in 0..3500 {
+        if tick == 1000 {
+            rig.exchange(settings);
+        }
+        // mm behind the reference: 0.15 for a while, then almost the following-error limit.
+        let lag = match tick {
+            0..500 => 0.02,
+            500..1500 => 0.02 + 0.13 * f64::from(tick - 500) / 1000.0,
+            1500..2000 => 0.15,
+            2000..2500 => 0.15 + 0.84 * f64::from(tick - 2000) / 500.0,
+            2500..3000 => 0.99,
+            _ => 0.99 - 0.9 * f64::from(tick - 3000) / 500.0,
+        };
+        for index in 0..3 {
+            let reference = rig.state.axes()[index].telemetry().reference;
+            let count = (reference.0 >> 16) - (lag / 5e-4) as i64 + noise.counts(2);
+            rig.inputs.counts[index] = count as u32;
+        }
+        trace.push(tick_of(&mut rig));
+    }
+    // At rest: as far as one tick can plausibly go, then half the counter, then too far.
+    for jump in [100, 1 << 31, 103] {
+        rig.inputs.counts[jumping] = rig.inputs.counts[jumping].wrapping_add(jump);
+        trace.push(tick_of(&mut rig));
+    }
+    Some((trace, rig.state.safety()))
+}
+
+fn tick_of<S: Scalar>(rig: &mut Rig<S>) -> ([u64; 3], [i16; 3]) {
+    let outputs = rig.tick();
+    let volts = |index: usize| {
+        let volts = rig.state.axes()[index].telemetry().output;
+        volts.to_f64(Quantity::Voltage).to_bits()
+    };
+    (
+        core::array::from_fn(volts),
+        outputs.codes.map(|code| code.0),
+    )
+}
+
+/// The paths of all leaves of a tree.
+fn leaves(value: &Value, path: &str, found: &mut Vec<String>) {
+    match value {
+        Value::Object(fields) => {
+            for (name, value) in fields {
+                leaves(value, &format!("{path}/{name}"), found);
+            }
+        }
+        Value::Array(items) => {
+            for (index, value) in items.iter().enumerate() {
+                leaves(value, &format!("{path}/{index}"), found);
+            }
+        }
+        _ => found.push(path.to_owned()),
+    }
+}
+
+/// A small change to a leaf; some act only as the bound of something else, and need a larger one.
+fn perturbed(path: &str, value: &Value) -> Value {
+    let field = path.rsplit('/').next().unwrap_or_default();
+    match value {
+        Value::Bool(flag) => Value::Bool(!flag),
+        Value::String(kind) => Value::from(if kind == "static" { "gms" } else { "static" }),
+        Value::Null => panic!("{path} is not set by default"),
+        Value::Number(number) if number.is_u64() => Value::from(number.as_u64().expect("u64") - 1),
+        Value::Number(number) => {
+            let number = number.as_f64().expect("a number");
+            Value::from(match field {
+                // The plant only bounds what others may be: Popov's gain and the stiffness.
+                "gain_mm_per_v_s2" | "delay_s" => number * 2.0,
+                "damping_per_s" => 0.0,
+                "stiffness_per_s2" => 1e6,
+                // Whole ticks count.
+                "preview_s" => number * 0.9,
+                _ if number == 0.0 => 1e-3,
+                _ => number * 0.97,
+            })
+        }
+        _ => unreachable!("{path} is no leaf"),
+    }
+}
+
+fn inert(base: &StageSettings) -> Vec<String> {
+    let tree = serde_json::to_value(base).expect("plain data");
+    let mut paths = vec![];
+    leaves(&tree, "", &mut paths);
+    assert!(paths.len() > 100, "{} leaves", paths.len());
+    let unchanged = [0, 1, 2].map(|axis| run::<f32>(base, axis).expect("valid"));
+    paths
+        .into_iter()
+        .filter(|path| {
+            let mut tree = tree.clone();
+            let leaf = tree.pointer_mut(path).expect("a leaf");
+            *leaf = perturbed(path, leaf);
+            let settings: StageSettings = serde_json::from_value(tree).expect("the same shape");
+            assert_ne!(settings, *base, "{path} changed");
+            let axis = path
+                .strip_prefix("/axes/")
+                .and_then(|rest| rest[..1].parse().ok());
+            let axis = axis.unwrap_or(0);
+            run::<f32>(&settings, axis).is_some_and(|trace| trace == unchanged[axis])
+        })
+        .collect()
+}
+
+fn with_kind(kind: FeedforwardKind) -> StageSettings {
+    let mut settings = StageSettings::default();
+    for axis in &mut settings.axes {
+        axis.feedforward.kind = kind;
+        // Low enough for the stretch with a large error to saturate, and the integral to reach its limit.
+        axis.amplifier.output_limit_v = 1.5;
+        axis.feedback.integral_limit_v = 0.05;
+        // As much nonlinear gain as the plant bears, so that less damping bears less.
+        let plant = axis.plant.expect("a plant by default");
+        let bound = sector_bound(&plant, &axis.feedback.pid, 1.0 / settings.rate_hz);
+        let gain = axis.feedback.nonlinear.as_mut().expect("an N-PID by default");
+        gain.rate_per_mm = (0.999 * bound).acosh() / gain.range_mm;
+    }
+    settings
+}
+
+#[test]
+fn every_parameter_acts_with_combined_feedforward_or_with_static() {
+    let combined = inert(&with_kind(FeedforwardKind::Combined));
+    // The share of the static level acts where the static level does.
+    let level: Vec<String> = (0..3)
+        .map(|axis| format!("/axes/{axis}/feedforward/gains/level"))
+        .collect();
+    assert_eq!(combined, level);
+    let statically = inert(&with_kind(FeedforwardKind::Static));
+    assert!(
+        level.iter().all(|path| !statically.contains(path)),
+        "{statically:?}"
+    );
+}
+
+/// The weights act on the outputs too, not only through their sum.
+#[test]
+fn each_weight_acts() {
+    let base = with_kind(FeedforwardKind::Combined);
+    let unchanged = run::<f32>(&base, 0);
+    for axis in 0..3 {
+        for element in 0..4 {
+            let mut settings = base.clone();
+            let elements = &mut settings.axes[axis].friction.gms.elements;
+            elements[element].weight -= 0.01;
+            elements[(element + 1) % 4].weight += 0.01;
+            let trace = run::<f32>(&settings, 0);
+            assert!(
+                trace.is_some() && trace != unchanged,
+                "axis {axis}, element {element}"
+            );
+        }
+    }
+}
+
+#[test]
+fn the_scenario_saturates_and_ends_in_the_jump() {
+    let (trace, end) = run::<f32>(&with_kind(FeedforwardKind::Combined), 1).expect("valid");
+    assert!(matches!(end, SafetyState::Faulted(_)), "{end:?}");
+    let full = 1.5f32.to_bits();
+    let limit = f64::from(f32::from_bits(full)).to_bits();
+    assert!(
+        trace.iter().any(|(volts, _)| volts[0] == limit),
+        "it saturates"
+    );
+    let driven = trace.iter().filter(|(_, codes)| *codes != [0; 3]).count();
+    assert!(driven > 3490, "{driven} ticks are driven");
+}

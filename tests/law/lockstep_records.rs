@@ -1,0 +1,106 @@
+//! The records of the lockstep channel survive the way there and back.
+
+use proptest::prelude::*;
+use quadrant::link::lockstep::{
+    BootBlock, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, RECORDED_TICKS,
+};
+use quadrant::safety::Command;
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant::stage::Outputs;
+use quadrant::units::DacCode;
+
+use crate::common::{repeatable, sine_on_x};
+
+proptest! {
+    #![proptest_config(repeatable(500))]
+
+    #[test]
+    fn input_records_round_trip(counts in any::<[u32; 3]>(), number in 0u32..=5) {
+        let record = InputRecord { counts, request: Command::from_number(number) };
+        prop_assert_eq!(InputRecord::decode(&record.encode()), record);
+    }
+
+    #[test]
+    fn output_records_round_trip(codes in any::<[i16; 3]>(), enabled in any::<bool>()) {
+        let outputs = Outputs { codes: codes.map(DacCode), enabled };
+        let record = OutputRecord { outputs };
+        prop_assert_eq!(OutputRecord::decode(&record.encode()), record);
+    }
+
+    #[test]
+    fn boot_blocks_round_trip(mode in 0u8..3, ticks in any::<u32>(), job_bytes in 0..=JOB_BYTES as u32) {
+        let mode = [Mode::Lockstep, Mode::Paced, Mode::Unpaced][usize::from(mode)];
+        let block = BootBlock { mode, ticks, job_bytes };
+        prop_assert_eq!(BootBlock::decode(&block.encode()), Some(block));
+    }
+
+    #[test]
+    fn a_memory_that_no_host_prepared_is_not_a_boot_block(bytes in any::<[u8; BootBlock::BYTES]>()) {
+        prop_assume!(bytes[..4] != *b"DAUQ");
+        prop_assert_eq!(BootBlock::decode(&bytes), None);
+    }
+}
+
+#[test]
+fn records_are_little_endian_words() {
+    let record = InputRecord {
+        counts: [1, 0x0203, 0x0405_0607],
+        request: Some(Command::Run),
+    };
+    let bytes = [1, 0, 0, 0, 3, 2, 0, 0, 7, 6, 5, 4, 4, 0, 0, 0];
+    assert_eq!(record.encode(), bytes);
+    let record = OutputRecord {
+        outputs: Outputs {
+            codes: [DacCode(-1), DacCode(2), DacCode(-3)],
+            enabled: true,
+        },
+    };
+    assert_eq!(record.encode(), [0xFF, 0xFF, 2, 0, 0xFD, 0xFF, 1, 0]);
+}
+
+#[test]
+fn boot_blocks_with_wrong_magic_mode_or_size_are_refused() {
+    let block = BootBlock {
+        mode: Mode::Paced,
+        ticks: 10,
+        job_bytes: 100,
+    };
+    for (byte, value) in [(0, 0), (4, 3), (12 + 1, 0x7F)] {
+        let mut bytes = block.encode();
+        bytes[byte] = value;
+        assert_eq!(BootBlock::decode(&bytes), None, "byte {byte}");
+    }
+}
+
+#[test]
+fn every_command_has_its_number_and_no_other_number_a_command() {
+    for command in [
+        Command::Enable,
+        Command::Disable,
+        Command::ResetFault,
+        Command::Run,
+    ] {
+        assert_eq!(Command::from_number(command.number()), Some(command));
+    }
+    assert_eq!(Command::from_number(0), None);
+    assert_eq!(Command::from_number(5), None);
+    assert_eq!(Command::from_number(u32::MAX), None);
+}
+
+#[test]
+fn the_default_job_fits_its_room_and_round_trips() {
+    let job = Job {
+        stage: StageSettings::default(),
+        plan: sine_on_x(30.0, 10.0),
+    };
+    let mut room = vec![0; JOB_BYTES];
+    let used = postcard::to_slice(&job, &mut room).expect("fits").len();
+    let back: Job = postcard::from_bytes(&room[..used]).expect("decodes");
+    assert_eq!(back, job);
+    assert_ne!(back.plan, PlanSettings::default());
+}
+
+#[test]
+fn a_recorded_run_holds_a_minute_of_ticks() {
+    assert!(RECORDED_TICKS >= 600_000, "{RECORDED_TICKS}");
+}

@@ -1,0 +1,189 @@
+//! `cargo xtask emulate`: the image in QEMU against the simulated stage, word by word beside its twin in this process.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use quadrant::link::lockstep::{
+    END_OF_RUN, INPUT, INPUT_SEQUENCE, InputRecord, Mode, OUTPUT, OUTPUT_SEQUENCE, OutputRecord,
+    RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+};
+
+use crate::emulator::{Clock, Emulator, Memory};
+use crate::image::{self, Board, Image, Scalar, Target};
+use crate::toolchain::Toolchain;
+use crate::twin::{Tally, Twin, encoded_job};
+
+/// Control ticks per second of the firmware's time.
+const RATE_HZ: f64 = 10_000.0;
+/// How long the firmware may take to answer, in the host's time.
+const PATIENCE: Duration = Duration::from_secs(20);
+/// Looks at the answer between two looks at the clock.
+const LOOKS: u32 = 1 << 14;
+/// Ticks between two steps of the progress bar.
+const PROGRESS_TICKS: u32 = 10_000;
+
+/// Runs the image for some seconds of its time and fails on any difference.
+pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: bool) -> Result<()> {
+    let ticks = seconds * RATE_HZ;
+    ensure!(
+        (1.0..f64::from(u32::MAX)).contains(&ticks),
+        "{seconds} s is not a time to run"
+    );
+    let ticks = ticks as u32;
+    let image = image::build(
+        toolchain,
+        Target {
+            board: Board::Mps2,
+            scalar,
+        },
+    )?;
+    println!("{}", image.footprint()?);
+    let twin = Twin::of(scalar)?;
+    let (tally, elapsed) = if paced {
+        recorded(&image, twin, ticks)?
+    } else {
+        lockstep(&image, twin, ticks)?
+    };
+    if let Some((tick, twin, firmware)) = &tally.first {
+        println!("first difference at tick {tick}: {twin:?} here, {firmware:?} in the firmware");
+    }
+    let rate = f64::from(ticks) / elapsed.as_secs_f64();
+    println!(
+        "{} words compared, {} differ, {} of them not zero, {rate:.0} ticks/s, {:.1} times real time",
+        tally.words,
+        tally.differ,
+        tally.moving,
+        rate / RATE_HZ
+    );
+    ensure!(tally.differ == 0, "{} words differ", tally.differ);
+    ensure!(
+        2 * tally.moving > tally.words || seconds < 1.0,
+        "the stage did not move: only {} words were not zero",
+        tally.moving
+    );
+    Ok(())
+}
+
+/// Exchanges with the firmware tick by tick. The time starts with the first answer: compiling tables is not a tick.
+fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<(Tally, Duration)> {
+    let memory = Memory::create()?;
+    memory.prepare(Mode::Lockstep, 0, &encoded_job()?)?;
+    let mut emulator = Emulator::start(image, &memory, Clock::Host, true)?;
+    let bar = progress(ticks);
+    let mut started = None;
+    let mut bytes = [0; OutputRecord::BYTES];
+    for tick in 1..=ticks {
+        let input = twin.input();
+        memory.write(INPUT, &input.encode())?;
+        memory.set_word(INPUT_SEQUENCE, tick)?;
+        // The twin computes while the firmware does.
+        twin.compute(&input);
+        if let Err(error) = wait_for(&memory, &mut emulator, tick) {
+            // Why the firmware has stopped is in its log.
+            return match emulator.ended()? {
+                Some(_) => emulator.wait().and(Err(error)),
+                None => Err(error),
+            };
+        }
+        started.get_or_insert_with(Instant::now);
+        memory.read(OUTPUT, &mut bytes)?;
+        let outputs = OutputRecord::decode(&bytes).outputs;
+        twin.compare(outputs);
+        twin.step(&outputs);
+        if tick % PROGRESS_TICKS == 0 {
+            bar.inc(1);
+        }
+    }
+    let elapsed = started.map_or(Duration::ZERO, |started| started.elapsed());
+    bar.finish_and_clear();
+    memory.set_word(INPUT_SEQUENCE, END_OF_RUN)?;
+    emulator.wait()?;
+    Ok((*twin.tally(), elapsed))
+}
+
+/// A bar over seconds of firmware time; hidden where nobody watches.
+fn progress(ticks: u32) -> ProgressBar {
+    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} s of firmware time, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new((ticks / PROGRESS_TICKS).into()).with_style(style)
+}
+
+/// Waits until the firmware has answered tick number `tick`.
+fn wait_for(memory: &Memory, emulator: &mut Emulator, tick: u32) -> Result<()> {
+    let mut since = None;
+    loop {
+        for _ in 0..LOOKS {
+            if memory.word(OUTPUT_SEQUENCE)? == tick {
+                return Ok(());
+            }
+            std::hint::spin_loop();
+        }
+        let since = *since.get_or_insert_with(Instant::now);
+        if let Some(status) = emulator.ended()? {
+            bail!("the emulator ended ({status}) before it answered tick {tick}");
+        }
+        ensure!(
+            since.elapsed() < PATIENCE,
+            "the firmware has not answered tick {tick} within {PATIENCE:?}"
+        );
+    }
+}
+
+/// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
+fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<(Tally, Duration)> {
+    let (inputs, expected) = twin.rehearse(ticks);
+    let memory = Memory::create()?;
+    load(&memory, Mode::Paced, &inputs)?;
+    let started = Instant::now();
+    let lines = Emulator::start(image, &memory, Clock::Instructions, true)?.wait()?;
+    let elapsed = started.elapsed();
+    check_paced(&lines, ticks)?;
+    let mut bytes = vec![0; inputs.len() * OutputRecord::BYTES];
+    memory.read(RECORDED_OUTPUTS, &mut bytes)?;
+    let (records, _) = bytes.as_chunks();
+    let mut tally = Tally::default();
+    for ((tick, expected), record) in (0..).zip(expected).zip(records) {
+        tally.add(tick, expected, OutputRecord::decode(record).outputs);
+    }
+    Ok((tally, elapsed))
+}
+
+/// Prepares a run of recorded inputs.
+pub(crate) fn load(memory: &Memory, mode: Mode, inputs: &[InputRecord]) -> Result<()> {
+    ensure!(
+        inputs.len() <= RECORDED_TICKS,
+        "{} ticks asked for, but a recorded run holds at most {RECORDED_TICKS}",
+        inputs.len()
+    );
+    let ticks = u32::try_from(inputs.len())?;
+    let bytes: Vec<u8> = inputs.iter().flat_map(InputRecord::encode).collect();
+    memory.write(RECORDED_INPUTS, &bytes)?;
+    memory.prepare(mode, ticks, &encoded_job()?)
+}
+
+/// Checks what the firmware says of a paced run: all ticks, no overrun, and the time they should take.
+fn check_paced(lines: &[String], ticks: u32) -> Result<()> {
+    let numbers = lines.iter().rev().find_map(|line| {
+        let (_, line) = line.split_once("finished: ")?;
+        let words = line
+            .split(|c: char| !c.is_ascii_digit())
+            .filter(|word| !word.is_empty());
+        words
+            .map(|word| word.parse::<u64>().ok())
+            .collect::<Option<Vec<_>>>()
+    });
+    let numbers = numbers.context("the firmware has not said how the run went")?;
+    let [ran, overruns, _longest, microseconds] = numbers[..] else {
+        bail!("the firmware's account of the run is not as expected: {numbers:?}");
+    };
+    ensure!(ran == u64::from(ticks), "{ran} ticks ran instead of {ticks}");
+    ensure!(overruns == 0, "{overruns} control ticks overran their deadline");
+    let expected = (f64::from(ticks) * 1e6 / RATE_HZ) as u64;
+    // The idle loop, which takes the time, is at most one tick behind.
+    ensure!(
+        microseconds.abs_diff(expected) <= 100,
+        "{ticks} ticks took {microseconds} us of firmware time instead of {expected}"
+    );
+    Ok(())
+}

@@ -1,0 +1,231 @@
+//! Building the firmware's images and looking at what came out.
+
+use std::fmt;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, ensure};
+use clap::ValueEnum;
+use object::{Object, ObjectSymbol};
+
+use crate::command;
+use crate::toolchain::Toolchain;
+
+/// The targets rustup must have.
+pub(crate) const TRIPLES: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv7m-none-eabi"];
+
+/// The machines the firmware is built for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Board {
+    /// Arm MPS2, emulated by QEMU
+    Mps2,
+    /// ST Nucleo-F446RE, the reference board
+    #[value(name = "nucleo-f446re")]
+    NucleoF446re,
+}
+
+/// The firmware's number types.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(crate) enum Scalar {
+    /// Single-precision floating point
+    F32,
+    /// Fixed point, for machines without a floating-point unit
+    Fixed,
+}
+
+/// Which image.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) struct Target {
+    /// The machine.
+    pub(crate) board: Board,
+    /// The number type.
+    pub(crate) scalar: Scalar,
+}
+
+impl Target {
+    /// All there are.
+    pub(crate) const ALL: [Self; 4] = [
+        Self {
+            board: Board::Mps2,
+            scalar: Scalar::F32,
+        },
+        Self {
+            board: Board::Mps2,
+            scalar: Scalar::Fixed,
+        },
+        Self {
+            board: Board::NucleoF446re,
+            scalar: Scalar::F32,
+        },
+        Self {
+            board: Board::NucleoF446re,
+            scalar: Scalar::Fixed,
+        },
+    ];
+
+    /// The Rust target. The emulated machine for fixed point is a Cortex-M3, which has no floating-point unit.
+    pub(crate) fn triple(self) -> &'static str {
+        match (self.board, self.scalar) {
+            (Board::Mps2, Scalar::Fixed) => TRIPLES[1],
+            _ => TRIPLES[0],
+        }
+    }
+
+    /// QEMU's name of the machine, if it is emulated.
+    pub(crate) fn machine(self) -> Option<&'static str> {
+        match (self.board, self.scalar) {
+            (Board::Mps2, Scalar::F32) => Some("mps2-an386"),
+            (Board::Mps2, Scalar::Fixed) => Some("mps2-an385"),
+            (Board::NucleoF446re, _) => None,
+        }
+    }
+
+    /// The number type's name.
+    pub(crate) fn scalar_name(self) -> String {
+        self.scalar
+            .to_possible_value()
+            .expect("no variant is hidden")
+            .get_name()
+            .to_owned()
+    }
+
+    /// Cargo's features.
+    fn features(self) -> String {
+        let board = match self.board {
+            Board::Mps2 => "board-mps2",
+            Board::NucleoF446re => "board-nucleo-f446re",
+        };
+        match self.scalar {
+            Scalar::F32 => board.to_owned(),
+            Scalar::Fixed => format!("{board},scalar-fixed"),
+        }
+    }
+
+    /// Cargo's arguments to select the firmware of this target.
+    pub(crate) fn arguments(self) -> [String; 9] {
+        [
+            "--package".into(),
+            "quadrant".into(),
+            "--bin".into(),
+            "quadrant-firmware".into(),
+            "--release".into(),
+            "--target".into(),
+            self.triple().into(),
+            "--features".into(),
+            self.features(),
+        ]
+    }
+}
+
+impl fmt::Display for Target {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let board = self
+            .board
+            .to_possible_value()
+            .expect("no variant is hidden");
+        write!(f, "{} {}", board.get_name(), self.scalar_name())
+    }
+}
+
+/// A linked image.
+pub(crate) struct Image {
+    /// What it was built for.
+    pub(crate) target: Target,
+    /// Where it is.
+    pub(crate) path: PathBuf,
+    /// Its bytes.
+    pub(crate) elf: Vec<u8>,
+}
+
+/// Builds an image.
+pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
+    let mut cargo = toolchain.cargo("build");
+    cargo.args(target.arguments());
+    command::run_quietly(&mut cargo)
+        .with_context(|| format!("cannot build the image for {target}"))?;
+    let built = command::root()
+        .join("target/firmware")
+        .join(target.triple())
+        .join("release/quadrant-firmware");
+    // Two boards share a triple: keep each image under a name of its own.
+    let folder = command::root().join("target/images");
+    std::fs::create_dir_all(&folder)
+        .with_context(|| format!("cannot create {}", folder.display()))?;
+    let path = folder
+        .join(target.to_string().replace(' ', "-"))
+        .with_extension("elf");
+    let elf = std::fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
+    std::fs::write(&path, &elf).with_context(|| format!("cannot write {}", path.display()))?;
+    Ok(Image { target, path, elf })
+}
+
+impl Image {
+    /// The address of a function, without the bit that says Thumb.
+    pub(crate) fn function(&self, name: &str) -> Result<u32> {
+        let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
+        let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
+        let symbol = symbol.with_context(|| format!("the image has no symbol `{name}`"))?;
+        Ok(u32::try_from(symbol.address())? & !1)
+    }
+
+    /// How much of the machine's memories the image takes.
+    pub(crate) fn footprint(&self) -> Result<Footprint> {
+        use object::ObjectSection;
+        let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
+        let mut footprint = Footprint {
+            target: self.target,
+            flash: 0,
+            data: 0,
+            zeroed: 0,
+        };
+        for section in file.sections() {
+            let object::SectionFlags::Elf { sh_flags } = section.flags() else {
+                continue;
+            };
+            // The log's strings have addresses too, but are in no memory of the machine.
+            if sh_flags & u64::from(object::elf::SHF_ALLOC) == 0
+                || section.name().is_ok_and(|n| n == ".defmt")
+            {
+                continue;
+            }
+            let is_ram = section.address() >= 0x2000_0000;
+            let is_stored = section.kind() != object::SectionKind::UninitializedData;
+            match (is_ram, is_stored) {
+                (false, _) => footprint.flash += section.size(),
+                (true, true) => footprint.data += section.size(),
+                (true, false) => footprint.zeroed += section.size(),
+            }
+        }
+        ensure!(
+            footprint.flash > 0,
+            "the image for {} is empty",
+            self.target
+        );
+        Ok(footprint)
+    }
+}
+
+/// How much of the machine's memories an image takes, in bytes.
+pub(crate) struct Footprint {
+    target: Target,
+    flash: u64,
+    data: u64,
+    zeroed: u64,
+}
+
+impl fmt::Display for Footprint {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            target,
+            flash,
+            data,
+            zeroed,
+        } = self;
+        // Initialised variables are in both: flash holds their first values.
+        write!(
+            f,
+            "{target}: flash {} bytes, RAM {} bytes without the stack",
+            flash + data,
+            data + zeroed
+        )
+    }
+}

@@ -1,0 +1,132 @@
+//! The image as machine code: functions and their instructions, from the disassembler.
+
+use std::collections::BTreeMap;
+use std::ops::Range;
+
+use anyhow::{Context, Result, ensure};
+
+use crate::command;
+use crate::image::Image;
+
+/// One instruction.
+pub(crate) struct Instruction {
+    /// Where it is.
+    pub(crate) address: u32,
+    /// Its name, without a width suffix.
+    pub(crate) mnemonic: String,
+    /// The rest of the line.
+    pub(crate) operands: String,
+}
+
+/// One function.
+pub(crate) struct Function {
+    /// Its linker symbol.
+    pub(crate) symbol: String,
+    /// Its name as a person would write it.
+    pub(crate) name: String,
+    /// The addresses it covers.
+    pub(crate) range: Range<u32>,
+    /// Its instructions in order of address.
+    pub(crate) instructions: Vec<Instruction>,
+}
+
+/// All functions of an image, by their first address.
+pub(crate) struct Listing {
+    functions: BTreeMap<u32, Function>,
+}
+
+impl Listing {
+    /// Disassembles an image.
+    pub(crate) fn of(image: &Image) -> Result<Self> {
+        let mut objdump = command::command("arm-none-eabi-objdump");
+        objdump
+            .args(["--disassemble", "--no-show-raw-insn"])
+            .arg(&image.path);
+        let text = command::output(&mut objdump)
+            .context("`cargo xtask setup` installs the disassembler")?;
+        let listing = Self::parse(&text);
+        ensure!(
+            !listing.functions.is_empty(),
+            "the disassembler found no function in {}",
+            image.path.display()
+        );
+        Ok(listing)
+    }
+
+    fn parse(text: &str) -> Self {
+        let mut functions: BTreeMap<u32, Function> = BTreeMap::new();
+        let mut current = None;
+        for line in text.lines() {
+            if let Some((address, symbol)) = header(line) {
+                let name = format!("{:#}", rustc_demangle::demangle(symbol));
+                let function = Function {
+                    symbol: symbol.into(),
+                    name,
+                    range: address..address,
+                    instructions: Vec::new(),
+                };
+                functions.insert(address, function);
+                current = Some(address);
+            } else if let Some(instruction) = instruction(line)
+                && let Some(function) = current.and_then(|address| functions.get_mut(&address))
+            {
+                // At least one half-word; the next line or header corrects it.
+                function.range.end = instruction.address + 2;
+                function.instructions.push(instruction);
+            }
+        }
+        // A function ends where the next begins, but gaps between sections belong to none: 32-bit instructions only
+        // lengthen the last line by two.
+        for function in functions.values_mut() {
+            function.range.end += 2;
+        }
+        Self { functions }
+    }
+
+    /// The function that covers an address.
+    pub(crate) fn at(&self, address: u32) -> Option<&Function> {
+        let (_, function) = self.functions.range(..=address).next_back()?;
+        function.range.contains(&address).then_some(function)
+    }
+}
+
+/// `000000d8 <CONTROL_TICK>:`
+fn header(line: &str) -> Option<(u32, &str)> {
+    let (address, symbol) = line.strip_suffix(">:")?.split_once(" <")?;
+    Some((u32::from_str_radix(address, 16).ok()?, symbol))
+}
+
+/// `     0d8:\tpush\t{r4, r5, r6, r7, lr}`
+fn instruction(line: &str) -> Option<Instruction> {
+    let (address, rest) = line.split_once(":\t")?;
+    let address = u32::from_str_radix(address.trim(), 16).ok()?;
+    let (mnemonic, operands) = rest.split_once('\t').unwrap_or((rest, ""));
+    let mnemonic = mnemonic
+        .trim()
+        .trim_end_matches(".n")
+        .trim_end_matches(".w")
+        .to_owned();
+    Some(Instruction {
+        address,
+        mnemonic,
+        operands: operands.trim().to_owned(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn functions_are_found_with_their_instructions() {
+        let listing = Listing::parse(
+            "000000d8 <CONTROL_TICK>:\n  d8:\tpush\t{r4, lr}\n  da:\tbl\te0 <_ZN4core3fooE>\n",
+        );
+        let function = listing.at(0xda).expect("the address is covered");
+        assert_eq!(function.symbol, "CONTROL_TICK");
+        assert_eq!(function.range, 0xd8..0xde);
+        assert_eq!(function.instructions[1].mnemonic, "bl");
+        assert_eq!(function.instructions[1].operands, "e0 <_ZN4core3fooE>");
+        assert!(listing.at(0xd6).is_none() && listing.at(0xde).is_none());
+    }
+}

@@ -1,0 +1,65 @@
+//! Which function belongs to which stage of the control tick.
+
+/// The stages, each by the beginning of the path of its functions. Of an instruction's inlined frames, the outermost
+/// one found here decides: friction evaluated for the feedforward is feedforward.
+const STAGES: [(&str, &str); 11] = [
+    ("quadrant_firmware::board::", "inputs and outputs"),
+    ("quadrant::encoder::", "encoders"),
+    ("quadrant::reference::", "reference"),
+    ("quadrant::control::", "feedback"),
+    ("quadrant::feedforward::", "feedforward"),
+    ("quadrant::friction::", "friction"),
+    ("quadrant::safety::", "safety"),
+    ("quadrant::telemetry::", "telemetry"),
+    ("quadrant::units::", "units"),
+    ("heapless::", "queues"),
+    ("quadrant_firmware::app::__rtic_internal_", "spawning"),
+];
+
+/// What holds the stages together; it counts only where no stage does.
+const FRAMES: [(&str, &str); 4] = [
+    ("quadrant::axis::", "axis"),
+    ("quadrant::stage::", "stage"),
+    ("quadrant_firmware::", "interrupt"),
+    ("rtic::", "interrupt"),
+];
+
+/// What no table knows.
+pub(crate) const OTHER: &str = "other";
+
+/// The stage of an instruction, from the functions it was inlined into, outermost first.
+pub(crate) fn of<'a>(functions: impl Iterator<Item = &'a str> + Clone) -> Option<&'static str> {
+    find(functions.clone(), &STAGES).or_else(|| find(functions, &FRAMES))
+}
+
+fn find<'a>(
+    mut functions: impl Iterator<Item = &'a str>,
+    table: &[(&str, &'static str)],
+) -> Option<&'static str> {
+    functions.find_map(|function| {
+        // `<quadrant::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
+        let path = function.trim_start_matches(['<', '&', '[', '(']);
+        table
+            .iter()
+            .find(|(prefix, _)| path.starts_with(prefix))
+            .map(|(_, stage)| *stage)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_outermost_stage_decides() {
+        let frames = [
+            "CONTROL_TICK",
+            "<quadrant::axis::Axis<f32>>::tick",
+            "quadrant::feedforward::f",
+            "quadrant::friction::g",
+        ];
+        assert_eq!(of(frames.into_iter()), Some("feedforward"));
+        assert_eq!(of(frames[..2].iter().copied()), Some("axis"));
+        assert_eq!(of(["core::ptr::read"].into_iter()), None);
+    }
+}

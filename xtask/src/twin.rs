@@ -1,0 +1,163 @@
+//! The emulated firmware's twin: the same job in this process, on the simulated stage.
+
+use std::marker::PhantomData;
+
+use anyhow::{Context, Result};
+use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
+use quadrant::scalar::{Fixed, Scalar};
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant::stage::Outputs;
+use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::plant::{SimulatedStage, StageTruth};
+
+use crate::image;
+
+/// Room for GMS elements in the firmware.
+const ELEMENTS: usize = 4;
+/// Seed of the simulated stage's noise.
+const SEED: u64 = 1;
+
+/// The job of every emulated run: a circle in XY and a sine in Z, without an end, on the default settings.
+pub(crate) fn job() -> Job {
+    const RADIUS_MM: f64 = 30.0;
+    const FEED_MM_S: f64 = 15.0;
+    const LEAD_S: f64 = 0.5;
+    let mut motions = circle(
+        Plane::Xy,
+        Sense::CounterClockwise,
+        RADIUS_MM,
+        FEED_MM_S,
+        0.0,
+        1.0,
+        LEAD_S,
+    );
+    motions[2] = MotionSettings::Harmonic(HarmonicSettings::with_velocity(10.0, 8.0, 1.0, LEAD_S));
+    for motion in &mut motions {
+        if let MotionSettings::Harmonic(sine) = motion {
+            sine.cycles = None;
+        }
+    }
+    Job {
+        stage: StageSettings::default(),
+        plan: PlanSettings { motions },
+    }
+}
+
+/// The job as the firmware reads it.
+pub(crate) fn encoded_job() -> Result<Vec<u8>> {
+    postcard::to_allocvec(&job()).context("cannot encode the job")
+}
+
+/// A machine of either number type.
+pub(crate) trait Law {
+    /// One control period.
+    fn tick(&mut self, input: &InputRecord) -> Outputs;
+}
+
+impl<S: Scalar> Law for Machine<S, ELEMENTS> {
+    fn tick(&mut self, input: &InputRecord) -> Outputs {
+        Machine::tick(self, input)
+    }
+}
+
+/// How the firmware's words compare with the twin's.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    /// Converter words compared.
+    pub(crate) words: u64,
+    /// Words that differ; a differing enable line counts as one more.
+    pub(crate) differ: u64,
+    /// Words that were not zero: a comparison of zeros proves nothing.
+    pub(crate) moving: u64,
+    /// The first difference: tick, the twin's outputs, the firmware's.
+    pub(crate) first: Option<(u32, Outputs, Outputs)>,
+}
+
+/// Law and stage in this process.
+pub(crate) struct Twin {
+    law: Box<dyn Law>,
+    plant: SimulatedStage,
+    operator: Operator,
+    tick: u32,
+    expected: Outputs,
+    tally: Tally,
+}
+
+impl Twin {
+    /// The twin of a firmware of a number type.
+    pub(crate) fn of(scalar: image::Scalar) -> Result<Self> {
+        fn law<S: Scalar>(job: &Job, _: PhantomData<S>) -> Result<Box<dyn Law>> {
+            Ok(Box::new(Machine::<S, ELEMENTS>::new(job)?))
+        }
+        let job = job();
+        Ok(Self {
+            law: match scalar {
+                image::Scalar::F32 => law(&job, PhantomData::<f32>)?,
+                image::Scalar::Fixed => law(&job, PhantomData::<Fixed>)?,
+            },
+            plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, SEED),
+            operator: Operator::runs_the_plan(),
+            tick: 0,
+            expected: Outputs::default(),
+            tally: Tally::default(),
+        })
+    }
+
+    /// What firmware and twin read in the next tick.
+    pub(crate) fn input(&mut self) -> InputRecord {
+        InputRecord {
+            counts: self.plant.read_counters(),
+            request: self.operator.request(self.tick),
+        }
+    }
+
+    /// The twin's own answer.
+    pub(crate) fn compute(&mut self, input: &InputRecord) -> Outputs {
+        self.expected = self.law.tick(input);
+        self.tick += 1;
+        self.expected
+    }
+
+    /// Moves the stage by one control period.
+    pub(crate) fn step(&mut self, outputs: &Outputs) {
+        self.plant.step(outputs);
+    }
+
+    /// Compares an answer of the firmware with the twin's last.
+    pub(crate) fn compare(&mut self, firmware: Outputs) {
+        self.tally.add(self.tick, self.expected, firmware);
+    }
+
+    /// How the comparison stands.
+    pub(crate) fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// The twin alone in closed loop, for `ticks` ticks: what it read and what it answered.
+    pub(crate) fn rehearse(mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
+        (0..ticks)
+            .map(|_| {
+                let input = self.input();
+                let outputs = self.compute(&input);
+                self.step(&outputs);
+                (input, outputs)
+            })
+            .unzip()
+    }
+}
+
+impl Tally {
+    /// Compares the outputs of one tick.
+    pub(crate) fn add(&mut self, tick: u32, expected: Outputs, firmware: Outputs) {
+        for (ours, theirs) in expected.codes.iter().zip(firmware.codes) {
+            self.words += 1;
+            self.differ += u64::from(*ours != theirs);
+            self.moving += u64::from(ours.0 != 0);
+        }
+        self.differ += u64::from(expected.enabled != firmware.enabled);
+        if expected != firmware {
+            self.first.get_or_insert((tick, expected, firmware));
+        }
+    }
+}
