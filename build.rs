@@ -22,7 +22,9 @@ fn main() {
     } else {
         return;
     };
-    install(board, "memory.x", &out);
+    // The linker finds memory.x at the root of the package, and that asks for the board's.
+    println!("cargo:rerun-if-changed=memory.x");
+    install(board, "board_memory.x", &out);
     println!("cargo:rustc-link-search={}", out.display());
     // Sections need not start at page boundaries of a machine that has no pages.
     link_argument("--nmagic");

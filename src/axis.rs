@@ -6,6 +6,7 @@ use crate::encoder::{Encoder, EncoderState};
 use crate::feedforward::{Feedforward, ReferenceStep};
 use crate::friction::gms::GmsState;
 use crate::reference::{Motion, MotionState, ReferenceSample};
+use crate::safety::FaultCode;
 use crate::scalar::{Quantity, Scalar};
 use crate::telemetry::{AxisTelemetry, LimitedBy};
 use crate::units::{DacCode, Position};
@@ -56,6 +57,10 @@ pub struct AxisState<S: Scalar, const N: usize> {
     encoder: EncoderState,
     motion: MotionState,
     running: bool,
+    /// What speaks against the axis in this tick.
+    pub(crate) suspect: Option<FaultCode>,
+    /// The reference's step at the feedforward's tick.
+    step: ReferenceStep<S>,
     /// The reference at the feedforward's tick, ahead of the feedback's.
     ahead: Position,
     preview: [Position; PREVIEW_ROOM],
@@ -72,6 +77,8 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             encoder: EncoderState::default(),
             motion: MotionState::default(),
             running: false,
+            suspect: None,
+            step: ReferenceStep::default(),
             ahead: Position::ZERO,
             preview: [Position::ZERO; PREVIEW_ROOM],
             pid: PidState::default(),
@@ -106,7 +113,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
 
     /// Prepares to hold the measured position.
     pub(crate) fn enable(&self, state: &mut AxisState<S, N>) {
-        let here = Position::from_counts(state.encoder.count());
+        let here = state.encoder.position();
         *state = AxisState {
             encoder: state.encoder.clone(),
             ahead: here,
@@ -131,7 +138,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state: &mut AxisState<S, N>,
         motion: &Motion<S>,
         tick: u32,
-    ) -> (ReferenceStep<S>, bool) {
+    ) -> bool {
         let ahead = if state.running {
             let sample = motion.step(&mut state.motion);
             state.running = !motion.finished(&state.motion);
@@ -151,16 +158,16 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
         let reference = state.preview[delayed];
 
-        let measured = Position::from_counts(state.encoder.count());
+        let measured = state.encoder.position();
         let error = S::scale_wide((reference - measured).0, self.unit_mm);
         state.telemetry.reference = reference;
         state.telemetry.error = error;
-        let step = ReferenceStep {
+        state.step = ReferenceStep {
             displacement: S::scale_integer(displacement, self.unit_mm),
             velocity: ahead.velocity,
             acceleration: ahead.acceleration,
         };
-        (step, error.magnitude() <= self.following_error_limit)
+        error.magnitude() <= self.following_error_limit
     }
 
     /// Computes the output. `changed` says that the settings are new in this tick: the output then starts from where
@@ -169,7 +176,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     pub(crate) fn drive(
         &self,
         state: &mut AxisState<S, N>,
-        reference: ReferenceStep<S>,
         changed: bool,
     ) -> DacCode {
         let error = state.telemetry.error;
@@ -177,7 +183,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             Some(gain) => gain.scaled_error(error),
             None => error,
         };
-        let feedforward = self.feedforward.step(&mut state.gms, reference);
+        let feedforward = self.feedforward.step(&mut state.gms, state.step);
         let limit = self.amplifier.limit;
         if changed {
             self.pid.take_over(&mut state.pid, scaled);
@@ -199,18 +205,16 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             .times(self.transfer_decay, Quantity::Fraction);
         state.last_output = output;
         let code = self.amplifier.code(output);
-        state.telemetry = AxisTelemetry {
-            feedback,
-            feedforward,
-            transfer: state.transfer,
-            output,
-            code,
-            limited_by: if feedback.saturated {
-                LimitedBy::OutputLimit
-            } else {
-                LimitedBy::Nothing
-            },
-            ..state.telemetry
+        let telemetry = &mut state.telemetry;
+        telemetry.feedback = feedback;
+        telemetry.feedforward = feedforward;
+        telemetry.transfer = state.transfer;
+        telemetry.output = output;
+        telemetry.code = code;
+        telemetry.limited_by = if feedback.saturated {
+            LimitedBy::OutputLimit
+        } else {
+            LimitedBy::Nothing
         };
         code
     }
@@ -222,7 +226,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.running = false;
         state.last_output = S::ZERO;
         state.telemetry = AxisTelemetry {
-            reference: Position::from_counts(measured),
+            reference: state.encoder.position(),
             measured,
             ..AxisTelemetry::default()
         };

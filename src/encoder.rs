@@ -1,6 +1,6 @@
 //! From a hardware counter that wraps to a count that does not.
 
-use crate::units::EncoderCount;
+use crate::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
 
 /// An incremental encoder's counter.
 #[derive(Clone, Debug, PartialEq)]
@@ -15,7 +15,8 @@ pub struct Encoder {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct EncoderState {
     raw: u32,
-    count: i64,
+    /// Held as a position: one saturating sum serves both.
+    position: Position,
     started: bool,
 }
 
@@ -23,7 +24,13 @@ impl EncoderState {
     /// The accumulated count; zero where the first reading was taken.
     #[inline(always)]
     pub const fn count(&self) -> EncoderCount {
-        EncoderCount(self.count)
+        EncoderCount(self.position.0 >> POSITION_FRACTION_BITS)
+    }
+
+    /// The accumulated count as a position.
+    #[inline(always)]
+    pub const fn position(&self) -> Position {
+        self.position
     }
 }
 
@@ -53,7 +60,7 @@ impl Encoder {
         } else {
             step
         };
-        state.count = state.count.saturating_add(directed as i64);
+        state.position = state.position.saturating_add(Position::from_step(directed));
         step.unsigned_abs() <= self.largest_step as u32
     }
 }

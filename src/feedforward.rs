@@ -68,7 +68,7 @@ pub struct FeedforwardGains {
 }
 
 /// What the reference does in one tick, seen far enough ahead.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceStep<S> {
     /// Displacement since the last tick, mm.
     pub displacement: S,

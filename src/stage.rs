@@ -1,7 +1,6 @@
 //! Three axes, one tick: a pure function of settings, memory and inputs.
 
 use crate::axis::{Axis, AxisState};
-use crate::feedforward::ReferenceStep;
 use crate::reference::Motion;
 use crate::safety::{AxisName, Command, Fault, FaultCode, SafetyState};
 use crate::scalar::Scalar;
@@ -77,6 +76,22 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     pub fn is_running(&self) -> bool {
         self.axes.iter().any(AxisState::is_running)
     }
+
+    #[cold]
+    #[inline(never)]
+    fn trip(&mut self, code: FaultCode, axis: Option<AxisName>, tick: u32) {
+        self.safety.trip(Fault { code, axis, tick });
+    }
+
+    /// Latches the fault of the first axis that is under suspicion.
+    #[inline(always)]
+    fn trip_suspects(&mut self, tick: u32) {
+        for (index, name) in AxisName::ALL.into_iter().enumerate() {
+            if let Some(code) = self.axes[index].suspect {
+                self.trip(code, Some(name), tick);
+            }
+        }
+    }
 }
 
 impl<S: Scalar, const N: usize> Stage<S, N> {
@@ -89,65 +104,27 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
         let tick = state.tick;
         state.tick = tick.wrapping_add(1);
         let was_enabled = state.safety.is_enabled();
-        let [x, y, z] = &mut state.axes;
-        let mut axes = [
-            (AxisName::X, &self.axes[0], &plan[0], x, inputs.counts[0]),
-            (AxisName::Y, &self.axes[1], &plan[1], y, inputs.counts[1]),
-            (AxisName::Z, &self.axes[2], &plan[2], z, inputs.counts[2]),
-        ];
-        for (name, axis, _, memory, count) in &mut axes {
-            if !axis.measure(memory, *count) && was_enabled {
-                state.safety.trip(Fault {
-                    code: FaultCode::EncoderJump,
-                    axis: Some(*name),
-                    tick,
-                });
-            }
-        }
-        if inputs.deadline_missed && was_enabled {
-            state.safety.trip(Fault {
-                code: FaultCode::DeadlineMissed,
-                axis: None,
-                tick,
-            });
-        }
-        // A reset is for a fault that was there to be seen, not for one of this tick.
-        let early_reset = was_enabled && inputs.command == Some(Command::ResetFault);
-        if let Some(command) = inputs.command
-            && !early_reset
+        for (axis, (memory, count)) in self.axes.iter().zip(state.axes.iter_mut().zip(inputs.counts))
         {
-            let moving = axes.iter().any(|(_, _, _, memory, _)| memory.is_running());
-            if state.safety.apply(command) {
-                for (_, axis, _, memory, _) in &mut axes {
-                    axis.enable(memory);
-                }
-            } else if command == Command::Run && state.safety.is_enabled() && !moving {
-                for (_, axis, _, memory, _) in &mut axes {
-                    axis.run(memory);
-                }
-            }
+            let plausible = axis.measure(memory, count);
+            memory.suspect = (was_enabled && !plausible).then_some(FaultCode::EncoderJump);
         }
-        let mut references = [ReferenceStep {
-            displacement: S::ZERO,
-            velocity: S::ZERO,
-            acceleration: S::ZERO,
-        }; 3];
+        state.trip_suspects(tick);
+        if inputs.deadline_missed && was_enabled {
+            state.trip(FaultCode::DeadlineMissed, None, tick);
+        }
+        if let Some(command) = inputs.command {
+            self.obey(state, command, was_enabled);
+        }
         if state.safety.is_enabled() {
-            for ((name, axis, motion, memory, _), reference) in axes.iter_mut().zip(&mut references)
-            {
-                let (step, follows) = axis.refer(memory, motion, tick);
-                *reference = step;
-                if !follows {
-                    state.safety.trip(Fault {
-                        code: FaultCode::FollowingError,
-                        axis: Some(*name),
-                        tick,
-                    });
-                }
+            for (axis, (memory, motion)) in self.axes.iter().zip(state.axes.iter_mut().zip(plan)) {
+                let follows = axis.refer(memory, motion, tick);
+                memory.suspect = (!follows).then_some(FaultCode::FollowingError);
             }
+            state.trip_suspects(tick);
         }
         if !state.safety.is_enabled() {
-            for (_, axis, _, memory, _) in &mut axes {
+            for (axis, memory) in self.axes.iter().zip(&mut state.axes) {
                 axis.rest(memory);
             }
             return Outputs::default();
@@ -156,11 +133,34 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
             codes: [DacCode::ZERO; 3],
             enabled: true,
         };
-        for (((_, axis, _, memory, _), reference), code) in
-            axes.iter_mut().zip(references).zip(&mut outputs.codes)
+        for ((axis, memory), code) in self
+            .axes
+            .iter()
+            .zip(&mut state.axes)
+            .zip(&mut outputs.codes)
         {
-            *code = axis.drive(memory, reference, inputs.settings_changed);
+            *code = axis.drive(memory, inputs.settings_changed);
         }
         outputs
+    }
+
+    /// Acts on a command.
+    #[cold]
+    #[inline(never)]
+    fn obey(&self, state: &mut StageState<S, N>, command: Command, was_enabled: bool) {
+        // A reset is for a fault that was there to be seen, not for one of this tick.
+        if was_enabled && command == Command::ResetFault {
+            return;
+        }
+        let moving = state.is_running();
+        if state.safety.apply(command) {
+            for (axis, memory) in self.axes.iter().zip(&mut state.axes) {
+                axis.enable(memory);
+            }
+        } else if command == Command::Run && state.safety.is_enabled() && !moving {
+            for (axis, memory) in self.axes.iter().zip(&mut state.axes) {
+                axis.run(memory);
+            }
+        }
     }
 }

@@ -13,7 +13,8 @@ pub const POSITION_FRACTION_BITS: u32 = 16;
 /// Units of [`Position`] per encoder count, 2^16.
 pub const POSITION_UNITS_PER_COUNT: f64 = 65536.0;
 
-/// A position or a displacement in 2^-16 encoder counts; +-1.4e14 counts, so it never wraps in use.
+/// A position or a displacement in 2^-16 encoder counts. It holds +-1.4e14 counts, 70 000 km of half micrometres: sums
+/// and differences of what a machine can reach do not wrap, and the encoder's own sum saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position(pub i64);
 
@@ -21,9 +22,16 @@ impl Position {
     /// The origin.
     pub const ZERO: Self = Self(0);
 
-    /// The position of a whole number of encoder counts.
-    pub const fn from_counts(counts: EncoderCount) -> Self {
-        Self(counts.0.saturating_mul(1 << POSITION_FRACTION_BITS))
+    /// The displacement of a step of an encoder; never saturates.
+    #[inline(always)]
+    pub const fn from_step(counts: i32) -> Self {
+        Self((counts as i64) << POSITION_FRACTION_BITS)
+    }
+
+    /// The sum, saturating: for what adds up without end.
+    #[inline(always)]
+    pub const fn saturating_add(self, other: Self) -> Self {
+        Self(self.0.saturating_add(other.0))
     }
 
     /// Rounds `value_mm` to the nearest unit; `resolution_mm` is the length of one encoder count. Settings time only.
@@ -50,22 +58,25 @@ impl Position {
 
 impl Add for Position {
     type Output = Self;
+    #[inline(always)]
     fn add(self, other: Self) -> Self {
-        Self(self.0.saturating_add(other.0))
+        Self(self.0.wrapping_add(other.0))
     }
 }
 
 impl Sub for Position {
     type Output = Self;
+    #[inline(always)]
     fn sub(self, other: Self) -> Self {
-        Self(self.0.saturating_sub(other.0))
+        Self(self.0.wrapping_sub(other.0))
     }
 }
 
 impl Neg for Position {
     type Output = Self;
+    #[inline(always)]
     fn neg(self) -> Self {
-        Self(self.0.saturating_neg())
+        Self(self.0.wrapping_neg())
     }
 }
 

@@ -6,7 +6,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Quantity, Scalar};
-use crate::table::{OctaveTable, interpolation_error};
+use crate::table::OctaveTable;
 
 /// The nonlinear gain as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,13 +27,6 @@ impl NonlinearGain {
     /// cosh(ko emax), the largest gain.
     pub fn largest(&self) -> f64 {
         self.at(self.range_mm)
-    }
-
-    /// The largest difference between k(e) and its table.
-    pub fn table_error(&self) -> f64 {
-        interpolation_error(self.range_mm, self.range_mm, |e| {
-            libm::cosh(self.rate_per_mm * e.min(self.range_mm))
-        })
     }
 }
 

@@ -7,7 +7,7 @@ use core::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::sine::{cosine, sine};
+use super::sine::{SINE_BITS, cosine, sine};
 use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_FRACTION_BITS, Position};
@@ -115,10 +115,10 @@ pub fn circle(
 /// A sine ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonic<S: Scalar> {
-    amplitude_counts: i64,
-    amplitude_fraction: i64,
+    amplitude_counts: i32,
+    amplitude_fraction: i32,
     start_phase: u32,
-    start_sine: i64,
+    start_swing: i64,
     phase_per_tick: u64,
     lead_ticks: u32,
     lead_step: u64,
@@ -129,14 +129,25 @@ pub struct Harmonic<S: Scalar> {
     q30: S::Gain,
 }
 
+/// Where a tick lies in a harmonic motion.
+enum Lead {
+    /// In the lead-in or the lead-out, at this tick from its standing end.
+    Under { tick: u32, leaving: bool },
+    /// Between them.
+    FullSpeed,
+    /// After the lead-out.
+    Ended,
+}
+
 /// One, as a Q31 phase speed or lead progress.
 const ONE: u64 = 1 << 31;
 
-/// A sine or cosine in Q31 times an amplitude split in counts and 2^-16 counts, in 2^-16 counts.
+/// A sine times an amplitude split in counts and 2^-16 counts, in 2^-16 counts.
 #[inline(always)]
-fn swing(sine: i64, counts: i64, fraction: i64) -> i64 {
-    const SHIFT: u32 = 31 - POSITION_FRACTION_BITS;
-    ((sine * counts + (1 << (SHIFT - 1))) >> SHIFT) + ((sine * fraction + (1 << 30)) >> 31)
+fn swing(sine: i32, counts: i32, fraction: i32) -> i64 {
+    const SHIFT: u32 = SINE_BITS - POSITION_FRACTION_BITS;
+    let product = |factor: i32| i64::from(sine) * i64::from(factor);
+    ((product(counts) + (1 << (SHIFT - 1))) >> SHIFT) + (product(fraction) >> SINE_BITS)
 }
 
 /// `rate` times a Q31 factor.
@@ -159,14 +170,17 @@ impl<S: Scalar> Harmonic<S> {
         let start_turns = start_turns - libm::floor(start_turns);
         let start_phase = libm::round(libm::scalbn(start_turns, 32)) as u64 as u32;
         let angular = TAU * settings.frequency_hz;
-        let unit = 1.0 / ONE as f64;
+        let unit = 1.0 / f64::from(1u32 << SINE_BITS);
+        // Settings are refused whose amplitude does not fit.
+        let amplitude_counts = (amplitude >> POSITION_FRACTION_BITS) as i32;
+        let amplitude_fraction = (amplitude & ((1 << POSITION_FRACTION_BITS) - 1)) as i32;
         let lead_s = f64::from(lead_ticks) / scale.rate_hz;
         let gain = |value: f64, to| S::gain(value * unit, Quantity::Integer, to);
         Self {
-            amplitude_counts: amplitude >> POSITION_FRACTION_BITS,
-            amplitude_fraction: amplitude & ((1 << POSITION_FRACTION_BITS) - 1),
+            amplitude_counts,
+            amplitude_fraction,
             start_phase,
-            start_sine: i64::from(sine(start_phase)),
+            start_swing: swing(sine(start_phase), amplitude_counts, amplitude_fraction),
             phase_per_tick,
             lead_ticks,
             lead_step: (1 << 62) / u64::from(lead_ticks),
@@ -182,80 +196,84 @@ impl<S: Scalar> Harmonic<S> {
                 1.5 * settings.amplitude_mm * angular / lead_s,
                 Quantity::Acceleration,
             ),
-            q30: S::gain(2.0 * unit, Quantity::Integer, Quantity::Fraction),
+            q30: S::gain(unit, Quantity::Integer, Quantity::Fraction),
         }
     }
 
-    /// The phase speed as Q31 of full speed, the progress of the lead (Q31) while in one, and the lead's sign.
+    /// Where in the lead-in or lead-out a tick lies: its number from the standing end, and whether it is the lead-out.
     #[inline(always)]
-    fn speed(&self, elapsed: u32) -> (u64, Option<(u64, bool)>) {
-        let (tick, leaving) = match self.cruise_ticks {
-            _ if elapsed < self.lead_ticks => (elapsed, false),
+    fn lead(&self, elapsed: u32) -> Lead {
+        match self.cruise_ticks {
+            _ if elapsed < self.lead_ticks => Lead::Under { tick: elapsed, leaving: false },
             Some(cruise) if elapsed - self.lead_ticks >= cruise => {
                 let past = elapsed - self.lead_ticks - cruise;
-                if past >= self.lead_ticks {
-                    return (0, None);
+                if past < self.lead_ticks {
+                    let tick = self.lead_ticks - 1 - past;
+                    Lead::Under { tick, leaving: true }
+                } else {
+                    Lead::Ended
                 }
-                (self.lead_ticks - 1 - past, true)
             }
-            _ => return (ONE, None),
-        };
-        // The middle of the tick, so that lead-in and lead-out are mirror images. lead_ticks fits 31 bits.
-        let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
-        let square = (progress * progress) >> 31;
-        let smooth = (square * (3 * ONE - 2 * progress)) >> 31;
-        (smooth, Some((progress, leaving)))
+            _ => Lead::FullSpeed,
+        }
     }
 
     #[inline(always)]
     pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
-        let (speed, lead) = self.speed(state.elapsed);
-        let advance = if speed == ONE {
-            self.phase_per_tick
-        } else {
-            scaled_phase(self.phase_per_tick, speed)
-        };
-        state.phase = state.phase.wrapping_add(advance);
-        let phase = ((state.phase >> 32) as u32).wrapping_add(self.start_phase);
-        let (sine, cosine) = (sine(phase), cosine(phase));
-
-        let position = Position(swing(
-            i64::from(sine) - self.start_sine,
-            self.amplitude_counts,
-            self.amplitude_fraction,
-        ));
-        let velocity = S::scale_integer(cosine, self.velocity);
-        let acceleration = S::scale_integer(sine, self.centripetal);
-        if speed == ONE {
-            return ReferenceSample {
-                position,
-                velocity,
-                acceleration,
-            };
+        match self.lead(state.elapsed) {
+            Lead::FullSpeed => self.advance(state, self.phase_per_tick),
+            Lead::Under { tick, leaving } => self.step_lead(state, tick, leaving),
+            Lead::Ended => ReferenceSample {
+                velocity: S::ZERO,
+                acceleration: S::ZERO,
+                ..self.advance(state, 0)
+            },
         }
-        let unit = self.q30;
-        let ratio = S::scale_integer((speed >> 1) as i32, unit);
-        let velocity = velocity.times(ratio, Quantity::Fraction);
-        let mut acceleration = acceleration
+    }
+
+    /// Turns the phase and looks up the sample at full speed.
+    #[inline(always)]
+    fn advance(&self, state: &mut MotionState, phase: u64) -> ReferenceSample<S> {
+        state.phase = state.phase.wrapping_add(phase);
+        let (sine, cosine) = self.sine_and_cosine(state);
+        let swing = swing(sine, self.amplitude_counts, self.amplitude_fraction);
+        ReferenceSample {
+            position: Position(swing - self.start_swing),
+            velocity: S::scale_integer(cosine, self.velocity),
+            acceleration: S::scale_integer(sine, self.centripetal),
+        }
+    }
+
+    #[inline(always)]
+    fn sine_and_cosine(&self, state: &MotionState) -> (i32, i32) {
+        let phase = ((state.phase >> 32) as u32).wrapping_add(self.start_phase);
+        (sine(phase), cosine(phase))
+    }
+
+    /// A tick of the lead-in or lead-out, whose phase speed is a smooth step `p^2 (3 - 2 p)` of the progress `p`. Kept
+    /// apart: most ticks run at full speed.
+    #[inline(never)]
+    fn step_lead(&self, state: &mut MotionState, tick: u32, leaving: bool) -> ReferenceSample<S> {
+        // The middle of the tick, so that lead-in and lead-out are mirror images. lead_ticks fits 31 bits.
+        let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
+        let square = (progress * progress) >> 31;
+        let speed = (square * (3 * ONE - 2 * progress)) >> 31;
+        let full = self.advance(state, scaled_phase(self.phase_per_tick, speed));
+
+        let fraction = |q31: u64| S::scale_integer((q31 >> 1) as i32, self.q30);
+        let ratio = fraction(speed);
+        let centripetal = full
+            .acceleration
             .times(ratio, Quantity::Fraction)
             .times(ratio, Quantity::Fraction);
-        if let Some((progress, leaving)) = lead {
-            // The slope of the smooth step over its largest, 4 p (1 - p).
-            let slope = (progress * (ONE - progress)) >> 29;
-            let along = S::scale_integer(cosine, self.tangential).times(
-                S::scale_integer((slope >> 1) as i32, unit),
-                Quantity::Fraction,
-            );
-            acceleration = if leaving {
-                acceleration - along
-            } else {
-                acceleration + along
-            };
-        }
+        // The slope of the smooth step over its largest, 4 p (1 - p).
+        let slope = fraction((progress * (ONE - progress)) >> 29);
+        let (_, cosine) = self.sine_and_cosine(state);
+        let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
-            position,
-            velocity,
-            acceleration,
+            velocity: full.velocity.times(ratio, Quantity::Fraction),
+            acceleration: if leaving { centripetal - along } else { centripetal + along },
+            ..full
         }
     }
 

@@ -118,7 +118,8 @@ impl<S: Scalar> PointToPoint<S> {
         }
     }
 
-    #[inline(always)]
+    // Not inlined: its wide integers would crowd the registers of the motions that run for hours.
+    #[inline(never)]
     pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
         let chain = &mut state.chain;
         // At most eight, as many as there are impulses.

@@ -46,10 +46,11 @@ impl<S: Scalar> RecordedTable<S> {
         } else {
             self.samples.get(index as usize).unwrap_or(last)
         };
-        i64::from((*sample - *first).0)
+        (*sample - *first).0
     }
 
-    #[inline(always)]
+    // Not inlined: its wide integers would crowd the registers of the motions that run for hours.
+    #[inline(never)]
     pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
         // The phase holds the present sample in its upper half and the tick within it in the lower.
         let (index, tick) = ((state.phase >> 32) as i64, state.phase as u32);

@@ -178,11 +178,7 @@ impl Scalar for Fixed {
         let key = (exponent << OCTAVE_INTERVAL_BITS)
             | ((normal >> (31 - OCTAVE_INTERVAL_BITS)) & ((1 << OCTAVE_INTERVAL_BITS) - 1));
         let place = (normal << (1 + OCTAVE_INTERVAL_BITS)) >> 2;
-        // The sum may pass the table's end, not wrap: a key is below 2^9.
-        (
-            key.wrapping_sub(start.key) as usize + 1,
-            Self(place as i32),
-        )
+        (key.wrapping_sub(start.key) as usize + 1, Self(place as i32))
     }
 
     #[inline(always)]

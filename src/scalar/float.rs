@@ -40,11 +40,16 @@ macro_rules! float_scalar {
 
             #[inline(always)]
             fn scale_wide(value: i64, gain: Self::Gain) -> Self {
-                const LIMIT: i64 = (1 << 40) - 1;
-                let value = value.clamp(-LIMIT, LIMIT);
-                // Two exact halves: a 64-bit conversion is a library call on the target.
-                let high = (value >> 20) as i32;
+                // Two halves, the lower one exact: a 64-bit conversion is a library call on the target.
+                let high = value >> 20;
                 let low = (value & 0xF_FFFF) as i32;
+                let high = if high == i64::from(high as i32) {
+                    high as i32
+                } else if high < 0 {
+                    i32::MIN
+                } else {
+                    i32::MAX
+                };
                 (high as $float * 1_048_576.0 + low as $float) * gain
             }
 

@@ -97,7 +97,7 @@ pub trait Scalar:
     /// An integer times a constant made from [`Quantity::Integer`].
     fn scale_integer(value: i32, gain: Self::Gain) -> Self;
 
-    /// A wide integer times a constant made from [`Quantity::Integer`]; saturates beyond +-2^40.
+    /// A wide integer times a constant made from [`Quantity::Integer`]; saturates at +-2^40 or beyond.
     fn scale_wide(value: i64, gain: Self::Gain) -> Self;
 
     /// This signal times a constant made to [`Quantity::Integer`], rounded to the nearest integer, saturating;

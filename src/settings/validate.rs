@@ -314,12 +314,7 @@ impl PlanSettings {
             .zip(&stage.axes)
             .zip(&self.motions)
         {
-            validate_motion(
-                Place { axis: Some(name) },
-                motion,
-                axis,
-                stage.rate_hz,
-            )?;
+            validate_motion(Place { axis: Some(name) }, motion, axis, stage.rate_hz)?;
         }
         Ok(())
     }
@@ -339,12 +334,7 @@ fn validate_motion(
     match motion {
         MotionSettings::Hold => return Ok(()),
         MotionSettings::Harmonic(sine) => {
-            at.within(
-                "motion.amplitude_mm",
-                sine.amplitude_mm,
-                1e-6,
-                longest,
-            )?;
+            at.within("motion.amplitude_mm", sine.amplitude_mm, 1e-6, longest)?;
             at.within(
                 "motion.frequency_hz",
                 sine.frequency_hz,
@@ -359,12 +349,7 @@ fn validate_motion(
             at.within("motion.lead_s", sine.lead_s, 1.0 / rate_hz, 100.0)?;
         }
         MotionSettings::PointToPoint(to) => {
-            at.within(
-                "motion.distance_mm",
-                to.distance_mm,
-                -longest,
-                longest,
-            )?;
+            at.within("motion.distance_mm", to.distance_mm, -longest, longest)?;
             at.within("motion.max_jerk_mm_s3", to.max_jerk_mm_s3, 1e-3, 1e9)?;
             at.within("motion.max_velocity_mm_s", to.max_velocity_mm_s, 1e-6, 1e3)?;
             at.within(

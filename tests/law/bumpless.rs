@@ -94,6 +94,9 @@ fn all_scalars(what: &str, first: &StageSettings, second: &StageSettings) {
     check::<Fixed>(what, first, second);
 }
 
+/// A change of settings and its name.
+type Change = (&'static str, fn(&mut AxisSettings));
+
 fn linear(axis: &mut AxisSettings) {
     axis.feedback.nonlinear = None;
 }
@@ -101,7 +104,7 @@ fn linear(axis: &mut AxisSettings) {
 #[test]
 fn gains_change_without_a_jump() {
     let first = with_x(linear);
-    let changes: [(&str, fn(&mut AxisSettings)); 5] = [
+    let changes: [Change; 5] = [
         ("kp", |axis| axis.feedback.pid.kp_v_per_mm *= 0.4),
         ("ki", |axis| axis.feedback.pid.ki_v_per_mm_s *= 10.0),
         ("kd", |axis| axis.feedback.pid.kd_v_s_per_mm *= 0.5),
@@ -140,7 +143,7 @@ fn feedforward_kinds_exchange_without_a_jump() {
 #[test]
 fn feedforward_gains_and_preview_change_without_a_jump() {
     let first = StageSettings::default();
-    let changes: [(&str, fn(&mut AxisSettings)); 4] = [
+    let changes: [Change; 4] = [
         ("gms", |axis| axis.feedforward.gains.gms = 0.0),
         ("viscous", |axis| axis.feedforward.gains.viscous = 2.0),
         ("inertia", |axis| {

@@ -151,7 +151,11 @@ fn with_kind(kind: FeedforwardKind) -> StageSettings {
         // As much nonlinear gain as the plant bears, so that less damping bears less.
         let plant = axis.plant.expect("a plant by default");
         let bound = sector_bound(&plant, &axis.feedback.pid, 1.0 / settings.rate_hz);
-        let gain = axis.feedback.nonlinear.as_mut().expect("an N-PID by default");
+        let gain = axis
+            .feedback
+            .nonlinear
+            .as_mut()
+            .expect("an N-PID by default");
         gain.rate_per_mm = (0.999 * bound).acosh() / gain.range_mm;
     }
     settings

@@ -19,7 +19,7 @@ fn gains() -> impl Strategy<Value = NonlinearGain> {
 
 /// The stated bound of the table's error: chords of a convex curve over intervals of at most a sixteenth of their
 /// argument, and the rounding of the number type.
-fn bound<S: Scalar>(gain: &NonlinearGain, rounding: f64) -> f64 {
+fn bound(gain: &NonlinearGain, rounding: f64) -> f64 {
     let steepness = gain.rate_per_mm * gain.range_mm;
     (steepness / 16.0).powi(2) / 8.0 * (steepness * 17.0 / 16.0).cosh() + rounding
 }
@@ -38,7 +38,7 @@ fn check<S: Scalar>(
     prop_assert!(value <= S::quantise(largest, Quantity::Multiplier).to_f64(Quantity::Multiplier));
     // The formula at the error that the number type holds.
     let exact = gain.at(error.to_f64(Quantity::Length));
-    let most = bound::<S>(gain, rounding * exact);
+    let most = bound(gain, rounding * exact);
     prop_assert!((value - exact).abs() <= most, "{value} {exact} {most}");
     Ok(())
 }

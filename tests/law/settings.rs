@@ -1,14 +1,12 @@
-//! Settings are refused by name, with the value and what is allowed; good ones survive being stored.
+//! Every number out of its range is refused by name, with the value and what is allowed.
 
 use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::gms::GmsElement;
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, PlanSettings, Reason, SettingsError, StageSettings};
 
 use crate::common::with_x;
 
-const ROOM: usize = 4;
+pub(crate) const ROOM: usize = 4;
 
 type Field = fn(&mut AxisSettings) -> &mut f64;
 
@@ -237,19 +235,19 @@ fn plant(axis: &mut AxisSettings) -> &mut PlantModel {
     axis.plant.as_mut().expect("a plant by default")
 }
 
-fn nonlinear(axis: &mut AxisSettings) -> &mut quadrant::control::npid::NonlinearGain {
+pub(crate) fn nonlinear(axis: &mut AxisSettings) -> &mut quadrant::control::npid::NonlinearGain {
     axis.feedback
         .nonlinear
         .as_mut()
         .expect("an N-PID by default")
 }
 
-fn refusal(settings: &StageSettings) -> SettingsError {
+pub(crate) fn refusal(settings: &StageSettings) -> SettingsError {
     settings.validate(ROOM).expect_err("refused")
 }
 
 /// Checks that the message names everything a person needs.
-fn check_message(error: &SettingsError, axis: AxisName, field: &str) {
+pub(crate) fn check_message(error: &SettingsError, axis: AxisName, field: &str) {
     assert_eq!((error.axis, error.field), (Some(axis), field));
     let text = error.to_string();
     assert!(
@@ -338,263 +336,4 @@ fn defaults_are_valid_at_every_rate_they_claim_and_with_room() {
         PlanSettings::default().validate(&StageSettings::default()),
         Ok(())
     );
-}
-
-fn reason(change: impl FnOnce(&mut AxisSettings)) -> (&'static str, Reason, String) {
-    let error = refusal(&with_x(change));
-    assert_eq!(error.axis, Some(AxisName::X));
-    (error.field, error.reason, error.to_string())
-}
-
-#[test]
-fn weights_that_do_not_sum_to_one_are_refused() {
-    let (field, reason, text) = reason(|axis| axis.friction.gms.elements[0].weight -= 2e-6);
-    assert_eq!(
-        (field, reason),
-        ("friction.gms.elements.weight", Reason::WeightsSum)
-    );
-    assert!(
-        text.contains("0.999998") && text.contains("sum to 1"),
-        "{text}"
-    );
-    let near = with_x(|axis| axis.friction.gms.elements[0].weight -= 0.5e-6);
-    assert_eq!(near.validate(ROOM), Ok(()));
-}
-
-#[test]
-fn elements_must_fit_the_room_and_exist() {
-    let split = |count: usize| {
-        let mut settings = StageSettings::default();
-        for axis in &mut settings.axes {
-            axis.friction.gms.elements = (0..count)
-                .map(|_| GmsElement {
-                    stiffness_v_per_mm: 1.0,
-                    weight: 1.0 / count as f64,
-                })
-                .collect();
-        }
-        settings
-    };
-    assert_eq!(split(5).validate(10), Ok(()));
-    assert_eq!(split(10).validate(10), Ok(()));
-    assert_eq!(split(1).validate(1), Ok(()));
-    let error = refusal(&split(5));
-    assert_eq!(error.reason, Reason::TooManyElements { room: 4 });
-    assert!(error.to_string().contains("room for 4"), "{error}");
-    assert_eq!(refusal(&split(0)).field, "friction.gms.elements");
-    assert!(split(5).build::<f32, 4>().is_err());
-    assert!(split(5).build::<f32, 5>().is_ok());
-}
-
-#[test]
-fn nonlinear_gain_beyond_the_popov_bound_is_refused_when_a_plant_is_given() {
-    let steep = |axis: &mut AxisSettings| nonlinear(axis).rate_per_mm = 25.0;
-    let (field, reason, text) = reason(steep);
-    assert_eq!(field, "feedback.nonlinear.rate_per_mm");
-    let Reason::BeyondPopov { bound } = reason else {
-        panic!("{reason:?}");
-    };
-    assert!((2.5..3.5).contains(&bound), "{bound}");
-    assert!(text.contains(&format!("{bound:.3}")), "{text}");
-    let unknown = with_x(|axis| {
-        steep(axis);
-        axis.plant = None;
-    });
-    assert_eq!(unknown.validate(ROOM), Ok(()));
-    // Just within.
-    let within = with_x(|axis| nonlinear(axis).rate_per_mm = (bound * 0.999).acosh() / 0.1);
-    assert_eq!(within.validate(ROOM), Ok(()));
-}
-
-#[test]
-fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
-    let stiff = |axis: &mut AxisSettings| axis.friction.gms.elements[0].stiffness_v_per_mm = 1000.0;
-    let (field, reason, text) = reason(stiff);
-    assert_eq!(field, "friction.gms.elements.stiffness_v_per_mm");
-    let Reason::TooStiffForRate { most } = reason else {
-        panic!("{reason:?}");
-    };
-    // (0.5 / Ts)^2 / A.
-    assert!((most - 25e6 / 69_390.0).abs() < 1e-9, "{most}");
-    assert!(text.contains(&format!("{most:.4}")), "{text}");
-    let unknown = with_x(|axis| {
-        stiff(axis);
-        axis.plant = None;
-    });
-    assert_eq!(unknown.validate(ROOM), Ok(()));
-    let slower = StageSettings {
-        rate_hz: 2e3,
-        ..with_x(|axis| axis.feedback.pid.derivative_filter_s = 1e-3)
-    };
-    assert!(slower.validate(ROOM).is_err());
-}
-
-#[test]
-fn attraction_faster_than_the_rate_is_refused() {
-    let (field, reason, text) = reason(|axis| axis.friction.gms.attraction_v_s = 1201.0);
-    assert_eq!(field, "friction.gms.attraction_v_s");
-    let Reason::TooFastForRate { most } = reason else {
-        panic!("{reason:?}");
-    };
-    assert!((most - 0.12 / 1e-4).abs() < 1e-9, "{most}");
-    assert!(text.contains(&format!("{most:.4}")), "{text}");
-}
-
-#[test]
-fn a_curve_too_sharp_for_its_table_is_refused() {
-    let (field, reason, text) = reason(|axis| {
-        let curve = &mut axis.friction.sliding.negative.curve;
-        curve.exponent = 0.3;
-        curve.coulomb_v = 0.01;
-    });
-    assert_eq!(field, "friction.sliding.negative.curve.exponent");
-    assert_eq!(reason, Reason::TableError);
-    assert!(text.contains("0.3") && text.contains("0.1 %"), "{text}");
-}
-
-#[test]
-fn fast_references_must_fit_the_encoder() {
-    // An 8-bit counter at 5 um a count: half its range in a tick is 0.64 mm.
-    let narrow = with_x(|axis| {
-        axis.encoder.counter_bits = 8;
-        axis.encoder.resolution_mm = 1e-5;
-    });
-    let error = refusal(&narrow);
-    check_message(&error, AxisName::X, "limits.max_velocity_mm_s");
-    // 4096 counts a tick is the most that the reference's formats hold.
-    let fine = with_x(|axis| axis.encoder.resolution_mm = 1e-6);
-    check_message(&refusal(&fine), AxisName::X, "limits.max_velocity_mm_s");
-}
-
-#[test]
-fn following_error_must_fit_the_position_difference() {
-    let fine = with_x(|axis| {
-        axis.encoder.resolution_mm = 1e-6;
-        axis.limits.max_velocity_mm_s = 10.0;
-        axis.limits.max_acceleration_mm_s2 = 100.0;
-        axis.limits.following_error_mm = 17.0;
-    });
-    check_message(&refusal(&fine), AxisName::X, "limits.following_error_mm");
-}
-
-fn plan_refusal(motion: MotionSettings) -> SettingsError {
-    let mut plan = PlanSettings::default();
-    plan.motions[1] = motion;
-    plan.validate(&StageSettings::default())
-        .expect_err("refused")
-}
-
-#[test]
-fn every_number_of_a_motion_is_refused_by_name() {
-    type SineField = fn(&mut HarmonicSettings) -> &mut f64;
-    let sine = HarmonicSettings::with_velocity(30.0, 10.0, 2.0, 0.5);
-    let fields: [(&str, SineField, f64, f64); 4] = [
-        ("motion.amplitude_mm", |s| &mut s.amplitude_mm, 0.0, 1.1e4),
-        ("motion.frequency_hz", |s| &mut s.frequency_hz, 0.0, 501.0),
-        ("motion.phase_rad", |s| &mut s.phase_rad, -101.0, 101.0),
-        ("motion.lead_s", |s| &mut s.lead_s, 0.9e-4, 101.0),
-    ];
-    for (field, place, below, above) in fields {
-        for value in [below, above, f64::NAN, f64::INFINITY] {
-            let mut sine = sine;
-            *place(&mut sine) = value;
-            check_message(
-                &plan_refusal(MotionSettings::Harmonic(sine)),
-                AxisName::Y,
-                field,
-            );
-        }
-    }
-    for cycles in [-0.1, 1e9, f64::NAN] {
-        let sine = HarmonicSettings {
-            cycles: Some(cycles),
-            ..sine
-        };
-        let error = plan_refusal(MotionSettings::Harmonic(sine));
-        check_message(&error, AxisName::Y, "motion.cycles");
-    }
-
-    type MoveField = fn(&mut PointToPointSettings) -> &mut f64;
-    let to = PointToPointSettings {
-        distance_mm: 10.0,
-        max_velocity_mm_s: 100.0,
-        max_acceleration_mm_s2: 1000.0,
-        max_jerk_mm_s3: 1e5,
-    };
-    let fields: [(&str, MoveField, f64, f64); 4] = [
-        ("motion.distance_mm", |m| &mut m.distance_mm, -1.1e4, 1.1e4),
-        (
-            "motion.max_velocity_mm_s",
-            |m| &mut m.max_velocity_mm_s,
-            0.0,
-            1001.0,
-        ),
-        (
-            "motion.max_acceleration_mm_s2",
-            |m| &mut m.max_acceleration_mm_s2,
-            0.0,
-            3.1e4,
-        ),
-        (
-            "motion.max_jerk_mm_s3",
-            |m| &mut m.max_jerk_mm_s3,
-            0.0,
-            1.1e9,
-        ),
-    ];
-    for (field, place, below, above) in fields {
-        for value in [below, above, f64::NAN, f64::INFINITY] {
-            let mut to = to;
-            *place(&mut to) = value;
-            check_message(
-                &plan_refusal(MotionSettings::PointToPoint(to)),
-                AxisName::Y,
-                field,
-            );
-        }
-    }
-}
-
-#[test]
-fn motions_faster_than_the_axis_are_refused() {
-    let fast = HarmonicSettings::with_velocity(30.0, 251.0, 2.0, 0.5);
-    let error = plan_refusal(MotionSettings::Harmonic(fast));
-    assert_eq!(error.field, "motion (peak velocity, mm/s)");
-    let abrupt = HarmonicSettings::with_velocity(30.0, 200.0, 2.0, 0.1);
-    let error = plan_refusal(MotionSettings::Harmonic(abrupt));
-    assert_eq!(error.field, "motion (peak acceleration, mm/s^2)");
-}
-
-#[test]
-fn a_move_longer_than_the_tick_counter_is_refused() {
-    let endless = PointToPointSettings {
-        distance_mm: 1e4,
-        max_velocity_mm_s: 1e-6,
-        max_acceleration_mm_s2: 1000.0,
-        max_jerk_mm_s3: 1e5,
-    };
-    let error = plan_refusal(MotionSettings::PointToPoint(endless));
-    check_message(&error, AxisName::Y, "motion (duration, s)");
-}
-
-#[test]
-fn a_travel_beyond_the_references_format_is_refused() {
-    let stage = with_x(|axis| {
-        axis.encoder.resolution_mm = 1e-6;
-        axis.limits.max_velocity_mm_s = 10.0;
-        axis.limits.max_acceleration_mm_s2 = 20.0;
-    });
-    let mut plan = PlanSettings::default();
-    let sine = HarmonicSettings::with_velocity(3000.0, 10.0, 1.0, 10.0);
-    plan.motions[0] = MotionSettings::Harmonic(sine);
-    let error = plan.validate(&stage).expect_err("refused");
-    check_message(&error, AxisName::X, "motion.amplitude_mm");
-    plan.motions[0] = MotionSettings::PointToPoint(PointToPointSettings {
-        distance_mm: -3000.0,
-        max_velocity_mm_s: 10.0,
-        max_acceleration_mm_s2: 10.0,
-        max_jerk_mm_s3: 10.0,
-    });
-    let error = plan.validate(&stage).expect_err("refused");
-    check_message(&error, AxisName::X, "motion.distance_mm");
 }

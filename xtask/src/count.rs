@@ -19,11 +19,9 @@ use crate::image::{self, Board, Image, Scalar, Target};
 use crate::listing::Listing;
 use crate::prove::ROOT;
 use crate::toolchain::Toolchain;
-use crate::twin::Twin;
+use crate::twin::{SETTLING_TICKS, Twin};
 use crate::{command, emulate, stages};
 
-/// Ticks before the motion has reached its speed, which are not counted.
-const SETTLING_TICKS: u32 = 6_000;
 /// How much more than expected is accepted, in percent.
 const TOLERANCE_PERCENT: f64 = 5.0;
 
@@ -104,6 +102,7 @@ fn count(image: &Image, ticks: u32) -> Result<Count> {
     emulate::load(&memory, Mode::Unpaced, &inputs)?;
     let mut qemu = emulator::command_line(image, &memory, Clock::Host)?;
     qemu.args(["-singlestep", "-d", "exec,nochain"])
+        .args(["-dfilter", &trace_filter(image, &listing, &graph)?])
         .stderr(Stdio::piped());
     let mut emulator = Emulator::spawn(qemu, image, false)?;
     let trace = emulator.take_stderr().context("QEMU's trace is a pipe")?;
@@ -118,6 +117,21 @@ fn count(image: &Image, ticks: u32) -> Result<Count> {
         counted.len()
     );
     Ok(summary(ticks, counted))
+}
+
+/// What follows a control tick: seeing its first instruction ends the tick.
+const FOLLOWERS: [&str; 4] = ["DISPATCHER_0", "DISPATCHER_1", "DISPATCHER_2", "main"];
+
+/// The address ranges worth a line in the trace: what the control interrupt can reach and what follows it. The tables
+/// that are filled before the first tick take thousands of times as many instructions as all ticks.
+fn trace_filter(image: &Image, listing: &Listing, graph: &CallGraph) -> Result<String> {
+    let mut starts: Vec<u32> = graph.reached.keys().copied().collect();
+    for name in FOLLOWERS {
+        starts.push(image.function(name)?);
+    }
+    let ranges = starts.iter().filter_map(|start| listing.at(*start));
+    let ranges = ranges.map(|f| format!("{:#x}..{:#x}", f.range.start, f.range.end - 1));
+    Ok(ranges.collect::<Vec<_>>().join(","))
 }
 
 /// Instructions of one tick, by stage.

@@ -94,7 +94,7 @@ struct CountArgs {
     #[arg(long, value_enum, default_value_t = Scalar::F32)]
     scalar: Scalar,
     /// Control ticks to run
-    #[arg(long, default_value_t = 2000)]
+    #[arg(long, default_value_t = 250)]
     ticks: u32,
     /// Write the figures to the file that later runs are held against
     #[arg(long)]

@@ -16,7 +16,7 @@ const STAGES: [(&str, &str); 11] = [
     ("quadrant_firmware::app::__rtic_internal_", "spawning"),
 ];
 
-/// What holds the stages together; it counts only where no stage does.
+/// What holds the stages together, innermost first; it counts only where no stage does.
 const FRAMES: [(&str, &str); 4] = [
     ("quadrant::axis::", "axis"),
     ("quadrant::stage::", "stage"),
@@ -29,21 +29,24 @@ pub(crate) const OTHER: &str = "other";
 
 /// The stage of an instruction, from the functions it was inlined into, outermost first.
 pub(crate) fn of<'a>(functions: impl Iterator<Item = &'a str> + Clone) -> Option<&'static str> {
-    find(functions.clone(), &STAGES).or_else(|| find(functions, &FRAMES))
+    let stage = functions.clone().find_map(|function| {
+        STAGES
+            .iter()
+            .find(|(prefix, _)| path(function).starts_with(prefix))
+    });
+    let frame = || {
+        FRAMES.iter().find(|(prefix, _)| {
+            functions
+                .clone()
+                .any(|function| path(function).starts_with(prefix))
+        })
+    };
+    stage.or_else(frame).map(|(_, name)| *name)
 }
 
-fn find<'a>(
-    mut functions: impl Iterator<Item = &'a str>,
-    table: &[(&str, &'static str)],
-) -> Option<&'static str> {
-    functions.find_map(|function| {
-        // `<quadrant::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
-        let path = function.trim_start_matches(['<', '&', '[', '(']);
-        table
-            .iter()
-            .find(|(prefix, _)| path.starts_with(prefix))
-            .map(|(_, stage)| *stage)
-    })
+/// `<quadrant::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
+fn path(function: &str) -> &str {
+    function.trim_start_matches(['<', '&', '[', '('])
 }
 
 #[cfg(test)]
@@ -60,6 +63,8 @@ mod tests {
         ];
         assert_eq!(of(frames.into_iter()), Some("feedforward"));
         assert_eq!(of(frames[..2].iter().copied()), Some("axis"));
+        let frames = ["quadrant_firmware::app::control", "quadrant::axis::Axis::drive"];
+        assert_eq!(of(frames.into_iter()), Some("axis"));
         assert_eq!(of(["core::ptr::read"].into_iter()), None);
     }
 }

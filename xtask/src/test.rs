@@ -9,7 +9,7 @@ use crate::toolchain::{Choice, Toolchain};
 use crate::{command, count, emulate, prove, setup};
 
 /// Ticks of the counting run.
-const COUNTED_TICKS: u32 = 2000;
+const COUNTED_TICKS: u32 = 250;
 /// Seconds of firmware time of the emulated runs.
 const EMULATED_SECONDS: f64 = 10.0;
 

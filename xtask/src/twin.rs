@@ -18,11 +18,15 @@ const ELEMENTS: usize = 4;
 /// Seed of the simulated stage's noise.
 const SEED: u64 = 1;
 
+/// Lead-in of the motions, s: short, because counting traces every instruction of it.
+const LEAD_S: f64 = 0.05;
+/// Ticks after which the motions of [`job`] have reached their speed.
+pub(crate) const SETTLING_TICKS: u32 = 750;
+
 /// The job of every emulated run: a circle in XY and a sine in Z, without an end, on the default settings.
 pub(crate) fn job() -> Job {
     const RADIUS_MM: f64 = 30.0;
     const FEED_MM_S: f64 = 15.0;
-    const LEAD_S: f64 = 0.5;
     let mut motions = circle(
         Plane::Xy,
         Sense::CounterClockwise,

@@ -1,10 +1,9 @@
-//! Fixed point: saturating arithmetic, accurate gains, and a law that differs from `f64` by microvolts.
+//! Fixed point: saturating arithmetic and accurate gains.
 
 use proptest::prelude::*;
 use quadrant::scalar::{Fixed, FixedGain, Quantity, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings};
 
-use crate::common::{Noise, Rig, repeatable, sine_on_x};
+use crate::common::repeatable;
 
 const QUANTITIES: [Quantity; 7] = [
     Quantity::Length,
@@ -165,86 +164,4 @@ fn ranges_are_those_that_the_analysis_states() {
     for (limit, expected) in limits.iter().zip(expected) {
         assert!((limit / expected - 1.0).abs() < 1e-9, "{limit} {expected}");
     }
-}
-
-/// What a tick shows of one axis: proportional, integral, derivative, feedforward, output (V), and the code.
-type Shown = ([f64; 5], i16);
-
-/// All axes over a motion with noise on the counts: the same counts for every type.
-fn run<S: Scalar>(plan: &PlanSettings, ticks: usize) -> Vec<[Shown; 3]> {
-    let settings = StageSettings::default();
-    let mut rig = Rig::<S>::new(&settings, plan);
-    let mut noise = Noise::new(3);
-    let mut lag = [0i64; 3];
-    rig.start();
-    (0..ticks)
-        .map(|_| {
-            for (index, lag) in lag.iter_mut().enumerate() {
-                // A machine that wanders about its reference by up to 0.15 mm, past the knee of k(e).
-                *lag = (*lag + noise.counts(2)).clamp(-300, 300);
-                let reference = rig.state.axes()[index].telemetry().reference;
-                rig.inputs.counts[index] = ((reference.0 >> 16) + *lag) as u32;
-            }
-            assert!(rig.tick().enabled);
-            core::array::from_fn(|index| {
-                let seen = rig.state.axes()[index].telemetry();
-                let volts = [
-                    seen.feedback.proportional,
-                    seen.feedback.integral,
-                    seen.feedback.derivative,
-                    seen.feedforward.total(),
-                    seen.output,
-                ];
-                (volts.map(|v| v.to_f64(Quantity::Voltage)), seen.code.0)
-            })
-        })
-        .collect()
-}
-
-/// Largest deviations from `f64`, per term, and the share of codes that differ, none by more than one.
-fn deviation<S: Scalar>(name: &str) -> [f64; 5] {
-    const TICKS: usize = 250_000;
-    let (exact, other) = (run::<f64>(&three_sines(), TICKS), run::<S>(&three_sines(), TICKS));
-    let mut worst = [0.0f64; 5];
-    let mut differ = 0u32;
-    for (exact, other) in exact.iter().flatten().zip(other.iter().flatten()) {
-        for ((worst, exact), other) in worst.iter_mut().zip(exact.0).zip(other.0) {
-            *worst = worst.max((exact - other).abs());
-        }
-        let step = (i32::from(exact.1) - i32::from(other.1)).abs();
-        assert!(step <= 1, "codes differ by {step}");
-        differ += u32::from(step != 0);
-    }
-    let share = 100.0 * f64::from(differ) / (3 * TICKS) as f64;
-    let [p, i, d, feedforward, output] = worst.map(|volts| volts * 1e6);
-    println!(
-        "{name} against f64 over 25 s, uV: P {p:.3}, I {i:.3}, D {d:.3}, feedforward {feedforward:.3}, \
-         output {output:.3}; {share:.2} % of the words differ, by one code"
-    );
-    worst
-}
-
-fn three_sines() -> PlanSettings {
-    let sine = sine_on_x(30.0, 10.0).motions[0];
-    PlanSettings { motions: [sine; 3] }
-}
-
-#[test]
-fn fixed_point_output_is_within_microvolts_of_double_precision() {
-    let [p, i, d, feedforward, output] = deviation::<Fixed>("fixed");
-    assert!(p < 1e-6 && i < 1e-6 && d < 25e-6 && feedforward < 10e-6, "{p} {i} {d} {feedforward}");
-    assert!(output < 30e-6, "{output} V");
-}
-
-#[test]
-fn single_precision_output_is_within_microvolts_of_double_precision() {
-    let [p, i, d, feedforward, output] = deviation::<f32>("f32");
-    assert!(p < 1e-6 && i < 30e-6 && d < 25e-6 && feedforward < 10e-6, "{p} {i} {d} {feedforward}");
-    assert!(output < 50e-6, "{output} V");
-}
-
-#[test]
-fn the_law_is_not_the_same_to_the_bit_in_every_type() {
-    let plan = three_sines();
-    assert_ne!(run::<f64>(&plan, 2000), run::<Fixed>(&plan, 2000));
 }

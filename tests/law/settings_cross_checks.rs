@@ -1,0 +1,156 @@
+//! What the fields of the settings must hold together.
+
+use quadrant::friction::gms::GmsElement;
+use quadrant::safety::AxisName;
+use quadrant::settings::{AxisSettings, Reason, StageSettings};
+
+use crate::common::with_x;
+use crate::settings::{ROOM, check_message, nonlinear, refusal};
+
+fn reason(change: impl FnOnce(&mut AxisSettings)) -> (&'static str, Reason, String) {
+    let error = refusal(&with_x(change));
+    assert_eq!(error.axis, Some(AxisName::X));
+    (error.field, error.reason, error.to_string())
+}
+
+#[test]
+fn weights_that_do_not_sum_to_one_are_refused() {
+    let (field, reason, text) = reason(|axis| axis.friction.gms.elements[0].weight -= 2e-6);
+    assert_eq!(
+        (field, reason),
+        ("friction.gms.elements.weight", Reason::WeightsSum)
+    );
+    assert!(
+        text.contains("0.999998") && text.contains("sum to 1"),
+        "{text}"
+    );
+    let near = with_x(|axis| axis.friction.gms.elements[0].weight -= 0.5e-6);
+    assert_eq!(near.validate(ROOM), Ok(()));
+}
+
+#[test]
+fn elements_must_fit_the_room_and_exist() {
+    let split = |count: usize| {
+        let mut settings = StageSettings::default();
+        for axis in &mut settings.axes {
+            axis.friction.gms.elements = (0..count)
+                .map(|_| GmsElement {
+                    stiffness_v_per_mm: 1.0,
+                    weight: 1.0 / count as f64,
+                })
+                .collect();
+        }
+        settings
+    };
+    assert_eq!(split(5).validate(10), Ok(()));
+    assert_eq!(split(10).validate(10), Ok(()));
+    assert_eq!(split(1).validate(1), Ok(()));
+    let error = refusal(&split(5));
+    assert_eq!(error.reason, Reason::TooManyElements { room: 4 });
+    assert!(error.to_string().contains("room for 4"), "{error}");
+    assert_eq!(refusal(&split(0)).field, "friction.gms.elements");
+    assert!(split(5).build::<f32, 4>().is_err());
+    assert!(split(5).build::<f32, 5>().is_ok());
+}
+
+#[test]
+fn nonlinear_gain_beyond_the_popov_bound_is_refused_when_a_plant_is_given() {
+    let steep = |axis: &mut AxisSettings| nonlinear(axis).rate_per_mm = 25.0;
+    let (field, reason, text) = reason(steep);
+    assert_eq!(field, "feedback.nonlinear.rate_per_mm");
+    let Reason::BeyondPopov { bound } = reason else {
+        panic!("{reason:?}");
+    };
+    assert!((2.5..3.5).contains(&bound), "{bound}");
+    assert!(text.contains(&format!("{bound:.3}")), "{text}");
+    let unknown = with_x(|axis| {
+        steep(axis);
+        axis.plant = None;
+    });
+    assert_eq!(unknown.validate(ROOM), Ok(()));
+    // Just within.
+    let within = with_x(|axis| nonlinear(axis).rate_per_mm = (bound * 0.999).acosh() / 0.1);
+    assert_eq!(within.validate(ROOM), Ok(()));
+}
+
+#[test]
+fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
+    let stiff = |axis: &mut AxisSettings| axis.friction.gms.elements[0].stiffness_v_per_mm = 1000.0;
+    let (field, reason, text) = reason(stiff);
+    assert_eq!(field, "friction.gms.elements.stiffness_v_per_mm");
+    let Reason::TooStiffForRate { most } = reason else {
+        panic!("{reason:?}");
+    };
+    // (0.5 / Ts)^2 / A.
+    assert!((most - 25e6 / 69_390.0).abs() < 1e-9, "{most}");
+    assert!(text.contains(&format!("{most:.4}")), "{text}");
+    let unknown = with_x(|axis| {
+        stiff(axis);
+        axis.plant = None;
+    });
+    assert_eq!(unknown.validate(ROOM), Ok(()));
+    let slower = StageSettings {
+        rate_hz: 2e3,
+        ..with_x(|axis| axis.feedback.pid.derivative_filter_s = 1e-3)
+    };
+    assert!(slower.validate(ROOM).is_err());
+}
+
+#[test]
+fn attraction_faster_than_the_rate_is_refused() {
+    let (field, reason, text) = reason(|axis| axis.friction.gms.attraction_v_s = 1201.0);
+    assert_eq!(field, "friction.gms.attraction_v_s");
+    let Reason::TooFastForRate { most } = reason else {
+        panic!("{reason:?}");
+    };
+    assert!((most - 0.12 / 1e-4).abs() < 1e-9, "{most}");
+    assert!(text.contains(&format!("{most:.4}")), "{text}");
+}
+
+#[test]
+fn a_curve_too_sharp_for_its_table_is_refused() {
+    let (field, reason, text) = reason(|axis| {
+        let curve = &mut axis.friction.sliding.negative.curve;
+        curve.exponent = 0.3;
+        curve.coulomb_v = 0.01;
+    });
+    assert_eq!(field, "friction.sliding.negative.curve.exponent");
+    assert_eq!(reason, Reason::TableError);
+    assert!(text.contains("0.3") && text.contains("0.1 %"), "{text}");
+}
+
+#[test]
+fn fast_references_must_fit_the_encoder() {
+    // An 8-bit counter at 5 um a count: half its range in a tick is 0.64 mm.
+    let narrow = with_x(|axis| {
+        axis.encoder.counter_bits = 8;
+        axis.encoder.resolution_mm = 1e-5;
+    });
+    let error = refusal(&narrow);
+    check_message(&error, AxisName::X, "limits.max_velocity_mm_s");
+    // 4096 counts a tick is the most that the reference's formats hold.
+    let fine = with_x(|axis| axis.encoder.resolution_mm = 1e-6);
+    check_message(&refusal(&fine), AxisName::X, "limits.max_velocity_mm_s");
+    // As are 256 counts per tick squared.
+    let abrupt = with_x(|axis| {
+        axis.encoder.resolution_mm = 1.05e-6;
+        axis.limits.max_velocity_mm_s = 1.0;
+        axis.limits.max_acceleration_mm_s2 = 27_000.0;
+    });
+    check_message(
+        &refusal(&abrupt),
+        AxisName::X,
+        "limits.max_acceleration_mm_s2",
+    );
+}
+
+#[test]
+fn following_error_must_fit_the_position_difference() {
+    let fine = with_x(|axis| {
+        axis.encoder.resolution_mm = 1e-6;
+        axis.limits.max_velocity_mm_s = 10.0;
+        axis.limits.max_acceleration_mm_s2 = 100.0;
+        axis.limits.following_error_mm = 17.0;
+    });
+    check_message(&refusal(&fine), AxisName::X, "limits.following_error_mm");
+}
