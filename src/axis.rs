@@ -132,13 +132,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Advances the reference and forms the error; says whether the axis follows. `tick` numbers the ticks.
-    #[inline(always)]
-    pub(crate) fn refer(
-        &self,
-        state: &mut AxisState<S, N>,
-        motion: &Motion<S>,
-        tick: u32,
-    ) -> bool {
+    #[inline(never)]
+    pub(crate) fn refer(&self, state: &mut AxisState<S, N>, motion: &Motion<S>, tick: u32) -> bool {
         let ahead = if state.running {
             let sample = motion.step(&mut state.motion);
             state.running = !motion.finished(&state.motion);
@@ -172,12 +167,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
 
     /// Computes the output. `changed` says that the settings are new in this tick: the output then starts from where
     /// it was, and the difference fades.
-    #[inline(always)]
-    pub(crate) fn drive(
-        &self,
-        state: &mut AxisState<S, N>,
-        changed: bool,
-    ) -> DacCode {
+    #[inline(never)]
+    pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
         let error = state.telemetry.error;
         let scaled = match &self.nonlinear {
             Some(gain) => gain.scaled_error(error),

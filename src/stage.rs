@@ -104,7 +104,10 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
         let tick = state.tick;
         state.tick = tick.wrapping_add(1);
         let was_enabled = state.safety.is_enabled();
-        for (axis, (memory, count)) in self.axes.iter().zip(state.axes.iter_mut().zip(inputs.counts))
+        for (axis, (memory, count)) in self
+            .axes
+            .iter()
+            .zip(state.axes.iter_mut().zip(inputs.counts))
         {
             let plausible = axis.measure(memory, count);
             memory.suspect = (was_enabled && !plausible).then_some(FaultCode::EncoderJump);

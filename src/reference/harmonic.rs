@@ -204,12 +204,18 @@ impl<S: Scalar> Harmonic<S> {
     #[inline(always)]
     fn lead(&self, elapsed: u32) -> Lead {
         match self.cruise_ticks {
-            _ if elapsed < self.lead_ticks => Lead::Under { tick: elapsed, leaving: false },
+            _ if elapsed < self.lead_ticks => Lead::Under {
+                tick: elapsed,
+                leaving: false,
+            },
             Some(cruise) if elapsed - self.lead_ticks >= cruise => {
                 let past = elapsed - self.lead_ticks - cruise;
                 if past < self.lead_ticks {
                     let tick = self.lead_ticks - 1 - past;
-                    Lead::Under { tick, leaving: true }
+                    Lead::Under {
+                        tick,
+                        leaving: true,
+                    }
                 } else {
                     Lead::Ended
                 }
@@ -272,7 +278,11 @@ impl<S: Scalar> Harmonic<S> {
         let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
             velocity: full.velocity.times(ratio, Quantity::Fraction),
-            acceleration: if leaving { centripetal - along } else { centripetal + along },
+            acceleration: if leaving {
+                centripetal - along
+            } else {
+                centripetal + along
+            },
             ..full
         }
     }

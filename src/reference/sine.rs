@@ -4,7 +4,13 @@
 /// `sin(pi/2 z) / z` in powers of `t = z^2 - 1/2`, a Chebyshev fit over -1/2..=1/2, exact to 3e-11 before rounding. Each
 /// coefficient has two fraction bits more than the one before, from 31 for that of `t`: then a step of Horner's scheme
 /// is the upper half of one product, one instruction with the sum.
-const COEFFICIENTS: [i32; 5] = [-1_223_429_338, 626_259_569, -150_142_711, 20_846_069, -1_886_646];
+const COEFFICIENTS: [i32; 5] = [
+    -1_223_429_338,
+    626_259_569,
+    -150_142_711,
+    20_846_069,
+    -1_886_646,
+];
 /// The constant coefficient, with 61 fraction bits.
 const CONSTANT: i64 = 2_921_876_942_130_950_361;
 /// One half, with the 30 fraction bits of the square.

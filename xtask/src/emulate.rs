@@ -104,8 +104,9 @@ fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<(Tally, Duratio
 
 /// A bar over seconds of firmware time; hidden where nobody watches.
 fn progress(ticks: u32) -> ProgressBar {
-    let style = ProgressStyle::with_template("{wide_bar} {pos}/{len} s of firmware time, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let style =
+        ProgressStyle::with_template("{wide_bar} {pos}/{len} s of firmware time, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new((ticks / PROGRESS_TICKS).into()).with_style(style)
 }
 
@@ -177,8 +178,14 @@ fn check_paced(lines: &[String], ticks: u32) -> Result<()> {
     let [ran, overruns, _longest, microseconds] = numbers[..] else {
         bail!("the firmware's account of the run is not as expected: {numbers:?}");
     };
-    ensure!(ran == u64::from(ticks), "{ran} ticks ran instead of {ticks}");
-    ensure!(overruns == 0, "{overruns} control ticks overran their deadline");
+    ensure!(
+        ran == u64::from(ticks),
+        "{ran} ticks ran instead of {ticks}"
+    );
+    ensure!(
+        overruns == 0,
+        "{overruns} control ticks overran their deadline"
+    );
     let expected = (f64::from(ticks) * 1e6 / RATE_HZ) as u64;
     // The idle loop, which takes the time, is at most one tick behind.
     ensure!(

@@ -63,7 +63,10 @@ mod tests {
         ];
         assert_eq!(of(frames.into_iter()), Some("feedforward"));
         assert_eq!(of(frames[..2].iter().copied()), Some("axis"));
-        let frames = ["quadrant_firmware::app::control", "quadrant::axis::Axis::drive"];
+        let frames = [
+            "quadrant_firmware::app::control",
+            "quadrant::axis::Axis::drive",
+        ];
         assert_eq!(of(frames.into_iter()), Some("axis"));
         assert_eq!(of(["core::ptr::read"].into_iter()), None);
     }
