@@ -3,11 +3,18 @@
 
 use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
 
+/// A sum that keeps what its last rounding lost: terms far below its resolution still add up.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CompensatedSum<F> {
+    total: F,
+    lost: F,
+}
+
 macro_rules! float_scalar {
     ($float:ty, $bits:ty, $place:ty, $mantissa_bits:expr, $half:expr) => {
         impl Scalar for $float {
             type Gain = $float;
-            type Sum = $float;
+            type Sum = CompensatedSum<$float>;
 
             const ZERO: Self = 0.0;
 
@@ -97,17 +104,26 @@ macro_rules! float_scalar {
 
             #[inline(always)]
             fn accumulate(self, sum: Self::Sum, gain: Self::Gain) -> Self::Sum {
-                sum + self * gain
+                // Kahan's summation: what rounding takes from one sum is added to the next term.
+                let term = self * gain + sum.lost;
+                let total = sum.total + term;
+                CompensatedSum {
+                    total,
+                    lost: term - (total - sum.total),
+                }
             }
 
             #[inline(always)]
             fn total(sum: Self::Sum) -> Self {
-                sum
+                sum.total
             }
 
             #[inline(always)]
             fn into_sum(self) -> Self::Sum {
-                self
+                CompensatedSum {
+                    total: self,
+                    lost: 0.0,
+                }
             }
         }
     };

@@ -15,6 +15,7 @@ mod fixed;
 mod float;
 
 pub use fixed::{Fixed, FixedGain};
+pub use float::CompensatedSum;
 
 use core::fmt::Debug;
 use core::ops::{Add, Neg, Sub};

@@ -1,6 +1,7 @@
 //! The command line.
 
 mod compare;
+mod numerics;
 mod output;
 mod replay;
 
@@ -21,6 +22,8 @@ enum Command {
     /// Run the thesis' comparison on the simulated stage: PID and N-PID with every feedforward, three velocities, and a
     /// circle.
     Compare(compare::Arguments),
+    /// Say what the number type costs: f32 and fixed point against f64 over the whole comparison.
+    Numerics(numerics::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did.
     Replay(replay::Arguments),
 }
@@ -30,6 +33,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
     match Arguments::parse().command {
         None => compare::run(&compare::Arguments::default()),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
+        Some(Command::Numerics(arguments)) => numerics::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
     }
 }

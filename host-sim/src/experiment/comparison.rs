@@ -13,7 +13,7 @@ use super::compensator::Knowledge;
 use super::metrics::{Score, change_percent, score};
 use super::run::{AxisTrace, RunError, run};
 use super::thesis::Metric;
-use crate::machine::Machine;
+use crate::machine::{Machine, Operator};
 use crate::plant::{SimulatedStage, StageTruth};
 
 /// Amplitude of the sine, mm.
@@ -122,6 +122,42 @@ fn job(configuration: Configuration, knowledge: Knowledge) -> Job {
     }
 }
 
+/// Time of one cycle at a largest velocity, s.
+fn cycle_s(velocity_mm_s: f64) -> f64 {
+    std::f64::consts::TAU * AMPLITUDE_MM / velocity_mm_s
+}
+
+/// All that a run of the comparison needs but the machine itself.
+pub(super) struct Bench {
+    /// What the machine is to run.
+    pub(super) job: Job,
+    /// The stage it runs on.
+    pub(super) plant: SimulatedStage,
+    /// Who starts it.
+    pub(super) operator: Operator,
+    /// Ticks after which the slowest sine has ended.
+    pub(super) most_ticks: usize,
+}
+
+impl Bench {
+    /// The x axis three times, on its job.
+    pub(super) fn new(configuration: Configuration, knowledge: Knowledge, seed: u64) -> Self {
+        let job = job(configuration, knowledge);
+        let [x, ..] = knowledge.truth().axes;
+        let truth = StageTruth {
+            axes: [x.clone(), x.clone(), x],
+        };
+        let rate_hz = job.stage.rate_hz;
+        let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(VELOCITIES_MM_S[0]);
+        Self {
+            plant: SimulatedStage::new(&truth, rate_hz, seed),
+            operator: Operator::runs_the_plan(),
+            most_ticks: (longest_s * rate_hz) as usize,
+            job,
+        }
+    }
+}
+
 /// Runs one configuration at all velocities, side by side, in the arithmetic of `S`.
 ///
 /// # Errors
@@ -131,22 +167,20 @@ pub fn run_configuration<S: Scalar>(
     knowledge: Knowledge,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
-    let job = job(configuration, knowledge);
-    let rate_hz = job.stage.rate_hz;
-    let [x, ..] = knowledge.truth().axes;
-    let resolution_mm = [x.resolution_mm; 3];
-    let truth = StageTruth {
-        axes: [x.clone(), x.clone(), x],
-    };
-    let mut plant = SimulatedStage::new(&truth, rate_hz, seed);
-    let mut machine = Machine::<S, ELEMENTS>::new(&job)?;
-    let cycle_s = |velocity: f64| std::f64::consts::TAU * AMPLITUDE_MM / velocity;
-    let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(VELOCITIES_MM_S[0]);
+    let mut bench = Bench::new(configuration, knowledge, seed);
+    let rate_hz = bench.job.stage.rate_hz;
+    let resolution_mm = bench
+        .job
+        .stage
+        .axes
+        .each_ref()
+        .map(|axis| axis.encoder.resolution_mm);
+    let mut machine = Machine::<S, ELEMENTS>::new(&bench.job)?;
     let traces = run(
         &mut machine,
-        &mut plant,
+        &mut bench.plant,
         resolution_mm,
-        (longest_s * rate_hz) as usize,
+        bench.most_ticks,
     )?;
     let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
     let mut velocities = VELOCITIES_MM_S.into_iter();

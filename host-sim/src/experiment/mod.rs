@@ -4,6 +4,7 @@ pub mod circle;
 pub mod comparison;
 pub mod compensator;
 pub mod metrics;
+pub mod numerics;
 pub mod recorded;
 mod run;
 pub mod thesis;

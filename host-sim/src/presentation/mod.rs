@@ -2,9 +2,11 @@
 
 mod circle;
 mod comparison;
+mod numerics;
 mod recorded;
 
 pub use comparison::{comparison_page, comparison_tables};
+pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 
 use crate::report::{Provenance, Series, Style};
