@@ -1,5 +1,13 @@
-//! The simulated XYZ stage and the experiments run on it.
+//! The simulated XYZ stage, and what is done around a controller: experiments, comparison, design.
+//!
+//! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
+//! - [`machine`]: the firmware's application in this process, on the library's own control law;
+//! - [`experiment`]: runs of a machine on a stage, and what they score;
+//! - [`presentation`]: their tables and pages, made with [`report`];
+//! - [`record`]: recorded motions from CSV files, checked;
+//! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
+
 pub mod design;
 pub mod experiment;
 pub mod machine;
