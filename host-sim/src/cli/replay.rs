@@ -30,6 +30,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
     } = arguments;
     let record = Record::read(reference, &axis.limits())?;
+    for doubt in &record.doubts {
+        eprintln!("note: {doubt}");
+    }
     let bar = progress(recorded::RUNS, "following the record");
     let outcomes = recorded::replay::<f32>(&record, *axis, output.seed, &bar)?;
     bar.finish_and_clear();

@@ -50,7 +50,7 @@ pub enum ReportError {
         radius_mm: f64,
     },
     /// The file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
+    #[error("cannot write {}", path.display())]
     Write {
         /// The file.
         path: PathBuf,

@@ -1,0 +1,130 @@
+//! The experiments on the simulated stage: what they must show whatever the exact figures are.
+
+use indicatif::ProgressBar;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::link::lockstep::Job;
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::safety::{Command, FaultCode, SafetyState};
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant::supervisor::Event;
+use quadrant_sim::experiment::circle::run_circles;
+use quadrant_sim::experiment::comparison::{Configuration, Controller, run_configuration};
+use quadrant_sim::experiment::compensator::Knowledge;
+use quadrant_sim::experiment::recorded::{RecordedAxis, replay};
+use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::record::Record;
+
+const PID: Configuration = Configuration {
+    controller: Controller::Pid,
+    feedforward: FeedforwardKind::None,
+};
+const BEST: Configuration = Configuration {
+    controller: Controller::NPid,
+    feedforward: FeedforwardKind::Combined,
+};
+
+#[test]
+fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_a_wrong_model() {
+    for knowledge in Knowledge::ALL {
+        let pid = run_configuration::<f32>(PID, knowledge, 1).unwrap();
+        let best = run_configuration::<f32>(BEST, knowledge, 1).unwrap();
+        for (pid, best) in pid.iter().zip(&best) {
+            assert!(best.score.largest_mm < 0.12 * pid.score.largest_mm);
+            assert!(best.score.glitch_mm < 0.2 * pid.score.glitch_mm);
+            assert!(best.score.rms_mm < 0.1 * pid.score.rms_mm);
+        }
+    }
+}
+
+#[test]
+fn the_same_seed_gives_the_same_outcome() {
+    let knowledge = Knowledge::VirtualMachine;
+    let run = |seed| {
+        run_configuration::<f32>(BEST, knowledge, seed)
+            .unwrap()
+            .map(|o| o.last_cycle.error_mm)
+    };
+    assert_eq!(run(7), run(7));
+    assert_ne!(run(7), run(8));
+}
+
+#[test]
+fn combined_feedforward_makes_the_circle_rounder() {
+    let circles = run_circles::<f32>(&[PID, BEST], 1).unwrap();
+    assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
+    assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
+}
+
+#[test]
+fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
+    let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(30.0, 15.0, 1.0, 0.5));
+    let job = Job {
+        stage: StageSettings::default(),
+        plan: PlanSettings {
+            motions: [sine, MotionSettings::Hold, MotionSettings::Hold],
+        },
+    };
+    let mut machine = Machine::<f32, 4>::new(&job).unwrap();
+    let mut plant = SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1);
+    let mut operator = Operator::runs_the_plan();
+    for tick in 0..20_000 {
+        // The encoder of x stands still, as if the axis were clamped.
+        let mut counts = plant.read_counters();
+        counts[0] = 0;
+        let input = quadrant::link::lockstep::InputRecord {
+            counts,
+            request: operator.request(tick),
+        };
+        let outputs = machine.tick(&input);
+        plant.step(&outputs);
+        if let SafetyState::Faulted(fault) = machine.state().safety() {
+            assert!(!outputs.enabled);
+            assert_eq!(outputs.codes.map(|code| code.0), [0; 3]);
+            assert_eq!(fault.code, FaultCode::FollowingError);
+            break;
+        }
+    }
+    for _ in 0..20 {
+        machine.tick(&quadrant::link::lockstep::InputRecord {
+            counts: [0; 3],
+            request: Some(Command::Run),
+        });
+    }
+    let events: Vec<_> = machine.events().iter().map(|(_, event)| *event).collect();
+    assert!(matches!(
+        events[..],
+        [
+            Event::Enabled,
+            Event::MotionStarted,
+            Event::Faulted(_),
+            Event::Refused(Command::Run, _),
+            ..
+        ]
+    ));
+}
+
+#[test]
+fn our_controllers_follow_the_recorded_emps_reference() {
+    let file = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../../shared/data/emps/emps.csv"
+    );
+    if !std::path::Path::new(file).exists() {
+        println!("SKIPPED: the EMPS record is not beside the repository ({file})");
+        return;
+    }
+    let axis = RecordedAxis::Emps;
+    let record = Record::read(file, &axis.limits()).unwrap();
+    let outcomes = replay::<f32>(&record, axis, 1, &ProgressBar::hidden()).unwrap();
+    let rms = |configuration| {
+        let found = outcomes
+            .iter()
+            .find(|outcome| outcome.configuration == configuration);
+        found.unwrap().rms_mm
+    };
+    // The recorded machine's own error, computed from the file alone, is 0.58 mm.
+    assert!((rms(None) - 0.58).abs() < 0.01);
+    assert!(rms(Some(BEST)) < 0.1 * rms(Some(PID)));
+    assert!(rms(Some(PID)) < rms(None));
+}
