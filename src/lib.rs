@@ -19,7 +19,7 @@
 //! One tick of one axis ([`axis`]):
 //!
 //! 1. [`encoder`]: the raw counter is differenced, wrap-safe, and accumulated.
-//! 2. [`reference`]: the motion's next position, an integer ([`units::Position`]); the error is formed in integers and
+//! 2. [`mod@reference`]: the motion's next position, an integer ([`units::Position`]); the error is formed in integers and
 //!    only then becomes a number.
 //! 3. [`feedforward`]: friction ([`friction`]) and inertia from the reference alone, as far ahead as the plant's delay;
 //!    each effect is counted once.

@@ -180,7 +180,7 @@ mod app {
             // A full queue drops the newest request: whoever asks too fast asks again.
             let _ = cx.local.requests_in.enqueue(request);
         }
-        if state.tick() % PERIOD_TICKS == 0 {
+        if state.tick().is_multiple_of(PERIOD_TICKS) {
             // A supervising task that is late finds the oldest samples and misses the newest.
             let _ = cx.local.samples_in.enqueue(Sample {
                 view: StageView {
@@ -216,8 +216,11 @@ mod app {
                 let _ = cx.local.commands_in.enqueue(command);
             }
             *cx.local.runs = cx.local.runs.wrapping_add(1);
-            let status =
-                (*cx.local.runs % STATUS_DIVIDER == 0).then_some(Line::Status(sample.errors));
+            let status = cx
+                .local
+                .runs
+                .is_multiple_of(STATUS_DIVIDER)
+                .then_some(Line::Status(sample.errors));
             for line in decision
                 .events
                 .into_iter()

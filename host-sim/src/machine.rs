@@ -69,7 +69,7 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
             },
         );
         self.requests.extend(input.request);
-        if self.state.tick() % PERIOD_TICKS == 0 {
+        if self.state.tick().is_multiple_of(PERIOD_TICKS) {
             self.supervise();
         }
         outputs

@@ -6,7 +6,7 @@
 //! with the same seed can be compared byte by byte.
 //!
 //! - [`Page::write_html`] writes the page; [`Table::write_csv`] and [`Table::to_text`] serve the other readers.
-//! - [`decimate`] thins long traces in such a way that spikes, which are what this project is about, survive.
+//! - [`decimate()`] thins long traces in such a way that spikes, which are what this project is about, survive.
 //! - [`PolarDeviation`] draws a circle test as a ball-bar instrument would (ISO 230-4).
 
 mod decimate;
