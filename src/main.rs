@@ -277,7 +277,7 @@ mod app {
         loop {
             if let Some(finished) = cx.local.idle.turn() {
                 defmt::info!(
-                    "finished: {=u32} ticks, {=u32} overruns, longest {=u32} cycles, {=u64} us of firmware time",
+                    "finished: {=u32} ticks, {=u32} overruns, longest {=u32} cycles, {=u32} us of firmware time",
                     finished.ticks,
                     OVERRUNS.load(Ordering::Relaxed),
                     LONGEST.load(Ordering::Relaxed),

@@ -32,8 +32,9 @@ pub(crate) use nucleo_f446re::*;
 pub(crate) struct Finished {
     /// Control ticks that ran.
     pub(crate) ticks: u32,
-    /// Time since the control timer was started, in microseconds of the firmware's own clock.
-    pub(crate) microseconds: u64,
+    /// Time from the start of the control timer to the last tick of a paced run, in microseconds of the firmware's own
+    /// clock; zero when nothing paced the run.
+    pub(crate) microseconds: u32,
 }
 
 /// How a program ends.

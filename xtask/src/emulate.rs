@@ -18,6 +18,8 @@ use crate::twin::{Tally, Twin, encoded_job};
 const RATE_HZ: f64 = 10_000.0;
 /// How long the firmware may take to answer, in the host's time.
 const PATIENCE: Duration = Duration::from_secs(20);
+/// How late, in us of firmware time, the last tick may look at the clock: the interrupt's latency.
+const LATENCY_US: u64 = 10;
 /// Looks at the answer between two looks at the clock.
 const LOOKS: u32 = 1 << 14;
 /// Ticks between two steps of the progress bar.
@@ -187,9 +189,8 @@ fn check_paced(lines: &[String], ticks: u32) -> Result<()> {
         "{overruns} control ticks overran their deadline"
     );
     let expected = (f64::from(ticks) * 1e6 / RATE_HZ) as u64;
-    // The idle loop, which takes the time, is at most one tick behind.
     ensure!(
-        microseconds.abs_diff(expected) <= 100,
+        microseconds.abs_diff(expected) <= LATENCY_US,
         "{ticks} ticks took {microseconds} us of firmware time instead of {expected}"
     );
     Ok(())

@@ -27,6 +27,9 @@ use quadrant::link::lockstep::{
 /// Control ticks begun. Written by [`Tick::acknowledge`] alone.
 static TICKS: AtomicU32 = AtomicU32::new(0);
 
+/// Cycles from the start of the control timer to the last tick of a paced run.
+static PACED_CYCLES: AtomicU32 = AtomicU32::new(0);
+
 /// The machine, started, in pieces.
 pub(crate) struct Board {
     /// Three position encoders.
@@ -42,14 +45,10 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// Starts the machine with `rate_hz` control ticks per second.
+    /// Prepares the machine for `rate_hz` control ticks per second; the idle loop starts them.
     pub(crate) fn init(_core: cortex_m::Peripherals, rate_hz: u32) -> Self {
         let boot = mailbox::boot();
         let period = timer::CLOCK_HZ / rate_hz;
-        timer::CLOCK.start(u32::MAX, false);
-        if boot.mode == Mode::Paced {
-            timer::CONTROL.start(period - 1, true);
-        }
         Self {
             encoders: Encoders { mode: boot.mode },
             operator: Operator { mode: boot.mode },
@@ -61,11 +60,10 @@ impl Board {
             },
             idle: Idle {
                 mode: boot.mode,
+                period,
                 last: boot.ticks,
                 sequence: 0,
-                seen: 0,
-                clock: u32::MAX,
-                cycles: 0,
+                started: false,
             },
         }
     }
@@ -173,6 +171,8 @@ impl Tick {
             timer::CONTROL.acknowledge();
             if ticks == self.last {
                 timer::CONTROL.stop();
+                // The clock counts down, and a record is shorter than its range: 172 s.
+                PACED_CYCLES.store(u32::MAX - timer::CLOCK.value(), Ordering::Relaxed);
             }
         }
     }
@@ -204,11 +204,10 @@ impl Tick {
 /// What the idle loop does.
 pub(crate) struct Idle {
     mode: Mode,
+    period: u32,
     last: u32,
     sequence: u32,
-    seen: u32,
-    clock: u32,
-    cycles: u64,
+    started: bool,
 }
 
 impl Idle {
@@ -226,15 +225,13 @@ impl Idle {
                 sequence == END_OF_RUN
             }
             Mode::Paced => {
-                let ticks = TICKS.load(Ordering::Relaxed);
-                // Once a tick is often enough to see every wrap, and the emulator is slow at reading timers.
-                if ticks != self.seen {
-                    self.seen = ticks;
-                    let value = timer::CLOCK.value();
-                    self.cycles += u64::from(self.clock.wrapping_sub(value));
-                    self.clock = value;
+                // Not before: ticks that come due while the application is still being set up would be lost.
+                if !self.started {
+                    self.started = true;
+                    timer::CLOCK.start(u32::MAX, false);
+                    timer::CONTROL.start(self.period - 1, true);
                 }
-                ticks == self.last
+                TICKS.load(Ordering::Relaxed) == self.last
             }
             Mode::Unpaced => {
                 let over = TICKS.load(Ordering::Relaxed) == self.last;
@@ -246,7 +243,7 @@ impl Idle {
         };
         over.then(|| Finished {
             ticks: TICKS.load(Ordering::Relaxed),
-            microseconds: self.cycles / u64::from(timer::CLOCK_HZ / 1_000_000),
+            microseconds: PACED_CYCLES.load(Ordering::Relaxed) / (timer::CLOCK_HZ / 1_000_000),
         })
     }
 }
