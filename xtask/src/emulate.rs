@@ -8,11 +8,12 @@ use quadrant::link::lockstep::{
     END_OF_RUN, INPUT, INPUT_SEQUENCE, InputRecord, Mode, OUTPUT, OUTPUT_SEQUENCE, OutputRecord,
     RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
+use quadrant::stage::Outputs;
 
 use crate::emulator::{Clock, Emulator, Memory};
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::toolchain::Toolchain;
-use crate::twin::{Tally, Twin, encoded_job};
+use crate::twin::{self, Tally, Twin};
 
 /// Control ticks per second of the firmware's time.
 const RATE_HZ: f64 = 10_000.0;
@@ -24,6 +25,18 @@ const LATENCY_US: u64 = 10;
 const LOOKS: u32 = 1 << 14;
 /// Ticks between two steps of the progress bar.
 const PROGRESS_TICKS: u32 = 10_000;
+
+/// What came of a run.
+pub(crate) struct Run {
+    /// How the words compare.
+    pub(crate) tally: Tally,
+    /// How long the ticks took.
+    elapsed: Duration,
+    /// The firmware's last outputs.
+    pub(crate) last: Outputs,
+    /// The firmware's log.
+    pub(crate) log: Vec<String>,
+}
 
 /// Runs the image for some seconds of its time and fails on any difference.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: bool) -> Result<()> {
@@ -42,7 +55,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: boo
     )?;
     println!("{}", image.footprint()?);
     let twin = Twin::of(scalar)?;
-    let (tally, elapsed) = if paced {
+    let Run { tally, elapsed, .. } = if paced {
         recorded(&image, twin, ticks)?
     } else {
         lockstep(&image, twin, ticks)?
@@ -68,12 +81,13 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: boo
 }
 
 /// Exchanges with the firmware tick by tick. The time starts with the first answer: compiling tables is not a tick.
-fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<(Tally, Duration)> {
+pub(crate) fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
-    memory.prepare(Mode::Lockstep, 0, &encoded_job()?)?;
+    memory.prepare(Mode::Lockstep, 0, &twin::encode(&twin::job())?)?;
     let mut emulator = Emulator::start(image, &memory, Clock::Host, true)?;
     let bar = progress(ticks);
     let mut started = None;
+    let mut last = Outputs::default();
     let mut bytes = [0; OutputRecord::BYTES];
     for tick in 1..=ticks {
         let input = twin.input();
@@ -90,9 +104,9 @@ fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<(Tally, Duratio
         }
         started.get_or_insert_with(Instant::now);
         memory.read(OUTPUT, &mut bytes)?;
-        let outputs = OutputRecord::decode(&bytes).outputs;
-        twin.compare(outputs);
-        twin.step(&outputs);
+        last = OutputRecord::decode(&bytes).outputs;
+        twin.compare(last);
+        twin.step(&last);
         if tick % PROGRESS_TICKS == 0 {
             bar.inc(1);
         }
@@ -100,8 +114,13 @@ fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<(Tally, Duratio
     let elapsed = started.map_or(Duration::ZERO, |started| started.elapsed());
     bar.finish_and_clear();
     memory.set_word(INPUT_SEQUENCE, END_OF_RUN)?;
-    emulator.wait()?;
-    Ok((*twin.tally(), elapsed))
+    let log = emulator.wait()?;
+    Ok(Run {
+        tally: *twin.tally(),
+        elapsed,
+        last,
+        log,
+    })
 }
 
 /// A bar over seconds of firmware time; hidden where nobody watches.
@@ -134,22 +153,29 @@ fn wait_for(memory: &Memory, emulator: &mut Emulator, tick: u32) -> Result<()> {
 }
 
 /// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
-fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<(Tally, Duration)> {
+fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
     let (inputs, expected) = twin.rehearse(ticks);
     let memory = Memory::create()?;
     load(&memory, Mode::Paced, &inputs)?;
     let started = Instant::now();
-    let lines = Emulator::start(image, &memory, Clock::Instructions, true)?.wait()?;
+    let log = Emulator::start(image, &memory, Clock::Instructions, true)?.wait()?;
     let elapsed = started.elapsed();
-    check_paced(&lines, ticks)?;
+    check_paced(&log, ticks)?;
     let mut bytes = vec![0; inputs.len() * OutputRecord::BYTES];
     memory.read(RECORDED_OUTPUTS, &mut bytes)?;
     let (records, _) = bytes.as_chunks();
     let mut tally = Tally::default();
+    let mut last = Outputs::default();
     for ((tick, expected), record) in (0..).zip(expected).zip(records) {
-        tally.add(tick, expected, OutputRecord::decode(record).outputs);
+        last = OutputRecord::decode(record).outputs;
+        tally.add(tick, expected, last);
     }
-    Ok((tally, elapsed))
+    Ok(Run {
+        tally,
+        elapsed,
+        last,
+        log,
+    })
 }
 
 /// Prepares a run of recorded inputs.
@@ -162,7 +188,7 @@ pub(crate) fn load(memory: &Memory, mode: Mode, inputs: &[InputRecord]) -> Resul
     let ticks = u32::try_from(inputs.len())?;
     let bytes: Vec<u8> = inputs.iter().flat_map(InputRecord::encode).collect();
     memory.write(RECORDED_INPUTS, &bytes)?;
-    memory.prepare(mode, ticks, &encoded_job()?)
+    memory.prepare(mode, ticks, &twin::encode(&twin::job())?)
 }
 
 /// Checks what the firmware says of a paced run: all ticks, no overrun, and the time they should take.

@@ -7,6 +7,7 @@ mod command;
 mod count;
 mod emulate;
 mod emulator;
+mod fault_paths;
 mod image;
 mod listing;
 mod prove;
@@ -45,6 +46,12 @@ enum Verb {
     Build(TargetArgs),
     /// Run the image in QEMU, in lockstep with a simulated stage
     Emulate(EmulateArgs),
+    /// Drive the emulated firmware into a fault and a panic, and see the outputs off
+    FaultPaths {
+        /// The firmware's number type
+        #[arg(long, value_enum, default_value_t = Scalar::F32)]
+        scalar: Scalar,
+    },
     /// Count the instructions of one control tick, stage by stage
     Count(CountArgs),
     /// Prove from the linked image that the control tick cannot panic
@@ -128,6 +135,7 @@ fn run(cli: Cli) -> Result<bool> {
             println!("{}", image.footprint()?);
         }
         Verb::Emulate(args) => emulate::run(toolchain()?, args.scalar, args.seconds, args.paced)?,
+        Verb::FaultPaths { scalar } => fault_paths::run(toolchain()?, scalar)?,
         Verb::Count(args) => {
             count::run(
                 toolchain()?,

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
-use crate::{command, count, emulate, prove, setup};
+use crate::{command, count, emulate, fault_paths, prove, setup};
 
 /// Ticks of the counting run.
 const COUNTED_TICKS: u32 = 250;
@@ -131,6 +131,9 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
         });
         report.step(format!("emulation paced by the timer, {target}"), || {
             emulate::run(toolchain, scalar, EMULATED_SECONDS, true)
+        });
+        report.step(format!("fault paths, {target}"), || {
+            fault_paths::run(toolchain, scalar)
         });
         report.step(format!("instructions per tick, {target}"), || {
             count::run(toolchain, scalar, COUNTED_TICKS, false)

@@ -48,9 +48,9 @@ pub(crate) fn job() -> Job {
     }
 }
 
-/// The job as the firmware reads it.
-pub(crate) fn encoded_job() -> Result<Vec<u8>> {
-    postcard::to_allocvec(&job()).context("cannot encode the job")
+/// A job as the firmware reads it.
+pub(crate) fn encode(job: &Job) -> Result<Vec<u8>> {
+    postcard::to_allocvec(job).context("cannot encode the job")
 }
 
 /// A machine of either number type.
@@ -74,6 +74,8 @@ pub(crate) struct Tally {
     pub(crate) differ: u64,
     /// Words that were not zero: a comparison of zeros proves nothing.
     pub(crate) moving: u64,
+    /// Ticks with the outputs enabled.
+    pub(crate) enabled: u64,
     /// The first difference: tick, the twin's outputs, the firmware's.
     pub(crate) first: Option<(u32, Outputs, Outputs)>,
 }
@@ -84,6 +86,8 @@ pub(crate) struct Twin {
     plant: SimulatedStage,
     operator: Operator,
     tick: u32,
+    /// The encoder of x stands still.
+    blocked: bool,
     expected: Outputs,
     tally: Tally,
 }
@@ -103,15 +107,28 @@ impl Twin {
             plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, SEED),
             operator: Operator::runs_the_plan(),
             tick: 0,
+            blocked: false,
             expected: Outputs::default(),
             tally: Tally::default(),
         })
     }
 
+    /// The same with x clamped, as its encoder sees it.
+    pub(crate) fn with_blocked_axis(self) -> Self {
+        Self {
+            blocked: true,
+            ..self
+        }
+    }
+
     /// What firmware and twin read in the next tick.
     pub(crate) fn input(&mut self) -> InputRecord {
+        let mut counts = self.plant.read_counters();
+        if self.blocked {
+            counts[0] = 0;
+        }
         InputRecord {
-            counts: self.plant.read_counters(),
+            counts,
             request: self.operator.request(self.tick),
         }
     }
@@ -159,6 +176,7 @@ impl Tally {
             self.differ += u64::from(*ours != theirs);
             self.moving += u64::from(ours.0 != 0);
         }
+        self.enabled += u64::from(expected.enabled);
         self.differ += u64::from(expected.enabled != firmware.enabled);
         if expected != firmware {
             self.first.get_or_insert((tick, expected, firmware));

@@ -83,14 +83,19 @@ impl Emulator {
         self.child.try_wait().context("cannot look after QEMU")
     }
 
-    /// Waits for the end and returns the log. Anything but success is an error that carries the log's last lines.
-    pub(crate) fn wait(mut self) -> Result<Vec<String>> {
+    /// Waits for the end, and returns whether it was a success, and the log.
+    pub(crate) fn end(mut self) -> Result<(bool, Vec<String>)> {
         let status = self.child.wait().context("cannot wait for QEMU")?;
         let log = self.log.take().context("the log is taken once")?;
         let Ok(lines) = log.join() else {
             bail!("the thread that decodes the log panicked")
         };
-        let lines = lines?;
+        Ok((status.success(), lines?))
+    }
+
+    /// Waits for the end and returns the log. Anything but success is an error that carries the log's last lines.
+    pub(crate) fn wait(self) -> Result<Vec<String>> {
+        let (succeeded, lines) = self.end()?;
         let last = lines
             .iter()
             .rev()
@@ -98,10 +103,7 @@ impl Emulator {
             .rev()
             .map(|line| format!("\n  {line}"))
             .collect::<String>();
-        ensure!(
-            status.success(),
-            "the firmware failed ({status}); its last words:{last}"
-        );
+        ensure!(succeeded, "the firmware failed; its last words:{last}");
         Ok(lines)
     }
 }
