@@ -9,7 +9,7 @@ use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::Toolchain;
 use crate::twin::{self, Twin};
 
-/// Ticks of the run with a blocked axis: the fault comes after about a fifth of a second.
+/// Ticks of the run with a blocked axis: the fault comes after 0.6 s.
 const TICKS: u32 = 10_000;
 
 /// Blocks an axis, then hands over settings that are refused.
