@@ -10,11 +10,14 @@
 //! | log       | low      | when supervise has something  | prints through defmt |
 //! | idle      | none     | the rest of the time          | what the board asks for |
 #![cfg_attr(target_os = "none", no_std, no_main)]
+// Registers are the only reason for `unsafe`, and `board` is their only place.
+#![deny(unsafe_code)]
 
 #[cfg(all(
     target_os = "none",
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
+#[allow(unsafe_code)]
 mod board;
 #[cfg(all(
     target_os = "none",
