@@ -5,36 +5,12 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use quadrant::link::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
+use quadrant::link::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
-
-/// A circle in XY and a sine in Z, without an end.
-fn job() -> Job {
-    let mut motions = circle(
-        Plane::Xy,
-        Sense::CounterClockwise,
-        30.0,
-        15.0,
-        0.0,
-        1.0,
-        0.5,
-    );
-    motions[2] = MotionSettings::Harmonic(HarmonicSettings::with_velocity(10.0, 8.0, 1.0, 0.5));
-    for motion in &mut motions {
-        if let MotionSettings::Harmonic(sine) = motion {
-            sine.cycles = None;
-        }
-    }
-    Job {
-        stage: StageSettings::default(),
-        plan: PlanSettings { motions },
-    }
-}
+use quadrant_sim::scenario::circle_and_sine;
 
 /// A machine on its stage, moving.
 struct Rig<S: Scalar> {
@@ -46,7 +22,7 @@ struct Rig<S: Scalar> {
 
 impl<S: Scalar> Rig<S> {
     fn moving() -> Self {
-        let job = job();
+        let job = circle_and_sine(0.5);
         let mut rig = Self {
             machine: Machine::new(&job).expect("the default settings are valid"),
             plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1),

@@ -5,6 +5,7 @@
 //! - [`experiment`]: runs of a machine on a stage, and what they score;
 //! - [`presentation`]: their tables and pages, made with [`report`];
 //! - [`record`]: recorded motions from CSV files, checked;
+//! - [`scenario`]: the motion that the firmware is emulated with;
 //! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
 
@@ -15,3 +16,4 @@ pub mod plant;
 pub mod presentation;
 pub mod record;
 pub mod report;
+pub mod scenario;

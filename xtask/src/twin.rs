@@ -4,12 +4,11 @@ use std::marker::PhantomData;
 
 use anyhow::{Context, Result};
 use quadrant::link::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
 use quadrant::scalar::{Fixed, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::scenario::circle_and_sine;
 
 use crate::image;
 
@@ -23,29 +22,9 @@ const LEAD_S: f64 = 0.05;
 /// Ticks after which the motions of [`job`] have reached their speed.
 pub(crate) const SETTLING_TICKS: u32 = 750;
 
-/// The job of every emulated run: a circle in XY and a sine in Z, without an end, on the default settings.
+/// The job of every emulated run.
 pub(crate) fn job() -> Job {
-    const RADIUS_MM: f64 = 30.0;
-    const FEED_MM_S: f64 = 15.0;
-    let mut motions = circle(
-        Plane::Xy,
-        Sense::CounterClockwise,
-        RADIUS_MM,
-        FEED_MM_S,
-        0.0,
-        1.0,
-        LEAD_S,
-    );
-    motions[2] = MotionSettings::Harmonic(HarmonicSettings::with_velocity(10.0, 8.0, 1.0, LEAD_S));
-    for motion in &mut motions {
-        if let MotionSettings::Harmonic(sine) = motion {
-            sine.cycles = None;
-        }
-    }
-    Job {
-        stage: StageSettings::default(),
-        plan: PlanSettings { motions },
-    }
+    circle_and_sine(LEAD_S)
 }
 
 /// A job as the firmware reads it.
