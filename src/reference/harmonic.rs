@@ -7,7 +7,7 @@ use core::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
-use super::sine::{SINE_BITS, cosine, sine};
+use super::sine::{SINE_BITS, sine, sine_and_cosine};
 use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_FRACTION_BITS, Position};
@@ -241,7 +241,7 @@ impl<S: Scalar> Harmonic<S> {
     #[inline(always)]
     fn advance(&self, state: &mut MotionState, phase: u64) -> ReferenceSample<S> {
         state.phase = state.phase.wrapping_add(phase);
-        let (sine, cosine) = self.sine_and_cosine(state);
+        let (sine, cosine) = sine_and_cosine(self.phase(state));
         let swing = swing(sine, self.amplitude_counts, self.amplitude_fraction);
         ReferenceSample {
             position: Position(swing - self.start_swing),
@@ -251,9 +251,8 @@ impl<S: Scalar> Harmonic<S> {
     }
 
     #[inline(always)]
-    fn sine_and_cosine(&self, state: &MotionState) -> (i32, i32) {
-        let phase = ((state.phase >> 32) as u32).wrapping_add(self.start_phase);
-        (sine(phase), cosine(phase))
+    fn phase(&self, state: &MotionState) -> u32 {
+        ((state.phase >> 32) as u32).wrapping_add(self.start_phase)
     }
 
     /// A tick of the lead-in or lead-out, whose phase speed is a smooth step `p^2 (3 - 2 p)` of the progress `p`. Kept
@@ -274,7 +273,7 @@ impl<S: Scalar> Harmonic<S> {
             .times(ratio, Quantity::Fraction);
         // The slope of the smooth step over its largest, 4 p (1 - p).
         let slope = fraction((progress * (ONE - progress)) >> 29);
-        let (_, cosine) = self.sine_and_cosine(state);
+        let (_, cosine) = sine_and_cosine(self.phase(state));
         let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
             velocity: full.velocity.times(ratio, Quantity::Fraction),

@@ -25,30 +25,46 @@ fn upper(a: i32, b: i32) -> i32 {
 /// Fraction bits of a sine.
 pub(super) const SINE_BITS: u32 = 30;
 
-/// The sine of a phase (a turn is 2^32) in units of 2^-30; the error is below 3e-9.
+/// The sines of phases (a turn is 2^32) in units of 2^-30; the error is below 3e-9. Together, so that each coefficient is
+/// fetched once.
 #[inline(always)]
-pub(super) fn sine(phase: u32) -> i32 {
+fn sines<const COUNT: usize>(phases: [u32; COUNT]) -> [i32; COUNT] {
     // z in quarter turns, Q31. The second and third quarters mirror the others.
-    let doubled = (phase << 1) as i32;
-    let z = if (phase ^ (phase << 1)) >> 31 == 0 {
-        doubled
-    } else {
-        doubled.saturating_neg()
-    };
-    let t = upper(z, z) - HALF;
+    let z = phases.map(|phase| {
+        let doubled = (phase << 1) as i32;
+        if (phase ^ (phase << 1)) >> 31 == 0 {
+            doubled
+        } else {
+            doubled.saturating_neg()
+        }
+    });
+    let t = z.map(|z| upper(z, z) - HALF);
     let [first, second, third, fourth, fifth] = COEFFICIENTS;
-    let sum = fourth + upper(fifth, t);
-    let sum = third + upper(sum, t);
-    let sum = second + upper(sum, t);
-    let sum = first + upper(sum, t);
-    let slope = ((CONSTANT + i64::from(sum) * i64::from(t)) >> 31) as i32;
-    ((i64::from(z) * i64::from(slope)) >> 31) as i32
+    let step = |sums: [i32; COUNT], coefficient: i32| {
+        core::array::from_fn(|lane| coefficient + upper(sums[lane], t[lane]))
+    };
+    let sums = step([fifth; COUNT], fourth);
+    let sums = step(sums, third);
+    let sums = step(sums, second);
+    let sums: [i32; COUNT] = step(sums, first);
+    core::array::from_fn(|lane| {
+        let product = i64::from(sums[lane]) * i64::from(t[lane]);
+        let slope = ((CONSTANT + product) >> 31) as i32;
+        ((i64::from(z[lane]) * i64::from(slope)) >> 31) as i32
+    })
 }
 
-/// The cosine of a phase, as [`sine`].
+/// The sine of a phase.
+pub(super) fn sine(phase: u32) -> i32 {
+    let [sine] = sines([phase]);
+    sine
+}
+
+/// The sine and the cosine of a phase.
 #[inline(always)]
-pub(super) fn cosine(phase: u32) -> i32 {
-    sine(phase.wrapping_add(1 << 30))
+pub(super) fn sine_and_cosine(phase: u32) -> (i32, i32) {
+    let [sine, cosine] = sines([phase, phase.wrapping_add(1 << 30)]);
+    (sine, cosine)
 }
 
 #[cfg(test)]
@@ -63,7 +79,8 @@ mod tests {
             let phase = step.wrapping_mul(2_147_483_659 / 7);
             let angle = f64::from(phase) * turn;
             assert!((f64::from(sine(phase)) * scale - libm::sin(angle)).abs() < 3e-9);
-            assert!((f64::from(cosine(phase)) * scale - libm::cos(angle)).abs() < 3e-9);
+            let (_, cosine) = sine_and_cosine(phase);
+            assert!((f64::from(cosine) * scale - libm::cos(angle)).abs() < 3e-9);
         }
     }
 
