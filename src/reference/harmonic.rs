@@ -122,7 +122,10 @@ pub struct Harmonic<S: Scalar> {
     phase_per_tick: u64,
     lead_ticks: u32,
     lead_step: u64,
-    cruise_ticks: Option<u32>,
+    /// Ticks at full speed; more than can elapse when there is no end.
+    cruise_ticks: u32,
+    /// When the lead-out has ended, if it ever does.
+    end_tick: Option<u32>,
     velocity: S::Gain,
     centripetal: S::Gain,
     tangential: S::Gain,
@@ -164,6 +167,9 @@ impl<S: Scalar> Harmonic<S> {
         let phase_per_tick = libm::round(libm::scalbn(turns_per_tick, 64)) as u64;
         let ticks = |seconds: f64| libm::round(seconds * scale.rate_hz) as u32;
         let lead_ticks = ticks(settings.lead_s).max(1);
+        let cruise_ticks = settings
+            .cycles
+            .map(|cycles| ticks(cycles / settings.frequency_hz));
         // The lead-in covers half of what full speed would.
         let lead_turns = 0.5 * f64::from(lead_ticks) * turns_per_tick;
         let start_turns = settings.phase_rad / TAU - lead_turns;
@@ -184,9 +190,8 @@ impl<S: Scalar> Harmonic<S> {
             phase_per_tick,
             lead_ticks,
             lead_step: (1 << 62) / u64::from(lead_ticks),
-            cruise_ticks: settings
-                .cycles
-                .map(|cycles| ticks(cycles / settings.frequency_hz)),
+            cruise_ticks: cruise_ticks.unwrap_or(u32::MAX),
+            end_tick: cruise_ticks.map(|cruise| cruise.saturating_add(2 * lead_ticks)),
             velocity: gain(settings.amplitude_mm * angular, Quantity::Velocity),
             centripetal: gain(
                 -settings.amplitude_mm * angular * angular,
@@ -200,27 +205,27 @@ impl<S: Scalar> Harmonic<S> {
         }
     }
 
-    /// Where in the lead-in or lead-out a tick lies: its number from the standing end, and whether it is the lead-out.
+    /// Where a tick lies in the motion.
     #[inline(always)]
     fn lead(&self, elapsed: u32) -> Lead {
-        match self.cruise_ticks {
-            _ if elapsed < self.lead_ticks => Lead::Under {
+        if elapsed < self.lead_ticks {
+            return Lead::Under {
                 tick: elapsed,
                 leaving: false,
-            },
-            Some(cruise) if elapsed - self.lead_ticks >= cruise => {
-                let past = elapsed - self.lead_ticks - cruise;
-                if past < self.lead_ticks {
-                    let tick = self.lead_ticks - 1 - past;
-                    Lead::Under {
-                        tick,
-                        leaving: true,
-                    }
-                } else {
-                    Lead::Ended
-                }
+            };
+        }
+        let cruised = elapsed - self.lead_ticks;
+        if cruised < self.cruise_ticks {
+            return Lead::FullSpeed;
+        }
+        let past = cruised - self.cruise_ticks;
+        if past < self.lead_ticks {
+            Lead::Under {
+                tick: self.lead_ticks - 1 - past,
+                leaving: true,
             }
-            _ => Lead::FullSpeed,
+        } else {
+            Lead::Ended
         }
     }
 
@@ -288,9 +293,6 @@ impl<S: Scalar> Harmonic<S> {
 
     #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
-        match self.cruise_ticks {
-            Some(cruise) => state.elapsed >= cruise.saturating_add(2 * self.lead_ticks),
-            None => false,
-        }
+        self.end_tick.is_some_and(|end| state.elapsed >= end)
     }
 }
