@@ -6,14 +6,18 @@
 //! - [`presentation`]: their tables and pages, made with [`report`];
 //! - [`record`]: recorded motions from CSV files, checked;
 //! - [`scenario`]: the motion that the firmware is emulated with;
+//! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
+//! - [`identify`]: from recordings to the parameters of an axis;
 //! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
 
 pub mod design;
 pub mod experiment;
+pub mod identify;
 pub mod machine;
 pub mod plant;
 pub mod presentation;
 pub mod record;
 pub mod report;
+pub mod rig;
 pub mod scenario;

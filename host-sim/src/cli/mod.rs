@@ -1,6 +1,8 @@
 //! The command line.
 
 mod compare;
+mod design;
+mod identify;
 mod numerics;
 mod output;
 mod replay;
@@ -22,6 +24,12 @@ enum Command {
     /// Run the thesis' comparison on the simulated stage: PID and N-PID with every feedforward, three velocities, and a
     /// circle.
     Compare(compare::Arguments),
+    /// Design a controller on a model of the axis or on a measured frequency response.
+    #[command(subcommand)]
+    Design(design::Command),
+    /// Identify an axis: its linear model, its friction, from experiments or from recordings.
+    #[command(subcommand)]
+    Identify(identify::Command),
     /// Say what the number type costs: f32 and fixed point against f64 over the whole comparison.
     Numerics(numerics::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did.
@@ -33,6 +41,8 @@ pub(crate) fn run() -> anyhow::Result<()> {
     match Arguments::parse().command {
         None => compare::run(&compare::Arguments::default()),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
+        Some(Command::Design(command)) => design::run(&command),
+        Some(Command::Identify(command)) => identify::run(&command),
         Some(Command::Numerics(arguments)) => numerics::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
     }

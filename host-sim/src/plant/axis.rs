@@ -121,8 +121,10 @@ impl SimulatedAxis {
         let acceleration = truth.gain_mm_per_v_s2 * (force_v - self.friction_v)
             - truth.damping_per_s * self.velocity_mm_s
             - truth.stiffness_per_s2 * self.position_mm;
-        self.velocity_mm_s += acceleration * self.step_s;
-        let displacement = self.velocity_mm_s * self.step_s;
+        // The mean of both velocities: a held force then moves the mass exactly as it would in continuous time.
+        let change = acceleration * self.step_s;
+        let displacement = (self.velocity_mm_s + 0.5 * change) * self.step_s;
+        self.velocity_mm_s += change;
         self.position_mm += displacement;
         let direction = if displacement < 0.0 {
             Direction::Negative

@@ -1,0 +1,8 @@
+//! From measurements to parameters: the thesis' chapter 3.
+//!
+//! An experiment is run on a [`Rig`](crate::rig::Rig), or its recording read from a file; everything here works on
+//! [`Recording`](crate::rig::Recording)s and knows nothing of where they come from.
+//!
+//! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which every step below uses.
+
+pub mod fit;
