@@ -1,11 +1,14 @@
 //! One axis of the simulated stage as a rig: its truth is on the other side of encoder and converter.
 
+use quadrant::feedforward::FeedforwardKind;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::reference::MotionSettings;
 use quadrant::safety::SafetyState;
 use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
 use quadrant::units::DacCode;
 
+use super::recorder::{Period, Recorder};
+use super::watch::Watch;
 use super::{Drive, Experiment, Recording, Rig, RigAxis, RigError};
 use crate::machine::{Machine, Operator};
 use crate::plant::{AxisTruth, SimulatedAxis};
@@ -16,8 +19,6 @@ const ELEMENTS: usize = quadrant::friction::gms::MAX_ELEMENTS;
 const TRAVEL_MM: f64 = 200.0;
 /// Control periods between two reports of progress.
 const PROGRESS_TICKS: usize = 20_000;
-/// Control periods over which the velocity is watched.
-const SPEED_TICKS: usize = 20;
 /// What the axes are called.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
@@ -31,6 +32,7 @@ pub struct SimulatedRig {
     plant: SimulatedAxis,
     full_scale_v: f64,
     resolution_mm: f64,
+    /// The axis under test is the first; the others stand still.
     stage: StageSettings,
 }
 
@@ -41,7 +43,7 @@ impl SimulatedRig {
         let mut stage = StageSettings::default();
         let mut axis = stage.axes[index].clone();
         axis.feedback.nonlinear = None;
-        axis.feedforward.kind = quadrant::feedforward::FeedforwardKind::None;
+        axis.feedforward.kind = FeedforwardKind::None;
         stage.axes[0] = axis;
         Self {
             name: NAMES[index],
@@ -69,6 +71,74 @@ impl SimulatedRig {
     fn code(&self, volts: f64) -> DacCode {
         DacCode::saturating((volts / self.full_scale_v * DacCode::FULL_SCALE).round() as i32)
     }
+
+    /// Runs the experiment until it ends; what follows, the outputs off, is the caller's.
+    fn drive(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, RigError> {
+        let mut law = self.law(experiment)?;
+        let mut watch = Watch::new(experiment, self.axis());
+        let mut recorder = Recorder::new(experiment.decimation, self.stage.rate_hz);
+        let expected = experiment.injection_v.len().max(1);
+        loop {
+            let raw = self.plant.read_counter();
+            let position_mm = f64::from(raw as i32) * self.resolution_mm;
+            let Some(step) = law.step(raw, experiment)? else {
+                self.plant.step(DacCode::ZERO, false);
+                continue;
+            };
+            let done = recorder.ticks();
+            let injection_v = experiment.injection_v.get(done).copied();
+            if injection_v.is_none() && step.motion_ended {
+                progress(1.0);
+                return Ok(recorder.finish());
+            }
+            let waits_for = if step.motion_ended {
+                "the injection has not ended"
+            } else {
+                "the motion has not ended"
+            };
+            watch.check(done, position_mm, waits_for)?;
+            if done.is_multiple_of(PROGRESS_TICKS) {
+                progress((done as f64 / expected as f64).min(1.0));
+            }
+            let injection_v = injection_v.unwrap_or(0.0);
+            let sum = i32::from(step.code.0) + i32::from(self.code(injection_v).0);
+            let code = DacCode::saturating(sum);
+            recorder.push(Period {
+                reference_mm: position_mm + step.error_mm,
+                position_mm,
+                voltage_v: self.volts(code),
+                injection_v,
+            });
+            self.plant.step(code, true);
+        }
+    }
+
+    fn law(&self, experiment: &Experiment) -> Result<Law, RigError> {
+        let Drive::ClosedLoop(motion) = &experiment.drive else {
+            return Ok(Law::OpenLoop);
+        };
+        let plan = PlanSettings {
+            motions: [*motion, MotionSettings::Hold, MotionSettings::Hold],
+        };
+        let build = || {
+            let plan = plan.build(&self.stage)?;
+            Ok(Machine::with_plan(self.stage.build()?, plan))
+        };
+        let machine = build().map_err(|source| RigError::Motion {
+            experiment: experiment.name.clone(),
+            source,
+        })?;
+        Ok(Law::ClosedLoop {
+            machine: Box::new(machine),
+            operator: Operator::runs_the_plan(),
+            tick: 0,
+            waits_for_motion: *motion != MotionSettings::Hold,
+        })
+    }
 }
 
 /// The law's side of an experiment.
@@ -77,7 +147,56 @@ enum Law {
     ClosedLoop {
         machine: Box<Machine<f32, ELEMENTS>>,
         operator: Operator,
+        tick: u32,
+        /// There is a motion, and it has not begun.
+        waits_for_motion: bool,
     },
+}
+
+/// What the law does in one control period with the outputs enabled.
+struct Step {
+    code: DacCode,
+    /// Reference minus position, mm.
+    error_mm: f64,
+    motion_ended: bool,
+}
+
+impl Law {
+    /// One control period; nothing while the outputs are off.
+    fn step(&mut self, raw: u32, experiment: &Experiment) -> Result<Option<Step>, RigError> {
+        let Self::ClosedLoop {
+            machine,
+            operator,
+            tick,
+            waits_for_motion,
+        } = self
+        else {
+            return Ok(Some(Step {
+                code: DacCode::ZERO,
+                error_mm: 0.0,
+                motion_ended: true,
+            }));
+        };
+        let outputs = machine.tick(&InputRecord {
+            counts: [raw, 0, 0],
+            request: operator.request(*tick),
+        });
+        *tick += 1;
+        let state = machine.state();
+        if let SafetyState::Faulted(fault) = state.safety() {
+            return Err(RigError::Fault {
+                experiment: experiment.name.clone(),
+                fault,
+            });
+        }
+        let running = state.is_running();
+        *waits_for_motion &= !running;
+        Ok(outputs.enabled.then(|| Step {
+            code: outputs.codes[0],
+            error_mm: f64::from(state.axes()[0].telemetry().error_mm()),
+            motion_ended: !*waits_for_motion && !running,
+        }))
+    }
 }
 
 impl Rig for SimulatedRig {
@@ -105,179 +224,8 @@ impl Rig for SimulatedRig {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, RigError> {
-        let mut law = match &experiment.drive {
-            Drive::OpenLoop => Law::OpenLoop,
-            Drive::ClosedLoop(motion) => {
-                let plan = PlanSettings {
-                    motions: [*motion, MotionSettings::Hold, MotionSettings::Hold],
-                };
-                let built = self
-                    .stage
-                    .build()
-                    .and_then(|stage| Ok((stage, plan.build(&self.stage)?)));
-                let (stage, plan) = built.map_err(|source| RigError::Motion {
-                    experiment: experiment.name.clone(),
-                    source,
-                })?;
-                Law::ClosedLoop {
-                    machine: Box::new(Machine::with_plan(stage, plan)),
-                    operator: Operator::runs_the_plan(),
-                }
-            }
-        };
-        let moves = !matches!(
-            experiment.drive,
-            Drive::OpenLoop | Drive::ClosedLoop(MotionSettings::Hold)
-        );
-        let rate_hz = self.stage.rate_hz;
-        let limits = self.axis();
-        let mut recorder = Recorder::new(experiment, rate_hz);
-        let mut moved = false;
-        let mut watched_mm = None;
-        let most_ticks = (experiment.time_limit_s * rate_hz) as usize;
-        let expected = experiment.injection_v.len().max(1);
-        for tick in 0.. {
-            let raw = self.plant.read_counter();
-            let position_mm = f64::from(raw as i32) * self.resolution_mm;
-            let (code, enabled, reference_mm, running) = match &mut law {
-                Law::OpenLoop => (DacCode::ZERO, true, position_mm, false),
-                Law::ClosedLoop { machine, operator } => {
-                    let outputs = machine.tick(&InputRecord {
-                        counts: [raw, 0, 0],
-                        request: operator.request(tick as u32),
-                    });
-                    let state = machine.state();
-                    if let SafetyState::Faulted(fault) = state.safety() {
-                        self.plant.step(DacCode::ZERO, false);
-                        let experiment = experiment.name.clone();
-                        return Err(RigError::Fault { experiment, fault });
-                    }
-                    // The law counts positions from where it was switched on.
-                    let telemetry = state.axes()[0].telemetry();
-                    let error_mm = f64::from(telemetry.error_mm());
-                    let running = state.is_running();
-                    (
-                        outputs.codes[0],
-                        outputs.enabled,
-                        position_mm + error_mm,
-                        running,
-                    )
-                }
-            };
-            if !enabled {
-                self.plant.step(DacCode::ZERO, false);
-                continue;
-            }
-            moved |= running;
-            let done = recorder.ticks;
-            let injected_v = experiment.injection_v.get(done).copied();
-            let motion_ended = !moves || (moved && !running);
-            if injected_v.is_none() && motion_ended {
-                self.plant.step(DacCode::ZERO, false);
-                progress(1.0);
-                return Ok(recorder.finish());
-            }
-            let time_s = done as f64 / rate_hz;
-            if position_mm.abs() > limits.travel_mm {
-                self.plant.step(DacCode::ZERO, false);
-                return Err(RigError::Travel {
-                    experiment: experiment.name.clone(),
-                    travel_mm: limits.travel_mm,
-                    time_s,
-                });
-            }
-            if done.is_multiple_of(SPEED_TICKS) {
-                let last_mm = watched_mm.replace(position_mm).unwrap_or(position_mm);
-                let velocity_mm_s = (position_mm - last_mm) * rate_hz / SPEED_TICKS as f64;
-                if velocity_mm_s.abs() > limits.max_velocity_mm_s {
-                    self.plant.step(DacCode::ZERO, false);
-                    return Err(RigError::Overspeed {
-                        experiment: experiment.name.clone(),
-                        max_velocity_mm_s: limits.max_velocity_mm_s,
-                        time_s,
-                    });
-                }
-            }
-            if done >= most_ticks {
-                self.plant.step(DacCode::ZERO, false);
-                return Err(RigError::TimedOut {
-                    experiment: experiment.name.clone(),
-                    time_limit_s: experiment.time_limit_s,
-                    reason: if motion_ended {
-                        "the injection has not ended"
-                    } else {
-                        "the motion has not ended"
-                    },
-                });
-            }
-            if done.is_multiple_of(PROGRESS_TICKS) {
-                progress((done as f64 / expected as f64).min(1.0));
-            }
-            let summed = i32::from(code.0) + i32::from(self.code(injected_v.unwrap_or(0.0)).0);
-            let code = DacCode::saturating(summed);
-            recorder.push(
-                reference_mm,
-                position_mm,
-                self.volts(code),
-                injected_v.unwrap_or(0.0),
-            );
-            self.plant.step(code, true);
-        }
-        unreachable!("the loop has no end but its returns")
-    }
-}
-
-/// Gathers control periods into samples.
-struct Recorder {
-    recording: Recording,
-    decimation: usize,
-    ticks: usize,
-    voltage_v: f64,
-    injection_v: f64,
-}
-
-impl Recorder {
-    fn new(experiment: &Experiment, rate_hz: f64) -> Self {
-        let decimation = experiment.decimation.max(1);
-        Self {
-            recording: Recording {
-                sample_time_s: decimation as f64 / rate_hz,
-                ..Recording::default()
-            },
-            decimation,
-            ticks: 0,
-            voltage_v: 0.0,
-            injection_v: 0.0,
-        }
-    }
-
-    fn push(&mut self, reference_mm: f64, position_mm: f64, voltage_v: f64, injection_v: f64) {
-        let Self {
-            recording,
-            decimation,
-            ..
-        } = self;
-        if self.ticks.is_multiple_of(*decimation) {
-            recording.reference_mm.push(reference_mm);
-            recording.position_mm.push(position_mm);
-        }
-        self.voltage_v += voltage_v;
-        self.injection_v += injection_v;
-        self.ticks += 1;
-        if self.ticks.is_multiple_of(*decimation) {
-            let count = *decimation as f64;
-            recording.voltage_v.push(self.voltage_v / count);
-            recording.injection_v.push(self.injection_v / count);
-            self.voltage_v = 0.0;
-            self.injection_v = 0.0;
-        }
-    }
-
-    /// The recording without an incomplete last sample.
-    fn finish(mut self) -> Recording {
-        let complete = self.recording.voltage_v.len();
-        self.recording.reference_mm.truncate(complete);
-        self.recording.position_mm.truncate(complete);
-        self.recording
+        let outcome = self.drive(experiment, progress);
+        self.plant.step(DacCode::ZERO, false);
+        outcome
     }
 }
