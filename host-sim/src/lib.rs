@@ -5,6 +5,7 @@
 //! - [`experiment`]: runs of a machine on a stage, and what they score;
 //! - [`presentation`]: their tables and pages, made with [`report`];
 //! - [`record`]: recorded motions from CSV files, checked;
+//! - [`settings_file`]: a stage's settings with their origin, as TOML;
 //! - [`scenario`]: the motion that the firmware is emulated with;
 //! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
 //! - [`identify`]: from recordings to the parameters of an axis;
@@ -21,3 +22,4 @@ pub mod record;
 pub mod report;
 pub mod rig;
 pub mod scenario;
+pub mod settings_file;

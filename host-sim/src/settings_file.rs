@@ -1,0 +1,236 @@
+//! The settings of a stage as a file: what a commissioning leaves, and what replays, comparisons and the firmware start
+//! from.
+//!
+//! TOML, with the names and units of [`StageSettings`], and above them where the numbers come from. A file is checked
+//! as a whole, against the firmware's own rules and its room for GMS elements.
+
+use std::path::{Path, PathBuf};
+
+use quadrant::settings::{SettingsError, StageSettings};
+use serde::{Deserialize, Serialize};
+
+/// Form of the file; a file of another form is refused.
+const FORM: u32 = 1;
+/// Room for GMS elements in the firmware.
+pub const FIRMWARE_ELEMENTS: usize = 4;
+
+/// A stage's settings and where they come from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SettingsFile {
+    /// Form of the file: 1.
+    form: u32,
+    /// Where the numbers come from, newest last.
+    #[serde(default)]
+    pub provenance: Vec<Provenance>,
+    /// The settings.
+    pub stage: StageSettings,
+}
+
+/// One command that had a hand in the settings.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Provenance {
+    /// The command line that wrote the settings.
+    pub command: String,
+    /// Version of the program.
+    pub version: String,
+    /// The axis that it set: "x", "y" or "z".
+    pub axis: String,
+    /// The recordings that it worked on, and what each was for.
+    pub records: Vec<String>,
+    /// What in the settings it set.
+    pub sets: Vec<String>,
+}
+
+/// Why a settings file cannot be used, or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SettingsFileError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// It is no TOML, a field is missing, misspelt, or of the wrong type.
+    #[error("{}: {source}", path.display())]
+    Syntax {
+        /// The file.
+        path: PathBuf,
+        /// Where and what.
+        source: Box<toml::de::Error>,
+    },
+    /// It cannot be expressed as TOML.
+    #[error("{}: {source}", path.display())]
+    Serialise {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: toml::ser::Error,
+    },
+    /// It is of a form that this program does not know.
+    #[error("{}: form {form} of the settings file; this program reads form {FORM}", path.display())]
+    Form {
+        /// The file.
+        path: PathBuf,
+        /// Its form.
+        form: u32,
+    },
+    /// A value is refused.
+    #[error("{}: {source}", path.display())]
+    Refused {
+        /// The file.
+        path: PathBuf,
+        /// The field and what is allowed.
+        source: SettingsError,
+    },
+}
+
+impl SettingsFile {
+    /// A file for these settings, of unknown origin.
+    pub fn new(stage: StageSettings) -> Self {
+        Self {
+            form: FORM,
+            provenance: Vec::new(),
+            stage,
+        }
+    }
+
+    /// Reads and checks a file.
+    ///
+    /// # Errors
+    /// A file that cannot be read or understood, or the first value that the firmware would refuse.
+    pub fn read(path: impl AsRef<Path>) -> Result<Self, SettingsFileError> {
+        let path = path.as_ref();
+        let text = std::fs::read_to_string(path).map_err(|source| SettingsFileError::Io {
+            path: path.to_owned(),
+            source,
+        })?;
+        Self::parse(&text, path)
+    }
+
+    /// Checks a file's text; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read).
+    pub fn parse(text: &str, path: &Path) -> Result<Self, SettingsFileError> {
+        let file: Self = toml::from_str(text).map_err(|source| SettingsFileError::Syntax {
+            path: path.to_owned(),
+            source: Box::new(source),
+        })?;
+        if file.form != FORM {
+            return Err(SettingsFileError::Form {
+                path: path.to_owned(),
+                form: file.form,
+            });
+        }
+        file.check(path)?;
+        Ok(file)
+    }
+
+    /// Checks and writes the file.
+    ///
+    /// # Errors
+    /// A value that the firmware would refuse, in which case nothing is written; or a file that cannot be written.
+    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), SettingsFileError> {
+        let path = path.as_ref();
+        self.check(path)?;
+        let text = toml::to_string_pretty(self).map_err(|source| SettingsFileError::Serialise {
+            path: path.to_owned(),
+            source,
+        })?;
+        std::fs::write(path, text).map_err(|source| SettingsFileError::Io {
+            path: path.to_owned(),
+            source,
+        })
+    }
+
+    fn check(&self, path: &Path) -> Result<(), SettingsFileError> {
+        self.stage
+            .validate(FIRMWARE_ELEMENTS)
+            .map_err(|source| SettingsFileError::Refused {
+                path: path.to_owned(),
+                source,
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn file() -> SettingsFile {
+        SettingsFile {
+            provenance: vec![Provenance {
+                command: "quadrant commission --axis x".to_owned(),
+                version: "0.1.0".to_owned(),
+                axis: "x".to_owned(),
+                records: vec!["frf.csv".to_owned()],
+                sets: vec!["plant".to_owned()],
+            }],
+            ..SettingsFile::new(StageSettings::default())
+        }
+    }
+
+    fn parse(text: &str) -> Result<SettingsFile, SettingsFileError> {
+        SettingsFile::parse(text, Path::new("stage.toml"))
+    }
+
+    #[test]
+    fn what_is_written_reads_back_to_the_last_bit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stage.toml");
+        let mut written = file();
+        written.stage.axes[1].feedback.nonlinear = None;
+        written.stage.axes[2].plant = None;
+        written.stage.axes[0].feedback.pid.kp_v_per_mm = 1.0 / 3.0;
+        written.write(&path).unwrap();
+        assert_eq!(SettingsFile::read(&path).unwrap(), written);
+    }
+
+    #[test]
+    fn a_misspelt_field_is_named_with_its_line() {
+        let text = toml::to_string_pretty(&file()).unwrap();
+        let misspelt = text.replacen("kp_v_per_mm", "kp_v_per_m", 1);
+        let message = parse(&misspelt).unwrap_err().to_string();
+        assert!(
+            message.contains("kp_v_per_m") && message.contains("line"),
+            "{message}"
+        );
+    }
+
+    #[test]
+    fn a_refused_value_is_named_with_its_limits() {
+        let mut bad = file();
+        bad.stage.axes[1].encoder.resolution_mm = 7.0;
+        let text = toml::to_string_pretty(&bad).unwrap();
+        assert_eq!(
+            parse(&text).unwrap_err().to_string(),
+            "stage.toml: y.encoder.resolution_mm = 7 is outside 0.000001 to 1"
+        );
+    }
+
+    #[test]
+    fn refused_settings_are_not_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stage.toml");
+        file().write(&path).unwrap();
+        let mut bad = file();
+        bad.stage.rate_hz = f64::NAN;
+        assert!(bad.write(&path).is_err());
+        assert_eq!(SettingsFile::read(&path).unwrap(), file());
+    }
+
+    #[test]
+    fn another_form_is_refused() {
+        let newer = SettingsFile { form: 2, ..file() };
+        let text = toml::to_string_pretty(&newer).unwrap();
+        let message = parse(&text).unwrap_err().to_string();
+        assert_eq!(
+            message,
+            "stage.toml: form 2 of the settings file; this program reads form 1"
+        );
+    }
+}
