@@ -100,7 +100,7 @@ impl std::error::Error for FitError {}
 const ROUNDS: usize = 30;
 /// Huber's constant, in standard deviations.
 const HUBER: f64 = 1.345;
-/// Step of the difference quotients, of a parameter's range or magnitude.
+/// Step of the difference quotients for smooth residuals, of a parameter's range or magnitude.
 const STEP: f64 = 1e-6;
 /// Distance to a bound, of the range, at which a value counts as lying on it.
 const ON_BOUND: f64 = 1e-6;
@@ -113,6 +113,20 @@ const ON_BOUND: f64 = 1e-6;
 pub fn fit(
     parameters: &[Parameter],
     loss: Loss,
+    residuals: impl Fn(&[f64]) -> Vec<f64>,
+) -> Result<Fit, FitError> {
+    fit_with_step(parameters, loss, STEP, residuals)
+}
+
+/// As [`fit`], for residuals that are rough on a small scale, such as those of a simulated encoder: `step` is that of the
+/// difference quotients, of a parameter's range or magnitude.
+///
+/// # Errors
+/// As [`fit`].
+pub fn fit_with_step(
+    parameters: &[Parameter],
+    loss: Loss,
+    step: f64,
     residuals: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Result<Fit, FitError> {
     for parameter in parameters {
@@ -138,6 +152,7 @@ pub fn fit(
     let mut problem = Problem {
         parameters,
         residuals: &residuals,
+        step,
         angles: DVector::from_iterator(parameters.len(), parameters.iter().map(angle)),
         weights: vec![1.0; first.len()],
     };
@@ -174,6 +189,7 @@ fn angle(parameter: &Parameter) -> f64 {
 struct Problem<'a, F> {
     parameters: &'a [Parameter],
     residuals: &'a F,
+    step: f64,
     angles: DVector<f64>,
     /// Square roots of the residuals' weights.
     weights: Vec<f64>,
@@ -257,7 +273,7 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
             .parameters
             .iter()
             .zip(&values)
-            .map(|(p, value)| STEP * value.abs().max(1e-3 * range(p)))
+            .map(|(p, value)| self.step * value.abs().max(1e-3 * range(p)))
             .collect();
         let at_bound: Vec<bool> = self
             .parameters
@@ -322,128 +338,11 @@ impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'
                 .map(|(parameter, &angle)| Self::value(parameter, angle))
                 .collect()
         };
-        let steps = vec![STEP; self.angles.len()];
+        let steps = vec![self.step; self.angles.len()];
         let jacobian = self.differences(self.angles.as_slice(), &steps, place);
         jacobian.iter().all(|d| d.is_finite()).then_some(jacobian)
     }
 }
 
 #[cfg(test)]
-mod tests {
-    use rand::SeedableRng;
-    use rand_distr::{Distribution, StandardNormal};
-    use rand_xoshiro::Xoshiro256PlusPlus;
-
-    use super::*;
-
-    const LEVEL: Parameter = Parameter {
-        name: "level",
-        start: 1.0,
-        bounds: (0.0, 100.0),
-    };
-    const RATE: Parameter = Parameter {
-        name: "rate",
-        start: 1.0,
-        bounds: (0.0, 50.0),
-    };
-
-    /// Samples of `3 exp(-2 t)` with noise.
-    fn decay(noise: f64, seed: u64) -> Vec<(f64, f64)> {
-        let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
-        (0..60)
-            .map(|k| {
-                let t = 0.03 * f64::from(k);
-                let normal: f64 = StandardNormal.sample(&mut random);
-                (t, 3.0 * (-2.0 * t).exp() + noise * normal)
-            })
-            .collect()
-    }
-
-    fn residuals(data: &[(f64, f64)]) -> impl Fn(&[f64]) -> Vec<f64> {
-        |p| {
-            data.iter()
-                .map(|(t, y)| p[0] * (-p[1] * t).exp() - y)
-                .collect()
-        }
-    }
-
-    #[test]
-    fn exact_data_give_the_exact_parameters() {
-        let data = decay(0.0, 1);
-        let fit = fit(&[LEVEL, RATE], Loss::Squares, residuals(&data)).unwrap();
-        assert!((fit.values[0] - 3.0).abs() < 1e-6);
-        assert!((fit.values[1] - 2.0).abs() < 1e-6);
-        assert!(!fit.at_bound.contains(&true));
-    }
-
-    #[test]
-    fn the_truth_lies_within_two_standard_errors_as_often_as_it_should() {
-        let inside = (0..200)
-            .filter(|&seed| {
-                let data = decay(0.05, seed);
-                let fit = fit(&[LEVEL, RATE], Loss::Squares, residuals(&data)).unwrap();
-                (fit.values[1] - 2.0).abs() < 2.0 * fit.standard_errors[1]
-            })
-            .count();
-        // 95.4 % of 200, give or take three standard deviations.
-        assert!((182..=199).contains(&inside), "{inside} of 200");
-    }
-
-    #[test]
-    fn outliers_hardly_move_the_robust_fit() {
-        let mut data = decay(0.01, 1);
-        for index in [5, 17, 33, 48] {
-            data[index].1 += 4.0;
-        }
-        let plain = fit(&[LEVEL, RATE], Loss::Squares, residuals(&data)).unwrap();
-        let robust = fit(&[LEVEL, RATE], Loss::Huber, residuals(&data)).unwrap();
-        assert!((plain.values[1] - 2.0).abs() > 0.3);
-        assert!((robust.values[1] - 2.0).abs() < 0.03);
-    }
-
-    #[test]
-    fn a_bound_holds_and_is_reported() {
-        let data = decay(0.01, 1);
-        let slow = Parameter {
-            bounds: (0.0, 1.5),
-            ..RATE
-        };
-        let fit = fit(&[LEVEL, slow], Loss::Squares, residuals(&data)).unwrap();
-        assert!(fit.values[1] <= 1.5);
-        assert_eq!(fit.at_bound, [false, true]);
-    }
-
-    #[test]
-    fn parameters_that_the_data_hardly_tell_apart_are_seen_to_be_correlated() {
-        let data = decay(0.01, 1);
-        let slope = Parameter {
-            name: "slope",
-            start: 0.5,
-            bounds: (-10.0, 10.0),
-        };
-        // A line far from the origin: a higher level is as good as a steeper slope.
-        let line = fit(&[LEVEL, slope], Loss::Squares, |p| {
-            data.iter()
-                .map(|(t, noise)| p[0] + p[1] * (t + 20.0) - noise)
-                .collect()
-        })
-        .unwrap();
-        assert!(line.correlation[(0, 1)] < -0.99);
-        let covariance = line.covariance(0, 1);
-        assert!(covariance < 0.0 && covariance.is_finite());
-    }
-
-    #[test]
-    fn too_few_data_and_bad_starts_are_refused() {
-        let few = fit(&[LEVEL, RATE], Loss::Squares, |_| vec![0.0; 2]);
-        assert!(matches!(few, Err(FitError::TooFewData { .. })));
-        let outside = Parameter {
-            start: -1.0,
-            ..RATE
-        };
-        let bad = fit(&[LEVEL, outside], Loss::Squares, |_| vec![0.0; 9]);
-        assert_eq!(bad, Err(FitError::BadStart { parameter: "rate" }));
-        let not_a_number = fit(&[LEVEL, RATE], Loss::Squares, |_| vec![f64::NAN; 9]);
-        assert_eq!(not_a_number, Err(FitError::NotFinite));
-    }
-}
+mod tests;
