@@ -9,7 +9,7 @@ use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::supervisor::Event;
 use quadrant_sim::experiment::circle::run_circles;
 use quadrant_sim::experiment::comparison::{Configuration, Controller, run_configuration};
-use quadrant_sim::experiment::compensator::Knowledge;
+use quadrant_sim::experiment::compensator::Setup;
 use quadrant_sim::experiment::recorded::{RecordedAxis, replay};
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
@@ -26,9 +26,9 @@ const BEST: Configuration = Configuration {
 
 #[test]
 fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_a_wrong_model() {
-    for knowledge in Knowledge::ALL {
-        let pid = run_configuration::<f32>(PID, knowledge, 1).unwrap();
-        let best = run_configuration::<f32>(BEST, knowledge, 1).unwrap();
+    for setup in Setup::both() {
+        let pid = run_configuration::<f32>(PID, &setup, 1).unwrap();
+        let best = run_configuration::<f32>(BEST, &setup, 1).unwrap();
         for (pid, best) in pid.iter().zip(&best) {
             assert!(best.score.largest_mm < 0.12 * pid.score.largest_mm);
             assert!(best.score.glitch_mm < 0.2 * pid.score.glitch_mm);
@@ -39,9 +39,9 @@ fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_a_wro
 
 #[test]
 fn the_same_seed_gives_the_same_outcome() {
-    let knowledge = Knowledge::VirtualMachine;
+    let [_, setup] = Setup::both();
     let run = |seed| {
-        run_configuration::<f32>(BEST, knowledge, seed)
+        run_configuration::<f32>(BEST, &setup, seed)
             .unwrap()
             .map(|o| o.last_cycle.error_mm)
     };
@@ -51,7 +51,8 @@ fn the_same_seed_gives_the_same_outcome() {
 
 #[test]
 fn combined_feedforward_makes_the_circle_rounder() {
-    let circles = run_circles::<f32>(&[PID, BEST], 1).unwrap();
+    let [_, setup] = Setup::both();
+    let circles = run_circles::<f32>(&[PID, BEST], &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
 }
@@ -116,7 +117,8 @@ fn our_controllers_follow_the_recorded_emps_reference() {
     }
     let axis = RecordedAxis::Emps;
     let record = Record::read(file, &axis.limits()).unwrap();
-    let outcomes = replay::<f32>(&record, axis, 1, &ProgressBar::hidden()).unwrap();
+    let outcomes =
+        replay::<f32>(&record, axis, &Setup::matched(), 1, &ProgressBar::hidden()).unwrap();
     let rms = |configuration| {
         let found = outcomes
             .iter()

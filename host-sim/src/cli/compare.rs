@@ -1,17 +1,23 @@
 //! `quadrant compare`.
 
+use std::path::{Path, PathBuf};
+
 use clap::Args;
 use quadrant_sim::experiment::circle::run_circles;
 use quadrant_sim::experiment::comparison::{self, Configuration, Outcome, VELOCITIES_MM_S, find};
-use quadrant_sim::experiment::compensator::Knowledge;
+use quadrant_sim::experiment::compensator::{Knowledge, Setup};
 use quadrant_sim::presentation::{comparison_page, comparison_tables, provenance};
 use quadrant_sim::record::write_trace;
+use quadrant_sim::settings_file::SettingsFile;
 
 use super::output::{Output, progress};
 
 /// Options of `quadrant compare`.
 #[derive(Clone, Debug, Default, Args)]
 pub(super) struct Arguments {
+    /// Settings of the virtual machine's control law, as `quadrant commission` leaves them.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
@@ -23,9 +29,12 @@ const PERIOD_S: f64 = 1e-4;
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
-    let bar = progress(comparison::RUNS + 1, "comparing on the simulated stage");
-    let outcomes = comparison::run_all::<f32>(output.seed, &bar)?;
-    let circles = run_circles::<f32>(&Configuration::all(), output.seed)?;
+    let setups = setups(arguments.settings.as_deref())?;
+    let runs = comparison::RUNS * setups.len() as u64 + 1;
+    let bar = progress(runs, "comparing on the simulated stage");
+    let outcomes = comparison::run_all::<f32>(&setups, output.seed, &bar)?;
+    let [_, virtual_machine] = &setups;
+    let circles = run_circles::<f32>(&Configuration::all(), virtual_machine, output.seed)?;
     bar.inc(1);
     bar.finish_and_clear();
     println!(
@@ -40,9 +49,22 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             write_errors(output, &outcomes, knowledge, velocity)?;
         }
     }
-    let command = format!("quadrant compare --seed {}", output.seed);
+    let settings = arguments.settings.as_ref();
+    let settings = settings.map_or_else(String::new, |path| {
+        format!(" --settings {}", path.display())
+    });
+    let command = format!("quadrant compare{settings} --seed {}", output.seed);
     let page = comparison_page(&outcomes, &circles, provenance(&command, output.seed));
     output.page(&page, "comparison.html")
+}
+
+/// Both setups; the virtual machine's with the settings of a file, if there is one.
+fn setups(settings: Option<&Path>) -> anyhow::Result<[Setup; 2]> {
+    let Some(path) = settings else {
+        return Ok(Setup::both());
+    };
+    let stage = SettingsFile::read(path)?.stage;
+    Ok([Setup::matched(), Setup::virtual_machine(stage)])
 }
 
 /// Writes the errors of all configurations over the last cycle at one velocity.

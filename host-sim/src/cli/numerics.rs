@@ -1,6 +1,7 @@
 //! `quadrant numerics`.
 
 use clap::Args;
+use quadrant_sim::experiment::compensator::Setup;
 use quadrant_sim::experiment::numerics;
 use quadrant_sim::presentation::numerics_table;
 
@@ -16,7 +17,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let bar = progress(numerics::RUNS, "comparing number types");
-    let numerics = numerics::run_all(output.seed, &bar)?;
+    let numerics = numerics::run_all(&Setup::both(), output.seed, &bar)?;
     bar.finish_and_clear();
     output.table(&numerics_table(&numerics))
 }

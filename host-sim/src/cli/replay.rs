@@ -2,10 +2,13 @@
 
 use std::path::PathBuf;
 
+use anyhow::ensure;
 use clap::Args;
+use quadrant_sim::experiment::compensator::Setup;
 use quadrant_sim::experiment::recorded::{self, RecordedAxis};
 use quadrant_sim::presentation::{provenance, recorded_page, recorded_table};
 use quadrant_sim::record::Record;
+use quadrant_sim::settings_file::SettingsFile;
 
 use super::output::{Output, progress};
 
@@ -19,6 +22,10 @@ pub(super) struct Arguments {
     /// The axis that follows it.
     #[arg(long, value_enum)]
     axis: RecordedAxis,
+    /// Settings of the simulated stage's control law, as `quadrant commission` leaves them; the stage then has
+    /// everything a real one has. Without them the law knows the stage's own parameters.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
@@ -27,18 +34,31 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         reference,
         axis,
+        settings,
         output,
     } = arguments;
+    ensure!(
+        settings.is_none() || *axis != RecordedAxis::Emps,
+        "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
+    );
+    let setup = match settings {
+        Some(path) => Setup::virtual_machine(SettingsFile::read(path)?.stage),
+        None => Setup::matched(),
+    };
     let record = Record::read(reference, &axis.limits())?;
     for doubt in &record.doubts {
         eprintln!("note: {doubt}");
     }
     let bar = progress(recorded::RUNS, "following the record");
-    let outcomes = recorded::replay::<f32>(&record, *axis, output.seed, &bar)?;
+    let outcomes = recorded::replay::<f32>(&record, *axis, &setup, output.seed, &bar)?;
     bar.finish_and_clear();
     output.table(&recorded_table(&outcomes, *axis))?;
+    let settings = settings.as_ref();
+    let settings = settings.map_or_else(String::new, |path| {
+        format!(" --settings {}", path.display())
+    });
     let command = format!(
-        "quadrant replay --reference {} --axis {} --seed {}",
+        "quadrant replay --reference {} --axis {}{settings} --seed {}",
         reference
             .file_name()
             .unwrap_or(reference.as_os_str())

@@ -7,7 +7,7 @@ use quadrant::settings::PlanSettings;
 use rayon::prelude::*;
 
 use super::comparison::{Configuration, ELEMENTS};
-use super::compensator::Knowledge;
+use super::compensator::Setup;
 use super::metrics::glitch_at;
 use super::run::{AxisTrace, RunError, run};
 use crate::machine::Machine;
@@ -72,19 +72,19 @@ fn outcome(configuration: Configuration, x: &AxisTrace, y: &AxisTrace) -> Circle
     }
 }
 
-/// Runs the circle on the virtual machine with each configuration, in parallel.
+/// Runs the circle with each configuration, in parallel.
 ///
 /// # Errors
 /// Refused settings or a fault.
 pub fn run_circles<S: Scalar>(
     configurations: &[Configuration],
+    setup: &Setup,
     seed: u64,
 ) -> Result<Vec<CircleOutcome>, RunError> {
-    let knowledge = Knowledge::VirtualMachine;
     configurations
         .par_iter()
         .map(|&configuration| {
-            let mut stage = knowledge.settings();
+            let mut stage = setup.stage.clone();
             configuration.apply(&mut stage);
             let rate_hz = stage.rate_hz;
             let job = Job {
@@ -109,7 +109,7 @@ pub fn run_circles<S: Scalar>(
                 .each_ref()
                 .map(|axis| axis.encoder.resolution_mm);
             let mut machine = Machine::<S, ELEMENTS>::new(&job)?;
-            let mut plant = SimulatedStage::new(&knowledge.truth(), rate_hz, seed);
+            let mut plant = SimulatedStage::new(&setup.truth, rate_hz, seed);
             let [x, y, _] = run(
                 &mut machine,
                 &mut plant,

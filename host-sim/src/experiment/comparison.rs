@@ -9,7 +9,7 @@ use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, StageSettings};
 use rayon::prelude::*;
 
-use super::compensator::Knowledge;
+use super::compensator::{Knowledge, Setup};
 use super::metrics::{Score, change_percent, score};
 use super::run::{AxisTrace, RunError, run};
 use super::thesis::Metric;
@@ -102,8 +102,8 @@ pub struct Outcome {
 }
 
 /// The x axis three times, one for each velocity, and the sines they run.
-fn job(configuration: Configuration, knowledge: Knowledge) -> Job {
-    let mut stage = knowledge.settings();
+fn job(configuration: Configuration, setup: &Setup) -> Job {
+    let mut stage = setup.stage.clone();
     let x = stage.axes[0].clone();
     stage.axes = [x.clone(), x.clone(), x];
     configuration.apply(&mut stage);
@@ -141,11 +141,11 @@ pub(super) struct Bench {
 
 impl Bench {
     /// The x axis three times, on its job.
-    pub(super) fn new(configuration: Configuration, knowledge: Knowledge, seed: u64) -> Self {
-        let job = job(configuration, knowledge);
-        let [x, ..] = knowledge.truth().axes;
+    pub(super) fn new(configuration: Configuration, setup: &Setup, seed: u64) -> Self {
+        let job = job(configuration, setup);
+        let [x, ..] = &setup.truth.axes;
         let truth = StageTruth {
-            axes: [x.clone(), x.clone(), x],
+            axes: [x.clone(), x.clone(), x.clone()],
         };
         let rate_hz = job.stage.rate_hz;
         let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(VELOCITIES_MM_S[0]);
@@ -164,10 +164,10 @@ impl Bench {
 /// Refused settings or a fault.
 pub fn run_configuration<S: Scalar>(
     configuration: Configuration,
-    knowledge: Knowledge,
+    setup: &Setup,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
-    let mut bench = Bench::new(configuration, knowledge, seed);
+    let mut bench = Bench::new(configuration, setup, seed);
     let rate_hz = bench.job.stage.rate_hz;
     let resolution_mm = bench
         .job
@@ -191,7 +191,7 @@ pub fn run_configuration<S: Scalar>(
         let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
         Outcome {
             configuration,
-            knowledge,
+            knowledge: setup.knowledge,
             velocity_mm_s,
             score: score(&scored.reference_mm, &scored.error_mm, cycle),
             last_cycle: scored.slice((SCORED_CYCLES - 1) * cycle..SCORED_CYCLES * cycle),
@@ -199,26 +199,26 @@ pub fn run_configuration<S: Scalar>(
     }))
 }
 
-/// Number of runs in [`run_all`].
-pub const RUNS: u64 = 16;
+/// Number of runs in [`run_all`] of a setup.
+pub const RUNS: u64 = 8;
 
 /// The whole comparison, in parallel; the same seed gives the same outcomes. `progress` advances by one a run.
 ///
 /// # Errors
 /// The first refused setting or fault.
-pub fn run_all<S: Scalar>(seed: u64, progress: &ProgressBar) -> Result<Vec<Outcome>, RunError> {
-    let runs: Vec<_> = Knowledge::ALL
-        .into_iter()
-        .flat_map(|knowledge| {
-            Configuration::all()
-                .into_iter()
-                .map(move |c| (c, knowledge))
-        })
+pub fn run_all<S: Scalar>(
+    setups: &[Setup],
+    seed: u64,
+    progress: &ProgressBar,
+) -> Result<Vec<Outcome>, RunError> {
+    let runs: Vec<_> = setups
+        .iter()
+        .flat_map(|setup| Configuration::all().into_iter().map(move |c| (c, setup)))
         .collect();
     let outcomes: Result<Vec<_>, _> = runs
         .into_par_iter()
-        .map(|(configuration, knowledge)| {
-            let outcomes = run_configuration::<S>(configuration, knowledge, seed);
+        .map(|(configuration, setup)| {
+            let outcomes = run_configuration::<S>(configuration, setup, seed);
             progress.inc(1);
             outcomes
         })

@@ -45,16 +45,8 @@ impl Knowledge {
         }
     }
 
-    /// The simulated stage that goes with it.
-    pub fn truth(self) -> StageTruth {
-        match self {
-            Self::Matched => StageTruth::ideal(),
-            Self::VirtualMachine => StageTruth::real(),
-        }
-    }
-
     /// The default stage's settings with this knowledge of the truth's friction.
-    pub fn settings(self) -> StageSettings {
+    fn settings(self) -> StageSettings {
         let mut stage = StageSettings::default();
         for (axis, truth) in stage.axes.iter_mut().zip(&StageTruth::real().axes) {
             self.tell(axis, truth);
@@ -89,6 +81,46 @@ impl Knowledge {
                 }
             }
         }
+    }
+}
+
+/// A simulated stage, and the settings of the law that runs on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Setup {
+    /// What the settings know of the stage.
+    pub knowledge: Knowledge,
+    /// The settings.
+    pub stage: StageSettings,
+    /// The stage.
+    pub truth: StageTruth,
+}
+
+impl Setup {
+    /// The ideal stage, and settings that hold its own parameters.
+    pub fn matched() -> Self {
+        let knowledge = Knowledge::Matched;
+        Self {
+            knowledge,
+            stage: knowledge.settings(),
+            truth: StageTruth::ideal(),
+        }
+    }
+
+    /// The stage with everything a real one has, and settings that were made without knowing it.
+    pub fn virtual_machine(stage: StageSettings) -> Self {
+        Self {
+            knowledge: Knowledge::VirtualMachine,
+            stage,
+            truth: StageTruth::real(),
+        }
+    }
+
+    /// Both, the virtual machine with its own settings.
+    pub fn both() -> [Self; 2] {
+        [
+            Self::matched(),
+            Self::virtual_machine(Knowledge::VirtualMachine.settings()),
+        ]
     }
 }
 

@@ -10,7 +10,7 @@ use quadrant::scalar::{Fixed, Scalar};
 use rayon::prelude::*;
 
 use super::comparison::{Bench, Configuration, ELEMENTS, Outcome, run_configuration};
-use super::compensator::Knowledge;
+use super::compensator::Setup;
 use super::run::RunError;
 use crate::machine::Machine;
 
@@ -59,7 +59,11 @@ pub const RUNS: u64 = 8;
 ///
 /// # Errors
 /// The first refused setting or fault.
-pub fn run_all(seed: u64, progress: &ProgressBar) -> Result<Vec<Numerics>, RunError> {
+pub fn run_all(
+    setups: &[Setup],
+    seed: u64,
+    progress: &ProgressBar,
+) -> Result<Vec<Numerics>, RunError> {
     Configuration::all()
         .into_par_iter()
         .map(|configuration| {
@@ -68,11 +72,11 @@ pub fn run_all(seed: u64, progress: &ProgressBar) -> Result<Vec<Numerics>, RunEr
                 single: Deviation::default(),
                 fixed: Deviation::default(),
             };
-            for knowledge in Knowledge::ALL {
-                shadow(&mut numerics, knowledge, seed)?;
-                let exact = run_configuration::<f64>(configuration, knowledge, seed)?;
-                let single = run_configuration::<f32>(configuration, knowledge, seed)?;
-                let fixed = run_configuration::<Fixed>(configuration, knowledge, seed)?;
+            for setup in setups {
+                shadow(&mut numerics, setup, seed)?;
+                let exact = run_configuration::<f64>(configuration, setup, seed)?;
+                let single = run_configuration::<f32>(configuration, setup, seed)?;
+                let fixed = run_configuration::<Fixed>(configuration, setup, seed)?;
                 numerics.single = numerics.single.worst(closed_loop(&exact, &single));
                 numerics.fixed = numerics.fixed.worst(closed_loop(&exact, &fixed));
             }
@@ -83,13 +87,13 @@ pub fn run_all(seed: u64, progress: &ProgressBar) -> Result<Vec<Numerics>, RunEr
 }
 
 /// Lets the `f64` law drive the stage, and the others compute from the same counts.
-fn shadow(numerics: &mut Numerics, knowledge: Knowledge, seed: u64) -> Result<(), RunError> {
+fn shadow(numerics: &mut Numerics, setup: &Setup, seed: u64) -> Result<(), RunError> {
     let Bench {
         job,
         mut plant,
         most_ticks,
         mut operator,
-    } = Bench::new(numerics.configuration, knowledge, seed);
+    } = Bench::new(numerics.configuration, setup, seed);
     let mut exact = Machine::<f64, ELEMENTS>::new(&job)?;
     let mut single = Machine::<f32, ELEMENTS>::new(&job)?;
     let mut fixed = Machine::<Fixed, ELEMENTS>::new(&job)?;

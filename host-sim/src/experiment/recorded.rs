@@ -16,7 +16,7 @@ use quadrant::units::Position;
 use rayon::prelude::*;
 
 use super::comparison::{Configuration, ELEMENTS};
-use super::compensator::Knowledge;
+use super::compensator::Setup;
 use super::metrics::{largest, rms};
 use super::run::{RunError, run};
 use crate::design::shaping::{ShapingError, shape_to_margins};
@@ -85,13 +85,10 @@ struct Axis {
 }
 
 impl RecordedAxis {
-    fn build(self) -> Result<Axis, ShapingError> {
-        let simulated = |index: usize| {
-            let knowledge = Knowledge::Matched;
-            Axis {
-                settings: knowledge.settings().axes[index].clone(),
-                truth: knowledge.truth().axes[index].clone(),
-            }
+    fn build(self, setup: &Setup) -> Result<Axis, ShapingError> {
+        let simulated = |index: usize| Axis {
+            settings: setup.stage.axes[index].clone(),
+            truth: setup.truth.axes[index].clone(),
         };
         Ok(match self {
             Self::Emps => emps_axis()?,
@@ -236,16 +233,18 @@ impl From<quadrant::settings::SettingsError> for ReplayError {
 pub const RUNS: u64 = 8;
 
 /// Runs all configurations over the record's reference, in parallel, and scores them beside the recorded machine.
+/// An axis of the simulated stage is that of `setup`.
 ///
 /// # Errors
 /// A record that does not fit the control rate, refused settings, or a fault.
 pub fn replay<S: Scalar>(
     record: &Record,
     axis: RecordedAxis,
+    setup: &Setup,
     seed: u64,
     progress: &ProgressBar,
 ) -> Result<Vec<RecordedOutcome>, ReplayError> {
-    let axis = axis.build()?;
+    let axis = axis.build(setup)?;
     let rate_hz = StageSettings::default().rate_hz;
     let ticks = record.sample_time_s * rate_hz;
     let ticks_per_sample = ticks.round();
