@@ -19,7 +19,7 @@ use crate::image::{self, Board, Image, Scalar, Target};
 use crate::listing::Listing;
 use crate::prove::ROOT;
 use crate::toolchain::Toolchain;
-use crate::twin::{SETTLING_TICKS, Twin};
+use crate::twin::{self, SETTLING_TICKS, Twin};
 use crate::{command, emulate, stages};
 
 /// How much more than expected is accepted, in percent.
@@ -98,8 +98,9 @@ fn count(image: &Image, ticks: u32) -> Result<Count> {
 
     let memory = Memory::create()?;
     // The rehearsal's beginning is spent at rest and is not counted.
-    let (inputs, _) = Twin::of(image.target.scalar)?.rehearse(SETTLING_TICKS + ticks);
-    emulate::load(&memory, Mode::Unpaced, &inputs)?;
+    let job = twin::job();
+    let (inputs, _) = Twin::of(image.target.scalar, job.clone())?.rehearse(SETTLING_TICKS + ticks);
+    emulate::load(&memory, Mode::Unpaced, &job, &inputs)?;
     let mut qemu = emulator::command_line(image, &memory, Clock::Host)?;
     qemu.args(["-singlestep", "-d", "exec,nochain"])
         .args(["-dfilter", &trace_filter(image, &listing, &graph)?])

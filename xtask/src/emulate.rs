@@ -5,8 +5,8 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::link::lockstep::{
-    END_OF_RUN, INPUT, INPUT_SEQUENCE, InputRecord, Mode, OUTPUT, OUTPUT_SEQUENCE, OutputRecord,
-    RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+    END_OF_RUN, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
+    OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
 use quadrant::stage::Outputs;
 
@@ -39,7 +39,13 @@ pub(crate) struct Run {
 }
 
 /// Runs the image for some seconds of its time and fails on any difference.
-pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: bool) -> Result<()> {
+pub(crate) fn run(
+    toolchain: Toolchain,
+    scalar: Scalar,
+    job: Job,
+    seconds: f64,
+    paced: bool,
+) -> Result<()> {
     let ticks = seconds * RATE_HZ;
     ensure!(
         (1.0..f64::from(u32::MAX)).contains(&ticks),
@@ -54,7 +60,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: boo
         },
     )?;
     println!("{}", image.footprint()?);
-    let twin = Twin::of(scalar)?;
+    let twin = Twin::of(scalar, job)?;
     let Run { tally, elapsed, .. } = if paced {
         recorded(&image, twin, ticks)?
     } else {
@@ -83,7 +89,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, seconds: f64, paced: boo
 /// Exchanges with the firmware tick by tick. The time starts with the first answer: compiling tables is not a tick.
 pub(crate) fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
-    memory.prepare(Mode::Lockstep, 0, &twin::encode(&twin::job())?)?;
+    memory.prepare(Mode::Lockstep, 0, &twin::encode(twin.job())?)?;
     let mut emulator = Emulator::start(image, &memory, Clock::Host, true)?;
     let bar = progress(ticks);
     let mut started = None;
@@ -154,9 +160,10 @@ fn wait_for(memory: &Memory, emulator: &mut Emulator, tick: u32) -> Result<()> {
 
 /// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
 fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
-    let (inputs, expected) = twin.rehearse(ticks);
     let memory = Memory::create()?;
-    load(&memory, Mode::Paced, &inputs)?;
+    let job = twin.job().clone();
+    let (inputs, expected) = twin.rehearse(ticks);
+    load(&memory, Mode::Paced, &job, &inputs)?;
     let started = Instant::now();
     let log = Emulator::start(image, &memory, Clock::Instructions, true)?.wait()?;
     let elapsed = started.elapsed();
@@ -179,7 +186,7 @@ fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
 }
 
 /// Prepares a run of recorded inputs.
-pub(crate) fn load(memory: &Memory, mode: Mode, inputs: &[InputRecord]) -> Result<()> {
+pub(crate) fn load(memory: &Memory, mode: Mode, job: &Job, inputs: &[InputRecord]) -> Result<()> {
     ensure!(
         inputs.len() <= RECORDED_TICKS,
         "{} ticks asked for, but a recorded run holds at most {RECORDED_TICKS}",
@@ -188,7 +195,7 @@ pub(crate) fn load(memory: &Memory, mode: Mode, inputs: &[InputRecord]) -> Resul
     let ticks = u32::try_from(inputs.len())?;
     let bytes: Vec<u8> = inputs.iter().flat_map(InputRecord::encode).collect();
     memory.write(RECORDED_INPUTS, &bytes)?;
-    memory.prepare(mode, ticks, &twin::encode(&twin::job())?)
+    memory.prepare(mode, ticks, &twin::encode(job)?)
 }
 
 /// Checks what the firmware says of a paced run: all ticks, no overrun, and the time they should take.

@@ -23,7 +23,11 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
 /// An axis whose encoder stands still while its reference moves: the outputs go to zero and are disabled in the tick
 /// that finds it, which is the twin's tick, and the log says why.
 fn blocked_axis(image: &image::Image, scalar: Scalar) -> Result<()> {
-    let run = emulate::lockstep(image, Twin::of(scalar)?.with_blocked_axis(), TICKS)?;
+    let run = emulate::lockstep(
+        image,
+        Twin::of(scalar, twin::job())?.with_blocked_axis(),
+        TICKS,
+    )?;
     ensure!(run.tally.differ == 0, "{} words differ", run.tally.differ);
     ensure!(run.tally.enabled > 0, "the stage was never enabled");
     ensure!(!run.last.enabled, "the outputs are still enabled");

@@ -17,6 +17,7 @@ mod test;
 mod toolchain;
 mod twin;
 
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use anyhow::Result;
@@ -92,6 +93,9 @@ struct EmulateArgs {
     /// Let the hardware timer fire the control interrupt, on recorded inputs
     #[arg(long)]
     paced: bool,
+    /// Run on the settings of a file, as `quadrant commission` leaves it, instead of the default ones
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
 }
 
 /// What to count.
@@ -134,7 +138,13 @@ fn run(cli: Cli) -> Result<bool> {
             println!("{}", image.path.display());
             println!("{}", image.footprint()?);
         }
-        Verb::Emulate(args) => emulate::run(toolchain()?, args.scalar, args.seconds, args.paced)?,
+        Verb::Emulate(args) => {
+            let job = match &args.settings {
+                Some(path) => twin::job_with(path)?,
+                None => twin::job(),
+            };
+            emulate::run(toolchain()?, args.scalar, job, args.seconds, args.paced)?;
+        }
         Verb::FaultPaths { scalar } => fault_paths::run(toolchain()?, scalar)?,
         Verb::Count(args) => {
             count::run(

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
-use crate::{command, count, emulate, fault_paths, prove, setup};
+use crate::{command, count, emulate, fault_paths, prove, setup, twin};
 
 /// Ticks of the counting run.
 const COUNTED_TICKS: u32 = 250;
@@ -127,10 +127,10 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
             scalar,
         };
         report.step(format!("emulation in lockstep, {target}"), || {
-            emulate::run(toolchain, scalar, EMULATED_SECONDS, false)
+            emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, false)
         });
         report.step(format!("emulation paced by the timer, {target}"), || {
-            emulate::run(toolchain, scalar, EMULATED_SECONDS, true)
+            emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, true)
         });
         report.step(format!("fault paths, {target}"), || {
             fault_paths::run(toolchain, scalar)

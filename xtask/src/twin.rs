@@ -1,6 +1,7 @@
 //! The emulated firmware's twin: the same job in this process, on the simulated stage.
 
 use std::marker::PhantomData;
+use std::path::Path;
 
 use anyhow::{Context, Result};
 use quadrant::link::lockstep::{InputRecord, Job};
@@ -9,6 +10,7 @@ use quadrant::stage::Outputs;
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::scenario::circle_and_sine;
+use quadrant_sim::settings_file::SettingsFile;
 
 use crate::image;
 
@@ -22,9 +24,17 @@ const LEAD_S: f64 = 0.05;
 /// Ticks after which the motions of [`job`] have reached their speed.
 pub(crate) const SETTLING_TICKS: u32 = 750;
 
-/// The job of every emulated run.
+/// The job of an emulated run, on the default settings.
 pub(crate) fn job() -> Job {
     circle_and_sine(LEAD_S)
+}
+
+/// The job of an emulated run, on the settings of a file.
+pub(crate) fn job_with(settings: &Path) -> Result<Job> {
+    Ok(Job {
+        stage: SettingsFile::read(settings)?.stage,
+        ..job()
+    })
 }
 
 /// A job as the firmware reads it.
@@ -61,6 +71,7 @@ pub(crate) struct Tally {
 
 /// Law and stage in this process.
 pub(crate) struct Twin {
+    job: Job,
     law: Box<dyn Law>,
     plant: SimulatedStage,
     operator: Operator,
@@ -72,12 +83,11 @@ pub(crate) struct Twin {
 }
 
 impl Twin {
-    /// The twin of a firmware of a number type.
-    pub(crate) fn of(scalar: image::Scalar) -> Result<Self> {
+    /// The twin of a firmware of a number type that runs a job.
+    pub(crate) fn of(scalar: image::Scalar, job: Job) -> Result<Self> {
         fn law<S: Scalar>(job: &Job, _: PhantomData<S>) -> Result<Box<dyn Law>> {
             Ok(Box::new(Machine::<S, ELEMENTS>::new(job)?))
         }
-        let job = job();
         Ok(Self {
             law: match scalar {
                 image::Scalar::F32 => law(&job, PhantomData::<f32>)?,
@@ -89,7 +99,13 @@ impl Twin {
             blocked: false,
             expected: Outputs::default(),
             tally: Tally::default(),
+            job,
         })
+    }
+
+    /// What it runs.
+    pub(crate) fn job(&self) -> &Job {
+        &self.job
     }
 
     /// The same with x clamped, as its encoder sees it.
