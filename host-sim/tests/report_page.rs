@@ -21,6 +21,7 @@ fn lines(id: &str, series: usize, samples: usize) -> Figure {
         x_label: "Time (s)".into(),
         y_label: "Error (µm)".into(),
         series,
+        ..Lines::default()
     });
     Figure {
         id: id.into(),

@@ -85,6 +85,7 @@ pub(super) fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
                 x_label: "turn (1)".to_owned(),
                 y_label: "radial deviation (um)".to_owned(),
                 series: over_time,
+                ..Lines::default()
             }),
         },
     ]

@@ -271,6 +271,7 @@ fn error_figure(outcomes: &[Outcome], knowledge: Knowledge, velocity_mm_s: f64) 
             x_label: "time (s)".to_owned(),
             y_label: "tracking error (um)".to_owned(),
             series,
+            ..Lines::default()
         }),
     }
 }

@@ -88,6 +88,7 @@ pub fn recorded_page(
                 x_label: "time (s)".to_owned(),
                 y_label: "tracking error (um)".to_owned(),
                 series,
+                ..Lines::default()
             }),
         })
     };

@@ -1,10 +1,11 @@
 //! Figures, and their translation into plotly's description.
 
-use super::polar::{PolarDeviation, rounded};
-use super::{Colour, ReportError, decimate, palette};
-use plotly::common::{Anchor, DashType, Font, Line, Mode, Orientation, Title};
-use plotly::layout::{Axis, DragMode, HoverMode, Layout, Legend, Margin, TicksDirection};
-use plotly::{Plot as Plotly, Scatter};
+use super::lines::Lines;
+use super::polar::PolarDeviation;
+use super::{Colour, ReportError, palette};
+use plotly::Plot as Plotly;
+use plotly::common::{Anchor, DashType, Font, Line, Orientation, Title};
+use plotly::layout::{Axis, Layout, Legend, Margin};
 
 /// A drawing with its caption.
 #[derive(Debug, Clone, PartialEq)]
@@ -26,30 +27,6 @@ pub enum Plot {
     PolarDeviation(PolarDeviation),
 }
 
-/// Curves over a common axis, or paths in a plane.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Lines {
-    /// Horizontal axis, with its unit.
-    pub x_label: String,
-    /// Vertical axis, with its unit.
-    pub y_label: String,
-    /// The curves; later ones are drawn over earlier ones.
-    pub series: Vec<Series>,
-}
-
-/// One curve. Samples that are not finite are gaps.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Series {
-    /// For the legend.
-    pub name: String,
-    /// Abscissas.
-    pub x: Vec<f64>,
-    /// Ordinates, as many.
-    pub y: Vec<f64>,
-    /// How it is drawn.
-    pub style: Style,
-}
-
 /// How a curve is drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Style {
@@ -68,6 +45,8 @@ pub enum Dash {
     Dashed,
     /// Dotted.
     Dotted,
+    /// Marks that are not joined: measured points.
+    Points,
 }
 
 impl Style {
@@ -86,6 +65,15 @@ impl Style {
         Self {
             colour,
             dash: Dash::Dashed,
+        }
+    }
+
+    /// Marks that are not joined: measured points.
+    #[must_use]
+    pub const fn points(colour: Colour) -> Self {
+        Self {
+            colour,
+            dash: Dash::Points,
         }
     }
 
@@ -165,52 +153,10 @@ impl Figure {
     }
 }
 
-impl Lines {
-    fn to_plotly(&self, points_per_series: usize) -> Plotly {
-        let mut plot = Plotly::new();
-        // A hundred-thousandth of what an axis spans is a hundredth of a pixel: digits beyond it only cost bytes. The
-        // abscissas keep one digit more, for zooming into a long run.
-        let x_step = 1e-6 * span(self.series.iter().flat_map(|s| &s.x));
-        let y_step = 1e-5 * span(self.series.iter().flat_map(|s| &s.y));
-        for series in &self.series {
-            let kept = decimate(&series.x, &series.y, points_per_series);
-            let x: Vec<f64> = kept.iter().map(|&i| rounded(series.x[i], x_step)).collect();
-            let y: Vec<f64> = kept.iter().map(|&i| rounded(series.y[i], y_step)).collect();
-            plot.add_trace(
-                Scatter::new(x, y)
-                    .mode(Mode::Lines)
-                    .name(&series.name)
-                    .line(trace_line(series.style)),
-            );
-        }
-        let layout = layout()
-            .x_axis(
-                axis(&self.x_label)
-                    .show_grid(false)
-                    .zero_line_color(palette::RULE.0)
-                    .ticks(TicksDirection::Outside),
-            )
-            .y_axis(axis(&self.y_label).zero_line_color(palette::RULE.0))
-            .drag_mode(DragMode::Zoom)
-            .hover_mode(HoverMode::Closest);
-        plot.set_layout(layout);
-        plot
-    }
-}
-
-fn span<'a>(values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (low, high) = values
-        .filter(|v| v.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| {
-            (low.min(*v), high.max(*v))
-        });
-    high - low
-}
-
 /// The line of a curve.
 pub(super) fn trace_line(style: Style) -> Line {
     let dash = match style.dash {
-        Dash::Solid => DashType::Solid,
+        Dash::Solid | Dash::Points => DashType::Solid,
         Dash::Dashed => DashType::Dash,
         Dash::Dotted => DashType::Dot,
     };
@@ -260,8 +206,8 @@ pub(super) fn layout() -> Layout {
 
 #[cfg(test)]
 mod tests {
-    use super::{Dash, Figure, Lines, Plot, Series, Style};
-    use crate::report::{Colour, ReportError};
+    use super::{Dash, Figure, Plot, Style};
+    use crate::report::{Colour, Lines, ReportError, Series};
 
     fn figure(x: Vec<f64>, y: Vec<f64>) -> Figure {
         let series = vec![Series {
@@ -274,6 +220,7 @@ mod tests {
             x_label: "Time (s)".into(),
             y_label: "Error (µm)".into(),
             series,
+            ..Lines::default()
         });
         Figure {
             id: "error".into(),

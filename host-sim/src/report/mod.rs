@@ -12,6 +12,7 @@
 mod decimate;
 mod error;
 mod figure;
+mod lines;
 mod page;
 mod palette;
 mod polar;
@@ -19,7 +20,8 @@ mod table;
 
 pub use decimate::decimate;
 pub use error::ReportError;
-pub use figure::{Dash, Figure, Lines, Plot, Series, Style};
+pub use figure::{Dash, Figure, Plot, Style};
+pub use lines::{Lines, Scale, Series};
 pub use page::{Block, Page, Provenance, Section};
 pub use palette::Colour;
 pub use polar::{DeviationTrace, Magnification, PolarDeviation};

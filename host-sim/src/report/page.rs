@@ -275,6 +275,7 @@ fn legend_markup(figure: &Figure) -> Markup {
                     Dash::Solid => None,
                     Dash::Dashed => Some("6 4"),
                     Dash::Dotted => Some("2 3"),
+                    Dash::Points => Some("4 7"),
                 };
                 button type="button" aria-pressed="true" {
                     svg viewBox="0 0 26 4" width="26" height="4" aria-hidden="true" {
