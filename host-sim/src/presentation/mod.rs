@@ -1,13 +1,16 @@
 //! From outcomes to tables and figures: what a person reads of an experiment.
 
+mod bode;
 mod circle;
 mod comparison;
 mod numerics;
 mod recorded;
+mod revise;
 
 pub use comparison::{comparison_page, comparison_tables};
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
+pub use revise::{AmplitudeResponse, revise_page, revise_table};
 
 use crate::report::{Provenance, Series, Style};
 
