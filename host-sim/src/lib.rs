@@ -12,6 +12,7 @@
 //! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
 
+pub mod commission;
 pub mod design;
 pub mod experiment;
 pub mod identify;

@@ -1,0 +1,79 @@
+//! A first controller for an axis of which hardly anything is known: slow and safe, so that it can be measured.
+
+use std::f64::consts::TAU;
+
+use quadrant::control::popov::PidGains;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::settings::AxisSettings;
+
+/// Crossover frequency of the first controller, Hz: a dead time of 5 ms still leaves it a phase margin of 30 deg.
+const CROSSOVER_HZ: f64 = 15.0;
+/// Crossover frequency over the frequency from which the derivative acts.
+const LEAD: f64 = 3.0;
+/// Frequency below which the integral acts, over the crossover frequency.
+const INTEGRAL: f64 = 0.1;
+/// Time constant of the derivative's filter over the inverse crossover frequency in rad/s.
+const FILTER: f64 = 0.03;
+/// Tracking error allowed while the axis is measured, mm: the first controller is soft.
+const FOLLOWING_ERROR_MM: f64 = 10.0;
+
+/// The settings with which an axis is measured first: `base` with a controller that needs nothing but A,
+/// `gain_mm_per_v_s2`, within a factor of two; no nonlinear gain, no feedforward, no model.
+pub fn first_settings(base: &AxisSettings, gain_mm_per_v_s2: f64, rate_hz: f64) -> AxisSettings {
+    let mut settings = measuring_settings(base);
+    let crossover = TAU * CROSSOVER_HZ;
+    // |L| = A Kp sqrt(1 + lead^2) / w^2 = 1 on the double integrator that every axis is above its damping's corner.
+    let kp_v_per_mm = crossover * crossover / (gain_mm_per_v_s2 * LEAD.hypot(1.0));
+    settings.plant = None;
+    settings.feedback.pid = PidGains {
+        kp_v_per_mm,
+        ki_v_per_mm_s: INTEGRAL * crossover * kp_v_per_mm,
+        kd_v_s_per_mm: LEAD * kp_v_per_mm / crossover,
+        derivative_filter_s: (FILTER / crossover).max(1.0 / rate_hz),
+    };
+    settings
+}
+
+/// `base` as an axis is measured with it: its PID alone, and room for the error that it makes.
+pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
+    let mut settings = base.clone();
+    settings.feedback.nonlinear = None;
+    settings.feedforward.kind = FeedforwardKind::None;
+    settings.limits.following_error_mm = FOLLOWING_ERROR_MM;
+    settings
+}
+
+#[cfg(test)]
+mod tests {
+    use quadrant::control::plant_model::PlantModel;
+    use quadrant::settings::x_axis;
+
+    use super::*;
+    use crate::design::{SampledLoop, margins};
+
+    #[test]
+    fn the_first_controller_is_stable_whatever_the_axis_within_reason() {
+        for damping_per_s in [0.0, 20.0, 145.0, 400.0] {
+            for delay_s in [0.0, 0.5e-3, 1.2e-3, 3e-3, 5e-3] {
+                for wrong in [0.5, 1.0, 2.0] {
+                    let plant = PlantModel {
+                        gain_mm_per_v_s2: 69_390.0,
+                        damping_per_s,
+                        stiffness_per_s2: 0.0,
+                        delay_s,
+                    };
+                    let settings = first_settings(&x_axis(), wrong * plant.gain_mm_per_v_s2, 1e4);
+                    let open_loop = SampledLoop::new(&plant, &settings.feedback.pid, 1e-4, 0.0);
+                    // Without a delay nothing above makes it unstable, which the margins report as an error too.
+                    if delay_s > 0.0 {
+                        let margins = margins(&open_loop);
+                        assert!(
+                            margins.is_ok(),
+                            "B {damping_per_s}, Td {delay_s}, A wrong by {wrong}: {margins:?}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,124 @@
+//! What the commissioned settings achieve on the axis itself, by its own encoder.
+
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::settings::{AxisSettings, SettingsError};
+
+use super::bootstrap::measuring_settings;
+use crate::experiment::metrics::{Score, score};
+use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+
+/// The sine on which settings are judged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trial {
+    /// Amplitude, mm.
+    pub amplitude_mm: f64,
+    /// Largest velocity, mm/s.
+    pub velocity_mm_s: f64,
+}
+
+impl Default for Trial {
+    /// 5 mm at 10 mm/s: the middle velocity of the thesis, on a travel that every axis has.
+    fn default() -> Self {
+        Self {
+            amplitude_mm: 5.0,
+            velocity_mm_s: 10.0,
+        }
+    }
+}
+
+/// What one law scored.
+#[derive(Clone, Debug)]
+pub struct Verdict {
+    /// The law.
+    pub law: &'static str,
+    /// Its score, on the measured position.
+    pub score: Score,
+    /// The scored cycles.
+    pub recording: Recording,
+}
+
+/// Cycles at full speed, of which the last [`SCORED_CYCLES`] count.
+const CYCLES: f64 = 3.25;
+/// Cycles that count.
+const SCORED_CYCLES: usize = 2;
+/// Lead-in and lead-out, s.
+const LEAD_S: f64 = 0.5;
+
+/// Why a verdict cannot be had.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The settings are refused.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The run was stopped.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+/// Runs the PID alone, the N-PID alone, and `settings` as they are, on the trial's sine.
+///
+/// # Errors
+/// Refused settings, or a run that is stopped.
+pub fn verify(
+    rig: &mut dyn Rig,
+    settings: &AxisSettings,
+    trial: Trial,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Vec<Verdict>, VerifyError> {
+    let pid = measuring_settings(settings);
+    let npid = AxisSettings {
+        feedback: settings.feedback,
+        ..pid.clone()
+    };
+    let mut full = settings.clone();
+    full.feedforward.kind = FeedforwardKind::Combined;
+    let laws = [
+        ("PID", pid),
+        ("N-PID", npid),
+        ("N-PID + static + GMS", full),
+    ];
+    let mut verdicts = Vec::new();
+    for (index, (law, settings)) in laws.into_iter().enumerate() {
+        rig.apply(&settings)?;
+        let share = |done: f64| (index as f64 + done) / 3.0;
+        verdicts.push(run(rig, law, trial, &mut |done| progress(share(done)))?);
+    }
+    Ok(verdicts)
+}
+
+fn run(
+    rig: &mut dyn Rig,
+    law: &'static str,
+    trial: Trial,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Verdict, VerifyError> {
+    let sine =
+        HarmonicSettings::with_velocity(trial.amplitude_mm, trial.velocity_mm_s, CYCLES, LEAD_S);
+    let recording = rig.perform(
+        &Experiment {
+            name: format!("{law} on a sine of {} mm", trial.amplitude_mm),
+            drive: Drive::ClosedLoop(MotionSettings::Harmonic(sine)),
+            injection_v: Vec::new(),
+            decimation: 1,
+            time_limit_s: 60.0 + 2.0 * CYCLES / sine.frequency_hz,
+        },
+        progress,
+    )?;
+    let samples = |seconds: f64| (seconds / recording.sample_time_s).round() as usize;
+    let cycle = samples(1.0 / sine.frequency_hz);
+    // The recording ends with the lead-out, whose end is a little later than the last full-speed cycle's.
+    let end = recording.len() - samples(LEAD_S);
+    let scored = recording.slice(end.saturating_sub(SCORED_CYCLES * cycle)..end);
+    let errors: Vec<f64> = scored
+        .reference_mm
+        .iter()
+        .zip(&scored.position_mm)
+        .map(|(reference, position)| reference - position)
+        .collect();
+    Ok(Verdict {
+        law,
+        score: score(&scored.reference_mm, &errors, cycle),
+        recording: scored,
+    })
+}
