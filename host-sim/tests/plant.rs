@@ -96,3 +96,25 @@ fn the_same_seed_gives_the_same_noise_and_another_seed_another() {
     assert_eq!(readings(1), readings(1));
     assert_ne!(readings(1), readings(2));
 }
+
+#[test]
+fn a_held_voltage_moves_the_axis_as_it_would_in_continuous_time() {
+    let mut truth = StageTruth::ideal().axes[0].clone();
+    for model in [&mut truth.friction.positive, &mut truth.friction.negative] {
+        model.curve.coulomb_v = 1e-9;
+        model.curve.breakaway_v = 1e-9;
+    }
+    let damping =
+        truth.damping_per_s + truth.gain_mm_per_v_s2 * truth.friction.positive.viscous_v_s_per_mm;
+    let mut axis = SimulatedAxis::new(truth.clone(), RATE_HZ, 1);
+    let volts = 3276.0 / 32767.0 * 10.0;
+    for tick in 1..=500 {
+        axis.step(DacCode(3276), true);
+        let time = (f64::from(tick) / RATE_HZ - truth.delay_s).max(0.0);
+        let exact = truth.gain_mm_per_v_s2 * volts / damping
+            * (time - (1.0 - (-damping * time).exp()) / damping);
+        // A thousandth of a count, and a few millionths of the way.
+        let apart = axis.position_mm() - exact;
+        assert!(apart.abs() < 5e-7 + 3e-6 * exact, "tick {tick}: {apart} mm");
+    }
+}

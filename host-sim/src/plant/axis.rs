@@ -27,6 +27,8 @@ pub struct SimulatedAxis {
     gms: Gms<f64, TRUTH_ELEMENTS>,
     surface: SlidingTable<f64>,
     friction: GmsState<f64, TRUTH_ELEMENTS>,
+    /// The force of the GMS elements alone, V.
+    elements_v: f64,
     friction_v: f64,
     load_v: f64,
     position_mm: f64,
@@ -50,6 +52,7 @@ impl SimulatedAxis {
                 step_s,
             ),
             friction: GmsState::default(),
+            elements_v: 0.0,
             friction_v: 0.0,
             load_v: 0.0,
             position_mm: 0.0,
@@ -118,21 +121,28 @@ impl SimulatedAxis {
 
     fn substep(&mut self, force_v: f64) {
         let truth = &self.truth;
-        let acceleration = truth.gain_mm_per_v_s2 * (force_v - self.friction_v)
-            - truth.damping_per_s * self.velocity_mm_s
-            - truth.stiffness_per_s2 * self.position_mm;
-        // The mean of both velocities: a held force then moves the mass exactly as it would in continuous time.
-        let change = acceleration * self.step_s;
-        let displacement = (self.velocity_mm_s + 0.5 * change) * self.step_s;
-        self.velocity_mm_s += change;
-        self.position_mm += displacement;
-        let direction = if displacement < 0.0 {
-            Direction::Negative
-        } else {
-            Direction::Positive
+        let gain = truth.gain_mm_per_v_s2;
+        let along = |velocity: f64| {
+            if velocity < 0.0 {
+                Direction::Negative
+            } else {
+                Direction::Positive
+            }
         };
-        let sliding = self.surface.at(self.velocity_mm_s.abs(), direction);
-        self.friction_v = self.gms.step(&mut self.friction, displacement, sliding)
-            + truth.friction.of(direction).viscous_v_s_per_mm * self.velocity_mm_s;
+        let viscous = truth
+            .friction
+            .of(along(self.velocity_mm_s))
+            .viscous_v_s_per_mm;
+        // The trapezoidal rule on the linear part: a held force moves the mass as it would in continuous time.
+        let drag = 0.5 * self.step_s * (truth.damping_per_s + gain * viscous);
+        let push = gain * (force_v - self.elements_v) - truth.stiffness_per_s2 * self.position_mm;
+        let before = self.velocity_mm_s;
+        let after = (before * (1.0 - drag) + push * self.step_s) / (1.0 + drag);
+        let displacement = 0.5 * (before + after) * self.step_s;
+        self.velocity_mm_s = after;
+        self.position_mm += displacement;
+        let sliding = self.surface.at(after.abs(), along(displacement));
+        self.elements_v = self.gms.step(&mut self.friction, displacement, sliding);
+        self.friction_v = self.elements_v + viscous * after;
     }
 }
