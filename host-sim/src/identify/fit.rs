@@ -48,6 +48,18 @@ pub struct Fit {
 }
 
 impl Fit {
+    /// The same with standard errors no smaller than the stated deviations of the residuals allow; for residuals that
+    /// are divided by their deviations. A fit that is better than that was lucky, or the deviations hold an error that does
+    /// not scatter.
+    #[must_use]
+    pub fn no_better_than_stated(mut self) -> Self {
+        let factor = self.residual_rms.recip().max(1.0);
+        self.standard_errors
+            .iter_mut()
+            .for_each(|error| *error *= factor);
+        self
+    }
+
     /// The covariance of two values' errors.
     pub fn covariance(&self, row: usize, column: usize) -> f64 {
         self.correlation[(row, column)] * self.standard_errors[row] * self.standard_errors[column]

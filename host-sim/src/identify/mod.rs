@@ -3,10 +3,18 @@
 //! An experiment is run on a [`Rig`](crate::rig::Rig), or its recording read from a file; everything here works on
 //! [`Recording`](crate::rig::Recording)s and knows nothing of where they come from.
 //!
+//! - [`excitation`]: voltages that make an axis show its response;
+//! - [`frf`]: that response, measured;
 //! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which the steps share;
+//! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
-//! - [`revise`]: the linear model once friction stands beside it.
+//! - [`revise`]: the linear model once friction stands beside it;
+//! - [`static_friction`]: the friction-velocity map and its model.
 
+pub mod excitation;
 pub mod fit;
+pub mod frf;
+pub mod plant;
 pub mod response;
 pub mod revise;
+pub mod static_friction;

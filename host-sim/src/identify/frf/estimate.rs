@@ -1,0 +1,186 @@
+//! From blocks of samples to a response with coherence and variance.
+//!
+//! Source: Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed., 2012, ch. 2.
+
+use std::f64::consts::PI;
+use std::ops::Range;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use rustfft::{Fft, FftPlanner};
+
+use super::super::response::{FrequencyResponse, ResponsePoint};
+use crate::rig::Recording;
+
+/// Which quotient of spectra is the response.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum Estimator {
+    /// `S_yr / S_ur` with the injected excitation as instrument: free of bias under feedback.
+    Instrument,
+    /// `S_yu / S_uu`: for open loop, where the voltage is the excitation.
+    H1,
+}
+
+/// What the blocks showed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Estimate {
+    /// The response.
+    pub response: FrequencyResponse,
+    /// Blocks that were averaged.
+    pub blocks: usize,
+    /// Distance of neighbouring lines, Hz.
+    pub resolution_hz: f64,
+}
+
+/// Sums over the blocks at one line.
+#[derive(Clone, Copy, Default)]
+struct Sums {
+    yr: Complex64,
+    ur: Complex64,
+    yu: Complex64,
+    yy: f64,
+    uu: f64,
+    rr: f64,
+}
+
+/// Estimates the response at `lines` (multiples of the inverse block length) from equally long blocks, each a recording
+/// and the range of its samples; at least two blocks.
+///
+/// Positions are taken relative to the reference, so that a motion at constant velocity is no part of them. A Hann window
+/// keeps what is not periodic (the screw's ripple, what is left of a transient) out of distant lines; a block of two
+/// periods of a periodic excitation puts its lines two apart, so that the window does not mix them.
+pub fn estimate(
+    blocks: &[(&Recording, Range<usize>)],
+    lines: &[usize],
+    estimator: Estimator,
+) -> Estimate {
+    let Some((first, range)) = blocks.first() else {
+        return Estimate {
+            response: FrequencyResponse::default(),
+            blocks: 0,
+            resolution_hz: f64::NAN,
+        };
+    };
+    let length = range.len();
+    let transform = Transform::new(length);
+    let spectra: Vec<[Vec<Complex64>; 3]> = blocks
+        .iter()
+        .map(|(recording, range)| {
+            let range = range.clone();
+            let deviation: Vec<f64> = recording.position_mm[range.clone()]
+                .iter()
+                .zip(&recording.reference_mm[range.clone()])
+                .map(|(position, reference)| position - reference)
+                .collect();
+            [
+                transform.spectrum(&deviation),
+                transform.spectrum(&recording.voltage_v[range.clone()]),
+                transform.spectrum(&recording.injection_v[range]),
+            ]
+        })
+        .collect();
+    let resolution_hz = 1.0 / (length as f64 * first.sample_time_s);
+    let points = lines
+        .iter()
+        .map(|&line| {
+            let hold = hold(PI * line as f64 / length as f64);
+            let frequency_hz = line as f64 * resolution_hz;
+            point(&spectra, line, frequency_hz, hold, estimator)
+        })
+        .collect();
+    Estimate {
+        response: FrequencyResponse { points },
+        blocks: blocks.len(),
+        resolution_hz,
+    }
+}
+
+/// The response of a zero-order hold at half the angle between samples, over that at zero frequency.
+fn hold(half_angle: f64) -> Complex64 {
+    Complex64::from_polar(half_angle.sin() / half_angle, -half_angle)
+}
+
+fn point(
+    spectra: &[[Vec<Complex64>; 3]],
+    line: usize,
+    frequency_hz: f64,
+    hold: Complex64,
+    estimator: Estimator,
+) -> ResponsePoint {
+    let mut sums = Sums::default();
+    for [y, u, r] in spectra {
+        let (y, u, r) = (y[line], u[line], r[line]);
+        sums.yr += y * r.conj();
+        sums.ur += u * r.conj();
+        sums.yu += y * u.conj();
+        sums.yy += y.norm_sqr();
+        sums.uu += u.norm_sqr();
+        sums.rr += r.norm_sqr();
+    }
+    let (sampled, coherence, input_power) = match estimator {
+        Estimator::Instrument => (
+            sums.yr / sums.ur,
+            sums.yr.norm_sqr() / (sums.yy * sums.rr),
+            sums.ur.norm_sqr() / sums.rr,
+        ),
+        Estimator::H1 => (
+            sums.yu / sums.uu,
+            sums.yu.norm_sqr() / (sums.yy * sums.uu),
+            sums.uu,
+        ),
+    };
+    // What the response does not explain, over the power that it was measured with.
+    let unexplained: f64 = spectra
+        .iter()
+        .map(|[y, u, _]| (y[line] - sampled * u[line]).norm_sqr())
+        .sum();
+    let freedom = (spectra.len().max(2) - 1) as f64;
+    let variance = unexplained / freedom / input_power;
+    ResponsePoint {
+        frequency_hz,
+        response: sampled / hold,
+        coherence: coherence.clamp(0.0, 1.0),
+        relative_deviation: (0.5 * variance).sqrt() / sampled.norm(),
+    }
+}
+
+struct Transform {
+    fft: Arc<dyn Fft<f64>>,
+    window: Vec<f64>,
+}
+
+impl Transform {
+    fn new(length: usize) -> Self {
+        let window = (0..length)
+            .map(|index| (PI * index as f64 / length as f64).sin().powi(2))
+            .collect();
+        Self {
+            fft: FftPlanner::new().plan_fft_forward(length),
+            window,
+        }
+    }
+
+    /// The spectrum of a block without its mean and slope.
+    fn spectrum(&self, block: &[f64]) -> Vec<Complex64> {
+        let count = block.len() as f64;
+        let middle = 0.5 * (count - 1.0);
+        let mean = block.iter().sum::<f64>() / count;
+        let moment: f64 = block
+            .iter()
+            .enumerate()
+            .map(|(index, value)| (index as f64 - middle) * value)
+            .sum();
+        let slope = moment / (count * (count * count - 1.0) / 12.0);
+        let mut spectrum: Vec<Complex64> = block
+            .iter()
+            .zip(&self.window)
+            .enumerate()
+            .map(|(index, (value, window))| {
+                let trend = mean + slope * (index as f64 - middle);
+                Complex64::from((value - trend) * window)
+            })
+            .collect();
+        self.fft.process(&mut spectrum);
+        spectrum
+    }
+}

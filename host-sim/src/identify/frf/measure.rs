@@ -1,0 +1,352 @@
+//! The experiment: excitation injected at standstill or at constant velocity, in closed or open loop.
+
+use std::ops::Range;
+
+use quadrant::reference::{MotionSettings, PointToPointSettings};
+
+use super::estimate::{Estimate, Estimator, estimate};
+use crate::identify::excitation::{Excitation, Waveform};
+use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+
+/// How a frequency response is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrfSettings {
+    /// What is injected.
+    pub excitation: Excitation,
+    /// Blocks of two periods, overlapping by half, that are averaged; at least 2.
+    pub periods: usize,
+    /// Velocity at which the axis moves meanwhile, mm/s, there and back; zero for standstill. Closed loop only.
+    pub bias_velocity_mm_s: f64,
+    /// The feedback is off: the excitation alone drives the amplifier.
+    pub open_loop: bool,
+}
+
+impl Default for FrfSettings {
+    /// The sliding axis, 2 to 400 Hz: what a plant model is fitted to.
+    fn default() -> Self {
+        Self {
+            excitation: Excitation {
+                waveform: Waveform::Multisine,
+                rms_v: 0.1,
+                band_hz: (4.0, 400.0),
+                rise_hz: 200.0,
+                period_s: 0.5,
+                seed: 1,
+            },
+            periods: 40,
+            bias_velocity_mm_s: 37.0,
+            open_loop: false,
+        }
+    }
+}
+
+/// A measured response and what it was measured from.
+#[derive(Clone, Debug)]
+pub struct FrfMeasurement {
+    /// The recordings, one for each pass.
+    pub recordings: Vec<Recording>,
+    /// The response, by the estimator that suits the loop.
+    pub estimate: Estimate,
+    /// The response by H1: under feedback, for comparison only.
+    pub plain: Estimate,
+}
+
+/// Why there is no response.
+#[derive(Debug, thiserror::Error)]
+pub enum FrfError {
+    /// A setting that cannot be.
+    #[error("{field} = {value}: {expected}")]
+    Setting {
+        /// Which.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// The travel does not allow a pass at this velocity.
+    #[error(
+        "a pass at {velocity_mm_s} mm/s needs {needed_mm:.0} mm of travel for a single period of {period_s} s, and there are \
+         {travel_mm:.0} mm: lower the velocity or the period"
+    )]
+    Travel {
+        /// The velocity.
+        velocity_mm_s: f64,
+        /// What one period takes.
+        needed_mm: f64,
+        /// What there is.
+        travel_mm: f64,
+        /// The period.
+        period_s: f64,
+    },
+    /// The excitation slowed the axis so far that friction is not linear.
+    #[error(
+        "the excitation slowed the axis from {velocity_mm_s} to {least_mm_s:.1} mm/s, where friction is not linear: lower its \
+         amplitude below {amplitude_v} V, let it rise up to a higher frequency, or raise the velocity"
+    )]
+    NotSliding {
+        /// The velocity asked for.
+        velocity_mm_s: f64,
+        /// The least velocity seen.
+        least_mm_s: f64,
+        /// RMS of the excitation.
+        amplitude_v: f64,
+    },
+    /// The experiment was stopped.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+/// Time at constant velocity before the first block, s: transients have died away.
+const SETTLING_S: f64 = 0.7;
+/// Periods in a block.
+const BLOCK_PERIODS: usize = 2;
+/// Acceleration and jerk of the passes.
+const ACCELERATION_MM_S2: f64 = 500.0;
+const JERK_MM_S3: f64 = 2e4;
+/// Share of the travel that passes use.
+const TRAVEL_SHARE: f64 = 0.9;
+
+impl FrfSettings {
+    fn check(&self, rate_hz: f64) -> Result<(), FrfError> {
+        let refuse = |field, value, expected| {
+            Err(FrfError::Setting {
+                field,
+                value,
+                expected,
+            })
+        };
+        let Excitation {
+            rms_v,
+            band_hz: (low, high),
+            period_s,
+            ..
+        } = self.excitation;
+        if !(rms_v.is_finite() && rms_v > 0.0) {
+            return refuse("amplitude", rms_v, "it must be above zero, in V RMS");
+        }
+        if !(period_s.is_finite() && period_s * rate_hz >= 16.0 && period_s <= 100.0) {
+            return refuse("period", period_s, "it must be 16 control periods to 100 s");
+        }
+        if !(low.is_finite() && low * period_s >= 1.0) {
+            let expected = "the lowest frequency must be at least one cycle in a period";
+            return refuse("band", low, expected);
+        }
+        if !(high > low && high < 0.4 * rate_hz) {
+            let expected =
+                "the highest frequency must lie above the lowest and below 0.4 of the control rate";
+            return refuse("band", high, expected);
+        }
+        if self.periods < 2 {
+            let expected = "at least 2 are needed, or there is no variance and no coherence";
+            return refuse("periods", self.periods as f64, expected);
+        }
+        if self.open_loop && self.bias_velocity_mm_s != 0.0 {
+            let expected = "an axis moves at constant velocity under feedback only";
+            return refuse("bias velocity", self.bias_velocity_mm_s, expected);
+        }
+        Ok(())
+    }
+}
+
+/// Measures the response of the rig's axis, under the settings that are in force.
+///
+/// # Errors
+/// Settings that cannot be, too little travel, or a run that is stopped.
+pub fn measure(
+    rig: &mut dyn Rig,
+    settings: &FrfSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<FrfMeasurement, FrfError> {
+    let axis = rig.axis();
+    settings.check(axis.rate_hz)?;
+    let period = settings.excitation.period(axis.rate_hz);
+    let moves = settings.bias_velocity_mm_s != 0.0;
+    let mut recordings: Vec<Recording> = Vec::new();
+    let mut blocks: Vec<(usize, Range<usize>)> = Vec::new();
+    while blocks.len() < settings.periods {
+        let missing = settings.periods - blocks.len();
+        let (experiment, expected) = if moves {
+            let direction = if recordings.len().is_multiple_of(2) {
+                1.0
+            } else {
+                -1.0
+            };
+            pass(settings, axis.travel_mm, axis.rate_hz, missing, direction)?
+        } else {
+            (standstill(settings, axis.rate_hz), settings.periods)
+        };
+        let done = blocks.len() as f64;
+        let recording = rig.perform(&experiment, &mut |share| {
+            progress((done + share * expected as f64) / settings.periods as f64);
+        })?;
+        let steady = steady_range(&recording, settings.bias_velocity_mm_s);
+        check_sliding(&recording, &steady, settings)?;
+        // Blocks begin where a period does, so that the excitation is the same in each; they overlap by half.
+        let first = steady.start.div_ceil(period);
+        let found = (first..)
+            .map(|index| index * period..(index + BLOCK_PERIODS) * period)
+            .take_while(|block| block.end <= steady.end)
+            .take(missing);
+        let index = recordings.len();
+        let before = blocks.len();
+        blocks.extend(found.map(|block| (index, block)));
+        recordings.push(recording);
+        if blocks.len() == before {
+            return Err(too_short(settings, axis.travel_mm));
+        }
+    }
+    let views: Vec<(&Recording, Range<usize>)> = blocks
+        .iter()
+        .map(|(index, block)| (&recordings[*index], block.clone()))
+        .collect();
+    let lines: Vec<usize> = settings
+        .excitation
+        .lines()
+        .into_iter()
+        .map(|line| line * BLOCK_PERIODS)
+        .collect();
+    let unbiased = if settings.open_loop {
+        Estimator::H1
+    } else {
+        Estimator::Instrument
+    };
+    let found = estimate(&views, &lines, unbiased);
+    let plain = estimate(&views, &lines, Estimator::H1);
+    Ok(FrfMeasurement {
+        estimate: found,
+        plain,
+        recordings,
+    })
+}
+
+fn too_short(settings: &FrfSettings, travel_mm: f64) -> FrfError {
+    let velocity_mm_s = settings.bias_velocity_mm_s.abs();
+    FrfError::Travel {
+        velocity_mm_s,
+        needed_mm: pass_length_mm(settings, 1),
+        travel_mm: TRAVEL_SHARE * travel_mm,
+        period_s: settings.excitation.period_s,
+    }
+}
+
+/// The excitation at rest, in closed or open loop; one period settles.
+fn standstill(settings: &FrfSettings, rate_hz: f64) -> Experiment {
+    let periods = settings.periods + 1;
+    Experiment {
+        name: "frequency response at standstill".to_owned(),
+        drive: if settings.open_loop {
+            Drive::OpenLoop
+        } else {
+            Drive::ClosedLoop(MotionSettings::Hold)
+        },
+        injection_v: settings.excitation.samples(rate_hz, periods),
+        decimation: 1,
+        time_limit_s: 10.0 + 2.0 * periods as f64 * settings.excitation.period_s,
+    }
+}
+
+/// The distance in which so many blocks fit: a period more, because blocks begin where a period does.
+fn pass_length_mm(settings: &FrfSettings, periods: usize) -> f64 {
+    let speed = settings.bias_velocity_mm_s.abs();
+    let steady_s = SETTLING_S + (periods + BLOCK_PERIODS) as f64 * settings.excitation.period_s;
+    let ramp_s = speed / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+    speed * (steady_s + ramp_s)
+}
+
+/// One pass at constant velocity, and how many blocks it gives.
+fn pass(
+    settings: &FrfSettings,
+    travel_mm: f64,
+    rate_hz: f64,
+    missing: usize,
+    direction: f64,
+) -> Result<(Experiment, usize), FrfError> {
+    let room_mm = TRAVEL_SHARE * travel_mm;
+    let periods = (1..=missing)
+        .rev()
+        .find(|&periods| pass_length_mm(settings, periods) <= room_mm)
+        .ok_or_else(|| too_short(settings, travel_mm))?;
+    let length_mm = pass_length_mm(settings, periods);
+    let speed = settings.bias_velocity_mm_s.abs();
+    let duration_s =
+        length_mm / speed + speed / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+    // The motion begins a few control periods after the recording.
+    let excited = ((duration_s + 0.1) / settings.excitation.period_s).ceil() as usize;
+    let motion = PointToPointSettings {
+        distance_mm: direction * length_mm,
+        max_velocity_mm_s: speed,
+        max_acceleration_mm_s2: ACCELERATION_MM_S2,
+        max_jerk_mm_s3: JERK_MM_S3,
+    };
+    let experiment = Experiment {
+        name: format!("frequency response at {} mm/s", direction * speed),
+        drive: Drive::ClosedLoop(MotionSettings::PointToPoint(motion)),
+        injection_v: settings.excitation.samples(rate_hz, excited),
+        decimation: 1,
+        time_limit_s: 10.0 + 2.0 * duration_s,
+    };
+    Ok((experiment, periods))
+}
+
+/// The samples at which the axis has settled: all but the first period at standstill, those at constant reference velocity
+/// otherwise.
+fn steady_range(recording: &Recording, bias_velocity_mm_s: f64) -> Range<usize> {
+    if bias_velocity_mm_s == 0.0 {
+        return 1..recording.len();
+    }
+    let step_mm = bias_velocity_mm_s.abs() * recording.sample_time_s;
+    let reference = &recording.reference_mm;
+    // The reference is rebuilt from single-precision errors: a step is known to a count's hundredth at best.
+    let steady = |index: &usize| {
+        let index = *index;
+        let span = STEADY_SAMPLES.min(reference.len() - 1 - index);
+        let moved = (reference[index + span] - reference[index]).abs();
+        span == STEADY_SAMPLES
+            && (moved - span as f64 * step_mm).abs() < 1e-3 * span as f64 * step_mm
+    };
+    let settling = (SETTLING_S / recording.sample_time_s) as usize;
+    let first = (0..reference.len()).find(steady);
+    let last = (0..reference.len()).rev().find(steady);
+    match (first, last) {
+        (Some(first), Some(last)) => first + settling..last.max(first + settling),
+        _ => 0..0,
+    }
+}
+
+/// Whether the axis kept moving all the time.
+fn check_sliding(
+    recording: &Recording,
+    steady: &Range<usize>,
+    settings: &FrfSettings,
+) -> Result<(), FrfError> {
+    let bias = settings.bias_velocity_mm_s;
+    if bias == 0.0 {
+        return Ok(());
+    }
+    let span = ((SPEED_S / recording.sample_time_s) as usize).max(1);
+    let along = if recording.reference_mm.first() < recording.reference_mm.last() {
+        1.0
+    } else {
+        -1.0
+    };
+    let least_mm_s = recording.position_mm[steady.clone()]
+        .windows(span + 1)
+        .map(|window| along * (window[span] - window[0]) / (span as f64 * recording.sample_time_s))
+        .fold(f64::INFINITY, f64::min);
+    if least_mm_s < LEAST_SPEED * bias.abs() {
+        return Err(FrfError::NotSliding {
+            velocity_mm_s: bias.abs(),
+            least_mm_s,
+            amplitude_v: settings.excitation.rms_v,
+        });
+    }
+    Ok(())
+}
+
+/// Time over which the velocity is taken, s, and the share of the bias that it may fall to.
+const SPEED_S: f64 = 2e-3;
+const LEAST_SPEED: f64 = 0.25;
+
+/// Samples over which the reference's velocity is looked at.
+const STEADY_SAMPLES: usize = 100;

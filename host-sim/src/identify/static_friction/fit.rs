@@ -1,0 +1,202 @@
+//! The model fitted to the map.
+
+use quadrant::friction::PerDirection;
+use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+
+use super::map::{FrictionMap, FrictionRun};
+use crate::identify::fit::{Fit, FitError, Loss, Parameter, fit};
+
+/// What is done about delta, the exponent of the Stribeck curve.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Exponent {
+    /// It has this value.
+    Fixed(f64),
+    /// It is fitted.
+    Free,
+}
+
+/// The model of one direction.
+#[derive(Clone, Debug)]
+pub struct DirectionFit {
+    /// The model: levels as seen at the amplifier's input, viscous friction with the linear damping in it.
+    pub model: StaticFriction,
+    /// Fc, Fs - Fc, Vs, sigma and, if it was free, delta, with standard errors and correlations.
+    pub fit: Fit,
+    /// Standard deviation of Fs, V.
+    pub breakaway_error_v: f64,
+    /// Slowest and fastest speed of the runs that counted, mm/s.
+    pub speeds_mm_s: (f64, f64),
+}
+
+/// The models of both directions.
+#[derive(Clone, Debug)]
+pub struct FrictionFit {
+    /// Each direction's.
+    pub directions: PerDirection<DirectionFit>,
+    /// Half the difference of the directions' Coulomb levels, V: the amplifier's offset if the friction is the same in both,
+    /// positive when the axis is pushed to larger positions.
+    pub offset_v: f64,
+    /// Runs that stuck and slipped and do not count.
+    pub stick_slip_runs: usize,
+}
+
+impl FrictionFit {
+    /// The models alone.
+    pub fn models(&self) -> PerDirection<StaticFriction> {
+        self.directions.map(|direction| direction.model)
+    }
+
+    /// The mean of both directions' Coulomb and breakaway levels, V: free of the amplifier's offset.
+    pub fn mean_levels_v(&self) -> (f64, f64) {
+        let [positive, negative] = [&self.directions.positive, &self.directions.negative]
+            .map(|direction| direction.model.curve);
+        (
+            0.5 * (positive.coulomb_v + negative.coulomb_v),
+            0.5 * (positive.breakaway_v + negative.breakaway_v),
+        )
+    }
+}
+
+/// Why a map supports no model.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum FrictionFitError {
+    /// Too few runs.
+    #[error(
+        "{runs} runs in the {direction} direction moved evenly; the model takes {LEAST_RUNS}: measure more velocities, or \
+         faster ones if the axis sticks and slips"
+    )]
+    TooFewRuns {
+        /// "positive" or "negative".
+        direction: &'static str,
+        /// Runs that count.
+        runs: usize,
+    },
+    /// The friction has the wrong sign.
+    #[error(
+        "the voltage of the {direction} direction, {voltage_v:.4} V at {velocity_mm_s:.3} mm/s, does not oppose the motion: are the \
+         signs of voltage and position alike, and is the axis free of load?"
+    )]
+    Sign {
+        /// "positive" or "negative".
+        direction: &'static str,
+        /// The voltage.
+        voltage_v: f64,
+        /// The velocity.
+        velocity_mm_s: f64,
+    },
+    /// The search failed.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+}
+
+/// Fewest runs of a direction.
+const LEAST_RUNS: usize = 6;
+/// An error of each mean that does not scatter within its run, over the voltage.
+const SYSTEMATIC: f64 = 2e-4;
+
+/// Fits both directions.
+///
+/// # Errors
+/// A map that cannot support the model, with the reason and what would.
+pub fn fit_map(map: &FrictionMap, exponent: Exponent) -> Result<FrictionFit, FrictionFitError> {
+    let positive = fit_direction(&map.direction(1.0), exponent, "positive")?;
+    let negative = fit_direction(&map.direction(-1.0), exponent, "negative")?;
+    let levels = [&positive, &negative].map(|direction| direction.model.curve.coulomb_v);
+    Ok(FrictionFit {
+        offset_v: 0.5 * (levels[1] - levels[0]),
+        directions: PerDirection { positive, negative },
+        stick_slip_runs: map.runs.iter().filter(|run| run.stick_slip).count(),
+    })
+}
+
+/// The model of the values in the order Fc, Fs - Fc, Vs, sigma, delta.
+fn model(values: &[f64], fixed: f64) -> StaticFriction {
+    StaticFriction {
+        curve: StribeckCurve {
+            coulomb_v: values[0],
+            breakaway_v: values[0] + values[1],
+            stribeck_velocity_mm_s: values[2],
+            exponent: values.get(4).copied().unwrap_or(fixed),
+        },
+        viscous_v_s_per_mm: values[3],
+    }
+}
+
+fn fit_direction(
+    runs: &[FrictionRun],
+    exponent: Exponent,
+    direction: &'static str,
+) -> Result<DirectionFit, FrictionFitError> {
+    let (Some(slowest), Some(fastest), true) =
+        (runs.first(), runs.last(), runs.len() >= LEAST_RUNS)
+    else {
+        return Err(FrictionFitError::TooFewRuns {
+            direction,
+            runs: runs.len(),
+        });
+    };
+    if let Some(odd) = runs.iter().find(|run| run.voltage_v <= 0.0) {
+        return Err(FrictionFitError::Sign {
+            direction,
+            voltage_v: odd.voltage_v,
+            velocity_mm_s: odd.velocity_mm_s,
+        });
+    }
+    let least = runs
+        .iter()
+        .map(|run| run.voltage_v)
+        .fold(f64::INFINITY, f64::min);
+    let most = runs.iter().map(|run| run.voltage_v).fold(0.0, f64::max);
+    let (low, high) = (slowest.velocity_mm_s, fastest.velocity_mm_s);
+    let slope = ((fastest.voltage_v - least) / high).max(1e-9);
+    let mut parameters = vec![
+        Parameter {
+            name: "Fc",
+            start: least,
+            bounds: (0.1 * least, 2.0 * most),
+        },
+        Parameter {
+            name: "Fs - Fc",
+            start: (slowest.voltage_v - least).max(0.02 * least),
+            bounds: (0.0, 5.0 * most),
+        },
+        Parameter {
+            name: "Vs",
+            start: (low * high).sqrt(),
+            bounds: (0.2 * low, high),
+        },
+        Parameter {
+            name: "sigma",
+            start: slope,
+            bounds: (0.0, 20.0 * slope),
+        },
+    ];
+    let fixed = match exponent {
+        Exponent::Fixed(value) => value,
+        Exponent::Free => {
+            parameters.push(Parameter {
+                name: "delta",
+                start: 1.2,
+                bounds: (0.4, 3.0),
+            });
+            1.0
+        }
+    };
+    let fit = fit(&parameters, Loss::Huber, |values| {
+        let model = model(values, fixed);
+        runs.iter()
+            .map(|run| {
+                let deviation = run.deviation_v.hypot(SYSTEMATIC * run.voltage_v);
+                (model.friction_v(run.velocity_mm_s) - run.voltage_v) / deviation
+            })
+            .collect()
+    })?
+    .no_better_than_stated();
+    let variance = fit.covariance(0, 0) + 2.0 * fit.covariance(0, 1) + fit.covariance(1, 1);
+    Ok(DirectionFit {
+        model: model(&fit.values, fixed),
+        breakaway_error_v: variance.max(0.0).sqrt(),
+        fit,
+        speeds_mm_s: (low, high),
+    })
+}

@@ -1,0 +1,224 @@
+//! The friction-velocity map: what the runs showed, in memory and as CSV.
+
+use std::path::{Path, PathBuf};
+
+/// One run at constant velocity.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FrictionRun {
+    /// Measured mean velocity, mm/s; its sign is the direction's.
+    pub velocity_mm_s: f64,
+    /// Mean voltage, V.
+    pub voltage_v: f64,
+    /// Standard deviation of that mean, from the scatter within the run, V.
+    pub deviation_v: f64,
+    /// The axis stuck and slipped instead of moving evenly: the mean is no friction at this velocity.
+    pub stick_slip: bool,
+}
+
+/// Runs at several velocities in both directions.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FrictionMap {
+    /// The runs, by rising velocity.
+    pub runs: Vec<FrictionRun>,
+}
+
+/// Why a file holds no map.
+#[derive(Debug, thiserror::Error)]
+pub enum MapError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Csv {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: csv::Error,
+    },
+    /// A column is missing.
+    #[error("{}: no column {name}; a friction map has the columns {}", path.display(), COLUMNS.join(", "))]
+    Column {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        name: &'static str,
+    },
+    /// A value that cannot be.
+    #[error("{}, row {row}, column {name}: {value:?} is not {expected}", path.display())]
+    Value {
+        /// The file.
+        path: PathBuf,
+        /// Row of data, from 1.
+        row: usize,
+        /// The column.
+        name: &'static str,
+        /// What stands there.
+        value: String,
+        /// What should.
+        expected: &'static str,
+    },
+}
+
+const COLUMNS: [&str; 4] = ["velocity_mm_s", "voltage_v", "deviation_v", "stick_slip"];
+const EXPECTED: [&str; 4] = [
+    "a finite number other than zero",
+    "a finite number",
+    "a number above zero",
+    "0 or 1",
+];
+
+impl FrictionMap {
+    /// Writes it as CSV: `velocity_mm_s`, `voltage_v`, `deviation_v`, `stick_slip` (0 or 1).
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), MapError> {
+        let path = path.as_ref();
+        let refuse = |source| MapError::Csv {
+            path: path.to_owned(),
+            source,
+        };
+        let mut writer = csv::Writer::from_path(path).map_err(refuse)?;
+        writer.write_record(COLUMNS).map_err(refuse)?;
+        for run in &self.runs {
+            let stick_slip = f64::from(u8::from(run.stick_slip));
+            let row = [
+                run.velocity_mm_s,
+                run.voltage_v,
+                run.deviation_v,
+                stick_slip,
+            ];
+            writer
+                .write_record(row.map(|value| value.to_string()))
+                .map_err(refuse)?;
+        }
+        writer.flush().map_err(|source| refuse(source.into()))
+    }
+
+    /// Reads what [`write_csv`](Self::write_csv) writes; the order of columns and rows is free, other columns are passed
+    /// over.
+    ///
+    /// # Errors
+    /// A file that cannot be read or is not a friction map; names the row and the column.
+    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, MapError> {
+        let path = path.as_ref();
+        let refuse = |source| MapError::Csv {
+            path: path.to_owned(),
+            source,
+        };
+        let mut reader = csv::Reader::from_path(path).map_err(refuse)?;
+        let header = reader.headers().map_err(refuse)?.clone();
+        let mut places = [0; 4];
+        for (place, name) in places.iter_mut().zip(COLUMNS) {
+            *place = header
+                .iter()
+                .position(|heading| heading.trim() == name)
+                .ok_or_else(|| MapError::Column {
+                    path: path.to_owned(),
+                    name,
+                })?;
+        }
+        let allowed: [fn(f64) -> bool; 4] = [
+            |velocity| velocity != 0.0,
+            |_| true,
+            |deviation| deviation > 0.0,
+            |flag| flag == 0.0 || flag == 1.0,
+        ];
+        let mut runs = Vec::new();
+        for (index, record) in reader.records().enumerate() {
+            let record = record.map_err(refuse)?;
+            let mut row = [0.0; 4];
+            for (column, value) in row.iter_mut().enumerate() {
+                let text = record.get(places[column]).unwrap_or_default().trim();
+                let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+                *value = number
+                    .filter(|number| allowed[column](*number))
+                    .ok_or_else(|| MapError::Value {
+                        path: path.to_owned(),
+                        row: index + 1,
+                        name: COLUMNS[column],
+                        value: text.to_owned(),
+                        expected: EXPECTED[column],
+                    })?;
+            }
+            let [velocity_mm_s, voltage_v, deviation_v, flag] = row;
+            runs.push(FrictionRun {
+                velocity_mm_s,
+                voltage_v,
+                deviation_v,
+                stick_slip: flag == 1.0,
+            });
+        }
+        runs.sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+        Ok(Self { runs })
+    }
+
+    /// The runs of one direction that moved evenly, speeds and friction positive, by rising speed. `sign` is 1 or -1.
+    pub(super) fn direction(&self, sign: f64) -> Vec<FrictionRun> {
+        let mut runs: Vec<FrictionRun> = self
+            .runs
+            .iter()
+            .filter(|run| sign * run.velocity_mm_s > 0.0 && !run.stick_slip)
+            .map(|run| FrictionRun {
+                velocity_mm_s: sign * run.velocity_mm_s,
+                voltage_v: sign * run.voltage_v,
+                ..*run
+            })
+            .collect();
+        runs.sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+        runs
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn run(velocity_mm_s: f64, stick_slip: bool) -> FrictionRun {
+        FrictionRun {
+            velocity_mm_s,
+            voltage_v: 0.1 * velocity_mm_s,
+            deviation_v: 1e-3,
+            stick_slip,
+        }
+    }
+
+    #[test]
+    fn what_is_written_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.csv");
+        let map = FrictionMap {
+            runs: vec![run(-2.0, false), run(0.05, true), run(1.0, false)],
+        };
+        map.write_csv(&path).unwrap();
+        assert_eq!(FrictionMap::read_csv(&path).unwrap(), map);
+    }
+
+    #[test]
+    fn a_direction_has_positive_speeds_and_no_stick_slip() {
+        let map = FrictionMap {
+            runs: vec![
+                run(-2.0, false),
+                run(-1.0, false),
+                run(-0.1, true),
+                run(1.0, false),
+            ],
+        };
+        let speeds: Vec<f64> = map
+            .direction(-1.0)
+            .iter()
+            .map(|run| run.velocity_mm_s)
+            .collect();
+        assert_eq!(speeds, [1.0, 2.0]);
+    }
+
+    #[test]
+    fn a_wrong_value_is_named_with_its_row_and_column() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("map.csv");
+        let text = "velocity_mm_s,voltage_v,deviation_v,stick_slip\n1,0.1,0.001,0\n0,0.1,0.001,0\n";
+        std::fs::write(&path, text).unwrap();
+        let message = FrictionMap::read_csv(&path).unwrap_err().to_string();
+        assert!(message.ends_with(
+            "row 2, column velocity_mm_s: \"0\" is not a finite number other than zero"
+        ));
+    }
+}
