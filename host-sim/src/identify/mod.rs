@@ -9,7 +9,8 @@
 //! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
 //! - [`revise`]: the linear model once friction stands beside it;
-//! - [`static_friction`]: the friction-velocity map and its model.
+//! - [`static_friction`]: the friction-velocity map and its model;
+//! - [`virgin_curve`]: pre-sliding friction, the GMS model.
 
 pub mod excitation;
 pub mod fit;
@@ -18,3 +19,4 @@ pub mod plant;
 pub mod response;
 pub mod revise;
 pub mod static_friction;
+pub mod virgin_curve;

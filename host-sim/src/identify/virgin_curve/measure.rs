@@ -1,0 +1,60 @@
+//! The experiment: a slow sine of small amplitude.
+
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+
+use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+
+/// How the hysteresis is measured.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VirginCurveSettings {
+    /// Amplitude of the reference, mm: it must carry the axis through its pre-sliding range and, before that, the
+    /// controller to the voltage at which the axis breaks away.
+    pub amplitude_mm: f64,
+    /// Frequency, Hz.
+    pub frequency_hz: f64,
+    /// Cycles at full speed.
+    pub cycles: f64,
+}
+
+impl Default for VirginCurveSettings {
+    /// The thesis' 10 um at 0.1 Hz.
+    fn default() -> Self {
+        Self {
+            amplitude_mm: 0.010,
+            frequency_hz: 0.1,
+            cycles: 3.0,
+        }
+    }
+}
+
+/// Rate of the recording, Hz.
+const RATE_HZ: f64 = 1000.0;
+
+/// Measures the hysteresis on the rig's axis, under the settings that are in force.
+///
+/// # Errors
+/// A run that is stopped.
+pub fn measure(
+    rig: &mut dyn Rig,
+    settings: &VirginCurveSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Recording, RigError> {
+    let lead_s = 0.5 / settings.frequency_hz;
+    let duration_s = settings.cycles / settings.frequency_hz + 2.0 * lead_s;
+    rig.perform(
+        &Experiment {
+            name: format!("hysteresis over {:.1} um", 1e3 * settings.amplitude_mm),
+            drive: Drive::ClosedLoop(MotionSettings::Harmonic(HarmonicSettings {
+                amplitude_mm: settings.amplitude_mm,
+                frequency_hz: settings.frequency_hz,
+                phase_rad: 0.0,
+                cycles: Some(settings.cycles),
+                lead_s,
+            })),
+            injection_v: Vec::new(),
+            decimation: ((rig.axis().rate_hz / RATE_HZ) as usize).max(1),
+            time_limit_s: 20.0 + 2.0 * duration_s,
+        },
+        progress,
+    )
+}
