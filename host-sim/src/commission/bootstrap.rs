@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::PidGains;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::AxisSettings;
@@ -43,10 +44,35 @@ pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     settings
 }
 
+/// `base` with a PID that is quiet enough for the smallest motions: of an axis that is held by friction, the noise of a
+/// fast derivative shakes loose what is to be measured.
+pub fn quiet_settings(base: &AxisSettings, plant: &PlantModel, rate_hz: f64) -> AxisSettings {
+    let mut settings = measuring_settings(base);
+    let crossover =
+        (QUIET_PHASE_RAD / plant.delay_s.max(1.0 / rate_hz)).min(TAU * QUIET_CROSSOVER_HZ);
+    let kp_v_per_mm = crossover * crossover.hypot(plant.damping_per_s)
+        / (plant.gain_mm_per_v_s2 * QUIET_LEAD.hypot(1.0));
+    settings.plant = None;
+    settings.feedback.pid = PidGains {
+        kp_v_per_mm,
+        ki_v_per_mm_s: QUIET_INTEGRAL_PER_S * kp_v_per_mm,
+        kd_v_s_per_mm: QUIET_LEAD * kp_v_per_mm / crossover,
+        derivative_filter_s: (QUIET_FILTER / crossover).max(1.0 / rate_hz),
+    };
+    settings
+}
+
+/// The quiet controller: phase that the dead time may turn at its crossover, rad; highest crossover, Hz; crossover over the
+/// frequency from which the derivative acts; integral over proportional gain, 1/s; filter over the inverse crossover.
+const QUIET_PHASE_RAD: f64 = 0.27;
+const QUIET_CROSSOVER_HZ: f64 = 60.0;
+const QUIET_LEAD: f64 = 1.4;
+const QUIET_INTEGRAL_PER_S: f64 = 5.0;
+const QUIET_FILTER: f64 = 0.07;
+
 #[cfg(test)]
 mod tests {
-    use quadrant::control::plant_model::PlantModel;
-    use quadrant::settings::x_axis;
+    use quadrant::settings::{x_axis, y_axis, z_axis};
 
     use super::*;
     use crate::design::{SampledLoop, margins};
@@ -74,6 +100,18 @@ mod tests {
                     }
                 }
             }
+        }
+    }
+
+    #[test]
+    fn the_quiet_controller_keeps_a_distance_from_instability() {
+        for axis in [x_axis(), y_axis(), z_axis()] {
+            let plant = axis.plant.unwrap();
+            let quiet = quiet_settings(&axis, &plant, 1e4);
+            let margins =
+                margins(&SampledLoop::new(&plant, &quiet.feedback.pid, 1e-4, 0.0)).unwrap();
+            assert!(margins.sensitivity_peak < 1.6, "{margins:?}");
+            assert!(quiet.feedback.pid.kd_v_s_per_mm < axis.feedback.pid.kd_v_s_per_mm);
         }
     }
 }

@@ -6,7 +6,7 @@
 
 use std::fmt;
 
-use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt};
+use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
 
 /// A parameter to be fitted.
@@ -222,13 +222,18 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
     }
 
     fn minimise(self) -> Result<Self, FitError> {
-        let (problem, report) = LevenbergMarquardt::new().with_patience(200).minimize(self);
-        // A gradient lost in the difference quotients' rounding is as near as this gets.
-        let done = report.termination.was_successful()
-            || matches!(
-                report.termination,
-                levenberg_marquardt::TerminationReason::NoImprovementPossible(_)
-            );
+        let rough = self.step > STEP;
+        let patience = if rough { 30 } else { 200 };
+        let (problem, report) = LevenbergMarquardt::new()
+            .with_patience(patience)
+            .minimize(self);
+        // A gradient lost in the difference quotients' rounding, or in the roughness of the residuals, is as near as
+        // this gets.
+        let done = match report.termination {
+            TerminationReason::NoImprovementPossible(_) => true,
+            TerminationReason::LostPatience => rough,
+            reason => reason.was_successful(),
+        };
         done.then_some(problem).ok_or(FitError::NotConverged)
     }
 

@@ -6,6 +6,7 @@
 //! - [`excitation`]: voltages that make an axis show its response;
 //! - [`frf`]: that response, measured;
 //! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which the steps share;
+//! - [`motor_constant`]: acceleration per volt from a square wave;
 //! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
 //! - [`revise`]: the linear model once friction stands beside it;
@@ -15,6 +16,7 @@
 pub mod excitation;
 pub mod fit;
 pub mod frf;
+pub mod motor_constant;
 pub mod plant;
 pub mod response;
 pub mod revise;

@@ -4,11 +4,13 @@
 //! [`Rig`]: the simulated stage here ([`SimulatedRig`]), a machine with the firmware on it elsewhere. A recording read
 //! from a file skips the rig and is otherwise the same.
 
+mod approach;
 mod recorder;
 mod recording;
 mod simulated;
 mod watch;
 
+pub use approach::approach;
 pub use recording::Recording;
 pub use simulated::SimulatedRig;
 

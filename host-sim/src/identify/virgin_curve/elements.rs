@@ -80,6 +80,11 @@ const THINNING: usize = 20;
 /// Relative standard error of C beyond which it is not determined.
 const MOST_UNCERTAIN: f64 = 0.3;
 
+/// Bounds of each knot over the one before, and the least share of an element in what those before have left.
+const SMALLEST_RATIO: f64 = 1.2;
+const LARGEST_RATIO: f64 = 3.5;
+const LEAST_SHARE: f64 = 0.05;
+
 /// Which knots the elements have.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Knots {
@@ -275,14 +280,19 @@ impl Shape {
             bounds: (first - 2.0 * room, first + 2.0 * room),
         }];
         parameters.extend(self.knots_mm.windows(2).map(|pair| {
-            let step = (pair[1] / pair[0]).ln();
+            let ratio = (pair[1] / pair[0]).ln();
+            let (low, high) = (SMALLEST_RATIO.ln(), LARGEST_RATIO.ln());
             Parameter {
                 name: "ln x ratio",
-                start: step,
-                bounds: if held {
-                    (step - room, step + room)
+                start: if held {
+                    ratio
                 } else {
-                    (0.1, step.max(0.2) + 2.0)
+                    ratio.clamp(low + 0.05, high - 0.05)
+                },
+                bounds: if held {
+                    (ratio - room, ratio + room)
+                } else {
+                    (low, high)
                 },
             }
         }));
@@ -290,8 +300,8 @@ impl Shape {
         for weight in &self.weights[..self.weights.len() - 1] {
             parameters.push(Parameter {
                 name: "share",
-                start: (weight / left).clamp(0.02, 0.98),
-                bounds: (0.0, 1.0),
+                start: (weight / left).clamp(LEAST_SHARE + 0.01, 0.99 - LEAST_SHARE),
+                bounds: (LEAST_SHARE, 1.0 - LEAST_SHARE),
             });
             left -= weight;
         }
@@ -386,7 +396,7 @@ fn refine(
         let shape = Shape::from_variables(values, count);
         parameters(&shape, level_v, values[2 * count - 1].exp())
     };
-    let found = fit_with_step(&variables, Loss::Huber, 1e-4, |values| {
+    let found = fit_with_step(&variables, Loss::Squares, 1e-3, |values| {
         let predicted = predict(smooth, sliding, &model(values));
         scored
             .clone()

@@ -1,0 +1,257 @@
+//! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
+
+use quadrant::control::npid::NonlinearGain;
+use quadrant::control::plant_model::PlantModel;
+use quadrant::control::popov::{PidGains, sector_bound};
+use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant::settings::{AxisSettings, FrictionSettings};
+
+use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
+use super::error::CommissionError;
+use super::verify::{Trial, Verdict, verify};
+use crate::design::{
+    MarginError, Margins, SampledLoop, largest_integral_gain_where, margins, shape_to_margins,
+};
+use crate::identify::excitation::Excitation;
+use crate::identify::frf::{self, FrfError, FrfMeasurement, FrfSettings};
+use crate::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
+use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
+use crate::identify::static_friction::{
+    self, Exponent, FrictionFit, FrictionMap, StaticFrictionSettings, fit_map,
+};
+use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveSettings};
+use crate::rig::{Recording, Rig, approach};
+use crate::settings_file::FIRMWARE_ELEMENTS;
+
+/// What a commissioning is asked for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CommissionSettings {
+    /// Gain margin of the PID, dB.
+    pub gain_margin_db: f64,
+    /// Phase margin of the PID, deg.
+    pub phase_margin_deg: f64,
+    /// Share of the Popov bound that the nonlinear gain may take, 0 to 1.
+    pub sector_share: f64,
+    /// The runs that the friction is taken from.
+    pub friction: StaticFrictionSettings,
+    /// The sine on which the result is judged.
+    pub trial: Trial,
+}
+
+impl Default for CommissionSettings {
+    /// The thesis' margins, and three quarters of the Popov bound.
+    fn default() -> Self {
+        Self {
+            gain_margin_db: 9.9,
+            phase_margin_deg: 54.2,
+            sector_share: 0.75,
+            friction: StaticFrictionSettings {
+                velocities_mm_s: (0.1, 40.0),
+                ..StaticFrictionSettings::default()
+            },
+            trial: Trial::default(),
+        }
+    }
+}
+
+/// Everything a commissioning found, in the order in which it did.
+#[derive(Clone, Debug)]
+pub struct Commissioned {
+    /// The motor constant, from the open-loop test.
+    pub motor: MotorConstant,
+    /// The response of the sliding axis.
+    pub response: FrfMeasurement,
+    /// The linear model.
+    pub plant: PlantFit,
+    /// Margins of the PID with sampling at the control rate.
+    pub margins: Result<Margins, MarginError>,
+    /// The friction-velocity map, its model, and the recordings of the runs.
+    pub friction: (FrictionMap, FrictionFit, Vec<Recording>),
+    /// Pre-sliding friction, and its recording.
+    pub presliding: (GmsFit, Recording),
+    /// The Popov bound of the nonlinear gain.
+    pub sector_bound: f64,
+    /// The finished settings.
+    pub settings: AxisSettings,
+    /// What they achieve on the axis.
+    pub verdicts: Vec<Verdict>,
+}
+
+/// The steps, for progress: name and share of the whole.
+const STEPS: [(&str, f64); 6] = [
+    ("motor constant", 0.01),
+    ("frequency response", 0.06),
+    ("friction at constant velocity", 0.63),
+    ("pre-sliding friction", 0.15),
+    ("controller", 0.01),
+    ("verdict", 0.14),
+];
+
+/// Where the experiments begin, mm: where the axis stood when it was switched on, in the middle of its travel.
+const HOME_MM: f64 = 0.0;
+/// How often the excitation is halved before the response is given up.
+const HALVINGS: usize = 6;
+/// Amplitude of the slow sine over the tracking error at which the axis breaks away.
+const AMPLITUDE: f64 = 2.0;
+/// Largest relative error of the predicted hysteresis.
+const MOST_HYSTERESIS_ERROR: f64 = 0.10;
+
+/// Commissions the rig's axis, unattended. `base` says what the axis is: encoder, amplifier, limits, derivative filter; its gains
+/// and its friction are not looked at. `progress` is told the step and the share of the whole.
+///
+/// # Errors
+/// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
+pub fn commission(
+    rig: &mut dyn Rig,
+    base: &AxisSettings,
+    request: &CommissionSettings,
+    progress: &mut dyn FnMut(&'static str, f64),
+) -> Result<Commissioned, CommissionError> {
+    let rate_hz = rig.axis().rate_hz;
+    let mut step = 0;
+    let mut report = |step: usize, share: f64| {
+        let before: f64 = STEPS[..step].iter().map(|(_, part)| part).sum();
+        progress(STEPS[step].0, before + share * STEPS[step].1);
+    };
+
+    let motor = motor_constant::measure(rig, &MotorConstantSettings::default(), &mut |share| {
+        report(step, share);
+    })?;
+
+    step += 1;
+    rig.apply(&first_settings(base, motor.gain_mm_per_v_s2, rate_hz))?;
+    approach(rig, HOME_MM)?;
+    let response = sliding_response(rig, &mut |share| report(step, share))?;
+    let plant = fit_plant(
+        &response.estimate.response,
+        &PlantFitSettings {
+            stiffness: Stiffness::Zero,
+            ..PlantFitSettings::default()
+        },
+    )?;
+    let pid = design_pid(&plant.plant, base, request)?;
+
+    step += 1;
+    let mut settings = base.clone();
+    settings.plant = Some(plant.plant);
+    settings.feedback.pid = pid;
+    rig.apply(&measuring_settings(&settings))?;
+    approach(rig, HOME_MM)?;
+    let (map, recordings) = static_friction::measure(rig, &request.friction, &mut |share| {
+        report(step, share);
+    })?;
+    let friction = fit_map(&map, Exponent::Fixed(1.0))?;
+
+    step += 1;
+    let quiet = quiet_settings(&settings, &plant.plant, rate_hz);
+    rig.apply(&quiet)?;
+    let (_, breakaway_v) = friction.mean_levels_v();
+    let sine = VirginCurveSettings {
+        amplitude_mm: AMPLITUDE * breakaway_v / quiet.feedback.pid.kp_v_per_mm,
+        ..VirginCurveSettings::default()
+    };
+    let recording = virgin_curve::measure(rig, &sine, &mut |share| report(step, share))?;
+    let sliding = friction.models();
+    let knots = Knots::Automatic(FIRMWARE_ELEMENTS);
+    let gms = virgin_curve::identify(&recording, Some(&sliding), &knots)?;
+    if gms.prediction.relative_error > MOST_HYSTERESIS_ERROR {
+        return Err(CommissionError::Hysteresis {
+            percent: 100.0 * gms.prediction.relative_error,
+        });
+    }
+
+    step += 1;
+    let bound = sector_bound(&plant.plant, &pid, 1.0 / rate_hz);
+    settings.feedback.nonlinear = choose_nonlinear(&pid, bound, breakaway_v, request);
+    settings.friction = FrictionSettings {
+        sliding,
+        gms: gms.gms.clone(),
+    };
+    settings.feedforward.kind = FeedforwardKind::Combined;
+    settings.feedforward.gains = FeedforwardGains {
+        level: 1.0,
+        viscous: 1.0,
+        gms: 1.0,
+        inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
+    };
+    settings.feedforward.preview_s = plant.plant.delay_s;
+    let margins = margins(&SampledLoop::new(&plant.plant, &pid, 1.0 / rate_hz, 0.0));
+
+    step += 1;
+    let verdicts = verify(rig, &settings, request.trial, &mut |share| {
+        report(step, share)
+    })?;
+    Ok(Commissioned {
+        motor,
+        response,
+        plant,
+        margins,
+        friction: (map, friction, recordings),
+        presliding: (gms, recording),
+        sector_bound: bound,
+        settings,
+        verdicts,
+    })
+}
+
+/// The response of the sliding axis, with less excitation as long as it slows the axis too much.
+fn sliding_response(
+    rig: &mut dyn Rig,
+    progress: &mut dyn FnMut(f64),
+) -> Result<FrfMeasurement, CommissionError> {
+    let mut settings = FrfSettings::default();
+    for _ in 0..HALVINGS {
+        match frf::measure(rig, &settings, progress) {
+            Err(FrfError::NotSliding { .. }) => {
+                settings.excitation = Excitation {
+                    rms_v: 0.5 * settings.excitation.rms_v,
+                    ..settings.excitation
+                };
+            }
+            outcome => return Ok(outcome?),
+        }
+    }
+    Ok(frf::measure(rig, &settings, progress)?)
+}
+
+/// The PID with the margins asked for, and the integral action that they bear.
+pub fn design_pid(
+    plant: &PlantModel,
+    base: &AxisSettings,
+    request: &CommissionSettings,
+) -> Result<PidGains, CommissionError> {
+    let filter_s = base.feedback.pid.derivative_filter_s;
+    let gains = shape_to_margins(
+        plant,
+        filter_s,
+        request.gain_margin_db,
+        request.phase_margin_deg,
+    )?;
+    let ki_v_per_mm_s = largest_integral_gain_where(plant, &gains, |with| {
+        (with.gain_margin_db - request.gain_margin_db).abs() <= INTEGRAL_COST
+            && (with.phase_margin_deg - request.phase_margin_deg).abs() <= INTEGRAL_COST
+    });
+    Ok(PidGains {
+        ki_v_per_mm_s: ki_v_per_mm_s.unwrap_or(0.0),
+        ..gains
+    })
+}
+
+/// What integral action may cost of the margins, dB and deg.
+const INTEGRAL_COST: f64 = 0.05;
+
+/// The nonlinear gain: it rises over the errors up to that at which friction alone would hold the axis against the
+/// PID, to a share of the Popov bound.
+pub fn choose_nonlinear(
+    pid: &PidGains,
+    bound: f64,
+    breakaway_v: f64,
+    request: &CommissionSettings,
+) -> Option<NonlinearGain> {
+    let largest = request.sector_share * bound;
+    let range_mm = (breakaway_v / pid.kp_v_per_mm).clamp(1e-3, 10.0);
+    (largest > 1.0).then(|| NonlinearGain {
+        rate_per_mm: largest.acosh() / range_mm,
+        range_mm,
+    })
+}

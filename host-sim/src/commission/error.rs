@@ -1,0 +1,56 @@
+//! Why a commissioning ends early.
+
+use quadrant::settings::SettingsError;
+
+use super::verify::VerifyError;
+use crate::design::ShapingError;
+use crate::identify::frf::FrfError;
+use crate::identify::motor_constant::MotorConstantError;
+use crate::identify::plant::PlantError;
+use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
+use crate::identify::virgin_curve::VirginCurveError;
+use crate::rig::RigError;
+
+/// Why a commissioning ends early.
+#[derive(Debug, thiserror::Error)]
+pub enum CommissionError {
+    /// Settings that the firmware refuses.
+    #[error("settings refused: {0}")]
+    Settings(#[from] SettingsError),
+    /// The open-loop test.
+    #[error("motor constant: {0}")]
+    Motor(#[from] MotorConstantError),
+    /// The response.
+    #[error("frequency response: {0}")]
+    Response(#[from] FrfError),
+    /// The linear model.
+    #[error("linear model: {0}")]
+    Plant(#[from] PlantError),
+    /// The PID.
+    #[error("PID: {0}")]
+    Pid(#[from] ShapingError),
+    /// The runs at constant velocity.
+    #[error("friction at constant velocity: {0}")]
+    Friction(#[from] StaticFrictionError),
+    /// Their model.
+    #[error("friction model: {0}")]
+    FrictionFit(#[from] FrictionFitError),
+    /// A run of the slow sine.
+    #[error("pre-sliding friction: {0}")]
+    Sine(#[from] RigError),
+    /// The GMS model.
+    #[error("pre-sliding friction: {0}")]
+    Presliding(#[from] VirginCurveError),
+    /// The GMS model does not predict what was measured.
+    #[error(
+        "the GMS model misses the measured hysteresis by {percent:.1} % of the breakaway level: the axis' friction changes with \
+         position or time; look for a bent screw, a tight guide, a cold machine"
+    )]
+    Hysteresis {
+        /// The miss.
+        percent: f64,
+    },
+    /// The verdict.
+    #[error("verdict: {0}")]
+    Verify(#[from] VerifyError),
+}

@@ -1,0 +1,276 @@
+//! The motor constant from an open-loop test (thesis, Fig 3.7).
+//!
+//! The voltage steps between two levels of one sign, so that the axis slides on and its friction stays the same: then
+//! `y'' = A (u(t - Td) - F) - B y'`, which integrated twice is linear in A, B and A F. Nothing is differentiated. Passes
+//! in both directions bring the axis back; their scatter is the uncertainty. With the moving mass, `k_f = m A`.
+
+use nalgebra::{DMatrix, DVector, RowVector5};
+
+use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+
+/// How the axis is driven.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MotorConstantSettings {
+    /// Lower level of the first test, V; it is raised until the axis slides.
+    pub first_level_v: f64,
+    /// Largest lower level, V.
+    pub most_level_v: f64,
+    /// Time at each level, s.
+    pub dwell_s: f64,
+    /// Levels in a pass.
+    pub levels: usize,
+    /// Passes, alternating in direction; at least 2.
+    pub passes: usize,
+}
+
+impl Default for MotorConstantSettings {
+    fn default() -> Self {
+        Self {
+            first_level_v: 0.02,
+            most_level_v: 5.0,
+            dwell_s: 0.015,
+            levels: 14,
+            passes: 4,
+        }
+    }
+}
+
+/// What the test found.
+#[derive(Clone, Debug)]
+pub struct MotorConstant {
+    /// A, acceleration per volt, mm/(V s^2).
+    pub gain_mm_per_v_s2: f64,
+    /// Its standard deviation, from the scatter over the passes.
+    pub standard_error: f64,
+    /// B, damping over mass, 1/s; rough.
+    pub damping_per_s: f64,
+    /// Lower level of the voltage, V.
+    pub level_v: f64,
+    /// The recording.
+    pub recording: Recording,
+}
+
+impl MotorConstant {
+    /// k_f, N/V, of a moving mass in kg.
+    pub fn force_n_per_v(&self, moving_mass_kg: f64) -> f64 {
+        1e-3 * self.gain_mm_per_v_s2 * moving_mass_kg
+    }
+}
+
+/// Why there is no motor constant.
+#[derive(Debug, thiserror::Error)]
+pub enum MotorConstantError {
+    /// The axis does not slide.
+    #[error(
+        "the axis did not slide at {level_v} V: is the amplifier enabled, the brake off, the encoder connected? Else raise the largest level"
+    )]
+    Still {
+        /// The largest level tried.
+        level_v: f64,
+    },
+    /// A positive voltage moves the axis to smaller positions.
+    #[error(
+        "a positive voltage moves the axis to smaller positions: set amplifier.reversed or encoder.reversed, or swap two wires; under \
+         feedback it would run away"
+    )]
+    Reversed,
+    /// The passes disagree.
+    #[error(
+        "the passes give {gain:.0} +- {standard_error:.0} mm/(V s^2): too uncertain; raise the levels' number or dwell"
+    )]
+    Uncertain {
+        /// Their mean.
+        gain: f64,
+        /// Its standard deviation.
+        standard_error: f64,
+    },
+    /// The recording is no test.
+    #[error(
+        "the recording has {passes} passes in which the voltage steps between levels of one sign while the axis slides; the test takes 2"
+    )]
+    NoPasses {
+        /// Passes found.
+        passes: usize,
+    },
+    /// The run was stopped.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+}
+
+/// Upper level over the lower.
+const UPPER: f64 = 1.5;
+/// Factor by which the levels rise from test to test.
+const RAISE: f64 = 1.3;
+/// Levels at the beginning of a pass that do not count: the axis breaks away.
+const BREAKING_AWAY: usize = 4;
+/// Time at rest between passes, s.
+const REST_S: f64 = 0.1;
+/// Slowest sliding, counts of the encoder in a level's dwell.
+const SLIDING_COUNTS: f64 = 600.0;
+/// Dead times tried, s.
+const DELAY_STEP_S: f64 = 1e-4;
+const LONGEST_DELAY_S: f64 = 6e-3;
+/// Largest relative standard error.
+const MOST_UNCERTAIN: f64 = 0.2;
+
+/// Runs the test on the rig's axis, with rising levels until the axis slides.
+///
+/// # Errors
+/// An axis that does not slide, moves the wrong way, or is too uncertain; a run that is stopped.
+pub fn measure(
+    rig: &mut dyn Rig,
+    settings: &MotorConstantSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<MotorConstant, MotorConstantError> {
+    let axis = rig.axis();
+    let mut level_v = settings.first_level_v;
+    while level_v <= settings.most_level_v {
+        let recording = rig.perform(
+            &Experiment {
+                name: format!("steps between {level_v:.3} and {:.3} V", UPPER * level_v),
+                drive: Drive::OpenLoop,
+                injection_v: steps(settings, level_v, axis.rate_hz),
+                decimation: 1,
+                time_limit_s: 60.0,
+            },
+            progress,
+        )?;
+        match evaluate(recording, settings, axis.resolution_mm) {
+            // Friction still holds it.
+            Err(MotorConstantError::NoPasses { .. }) => level_v *= RAISE,
+            outcome => return outcome,
+        }
+    }
+    Err(MotorConstantError::Still {
+        level_v: settings.most_level_v,
+    })
+}
+
+fn dwell(settings: &MotorConstantSettings, rate_hz: f64) -> usize {
+    ((settings.dwell_s * rate_hz).round() as usize).max(4)
+}
+
+/// The voltage of all passes, V.
+fn steps(settings: &MotorConstantSettings, level_v: f64, rate_hz: f64) -> Vec<f64> {
+    let dwell = dwell(settings, rate_hz);
+    let rest = (REST_S * rate_hz) as usize;
+    (0..settings.passes)
+        .flat_map(|pass| {
+            let sign = if pass.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let level = move |index: usize| {
+                let factor = if index.is_multiple_of(2) { UPPER } else { 1.0 };
+                sign * factor * level_v
+            };
+            (0..settings.levels)
+                .flat_map(move |index| std::iter::repeat_n(level(index), dwell))
+                .chain(std::iter::repeat_n(0.0, rest))
+        })
+        .collect()
+}
+
+/// Evaluates a recorded test.
+///
+/// # Errors
+/// A recording without passes, of an axis that moves the wrong way, or too uncertain.
+pub fn evaluate(
+    recording: Recording,
+    settings: &MotorConstantSettings,
+    resolution_mm: f64,
+) -> Result<MotorConstant, MotorConstantError> {
+    let dwell = dwell(settings, 1.0 / recording.sample_time_s);
+    let mut found: Vec<(f64, f64)> = Vec::new();
+    let mut begin = 0;
+    while begin < recording.len() {
+        let sign = recording.voltage_v[begin].signum();
+        let drives = |index: &usize| sign * recording.voltage_v[*index] > 0.01;
+        if !drives(&begin) {
+            begin += 1;
+            continue;
+        }
+        let end = (begin..recording.len())
+            .find(|index| !drives(index))
+            .unwrap_or(recording.len());
+        let from = begin + BREAKING_AWAY * dwell;
+        if end >= from + 4 * dwell {
+            let positions = &recording.position_mm[from..end];
+            let slowest = positions
+                .windows(dwell)
+                .map(|window| sign * (window[dwell - 1] - window[0]))
+                .fold(f64::INFINITY, f64::min);
+            let all = sign * (positions[positions.len() - 1] - positions[0]);
+            if -all > SLIDING_COUNTS * resolution_mm * 4.0 {
+                return Err(MotorConstantError::Reversed);
+            }
+            if slowest > SLIDING_COUNTS * resolution_mm {
+                found.push(fit_pass(&recording, begin, from, end));
+            }
+        }
+        begin = end;
+    }
+    if found.len() < 2 {
+        return Err(MotorConstantError::NoPasses {
+            passes: found.len(),
+        });
+    }
+    let count = found.len() as f64;
+    let gain = found.iter().map(|(gain, _)| gain).sum::<f64>() / count;
+    let damping_per_s = found.iter().map(|(_, damping)| damping).sum::<f64>() / count;
+    let squares: f64 = found.iter().map(|(each, _)| (each - gain).powi(2)).sum();
+    let standard_error = (squares / (count - 1.0) / count).sqrt();
+    if gain <= 0.0 || standard_error > MOST_UNCERTAIN * gain {
+        return Err(MotorConstantError::Uncertain {
+            gain,
+            standard_error,
+        });
+    }
+    Ok(MotorConstant {
+        gain_mm_per_v_s2: gain,
+        standard_error,
+        damping_per_s,
+        level_v: recording
+            .voltage_v
+            .iter()
+            .fold(0.0_f64, |most, v| most.max(v.abs()))
+            / UPPER,
+        recording,
+    })
+}
+
+/// A and B of one pass, with the dead time that fits best. `begin` is where its voltage begins.
+fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize) -> (f64, f64) {
+    let step_s = recording.sample_time_s;
+    let positions = &recording.position_mm[from..end];
+    let count = positions.len();
+    let mut best = (f64::INFINITY, (f64::NAN, f64::NAN));
+    let longest = ((LONGEST_DELAY_S / step_s) as usize).min(from - begin);
+    for delay in (0..=longest).step_by(((DELAY_STEP_S / step_s) as usize).max(1)) {
+        // Columns: 1, t, double integral of the delayed voltage, t^2 / 2, integral of the position.
+        let mut matrix = DMatrix::zeros(count, 5);
+        let (mut push, mut double_push, mut path) = (0.0, 0.0, 0.0);
+        for index in 0..count {
+            let time = index as f64 * step_s;
+            let row = [1.0, time, double_push, 0.5 * time * time, path];
+            matrix.row_mut(index).copy_from(&RowVector5::from(row));
+            let voltage = recording.voltage_v[from + index - delay];
+            double_push += (push + 0.5 * voltage * step_s) * step_s;
+            push += voltage * step_s;
+            path += (positions[index] - positions[0]) * step_s;
+        }
+        let right = DVector::from_column_slice(positions);
+        let scale: Vec<f64> = matrix
+            .column_iter()
+            .map(|column| column.norm().max(1e-12))
+            .collect();
+        for (mut column, scale) in matrix.column_iter_mut().zip(&scale) {
+            column /= *scale;
+        }
+        let Ok(solution) = matrix.clone().svd(true, true).solve(&right, 1e-12) else {
+            continue;
+        };
+        let cost = (&matrix * &solution - &right).norm_squared();
+        if cost < best.0 {
+            best = (cost, (solution[2] / scale[2], -solution[4] / scale[4]));
+        }
+    }
+    best.1
+}
