@@ -1,5 +1,6 @@
 //! The command line.
 
+mod commission;
 mod compare;
 mod design;
 mod identify;
@@ -21,6 +22,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Commission an axis, unattended: from nothing known to settings that the firmware runs, with a report.
+    Commission(commission::Arguments),
     /// Run the thesis' comparison on the simulated stage: PID and N-PID with every feedforward, three velocities, and a
     /// circle.
     Compare(compare::Arguments),
@@ -40,6 +43,7 @@ enum Command {
 pub(crate) fn run() -> anyhow::Result<()> {
     match Arguments::parse().command {
         None => compare::run(&compare::Arguments::default()),
+        Some(Command::Commission(arguments)) => commission::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
         Some(Command::Identify(command)) => identify::run(&command),

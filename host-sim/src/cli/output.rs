@@ -57,6 +57,13 @@ impl Output {
     }
 }
 
+/// A progress bar over a share of 0 to 1, in thousandths; hidden where nobody watches.
+pub(super) fn share(what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(1000).with_style(style).with_message(what)
+}
+
 /// A progress bar over `runs`; hidden where nobody watches.
 pub(super) fn progress(runs: u64, what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} runs, {eta} left")

@@ -4,7 +4,7 @@
 //! `y'' = A (u(t - Td) - F) - B y'`, which integrated twice is linear in A, B and A F. Nothing is differentiated. Passes
 //! in both directions bring the axis back; their scatter is the uncertainty. With the moving mass, `k_f = m A`.
 
-use nalgebra::{DMatrix, DVector, RowVector5};
+use nalgebra::{DMatrix, DVector};
 
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
@@ -28,8 +28,8 @@ impl Default for MotorConstantSettings {
         Self {
             first_level_v: 0.02,
             most_level_v: 5.0,
-            dwell_s: 0.015,
-            levels: 14,
+            dwell_s: 0.008,
+            levels: 24,
             passes: 4,
         }
     }
@@ -98,11 +98,11 @@ pub enum MotorConstantError {
 }
 
 /// Upper level over the lower.
-const UPPER: f64 = 1.5;
+const UPPER: f64 = 2.5;
 /// Factor by which the levels rise from test to test.
 const RAISE: f64 = 1.3;
 /// Levels at the beginning of a pass that do not count: the axis breaks away.
-const BREAKING_AWAY: usize = 4;
+const BREAKING_AWAY: usize = 6;
 /// Time at rest between passes, s.
 const REST_S: f64 = 0.1;
 /// Slowest sliding, counts of the encoder in a level's dwell.
@@ -202,7 +202,7 @@ pub fn evaluate(
                 return Err(MotorConstantError::Reversed);
             }
             if slowest > SLIDING_COUNTS * resolution_mm {
-                found.push(fit_pass(&recording, begin, from, end));
+                found.push(fit_pass(&recording, begin, from, end, dwell));
             }
         }
         begin = end;
@@ -236,41 +236,62 @@ pub fn evaluate(
     })
 }
 
-/// A and B of one pass, with the dead time that fits best. `begin` is where its voltage begins.
-fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize) -> (f64, f64) {
+/// A and B of one pass, with the dead time that fits best. `begin` is where its voltage begins, `lag` the time in samples over
+/// which differences are taken.
+fn fit_pass(
+    recording: &Recording,
+    begin: usize,
+    from: usize,
+    end: usize,
+    lag: usize,
+) -> (f64, f64) {
     let step_s = recording.sample_time_s;
     let positions = &recording.position_mm[from..end];
-    let count = positions.len();
+    // Second differences over a dwell keep what the steps do, and little of the screw's slow ripple and of the start.
+    let second = |signal: &[f64]| -> Vec<f64> {
+        signal
+            .windows(2 * lag + 1)
+            .map(|window| window[2 * lag] - 2.0 * window[lag] + window[0])
+            .collect()
+    };
+    let right = DVector::from_vec(second(positions));
+    let path = second(&integral(positions, positions[0], step_s));
     let mut best = (f64::INFINITY, (f64::NAN, f64::NAN));
     let longest = ((LONGEST_DELAY_S / step_s) as usize).min(from - begin);
     for delay in (0..=longest).step_by(((DELAY_STEP_S / step_s) as usize).max(1)) {
-        // Columns: 1, t, double integral of the delayed voltage, t^2 / 2, integral of the position.
-        let mut matrix = DMatrix::zeros(count, 5);
-        let (mut push, mut double_push, mut path) = (0.0, 0.0, 0.0);
-        for index in 0..count {
-            let time = index as f64 * step_s;
-            let row = [1.0, time, double_push, 0.5 * time * time, path];
-            matrix.row_mut(index).copy_from(&RowVector5::from(row));
-            let voltage = recording.voltage_v[from + index - delay];
-            double_push += (push + 0.5 * voltage * step_s) * step_s;
-            push += voltage * step_s;
-            path += (positions[index] - positions[0]) * step_s;
-        }
-        let right = DVector::from_column_slice(positions);
-        let scale: Vec<f64> = matrix
-            .column_iter()
-            .map(|column| column.norm().max(1e-12))
+        let push = integral(&recording.voltage_v[from - delay..end - delay], 0.0, step_s);
+        // The voltage is held: the mean of its integral over a step is that at the step's middle.
+        let middle: Vec<f64> = push
+            .windows(2)
+            .map(|pair| 0.5 * (pair[0] + pair[1]))
             .collect();
-        for (mut column, scale) in matrix.column_iter_mut().zip(&scale) {
-            column /= *scale;
-        }
+        let double_push = second(&integral(&middle, 0.0, step_s));
+        let count = right.len().min(double_push.len());
+        let columns = [double_push, vec![1.0; count], path.clone()];
+        let norms = columns.each_ref().map(|column| {
+            let square: f64 = column.iter().map(|value| value * value).sum();
+            square.sqrt().max(1e-12)
+        });
+        let matrix = DMatrix::from_fn(count, 3, |row, column| columns[column][row] / norms[column]);
+        let right = right.rows(0, count);
         let Ok(solution) = matrix.clone().svd(true, true).solve(&right, 1e-12) else {
             continue;
         };
-        let cost = (&matrix * &solution - &right).norm_squared();
+        let cost = (&matrix * &solution - right).norm_squared();
         if cost < best.0 {
-            best = (cost, (solution[2] / scale[2], -solution[4] / scale[4]));
+            best = (cost, (solution[0] / norms[0], -solution[2] / norms[2]));
         }
     }
     best.1
+}
+
+/// The running integral of held samples over `base`, beginning at zero.
+fn integral(samples: &[f64], base: f64, step_s: f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let mut sums = vec![sum];
+    sums.extend(samples.iter().map(|sample| {
+        sum += (sample - base) * step_s;
+        sum
+    }));
+    sums
 }

@@ -22,6 +22,15 @@ pub enum Stiffness {
     Zero,
 }
 
+impl std::fmt::Display for Stiffness {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::Free => "free",
+            Self::Zero => "zero",
+        })
+    }
+}
+
 /// What a fit looks at.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantFitSettings {

@@ -8,9 +8,10 @@ use std::path::Path;
 #[derive(Debug)]
 pub(super) struct Columns {
     pub(super) time: Column,
-    pub(super) reference: Column,
+    pub(super) reference: Option<Column>,
     pub(super) position: Option<Column>,
     pub(super) voltage: Option<Column>,
+    pub(super) injection: Option<Column>,
 }
 
 /// One column.
@@ -62,8 +63,18 @@ const TIME: &[Name] = &[("t_s", 1.0)];
 const REFERENCE: &[Name] = &[("reference_m", 1e3), ("reference_mm", 1.0)];
 const POSITION: &[Name] = &[("position_m", 1e3), ("position_mm", 1.0)];
 const VOLTAGE: &[Name] = &[("voltage_v", 1.0)];
+const INJECTION: &[Name] = &[("injection_v", 1.0)];
 
-pub(super) fn read(path: &Path) -> Result<Columns, RecordError> {
+/// What a file must hold besides the time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Purpose {
+    /// A motion to be followed: the reference.
+    Motion,
+    /// An experiment to be identified from: position and voltage.
+    Experiment,
+}
+
+pub(super) fn read(path: &Path, purpose: Purpose) -> Result<Columns, RecordError> {
     let mut reader = ReaderBuilder::new()
         .from_path(path)
         .map_err(|error| refuse(path, error))?;
@@ -80,9 +91,20 @@ pub(super) fn read(path: &Path) -> Result<Columns, RecordError> {
     };
 
     let mut time = header.required("t_s", TIME)?;
-    let mut reference = header.required("reference_m (or reference_mm)", REFERENCE)?;
+    let mut reference = header.optional("reference", REFERENCE)?;
     let mut position = header.optional("position", POSITION)?;
     let mut voltage = header.optional("voltage", VOLTAGE)?;
+    let mut injection = header.optional("injection", INJECTION)?;
+    let needed = match purpose {
+        Purpose::Motion => [("reference_m (or reference_mm)", &reference); 2],
+        Purpose::Experiment => [
+            ("position_m (or position_mm)", &position),
+            ("voltage_v", &voltage),
+        ],
+    };
+    if let Some((missing, _)) = needed.into_iter().find(|(_, column)| column.is_none()) {
+        return Err(header.missing(missing));
+    }
 
     let mut row = ByteRecord::new();
     while reader
@@ -92,9 +114,10 @@ pub(super) fn read(path: &Path) -> Result<Columns, RecordError> {
         let line = row.position().map_or(0, csv::Position::line);
         for (column, index) in [
             Some(&mut time),
-            Some(&mut reference),
+            reference.as_mut(),
             position.as_mut(),
             voltage.as_mut(),
+            injection.as_mut(),
         ]
         .into_iter()
         .flatten()
@@ -112,9 +135,10 @@ pub(super) fn read(path: &Path) -> Result<Columns, RecordError> {
     }
     Ok(Columns {
         time: time.0,
-        reference: reference.0,
+        reference: reference.map(|c| c.0),
         position: position.map(|c| c.0),
         voltage: voltage.map(|c| c.0),
+        injection: injection.map(|c| c.0),
     })
 }
 
@@ -174,12 +198,16 @@ type Place = (Column, usize);
 impl Header<'_> {
     fn required(&self, needed: &'static str, names: &[Name]) -> Result<Place, RecordError> {
         self.optional(names[0].0, names)?
-            .ok_or_else(|| RecordError::MissingColumn {
-                path: self.path.to_owned(),
-                needed,
-                found: self.found(),
-                hint: self.hint(),
-            })
+            .ok_or_else(|| self.missing(needed))
+    }
+
+    fn missing(&self, needed: &'static str) -> RecordError {
+        RecordError::MissingColumn {
+            path: self.path.to_owned(),
+            needed,
+            found: self.found(),
+            hint: self.hint(),
+        }
     }
 
     fn optional(

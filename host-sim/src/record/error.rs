@@ -25,8 +25,8 @@ pub enum RecordError {
     },
     /// A column is not there.
     #[error(
-        "{}: no column {needed}; found {found}. Needed: t_s, and reference_m or reference_mm; optional: position_m or \
-         position_mm, voltage_v{hint}", path.display()
+        "{}: no column {needed}; found {found}. A motion needs t_s and reference_m or reference_mm; an experiment t_s, position_m or \
+         position_mm, and voltage_v{hint}", path.display()
     )]
     MissingColumn {
         /// The file.
@@ -63,6 +63,16 @@ pub enum RecordError {
         value: String,
         /// What is allowed.
         expected: &'static str,
+    },
+    /// A column holds nothing that could be identified from.
+    #[error("{}, column {column}: {fault}", path.display())]
+    Useless {
+        /// The file.
+        path: PathBuf,
+        /// The column.
+        column: &'static str,
+        /// What is wrong with it.
+        fault: UselessFault,
     },
     /// There is no motion in so little.
     #[error("{}: {rows} rows of data; at least {MIN_ROWS} are needed", path.display())]
@@ -109,6 +119,52 @@ pub enum RecordError {
         /// What does not fit.
         fault: UnitFault,
     },
+}
+
+/// Why a column cannot be identified from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum UselessFault {
+    /// It never changes.
+    Constant {
+        /// Its value.
+        value: f64,
+    },
+    /// It is at the amplifier's limit too often.
+    Saturated {
+        /// Share of the rows, %.
+        percent: f64,
+        /// The limit, V.
+        limit_v: f64,
+    },
+    /// It is no voltage.
+    NotVoltage {
+        /// Its largest magnitude.
+        largest: f64,
+    },
+}
+
+impl fmt::Display for UselessFault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Constant { value } => write!(
+                f,
+                "it is {} in every row; an experiment needs a signal that moves",
+                Brief(*value)
+            ),
+            Self::Saturated { percent, limit_v } => write!(
+                f,
+                "{} % of the rows are at the amplifier's limit of {} V, where voltage and motion have nothing to do with each other; at \
+                 most 1 % may be: lower the amplitude",
+                Brief(*percent),
+                Brief(*limit_v)
+            ),
+            Self::NotVoltage { largest } => write!(
+                f,
+                "it reaches {}, and an amplifier's input takes at most 20 V; is it swapped with the position?",
+                Brief(*largest)
+            ),
+        }
+    }
 }
 
 /// How a time column fails.

@@ -10,19 +10,23 @@
 //! | `reference_m` or `reference_mm` | m or mm | the motion asked for |
 //! | `position_m` or `position_mm` | m or mm | optional: the motion measured |
 //! | `voltage_v` | V | optional: the controller's output |
+//! | `injection_v` | V | optional, of an experiment: the part of the voltage that was injected |
 //!
 //! Other columns are passed over, and the order is free.
 
 mod columns;
 mod error;
+mod experiment;
 mod plausible;
 mod time;
 mod trace;
 
-pub use error::{Doubt, RecordError, TimeFault, UnitFault};
+pub use error::{Doubt, RecordError, TimeFault, UnitFault, UselessFault};
 pub use trace::{TraceError, write_trace};
 
 use std::path::Path;
+
+use columns::Purpose;
 
 /// Fewest rows that make a motion.
 const MIN_ROWS: usize = 16;
@@ -61,10 +65,12 @@ impl Record {
     /// Reads and checks a record for an axis with `limits`.
     pub fn read(path: impl AsRef<Path>, limits: &AxisLimits) -> Result<Self, RecordError> {
         let path = path.as_ref();
-        let columns = columns::read(path)?;
+        let columns = columns::read(path, Purpose::Motion)?;
         let sample_time_s = time::check(path, &columns.time)?;
         plausible::check(path, &columns, sample_time_s, limits)?;
-        let reference_mm = columns.reference.into_mm();
+        let reference_mm = columns
+            .reference
+            .map_or_else(Vec::new, columns::Column::into_mm);
         let position_mm = columns.position.map(columns::Column::into_mm);
         let doubts = plausible::doubts(&reference_mm, position_mm.as_deref(), sample_time_s);
         Ok(Self {

@@ -1,11 +1,51 @@
 //! `quadrant identify`.
 
+mod frf;
+mod friction;
+mod motor_constant;
+mod plant;
+pub(super) mod rig;
+mod virgin_curve;
+
 use clap::Subcommand;
+use quadrant_sim::report::{Page, Provenance, Section};
 
 /// The steps from measurements to parameters.
 #[derive(Debug, Subcommand)]
-pub(super) enum Command {}
+pub(super) enum Command {
+    /// Measure the axis' frequency response, position over voltage (thesis, Figs 3.5, 3.6).
+    Frf(frf::Arguments),
+    /// Fit the linear model A exp(-s Td) / (s² + B s + C) to a response (thesis, Table 3.1).
+    Plant(plant::Arguments),
+    /// Measure the acceleration per volt in open loop (thesis, Fig 3.7).
+    MotorConstant(motor_constant::Arguments),
+    /// Measure friction at constant velocity, both ways, and fit the static model (thesis, Table 3.2).
+    StaticFriction(friction::Arguments),
+    /// Measure the hysteresis of a slow sine and identify the GMS model (thesis, Table 3.3).
+    VirginCurve(virgin_curve::Arguments),
+}
 
 pub(super) fn run(command: &Command) -> anyhow::Result<()> {
-    match *command {}
+    match command {
+        Command::Frf(arguments) => frf::run(arguments),
+        Command::Plant(arguments) => plant::run(arguments),
+        Command::MotorConstant(arguments) => motor_constant::run(arguments),
+        Command::StaticFriction(arguments) => friction::run(arguments),
+        Command::VirginCurve(arguments) => virgin_curve::run(arguments),
+    }
+}
+
+/// A page of one step.
+fn page(title: &str, axis: &str, sections: Vec<Section>, provenance: Provenance) -> Page {
+    Page {
+        title: title.to_owned(),
+        subtitle: axis.to_owned(),
+        provenance,
+        sections,
+    }
+}
+
+/// What an axis of the simulated stage is called.
+fn simulated(axis: rig::Axis) -> String {
+    format!("{} axis of the simulated stage", axis.name())
 }

@@ -1,0 +1,80 @@
+//! `quadrant identify plant`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
+use quadrant_sim::identify::response::FrequencyResponse;
+use quadrant_sim::presentation::{plant_tables, provenance, response_section};
+use quadrant_sim::report::Block;
+
+use super::frf::Measurement;
+use super::rig::Axis;
+use super::{page, simulated};
+use crate::cli::output::Output;
+
+/// Options of `quadrant identify plant`.
+#[derive(Clone, Debug, Args)]
+pub(in crate::cli) struct Arguments {
+    /// The axis of the simulated stage, whose response is measured first.
+    #[arg(
+        long,
+        value_enum,
+        required_unless_present = "frf",
+        conflicts_with = "frf"
+    )]
+    axis: Option<Axis>,
+    /// A measured response, as `quadrant identify frf` saves it.
+    #[arg(long, value_name = "FILE")]
+    frf: Option<PathBuf>,
+    /// Lowest coherence of a line that counts.
+    #[arg(long, default_value_t = 0.9)]
+    least_coherence: f64,
+    /// Whether the model has a spring to ground.
+    #[arg(long, value_enum, default_value_t = Stiffness::Zero)]
+    stiffness: Stiffness,
+    #[command(flatten)]
+    measurement: Measurement,
+    #[command(flatten)]
+    output: Output,
+}
+
+pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let output = &arguments.output;
+    let settings = PlantFitSettings {
+        least_coherence: arguments.least_coherence,
+        stiffness: arguments.stiffness,
+        ..PlantFitSettings::default()
+    };
+    if let Some(path) = &arguments.frf {
+        let found = fit_plant(&FrequencyResponse::read_csv(path)?, &settings)?;
+        for table in plant_tables(&found) {
+            output.table(&table)?;
+        }
+        return Ok(());
+    }
+    let Some(axis) = arguments.axis else {
+        return Ok(());
+    };
+    let measured = arguments.measurement.run(axis, output)?;
+    let found = fit_plant(&measured.estimate.response, &settings)?;
+    println!("Simulated, not measured.");
+    let tables = plant_tables(&found);
+    for table in &tables {
+        output.table(table)?;
+    }
+    let mut section = response_section(&measured, Some(&found.plant));
+    section.blocks.splice(0..0, tables.map(Block::Table));
+    let command = format!(
+        "quadrant identify plant --axis {} --seed {}",
+        axis.name(),
+        output.seed
+    );
+    let page = page(
+        "Linear model",
+        &simulated(axis),
+        vec![section],
+        provenance(&command, output.seed),
+    );
+    output.page(&page, "plant.html")
+}

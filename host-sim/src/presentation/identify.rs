@@ -1,0 +1,226 @@
+//! Tables and figures of the linear model: motor constant, response, parameters.
+
+use std::f64::consts::TAU;
+
+use quadrant::control::plant_model::PlantModel;
+
+use super::bode::{Curve, bode_figures};
+use crate::identify::frf::FrfMeasurement;
+use crate::identify::motor_constant::MotorConstant;
+use crate::identify::plant::PlantFit;
+use crate::identify::response::{FrequencyResponse, ResponsePoint};
+use crate::report::{
+    Block, Cell, Colour, Column, Figure, Lines, Plot, Scale, Section, Series, Style, Table,
+};
+
+/// Heads of columns, each with its unit or an empty one.
+pub(super) fn columns(heads: &[(&str, &str)]) -> Vec<Column> {
+    heads
+        .iter()
+        .map(|(heading, unit)| match *unit {
+            "" => Column::new(*heading),
+            unit => Column::with_unit(*heading, unit),
+        })
+        .collect()
+}
+
+/// A figure of curves over a common axis.
+pub(super) fn lines(id: &str, caption: &str, labels: (&str, &str), series: Vec<Series>) -> Figure {
+    Figure {
+        id: id.to_owned(),
+        caption: caption.to_owned(),
+        plot: Plot::Lines(Lines {
+            x_label: labels.0.to_owned(),
+            y_label: labels.1.to_owned(),
+            series,
+            ..Lines::default()
+        }),
+    }
+}
+
+/// One curve.
+pub(super) fn series(name: &str, x: Vec<f64>, y: Vec<f64>, style: Style) -> Series {
+    Series {
+        name: name.to_owned(),
+        x,
+        y,
+        style,
+    }
+}
+
+/// The motor constant (thesis, Fig 3.7); k_f if the moving mass is known.
+pub fn motor_constant_table(motor: &MotorConstant, moving_mass_kg: Option<f64>) -> Table {
+    Table {
+        id: "motor-constant".to_owned(),
+        caption: "Motor constant from voltage steps in open loop; ± is one standard deviation over the passes. A screw's ripple \
+                  makes it a few percent low: the linear model's A is the accurate one"
+            .to_owned(),
+        columns: columns(&[
+            ("Level", "V"),
+            ("A", "mm/(V s²)"),
+            ("± A", "mm/(V s²)"),
+            ("k_f", "N/V"),
+        ]),
+        rows: vec![vec![
+            Cell::number(motor.level_v, 3),
+            Cell::number(motor.gain_mm_per_v_s2, 0),
+            Cell::number(motor.standard_error, 0),
+            moving_mass_kg.map_or(Cell::Missing, |mass| {
+                Cell::number(motor.force_n_per_v(mass), 3)
+            }),
+        ]],
+    }
+}
+
+/// The measured response: its section, with the plain H1 estimate beside it where feedback biases that.
+pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>) -> Section {
+    let measured = &measurement.estimate.response;
+    let modelled = model.map(|model| modelled(model, measured));
+    let mut curves = vec![
+        Curve {
+            name: "H1 (biased under feedback)".to_owned(),
+            response: &measurement.plain.response,
+            style: Style::points(Colour::Grey),
+        },
+        Curve {
+            name: "measured".to_owned(),
+            response: measured,
+            style: Style::points(Colour::Ink),
+        },
+    ];
+    if let Some(response) = &modelled {
+        curves.push(Curve {
+            name: "fitted model".to_owned(),
+            response,
+            style: Style::solid(Colour::Blue),
+        });
+    }
+    let mut blocks: Vec<Block> =
+        bode_figures("response", "Response, position over voltage", &curves).into();
+    blocks.push(Block::Figure(quality_figure(measured)));
+    Section {
+        id: "response".to_owned(),
+        heading: "Frequency response".to_owned(),
+        prose: vec![format!(
+            "{} blocks averaged, resolution {} Hz. The instrument of the estimate is the injected excitation, which noise under feedback \
+             does not bias; the hold of the converter is divided out.",
+            measurement.estimate.blocks, measurement.estimate.resolution_hz
+        )],
+        blocks,
+    }
+}
+
+fn quality_figure(response: &FrequencyResponse) -> Figure {
+    let frequencies = || {
+        response
+            .points
+            .iter()
+            .map(|p| p.frequency_hz)
+            .collect::<Vec<_>>()
+    };
+    let coherence = response.points.iter().map(|p| p.coherence).collect();
+    let deviation = response
+        .points
+        .iter()
+        .map(|p| p.relative_deviation)
+        .collect();
+    let mut figure = lines(
+        "coherence",
+        "Coherence, and standard deviation of the response over its magnitude",
+        ("frequency (Hz)", "coherence, relative deviation"),
+        vec![
+            series(
+                "coherence",
+                frequencies(),
+                coherence,
+                Style::points(Colour::Blue),
+            ),
+            series(
+                "relative deviation",
+                frequencies(),
+                deviation,
+                Style::points(Colour::Vermillion),
+            ),
+        ],
+    );
+    if let Plot::Lines(lines) = &mut figure.plot {
+        lines.x_scale = Scale::Logarithmic;
+        lines.y_scale = Scale::Logarithmic;
+    }
+    figure
+}
+
+/// The response of a model at the lines of a measured one.
+fn modelled(model: &PlantModel, measured: &FrequencyResponse) -> FrequencyResponse {
+    let points = measured.points.iter().map(|point| ResponsePoint {
+        response: model.response(TAU * point.frequency_hz),
+        ..*point
+    });
+    FrequencyResponse {
+        points: points.collect(),
+    }
+}
+
+/// The linear model (thesis, Table 3.1), with standard errors, correlation with A, and fit by band.
+pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
+    let units = ["mm/(V s²)", "1/s", "s", "1/s²"];
+    let rows = found
+        .fit
+        .names
+        .iter()
+        .enumerate()
+        .map(|(index, name)| {
+            let value = found.fit.values[index];
+            let decimals = if *name == "Td" { 7 } else { 2 };
+            vec![
+                Cell::text(*name),
+                Cell::text(units[index]),
+                Cell::number(value, decimals),
+                Cell::number(found.fit.standard_errors[index], decimals),
+                Cell::number(100.0 * found.fit.standard_errors[index] / value, 3),
+                Cell::number(found.fit.correlation[(index, 0)], 3),
+                Cell::number(found.fit.correlation[(index, 1)], 3),
+            ]
+        })
+        .collect();
+    let parameters = Table {
+        id: "linear-model".to_owned(),
+        caption: format!(
+            "Linear model A exp(-s Td) / (s² + B s + C), fitted to {} lines; ± is one standard deviation",
+            found.lines
+        ),
+        columns: columns(&[
+            ("Parameter", ""),
+            ("Unit", ""),
+            ("Value", ""),
+            ("±", ""),
+            ("±", "%"),
+            ("Correlation with A", ""),
+            ("Correlation with B", ""),
+        ]),
+        rows,
+    };
+    let bands = Table {
+        id: "linear-model-fit".to_owned(),
+        caption: "Distance of the model from the measured response, RMS by band".to_owned(),
+        columns: columns(&[
+            ("From", "Hz"),
+            ("To", "Hz"),
+            ("Gain", "dB"),
+            ("Phase", "deg"),
+        ]),
+        rows: found
+            .bands
+            .iter()
+            .map(|band| {
+                vec![
+                    Cell::number(band.band_hz.0, 1),
+                    Cell::number(band.band_hz.1, 1),
+                    Cell::number(band.gain_db, 3),
+                    Cell::number(band.phase_deg, 2),
+                ]
+            })
+            .collect(),
+    };
+    [parameters, bands]
+}
