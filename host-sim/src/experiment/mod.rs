@@ -8,5 +8,6 @@ pub mod numerics;
 pub mod recorded;
 mod run;
 pub mod thesis;
+pub mod validation;
 
 pub use run::{AxisTrace, run};

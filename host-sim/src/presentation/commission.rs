@@ -127,7 +127,7 @@ pub fn commission_page(axis: &str, found: &Commissioned, provenance: Provenance)
         provenance,
         sections: vec![
             Section {
-                id: "verdict".to_owned(),
+                id: "result".to_owned(),
                 heading: "What it achieves".to_owned(),
                 prose: Vec::new(),
                 blocks: vec![

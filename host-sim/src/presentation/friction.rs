@@ -104,7 +104,7 @@ pub fn friction_section(map: &FrictionMap, found: &FrictionFit) -> Section {
         ));
     }
     Section {
-        id: "static-friction".to_owned(),
+        id: "friction".to_owned(),
         heading: "Friction at constant velocity".to_owned(),
         prose: vec![
             "At constant velocity the voltage is the friction. The slope at high velocity is sigma + B / A, which motion cannot tell \

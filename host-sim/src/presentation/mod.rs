@@ -9,6 +9,7 @@ mod identify;
 mod numerics;
 mod recorded;
 mod revise;
+mod validation;
 
 pub use commission::{commission_page, gains_table, verdict_table};
 pub use comparison::{comparison_page, comparison_tables};
@@ -17,6 +18,7 @@ pub use identify::{motor_constant_table, plant_tables, response_section};
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
+pub use validation::validation_table;
 
 use crate::report::{Provenance, Series, Style};
 

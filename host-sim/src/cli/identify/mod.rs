@@ -5,6 +5,7 @@ mod friction;
 mod motor_constant;
 mod plant;
 pub(super) mod rig;
+mod validate;
 mod virgin_curve;
 
 use clap::Subcommand;
@@ -21,6 +22,8 @@ pub(super) enum Command {
     MotorConstant(motor_constant::Arguments),
     /// Measure friction at constant velocity, both ways, and fit the static model (thesis, Table 3.2).
     StaticFriction(friction::Arguments),
+    /// Judge identification on the simulated stage by the truth that it does not know: a table of errors and honesty.
+    Validate(validate::Arguments),
     /// Measure the hysteresis of a slow sine and identify the GMS model (thesis, Table 3.3).
     VirginCurve(virgin_curve::Arguments),
 }
@@ -31,6 +34,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Plant(arguments) => plant::run(arguments),
         Command::MotorConstant(arguments) => motor_constant::run(arguments),
         Command::StaticFriction(arguments) => friction::run(arguments),
+        Command::Validate(arguments) => validate::run(arguments),
         Command::VirginCurve(arguments) => virgin_curve::run(arguments),
     }
 }
