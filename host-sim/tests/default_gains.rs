@@ -3,8 +3,8 @@
 use quadrant::control::popov::sector_bound;
 use quadrant::settings::{AxisSettings, StageSettings, x_axis, y_axis, z_axis};
 use quadrant_sim::design::{
-    ContinuousLoop, Margins, PrintedMargins, largest_integral_gain, largest_integral_gain_where,
-    margins, shape_to_margins,
+    ContinuousLoop, Form, Margins, PrintedMargins, Process, largest_integral_gain,
+    largest_integral_gain_where, margins, shape_to_margins,
 };
 
 fn loop_margins(axis: &AxisSettings) -> Margins {
@@ -38,7 +38,14 @@ fn the_integral_gain_of_x_is_the_largest_that_leaves_them_as_printed() {
 fn y_and_z_are_shaped_to_the_same_margins_with_an_integral_gain_chosen_as_strictly() {
     for axis in [y_axis(), z_axis()] {
         let (plant, pid) = (axis.plant.unwrap(), axis.feedback.pid);
-        let shaped = shape_to_margins(&plant, pid.derivative_filter_s, 9.9, 54.2).unwrap();
+        let shaped = shape_to_margins(
+            &Process::Model(plant),
+            Form::Continuous,
+            pid.derivative_filter_s,
+            9.9,
+            54.2,
+        )
+        .unwrap();
         assert!((pid.kp_v_per_mm / shaped.kp_v_per_mm - 1.0).abs() < 5e-4);
         assert!((pid.kd_v_s_per_mm / shaped.kd_v_s_per_mm - 1.0).abs() < 5e-4);
         let without = margins(&ContinuousLoop {
@@ -52,7 +59,8 @@ fn y_and_z_are_shaped_to_the_same_margins_with_an_integral_gain_chosen_as_strict
                 && (with.phase_crossover_hz - without.phase_crossover_hz).abs() < 0.5
                 && (with.gain_crossover_hz - without.gain_crossover_hz).abs() < 0.05
         };
-        let largest = largest_integral_gain_where(&plant, &shaped, strict);
+        let largest =
+            largest_integral_gain_where(&Process::Model(plant), Form::Continuous, &shaped, strict);
         assert_eq!(largest, Some(pid.ki_v_per_mm_s));
     }
 }

@@ -82,9 +82,34 @@ impl PidGains {
 ///
 /// Settings time only: some 400,000 operations in double precision and 16 KiB of stack.
 pub fn sector_bound(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> f64 {
+    sector_proof(plant, gains, sample_time_s).popov
+}
+
+/// What is proven of a loop with a varying gain in front of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SectorProof {
+    /// [`sector_bound`]: stable for every gain from 1 to this that depends on the error alone.
+    pub popov: f64,
+    /// The q of the line that proves it, s; in the plane of `Re H` and `w Im H` the line has the slope 1/q and meets
+    /// the real axis at `-1 / (popov - 1)`.
+    pub slope_s: f64,
+    /// The circle criterion, q = 0: stable for every gain from 1 to this, even one that varies with time in any way.
+    pub circle: f64,
+}
+
+impl SectorProof {
+    const NOTHING: Self = Self {
+        popov: 1.0,
+        slope_s: 0.0,
+        circle: 1.0,
+    };
+}
+
+/// [`sector_bound`] with the line that proves it, and the bound for gains that vary with time.
+pub fn sector_proof(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> SectorProof {
     let sampling_valid = sample_time_s.is_finite() && sample_time_s >= 0.0;
     if !(plant.is_valid() && gains.is_valid() && sampling_valid) {
-        return 1.0;
+        return SectorProof::NOTHING;
     }
     let held = PlantModel {
         delay_s: plant.delay_s + sample_time_s / 2.0,
@@ -95,8 +120,14 @@ pub fn sector_bound(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) ->
         gains: *gains,
     }
     .tabulate();
-    popov.map_or(1.0, |plot| {
-        (1.0 - 1.0 / plot.best_intercept()).min(NO_LIMIT)
+    popov.map_or(SectorProof::NOTHING, |plot| {
+        let bound = |intercept: f64| (1.0 - 1.0 / intercept).min(NO_LIMIT);
+        let (slope_s, intercept) = plot.best_line();
+        SectorProof {
+            popov: bound(intercept),
+            slope_s,
+            circle: bound(plot.leftmost(0.0).0.min(-f64::MIN_POSITIVE)),
+        }
     })
 }
 
@@ -264,9 +295,9 @@ struct PopovPlot {
 }
 
 impl PopovPlot {
-    /// The largest value, over q >= 0, of the smallest `Re H - q w Im H`: where the Popov line meets the real axis.
-    /// Below zero.
-    fn best_intercept(&self) -> f64 {
+    /// The q >= 0 for which the smallest `Re H - q w Im H` is largest, and that value, below zero: where the Popov line
+    /// meets the real axis.
+    fn best_line(&self) -> (f64, f64) {
         let (mut low, mut high) = (0.0, self.largest_q);
         for _ in 0..BISECTIONS {
             let middle = 0.5 * (low + high);
@@ -276,9 +307,14 @@ impl PopovPlot {
                 high = middle;
             }
         }
-        let best = self.leftmost(low).0.max(self.leftmost(high).0);
+        let (at_low, at_high) = (self.leftmost(low).0, self.leftmost(high).0);
+        let (q, best) = if at_low >= at_high {
+            (low, at_low)
+        } else {
+            (high, at_high)
+        };
         // The tail lies below zero, except for numbers so small that it vanishes.
-        best.min(-f64::MIN_POSITIVE)
+        (q, best.min(-f64::MIN_POSITIVE))
     }
 
     /// The smallest `Re H - q w Im H` over w, and its slope in q.

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
+use quadrant_sim::design::Target;
 use quadrant_sim::presentation::{
     commission_page, friction_table, gains_table, gms_table, motor_constant_table, plant_tables,
     provenance, verdict_table,
@@ -40,8 +41,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => SettingsFile::new(StageSettings::default()),
     };
     let request = CommissionSettings {
-        gain_margin_db: arguments.gain_margin_db,
-        phase_margin_deg: arguments.phase_margin_deg,
+        target: Target::Margins {
+            gain_margin_db: arguments.gain_margin_db,
+            phase_margin_deg: arguments.phase_margin_deg,
+            crossover_hz: None,
+        },
         ..CommissionSettings::default()
     };
     let bar = share("commissioning");

@@ -1,17 +1,14 @@
 //! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
 
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{PidGains, sector_bound};
+use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::settings::{AxisSettings, FrictionSettings};
 
 use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
 use super::error::CommissionError;
 use super::verify::{Trial, Verdict, verify};
-use crate::design::{
-    MarginError, Margins, SampledLoop, largest_integral_gain_where, margins, shape_to_margins,
-};
+use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
+use crate::design::{Form, MarginError, Margins, PidRequest, Process, Target, design_pid};
 use crate::identify::excitation::Excitation;
 use crate::identify::frf::{self, FrfError, FrfMeasurement, FrfSettings};
 use crate::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
@@ -26,10 +23,8 @@ use crate::settings_file::FIRMWARE_ELEMENTS;
 /// What a commissioning is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommissionSettings {
-    /// Gain margin of the PID, dB.
-    pub gain_margin_db: f64,
-    /// Phase margin of the PID, deg.
-    pub phase_margin_deg: f64,
+    /// What the PID is designed for, on the continuous loop.
+    pub target: Target,
     /// Share of the Popov bound that the nonlinear gain may take, 0 to 1.
     pub sector_share: f64,
     /// The runs that the friction is taken from.
@@ -42,8 +37,11 @@ impl Default for CommissionSettings {
     /// The thesis' margins, and three quarters of the Popov bound.
     fn default() -> Self {
         Self {
-            gain_margin_db: 9.9,
-            phase_margin_deg: 54.2,
+            target: Target::Margins {
+                gain_margin_db: 9.9,
+                phase_margin_deg: 54.2,
+                crossover_hz: None,
+            },
             sector_share: 0.75,
             friction: StaticFrictionSettings {
                 velocities_mm_s: (0.1, 40.0),
@@ -129,7 +127,14 @@ pub fn commission(
             ..PlantFitSettings::default()
         },
     )?;
-    let pid = design_pid(&plant.plant, base, request)?;
+    let process = Process::Model(plant.plant);
+    let design = PidRequest {
+        target: request.target,
+        form: Form::Continuous,
+        derivative_filter_s: base.feedback.pid.derivative_filter_s,
+        ki_v_per_mm_s: None,
+    };
+    let pid = design_pid(&process, &design)?.gains;
 
     step += 1;
     let mut settings = base.clone();
@@ -162,7 +167,14 @@ pub fn commission(
 
     step += 1;
     let bound = sector_bound(&plant.plant, &pid, 1.0 / rate_hz);
-    settings.feedback.nonlinear = choose_nonlinear(&pid, bound, breakaway_v, request);
+    settings.feedback.nonlinear = choose_nonlinear(
+        &pid,
+        bound,
+        &NonlinearRule {
+            sector_share: request.sector_share,
+            range: Range::Breakaway(breakaway_v),
+        },
+    );
     settings.friction = FrictionSettings {
         sliding,
         gms: gms.gms.clone(),
@@ -175,7 +187,13 @@ pub fn commission(
         inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
     };
     settings.feedforward.preview_s = plant.plant.delay_s;
-    let margins = margins(&SampledLoop::new(&plant.plant, &pid, 1.0 / rate_hz, 0.0));
+    let margins = process.margins(
+        &pid,
+        Form::Sampled {
+            sample_time_s: 1.0 / rate_hz,
+            computation_delay_s: 0.0,
+        },
+    );
 
     step += 1;
     let verdicts = verify(rig, &settings, request.trial, &mut |share| {
@@ -212,46 +230,4 @@ fn sliding_response(
         }
     }
     Ok(frf::measure(rig, &settings, progress)?)
-}
-
-/// The PID with the margins asked for, and the integral action that they bear.
-pub fn design_pid(
-    plant: &PlantModel,
-    base: &AxisSettings,
-    request: &CommissionSettings,
-) -> Result<PidGains, CommissionError> {
-    let filter_s = base.feedback.pid.derivative_filter_s;
-    let gains = shape_to_margins(
-        plant,
-        filter_s,
-        request.gain_margin_db,
-        request.phase_margin_deg,
-    )?;
-    let ki_v_per_mm_s = largest_integral_gain_where(plant, &gains, |with| {
-        (with.gain_margin_db - request.gain_margin_db).abs() <= INTEGRAL_COST
-            && (with.phase_margin_deg - request.phase_margin_deg).abs() <= INTEGRAL_COST
-    });
-    Ok(PidGains {
-        ki_v_per_mm_s: ki_v_per_mm_s.unwrap_or(0.0),
-        ..gains
-    })
-}
-
-/// What integral action may cost of the margins, dB and deg.
-const INTEGRAL_COST: f64 = 0.05;
-
-/// The nonlinear gain: it rises over the errors up to that at which friction alone would hold the axis against the
-/// PID, to a share of the Popov bound.
-pub fn choose_nonlinear(
-    pid: &PidGains,
-    bound: f64,
-    breakaway_v: f64,
-    request: &CommissionSettings,
-) -> Option<NonlinearGain> {
-    let largest = request.sector_share * bound;
-    let range_mm = (breakaway_v / pid.kp_v_per_mm).clamp(1e-3, 10.0);
-    (largest > 1.0).then(|| NonlinearGain {
-        rate_per_mm: largest.acosh() / range_mm,
-        range_mm,
-    })
 }

@@ -3,7 +3,7 @@
 use quadrant::settings::SettingsError;
 
 use super::verify::VerifyError;
-use crate::design::ShapingError;
+use crate::design::DesignError;
 use crate::identify::frf::FrfError;
 use crate::identify::motor_constant::MotorConstantError;
 use crate::identify::plant::PlantError;
@@ -28,7 +28,7 @@ pub enum CommissionError {
     Plant(#[from] PlantError),
     /// The PID.
     #[error("PID: {0}")]
-    Pid(#[from] ShapingError),
+    Pid(#[from] DesignError),
     /// The runs at constant velocity.
     #[error("friction at constant velocity: {0}")]
     Friction(#[from] StaticFrictionError),

@@ -10,5 +10,5 @@ mod chain;
 mod error;
 pub mod verify;
 
-pub use chain::{CommissionSettings, Commissioned, choose_nonlinear, commission, design_pid};
+pub use chain::{CommissionSettings, Commissioned, commission};
 pub use error::CommissionError;

@@ -6,8 +6,8 @@
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
-use super::loop_shape::ContinuousLoop;
-use super::margins::{Margins, bisect, margins};
+use super::margins::{Margins, bisect};
+use super::process::{Form, Process};
 
 /// A figure as a publication prints it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,10 +85,13 @@ pub fn largest_integral_gain(
         kd_v_s_per_mm,
         derivative_filter_s,
     };
-    largest_integral_gain_where(plant, &gains, |margins| targets.read(margins))
+    let process = Process::Model(*plant);
+    largest_integral_gain_where(&process, Form::Continuous, &gains, |margins| {
+        targets.read(margins)
+    })
 }
 
-/// The largest Ki, V/(mm s), rounded down to two significant digits, up to which the continuous loop is stable and its
+/// The largest Ki, V/(mm s), rounded down to two significant digits, up to which the loop is stable and its
 /// margins are acceptable without interruption; nothing when they are not even without integral action. The Ki in
 /// `gains` is not looked at.
 ///
@@ -96,15 +99,16 @@ pub fn largest_integral_gain(
 ///
 /// ```
 /// # use quadrant::control::{plant_model::PlantModel, popov::PidGains};
-/// # use quadrant_sim::design::{ContinuousLoop, largest_integral_gain_where, margins};
+/// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
 /// # let plant = PlantModel {
 /// #     gain_mm_per_v_s2: 69390.0, damping_per_s: 144.8, stiffness_per_s2: 166.6, delay_s: 1.2e-3,
 /// # };
 /// # let gains = PidGains {
 /// #     kp_v_per_mm: 1.118, ki_v_per_mm_s: 0.0, kd_v_s_per_mm: 0.005537, derivative_filter_s: 52e-6,
 /// # };
-/// let without = margins(&ContinuousLoop { plant, gains })?;
-/// let ki = largest_integral_gain_where(&plant, &gains, |with| {
+/// let process = Process::Model(plant);
+/// let without = process.margins(&gains, Form::Continuous)?;
+/// let ki = largest_integral_gain_where(&process, Form::Continuous, &gains, |with| {
 ///     (with.gain_margin_db - without.gain_margin_db).abs() <= 0.05
 ///         && (with.phase_margin_deg - without.phase_margin_deg).abs() <= 0.05
 /// });
@@ -112,7 +116,8 @@ pub fn largest_integral_gain(
 /// # Ok::<(), quadrant_sim::design::MarginError>(())
 /// ```
 pub fn largest_integral_gain_where(
-    plant: &PlantModel,
+    process: &Process,
+    form: Form,
     gains: &PidGains,
     acceptable: impl Fn(&Margins) -> bool,
 ) -> Option<f64> {
@@ -121,8 +126,7 @@ pub fn largest_integral_gain_where(
             ki_v_per_mm_s: ki,
             ..*gains
         };
-        let plant = *plant;
-        margins(&ContinuousLoop { plant, gains }).is_ok_and(|m| acceptable(&m))
+        process.margins(&gains, form).is_ok_and(|m| acceptable(&m))
     };
     if !passes(0.0) {
         return None;
@@ -152,6 +156,7 @@ fn round_down_to_two_digits(value: f64) -> f64 {
 mod tests {
     use super::*;
     use crate::design::fixtures::{FILTER_S, X_GAINS, X_PLANT};
+    use crate::design::{ContinuousLoop, margins};
 
     fn margins_with(ki_v_per_mm_s: f64) -> Margins {
         let gains = PidGains {

@@ -2,9 +2,10 @@
 
 use std::f64::consts::PI;
 
-use nalgebra::{Matrix2, Matrix3, Vector2};
 use num_complex::Complex64;
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+
+use super::held_plant::HeldPlant;
 
 /// An open loop without poles in the right half plane (outside the unit circle, when sampled).
 pub trait OpenLoop {
@@ -52,16 +53,10 @@ impl OpenLoop for ContinuousLoop {
 ///   `b = 2 Kd / (2 tau + Ts)`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SampledLoop {
+    plant: HeldPlant,
     gains: PidGains,
     sample_time_s: f64,
     lowest_rad_s: f64,
-    /// Position and velocity, from one sample to the next.
-    transition: Matrix2<f64>,
-    /// What the output written `whole_periods` ago adds.
-    recent_input: Vector2<f64>,
-    /// What the output written one period before that adds.
-    older_input: Vector2<f64>,
-    whole_periods: f64,
 }
 
 impl SampledLoop {
@@ -73,80 +68,35 @@ impl SampledLoop {
         sample_time_s: f64,
         computation_delay_s: f64,
     ) -> Self {
-        let periods = (plant.delay_s + computation_delay_s) / sample_time_s;
-        // A delay meant as a whole number of periods must not lose one to rounding.
-        let nearest = periods.round();
-        let whole_periods = if (periods - nearest).abs() < 1e-9 {
-            nearest
-        } else {
-            periods.floor()
-        };
-        let older_share_s = (periods - whole_periods).max(0.0) * sample_time_s;
-        let (_, older_start) = step(plant, older_share_s);
-        let (rest, recent_input) = step(plant, sample_time_s - older_share_s);
-        let (transition, _) = step(plant, sample_time_s);
         Self {
+            plant: HeldPlant::new(plant, sample_time_s, computation_delay_s),
             gains: *gains,
             sample_time_s,
             lowest_rad_s: 1e-4 * crossover_scale(plant, gains),
-            transition,
-            recent_input,
-            older_input: rest * older_start,
-            whole_periods,
         }
     }
+}
 
-    fn plant_response(&self, z: Complex64) -> Complex64 {
-        let delayed = z.powf(-self.whole_periods);
-        let drive =
-            |row: usize| (z.inv() * self.older_input[row] + self.recent_input[row]) * delayed;
-        // The first row of (z I - transition)^-1, times the input.
-        let phi = &self.transition;
-        let determinant = (z - phi[(0, 0)]) * (z - phi[(1, 1)]) - phi[(0, 1)] * phi[(1, 0)];
-        ((z - phi[(1, 1)]) * drive(0) + drive(1) * phi[(0, 1)]) / determinant
-    }
-
-    fn controller_response(&self, z: Complex64) -> Complex64 {
-        let (gains, period) = (&self.gains, self.sample_time_s);
-        let filter = 2.0 * gains.derivative_filter_s;
-        let a = (filter - period) / (filter + period);
-        let b = 2.0 * gains.kd_v_s_per_mm / (filter + period);
-        let derivative = (z - 1.0) / (z - a) * b;
-        let integral = z / (z - 1.0) * (gains.ki_v_per_mm_s * period);
-        derivative + integral + gains.kp_v_per_mm
-    }
+/// The controller's difference equations at a point of the z plane, V/mm. The derivative filter must not be zero.
+pub(super) fn controller_response(gains: &PidGains, period: f64, z: Complex64) -> Complex64 {
+    let filter = 2.0 * gains.derivative_filter_s;
+    let a = (filter - period) / (filter + period);
+    let b = 2.0 * gains.kd_v_s_per_mm / (filter + period);
+    let derivative = (z - 1.0) / (z - a) * b;
+    let integral = z / (z - 1.0) * (gains.ki_v_per_mm_s * period);
+    derivative + integral + gains.kp_v_per_mm
 }
 
 impl OpenLoop for SampledLoop {
     fn response(&self, omega_rad_s: f64) -> Complex64 {
         let z = Complex64::cis(omega_rad_s * self.sample_time_s);
-        self.plant_response(z) * self.controller_response(z)
+        self.plant.response(z) * controller_response(&self.gains, self.sample_time_s, z)
     }
 
     fn band_rad_s(&self) -> (f64, f64) {
         // Just below half the sampling frequency, where every response is real.
         (self.lowest_rad_s, 0.999 * PI / self.sample_time_s)
     }
-}
-
-/// Position and velocity after `duration_s`: the transition from those before, and what a constant volt adds.
-fn step(plant: &PlantModel, duration_s: f64) -> (Matrix2<f64>, Vector2<f64>) {
-    let rates = Matrix3::new(
-        0.0,
-        1.0,
-        0.0,
-        -plant.stiffness_per_s2,
-        -plant.damping_per_s,
-        plant.gain_mm_per_v_s2,
-        0.0,
-        0.0,
-        0.0,
-    );
-    let step = (rates * duration_s).exp();
-    (
-        step.fixed_view::<2, 2>(0, 0).into_owned(),
-        step.fixed_view::<2, 1>(0, 2).into_owned(),
-    )
 }
 
 #[cfg(test)]

@@ -39,6 +39,8 @@ pub enum MarginError {
     Unstable,
     /// The response is not a number somewhere in the band.
     NotFinite,
+    /// The open loop's gain is still above a half where a measured response ends.
+    BandTooNarrow,
 }
 
 impl fmt::Display for MarginError {
@@ -50,6 +52,9 @@ impl fmt::Display for MarginError {
             }
             Self::Unstable => "the closed loop is unstable",
             Self::NotFinite => "the open loop's response is not finite everywhere in the band",
+            Self::BandTooNarrow => {
+                "the measured response ends where the open loop's gain is still above a half; measure to higher frequencies"
+            }
         })
     }
 }

@@ -4,10 +4,19 @@
 //! sampled form with the controller's own difference equations, or anything else that answers with a complex number.
 //! How much *nonlinear* gain a design then bears is [`quadrant::control::popov::sector_bound`]'s answer.
 
+mod bandwidth;
+pub mod held_plant;
 pub mod integral_gain;
 pub mod loop_shape;
 pub mod margins;
+pub mod measured;
+pub mod npid;
+pub mod pid;
+pub mod process;
+pub mod robustness;
 pub mod shaping;
+pub mod step_response;
+pub mod time_varying;
 
 #[cfg(test)]
 mod time_domain;
@@ -17,7 +26,9 @@ pub use integral_gain::{
 };
 pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
-pub use shaping::{ShapingError, shape_to_margins};
+pub use pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
+pub use process::{Form, Process};
+pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]
 mod fixtures {

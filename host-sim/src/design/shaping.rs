@@ -1,17 +1,20 @@
-//! Proportional and derivative gain from a gain margin and a phase margin.
+//! Proportional and derivative gain from a gain margin and a phase margin, or from a crossover and a phase margin.
 
+use std::f64::consts::{PI, TAU};
 use std::fmt;
 
-use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+use num_complex::Complex64;
+use quadrant::control::popov::PidGains;
 
-use super::loop_shape::{ContinuousLoop, OpenLoop};
-use super::margins::{MarginError, bisect, falling_phase_crossover, margins};
+use super::loop_shape::OpenLoop;
+use super::margins::{MarginError, bisect, falling_phase_crossover};
+use super::process::{Form, Process};
 
 /// Why no gains have the margins asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShapingError {
-    /// The plant has no delay, so that no gain margin is finite.
-    NoDelay,
+    /// The phase of the process never reaches -180 degrees, so that no gain margin is finite.
+    NoHalfTurn,
     /// With the gain margin asked for, no derivative gain has the phase margin: they lie between these.
     OutOfReach {
         /// The smallest phase margin found, deg.
@@ -19,14 +22,24 @@ pub enum ShapingError {
         /// The largest phase margin found, deg.
         largest_deg: f64,
     },
+    /// At the crossover asked for, no ratio of the gains has the phase margin: they lie between these.
+    CrossoverOutOfReach {
+        /// The crossover, Hz.
+        crossover_hz: f64,
+        /// Phase margin with proportional gain alone, deg.
+        proportional_deg: f64,
+        /// Phase margin with derivative gain alone, deg.
+        derivative_deg: f64,
+    },
 }
 
 impl fmt::Display for ShapingError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::NoDelay => {
-                f.write_str("a plant without delay has no finite gain margin to shape")
-            }
+            Self::NoHalfTurn => f.write_str(
+                "the phase of the axis does not reach -180 deg: a model without delay, or a response measured to too low a frequency, \
+                 has no finite gain margin to shape",
+            ),
             Self::OutOfReach {
                 smallest_deg,
                 largest_deg,
@@ -34,21 +47,44 @@ impl fmt::Display for ShapingError {
                 f,
                 "with this gain margin the phase margin can only lie between {smallest_deg:.1} and {largest_deg:.1} deg"
             ),
+            Self::CrossoverOutOfReach {
+                crossover_hz,
+                proportional_deg,
+                derivative_deg,
+            } => write!(
+                f,
+                "with a crossover at {crossover_hz} Hz the phase margin can only lie between {proportional_deg:.1} deg, without \
+                 derivative, and {derivative_deg:.1} deg, with nothing else"
+            ),
         }
     }
 }
 
 impl std::error::Error for ShapingError {}
 
-/// The ratio Kd/Kp, over the plant's delay, at which the search starts: the derivative acts above all frequencies of
-/// interest.
-const SMALLEST_RATIO: f64 = 0.03;
+/// The ratio Kd/Kp, over the time in which the process alone turns by a radian at its half turn, at which the search
+/// starts: the derivative acts above all frequencies of interest.
+pub(super) const SMALLEST_RATIO: f64 = 0.01;
 /// And at which it ends: the derivative dominates the loop.
-const LARGEST_RATIO: f64 = 300.0;
+pub(super) const LARGEST_RATIO: f64 = 100.0;
 /// Points of the search, even on a log scale.
 const RATIOS: usize = 60;
 
-/// The PD gains with which the continuous loop has both margins, at whatever frequencies come out; Ki is zero.
+/// Gains without integral action.
+pub(super) fn proportional_derivative(
+    kp_v_per_mm: f64,
+    kd_v_s_per_mm: f64,
+    filter_s: f64,
+) -> PidGains {
+    PidGains {
+        kp_v_per_mm,
+        ki_v_per_mm_s: 0.0,
+        kd_v_s_per_mm,
+        derivative_filter_s: filter_s,
+    }
+}
+
+/// The PD gains with which the loop has both margins, at whatever frequencies come out; Ki is zero.
 ///
 /// The two equations are solved as one: at a given ratio Kd/Kp the frequency of the gain margin is fixed and Kp follows
 /// from it, so that the phase margin is a function of the ratio alone. Where several ratios fit, the largest is taken,
@@ -56,38 +92,32 @@ const RATIOS: usize = 60;
 ///
 /// `derivative_filter_s` is the time constant of the derivative's filter, s; `gain_margin_db` in dB and
 /// `phase_margin_deg` in deg are above zero.
+///
+/// # Errors
+/// A process without a half turn of phase, or margins that exclude each other.
 pub fn shape_to_margins(
-    plant: &PlantModel,
+    process: &Process,
+    form: Form,
     derivative_filter_s: f64,
     gain_margin_db: f64,
     phase_margin_deg: f64,
 ) -> Result<PidGains, ShapingError> {
-    if plant.delay_s <= 0.0 {
-        return Err(ShapingError::NoDelay);
-    }
+    let half_turn_hz = process.half_turn_hz().ok_or(ShapingError::NoHalfTurn)?;
     let gains_at = |ratio_s: f64| {
-        let unit = PidGains {
-            kp_v_per_mm: 1.0,
-            ki_v_per_mm_s: 0.0,
-            kd_v_s_per_mm: ratio_s,
-            derivative_filter_s,
-        };
-        scale_to_gain_margin(plant, &unit, gain_margin_db)
+        let unit = proportional_derivative(1.0, ratio_s, derivative_filter_s);
+        scale_to_gain_margin(process, form, &unit, gain_margin_db)
     };
-    let phase_margin_at = |ratio_s: f64| {
-        let gains = gains_at(ratio_s)?;
-        margins(&ContinuousLoop {
-            plant: *plant,
-            gains,
-        })
-        .map(|m| m.phase_margin_deg)
-    };
+    let phase_margin_at =
+        |ratio_s: f64| Ok(process.margins(&gains_at(ratio_s)?, form)?.phase_margin_deg);
     // A ratio without margins counts as one without phase margin.
-    let falls_short = |ratio_s: f64| phase_margin_at(ratio_s).unwrap_or(0.0) < phase_margin_deg;
+    let falls_short = |ratio_s: f64| {
+        phase_margin_at(ratio_s).unwrap_or_else(|_: MarginError| 0.0) < phase_margin_deg
+    };
 
     let span = LARGEST_RATIO / SMALLEST_RATIO;
+    let smallest_s = SMALLEST_RATIO / (TAU * half_turn_hz);
     let ratios: Vec<f64> = (0..RATIOS)
-        .map(|i| SMALLEST_RATIO * span.powf(i as f64 / (RATIOS - 1) as f64) * plant.delay_s)
+        .map(|i| smallest_s * span.powf(i as f64 / (RATIOS - 1) as f64))
         .collect();
     let bracket = ratios
         .windows(2)
@@ -109,15 +139,13 @@ pub fn shape_to_margins(
 }
 
 /// Scales a controller so that the loop has a gain margin.
-fn scale_to_gain_margin(
-    plant: &PlantModel,
+pub(super) fn scale_to_gain_margin(
+    process: &Process,
+    form: Form,
     gains: &PidGains,
     gain_margin_db: f64,
 ) -> Result<PidGains, MarginError> {
-    let open_loop = ContinuousLoop {
-        plant: *plant,
-        gains: *gains,
-    };
+    let open_loop = process.open_loop(gains, form);
     let crossover = falling_phase_crossover(&open_loop)?;
     let factor = 10.0_f64.powf(-gain_margin_db / 20.0) / open_loop.response(crossover).norm();
     Ok(PidGains {
@@ -128,10 +156,46 @@ fn scale_to_gain_margin(
     })
 }
 
+/// The PD gains with which the loop's gain is one at `crossover_hz`, Hz, and its phase `phase_margin_deg` above
+/// -180 deg there; Ki is zero. The loop is linear in the gains, so that two real equations give both.
+///
+/// # Errors
+/// A phase margin that takes a gain below zero.
+pub fn shape_to_crossover(
+    process: &Process,
+    form: Form,
+    derivative_filter_s: f64,
+    crossover_hz: f64,
+    phase_margin_deg: f64,
+) -> Result<PidGains, ShapingError> {
+    let omega = TAU * crossover_hz;
+    let alone = |kp: f64, kd: f64| {
+        let gains = proportional_derivative(kp, kd, derivative_filter_s);
+        process.open_loop(&gains, form).response(omega)
+    };
+    // Of the order of each other at the crossover, so that neither is lost to rounding.
+    let (proportional, derivative) = (alone(1.0, 0.0), alone(1.0, 1.0 / omega) - alone(1.0, 0.0));
+    let wanted = Complex64::cis(phase_margin_deg.to_radians() - PI);
+    let determinant = proportional.re * derivative.im - proportional.im * derivative.re;
+    let kp = (wanted.re * derivative.im - wanted.im * derivative.re) / determinant;
+    let kd = (proportional.re * wanted.im - proportional.im * wanted.re) / determinant / omega;
+    if kp > 0.0 && kd >= 0.0 {
+        return Ok(proportional_derivative(kp, kd, derivative_filter_s));
+    }
+    let margin_deg = |response: Complex64| (-response).arg().to_degrees();
+    Err(ShapingError::CrossoverOutOfReach {
+        crossover_hz,
+        proportional_deg: margin_deg(proportional),
+        derivative_deg: margin_deg(derivative),
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::design::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
+    use crate::design::{ContinuousLoop, margins};
+    use quadrant::control::plant_model::PlantModel;
 
     #[test]
     fn x_axis_gains_come_out_of_their_own_margins() {
@@ -141,7 +205,8 @@ mod tests {
         };
         let margins = margins(&open_loop).unwrap();
         let shaped = shape_to_margins(
-            &X_PLANT,
+            &Process::Model(X_PLANT),
+            Form::Continuous,
             FILTER_S,
             margins.gain_margin_db,
             margins.phase_margin_deg,
@@ -154,7 +219,14 @@ mod tests {
     #[test]
     fn y_and_z_axes_are_shaped_to_the_margins_of_x() {
         for (plant, kp, kd) in [(Y_PLANT, 1.310, 0.006275), (Z_PLANT, 1.669, 0.007301)] {
-            let gains = shape_to_margins(&plant, FILTER_S, 9.9, 54.2).unwrap();
+            let gains = shape_to_margins(
+                &Process::Model(plant),
+                Form::Continuous,
+                FILTER_S,
+                9.9,
+                54.2,
+            )
+            .unwrap();
             let margins = margins(&ContinuousLoop { plant, gains }).unwrap();
             assert!((margins.gain_margin_db - 9.9).abs() < 1e-9);
             assert!((margins.phase_margin_deg - 54.2).abs() < 1e-9);
@@ -166,7 +238,14 @@ mod tests {
     #[test]
     fn margins_that_exclude_each_other_name_what_is_possible() {
         for impossible_deg in [10.0, 100.0] {
-            let error = shape_to_margins(&X_PLANT, FILTER_S, 9.9, impossible_deg).unwrap_err();
+            let error = shape_to_margins(
+                &Process::Model(X_PLANT),
+                Form::Continuous,
+                FILTER_S,
+                9.9,
+                impossible_deg,
+            )
+            .unwrap_err();
             let ShapingError::OutOfReach {
                 smallest_deg,
                 largest_deg,
@@ -185,7 +264,14 @@ mod tests {
             delay_s: 0.0,
             ..X_PLANT
         };
-        let error = shape_to_margins(&plant, FILTER_S, 9.9, 54.2).unwrap_err();
-        assert_eq!(error, ShapingError::NoDelay);
+        let error = shape_to_margins(
+            &Process::Model(plant),
+            Form::Continuous,
+            FILTER_S,
+            9.9,
+            54.2,
+        )
+        .unwrap_err();
+        assert_eq!(error, ShapingError::NoHalfTurn);
     }
 }

@@ -5,7 +5,7 @@ use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::{PidGains, sector_bound};
 
 use super::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
-use super::{ContinuousLoop, SampledLoop, ShapingError, margins, shape_to_margins};
+use super::{ContinuousLoop, Form, Process, SampledLoop, ShapingError, margins, shape_to_margins};
 
 /// Control period of these tests, s.
 const PERIOD_S: f64 = 1e-4;
@@ -112,7 +112,14 @@ fn axes() -> [(PlantModel, PidGains); 3] {
     let shaped = |plant| {
         (
             plant,
-            shape_to_margins(&plant, FILTER_S, 9.9, 54.2).unwrap(),
+            shape_to_margins(
+                &Process::Model(plant),
+                Form::Continuous,
+                FILTER_S,
+                9.9,
+                54.2,
+            )
+            .unwrap(),
         )
     };
     [(X_PLANT, X_GAINS), shaped(Y_PLANT), shaped(Z_PLANT)]
@@ -177,7 +184,7 @@ proptest! {
             stiffness_per_s2: stiffness,
             delay_s: delay,
         };
-        let gains = match shape_to_margins(&plant, FILTER_S, gain_margin_db, phase_margin_deg) {
+        let gains = match shape_to_margins(&Process::Model(plant), Form::Continuous, FILTER_S, gain_margin_db, phase_margin_deg) {
             Ok(gains) => gains,
             Err(ShapingError::OutOfReach { smallest_deg, largest_deg }) => {
                 prop_assert!(!(smallest_deg..largest_deg).contains(&phase_margin_deg));

@@ -19,7 +19,7 @@ use super::comparison::{Configuration, ELEMENTS};
 use super::compensator::Setup;
 use super::metrics::{largest, rms};
 use super::run::{RunError, run};
-use crate::design::shaping::{ShapingError, shape_to_margins};
+use crate::design::{Form, Process, ShapingError, shape_to_margins};
 use crate::machine::Machine;
 use crate::plant::{AxisTruth, Imperfections, SimulatedStage, StageTruth};
 use crate::record::{AxisLimits, Record};
@@ -140,7 +140,13 @@ fn emps_axis() -> Result<Axis, ShapingError> {
     };
     let mut settings = quadrant::settings::x_axis();
     let filter_s = settings.feedback.pid.derivative_filter_s;
-    let mut pid = shape_to_margins(&plant, filter_s, MARGINS.0, MARGINS.1)?;
+    let mut pid = shape_to_margins(
+        &Process::Model(plant),
+        Form::Continuous,
+        filter_s,
+        MARGINS.0,
+        MARGINS.1,
+    )?;
     pid.ki_v_per_mm_s = INTEGRAL_RATIO_PER_S * pid.kp_v_per_mm;
     settings.encoder.resolution_mm = emps::RESOLUTION_MM;
     settings.feedback.pid = pid;

@@ -1,0 +1,121 @@
+//! What a controller is designed on: a model of the axis or its measured response, closed in continuous time or as it
+//! runs.
+
+use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+
+use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
+use super::margins::{MarginError, Margins, bisect, margins};
+use super::measured::{MeasuredLoop, MeasuredResponse};
+use num_complex::Complex64;
+
+/// The axis, as far as a design knows it.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Process {
+    /// Its linear model.
+    Model(PlantModel),
+    /// Its measured frequency response.
+    Measured(MeasuredResponse),
+}
+
+/// How the loop is closed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Form {
+    /// By a PID in continuous time: the form that textbooks and the thesis print margins of.
+    Continuous,
+    /// By the difference equations of the firmware, through the converter's hold.
+    Sampled {
+        /// Control period, s; above zero.
+        sample_time_s: f64,
+        /// From reading the encoder to writing the converter, s; zero or more.
+        computation_delay_s: f64,
+    },
+}
+
+/// A loop of either kind.
+#[derive(Clone, Debug)]
+pub enum AnyLoop<'a> {
+    /// Model and PID in continuous time.
+    Continuous(ContinuousLoop),
+    /// Model and PID as they run.
+    Sampled(SampledLoop),
+    /// Measured response and PID, in either form.
+    Measured(MeasuredLoop<'a>),
+}
+
+impl OpenLoop for AnyLoop<'_> {
+    fn response(&self, omega_rad_s: f64) -> Complex64 {
+        match self {
+            Self::Continuous(open_loop) => open_loop.response(omega_rad_s),
+            Self::Sampled(open_loop) => open_loop.response(omega_rad_s),
+            Self::Measured(open_loop) => open_loop.response(omega_rad_s),
+        }
+    }
+
+    fn band_rad_s(&self) -> (f64, f64) {
+        match self {
+            Self::Continuous(open_loop) => open_loop.band_rad_s(),
+            Self::Sampled(open_loop) => open_loop.band_rad_s(),
+            Self::Measured(open_loop) => open_loop.band_rad_s(),
+        }
+    }
+}
+
+impl Process {
+    /// The loop that a PID closes around the process.
+    pub fn open_loop(&self, gains: &PidGains, form: Form) -> AnyLoop<'_> {
+        match (self, form) {
+            (Self::Model(plant), Form::Continuous) => AnyLoop::Continuous(ContinuousLoop {
+                plant: *plant,
+                gains: *gains,
+            }),
+            (
+                Self::Model(plant),
+                Form::Sampled {
+                    sample_time_s,
+                    computation_delay_s,
+                },
+            ) => AnyLoop::Sampled(SampledLoop::new(
+                plant,
+                gains,
+                sample_time_s,
+                computation_delay_s,
+            )),
+            (Self::Measured(response), form) => {
+                AnyLoop::Measured(MeasuredLoop::new(response, gains, form))
+            }
+        }
+    }
+
+    /// Margins and peaks of the closed loop.
+    ///
+    /// # Errors
+    /// A loop without margins; [`MarginError::BandTooNarrow`] when a measured response ends before the loop's gain has fallen.
+    pub fn margins(&self, gains: &PidGains, form: Form) -> Result<Margins, MarginError> {
+        let open_loop = self.open_loop(gains, form);
+        if let AnyLoop::Measured(measured) = &open_loop
+            && !measured.has_fallen()
+        {
+            return Err(MarginError::BandTooNarrow);
+        }
+        margins(&open_loop)
+    }
+
+    /// The frequency at which the phase of the process alone reaches -180 degrees, Hz: without derivative action no
+    /// crossover lies above it. Nothing when the band does not hold it.
+    pub fn half_turn_hz(&self) -> Option<f64> {
+        match self {
+            Self::Model(plant) => {
+                // Above the resonance, where delay and inertia turn on: from there the phase only falls.
+                let lag = |omega: f64| {
+                    (-plant.denominator(omega).arg()) - omega * plant.delay_s
+                        > -std::f64::consts::PI
+                };
+                let lowest = plant.stiffness_per_s2.sqrt().max(1e-3);
+                let highest = 1e6;
+                (plant.delay_s > 0.0 && lag(lowest) && !lag(highest))
+                    .then(|| bisect(lowest, highest, lag) / std::f64::consts::TAU)
+            }
+            Self::Measured(response) => response.half_turn_hz(),
+        }
+    }
+}
