@@ -265,10 +265,7 @@ fn recordings_without_excitation_or_too_short_are_refused() {
         recording.injection_v.fill(0.0);
     }
     let error = response_of(silent, &SAVED).unwrap_err();
-    assert!(
-        matches!(error, SavedError::NoExcitation { .. }),
-        "{error}"
-    );
+    assert!(matches!(error, SavedError::NoExcitation { .. }), "{error}");
     let cut = vec![read[0].slice(0..15_000)];
     let error = response_of(cut, &SAVED).unwrap_err();
     assert!(

@@ -23,7 +23,7 @@ pub struct GmsFit {
     pub gms: GmsParameters,
     /// Knots x_i of the model, mm.
     pub knots_mm: Vec<f64>,
-    /// Refined parameters: knots, shares, C, with standard errors and correlations.
+    /// Refined parameters: knots unless they were given, shares, C, with standard errors and correlations.
     pub fit: Fit,
     /// Whether the record determines C; if not, it is as assumed.
     pub attraction_determined: bool,
@@ -47,6 +47,16 @@ pub enum Knots {
     Automatic(usize),
     /// At these displacements, mm.
     At(Vec<f64>),
+}
+
+impl Knots {
+    /// The knots that are given.
+    fn held(&self) -> Option<&[f64]> {
+        match self {
+            Self::Automatic(_) => None,
+            Self::At(places) => Some(places),
+        }
+    }
 }
 
 /// Identifies the GMS model. `sliding` is the static friction, as identified by runs at constant velocity; without it the
@@ -91,14 +101,7 @@ pub fn identify(
     let level_v = 0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
     let shape = fit_curve(&curve, level_v, knots, count)?;
     let from_curve = parameters(&shape, level_v, ASSUMED_ATTRACTION_V_S);
-    let refined = refine(
-        &smooth,
-        &reversals,
-        &sliding,
-        level_v,
-        &shape,
-        matches!(knots, Knots::At(_)),
-    )?;
+    let refined = refine(&smooth, &reversals, &sliding, level_v, &shape, knots.held())?;
     Ok(GmsFit {
         curve,
         from_curve,
@@ -132,15 +135,19 @@ fn fit_curve(
         },
         weights: vec![1.0 / count as f64; count],
     };
-    let held = matches!(knots, Knots::At(_));
-    let found = fit(&start.parameters(held), Loss::Squares, |values| {
-        let shape = Shape::from_variables(values, count);
+    let held = knots.held();
+    let variables = start.parameters(held.is_some());
+    if variables.is_empty() {
+        return Ok(start);
+    }
+    let found = fit(&variables, Loss::Squares, |values| {
+        let shape = Shape::from_variables(values, count, held);
         let points = fitted.iter();
         points
             .map(|point| shape.at(point.displacement_mm) * level_v - point.force_v)
             .collect()
     })?;
-    Ok(Shape::from_variables(&found.values, count))
+    Ok(Shape::from_variables(&found.values, count, held))
 }
 
 /// Refines knots, shares and C on the hysteresis.
@@ -150,11 +157,12 @@ fn refine(
     sliding: &PerDirection<StaticFriction>,
     level_v: f64,
     start: &Shape,
-    held: bool,
+    held: Option<&[f64]>,
 ) -> Result<GmsFit, VirginCurveError> {
     let count = start.knots_mm.len();
     let scored = reversals[1]..*reversals.last().unwrap_or(&smooth.position_mm.len());
-    let mut variables = start.parameters(held);
+    let mut variables = start.parameters(held.is_some());
+    let attraction = variables.len();
     variables.push(Parameter {
         name: "ln C",
         start: ASSUMED_ATTRACTION_V_S.ln(),
@@ -164,8 +172,8 @@ fn refine(
         ),
     });
     let model = |values: &[f64]| {
-        let shape = Shape::from_variables(values, count);
-        parameters(&shape, level_v, values[2 * count - 1].exp())
+        let shape = Shape::from_variables(values, count, held);
+        parameters(&shape, level_v, values[attraction].exp())
     };
     let found = fit_with_step(&variables, Loss::Squares, 1e-3, |values| {
         let predicted = predict(smooth, sliding, &model(values));
@@ -175,8 +183,8 @@ fn refine(
             .map(|index| predicted[index] - smooth.voltage_v[index])
             .collect()
     })?;
-    let attraction_error = found.standard_errors[2 * count - 1];
-    let attraction_determined = attraction_error < MOST_UNCERTAIN && !found.at_bound[2 * count - 1];
+    let attraction_determined =
+        found.standard_errors[attraction] < MOST_UNCERTAIN && !found.at_bound[attraction];
     let mut gms = model(&found.values);
     if !attraction_determined {
         gms.attraction_v_s = ASSUMED_ATTRACTION_V_S;
@@ -189,7 +197,7 @@ fn refine(
     Ok(GmsFit {
         curve: VirginCurve::default(),
         from_curve: gms.clone(),
-        knots_mm: Shape::from_variables(&found.values, count).knots_mm,
+        knots_mm: Shape::from_variables(&found.values, count, held).knots_mm,
         gms,
         fit: found,
         attraction_determined,

@@ -19,16 +19,21 @@ pub(super) struct Shape {
 }
 
 impl Shape {
-    pub(super) fn from_variables(values: &[f64], count: usize) -> Self {
-        let mut knots_mm = Vec::with_capacity(count);
-        let mut log_knot = values[0];
-        knots_mm.push(log_knot.exp());
-        for step in &values[1..count] {
-            log_knot += step;
-            knots_mm.push(log_knot.exp());
-        }
+    /// The shape of `count` elements from its variables: knots, unless they are `held`, then shares.
+    pub(super) fn from_variables(values: &[f64], count: usize, held: Option<&[f64]>) -> Self {
+        let (knots_mm, shares) = match held {
+            Some(knots) => (knots.to_vec(), values),
+            None => {
+                let (steps, shares) = values.split_at(count);
+                let rise = steps.iter().scan(0.0, |log_knot, step| {
+                    *log_knot += step;
+                    Some(log_knot.exp())
+                });
+                (rise.collect(), shares)
+            }
+        };
         let mut left = 1.0;
-        let mut weights: Vec<f64> = values[count..2 * count - 1]
+        let mut weights: Vec<f64> = shares[..count - 1]
             .iter()
             .map(|share| {
                 let weight = left * share;
@@ -40,32 +45,23 @@ impl Shape {
         Self { knots_mm, weights }
     }
 
-    /// The variables, as parameters to be fitted, with the knots held if they are given.
+    /// The variables, as parameters to be fitted; none for knots that are held.
     pub(super) fn parameters(&self, held: bool) -> Vec<Parameter> {
-        let room = if held { 1e-6 } else { 1.0 };
-        let first = self.knots_mm[0].ln();
-        let mut parameters = vec![Parameter {
-            name: "ln x",
-            start: first,
-            bounds: (first - 2.0 * room, first + 2.0 * room),
-        }];
-        parameters.extend(self.knots_mm.windows(2).map(|pair| {
-            let ratio = (pair[1] / pair[0]).ln();
+        let mut parameters = Vec::new();
+        if !held {
+            let first = self.knots_mm[0].ln();
+            parameters.push(Parameter {
+                name: "ln x",
+                start: first,
+                bounds: (first - 2.0, first + 2.0),
+            });
             let (low, high) = (SMALLEST_RATIO.ln(), LARGEST_RATIO.ln());
-            Parameter {
+            parameters.extend(self.knots_mm.windows(2).map(|pair| Parameter {
                 name: "ln x ratio",
-                start: if held {
-                    ratio
-                } else {
-                    ratio.clamp(low + 0.05, high - 0.05)
-                },
-                bounds: if held {
-                    (ratio - room, ratio + room)
-                } else {
-                    (low, high)
-                },
-            }
-        }));
+                start: (pair[1] / pair[0]).ln().clamp(low + 0.05, high - 0.05),
+                bounds: (low, high),
+            }));
+        }
         let mut left = 1.0;
         for weight in &self.weights[..self.weights.len() - 1] {
             parameters.push(Parameter {
