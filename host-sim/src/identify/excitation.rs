@@ -56,13 +56,16 @@ impl Excitation {
         ((self.period_s * rate_hz).round() as usize).max(2)
     }
 
-    /// The lines of a period that are excited, as multiples of the inverse period: all within the band for random and
-    /// sweep, log-spaced ones for a multisine, so that each has the power to be seen.
+    /// The lines of a period that are excited, as multiples of the inverse period: all within the band for a sweep,
+    /// all but the outermost for a random one, whose leakage is one-sided there; log-spaced ones for a multisine, so that
+    /// each has the power to be seen.
     pub fn lines(&self) -> Vec<usize> {
         let first = (self.band_hz.0 * self.period_s).ceil().max(1.0) as usize;
         let last = (self.band_hz.1 * self.period_s).floor() as usize;
-        if self.waveform != Waveform::Multisine {
-            return (first..=last).collect();
+        match self.waveform {
+            Waveform::Multisine => {}
+            Waveform::Random => return (first + 1..last).collect(),
+            Waveform::Sweep => return (first..=last).collect(),
         }
         let mut lines = Vec::new();
         let mut next = first;

@@ -72,22 +72,23 @@ pub fn motor_constant_table(motor: &MotorConstant, moving_mass_kg: Option<f64>) 
     }
 }
 
-/// The measured response: its section, with the plain H1 estimate beside it where feedback biases that.
+/// The measured response: its section, under feedback with the plain H1 estimate, which that biases, beside it.
 pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>) -> Section {
     let measured = &measurement.estimate.response;
     let modelled = model.map(|model| modelled(model, measured));
-    let mut curves = vec![
-        Curve {
+    let mut curves = Vec::new();
+    if measurement.closed_loop {
+        curves.push(Curve {
             name: "H1 (biased under feedback)".to_owned(),
             response: &measurement.plain.response,
             style: Style::points(Colour::Grey),
-        },
-        Curve {
-            name: "measured".to_owned(),
-            response: measured,
-            style: Style::points(Colour::Ink),
-        },
-    ];
+        });
+    }
+    curves.push(Curve {
+        name: "measured".to_owned(),
+        response: measured,
+        style: Style::points(Colour::Ink),
+    });
     if let Some(response) = &modelled {
         curves.push(Curve {
             name: "fitted model".to_owned(),
@@ -98,14 +99,44 @@ pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>
     let mut blocks: Vec<Block> =
         bode_figures("response", "Response, position over voltage", &curves).into();
     blocks.push(Block::Figure(quality_figure(measured)));
+    let estimator = if measurement.closed_loop {
+        "The instrument of the estimate is the injected excitation, which noise under feedback does not bias"
+    } else {
+        "The loop was open: the estimate is H1, of position over voltage"
+    };
     Section {
         id: "response".to_owned(),
         heading: "Frequency response".to_owned(),
         prose: vec![format!(
-            "{} blocks averaged, resolution {} Hz. The instrument of the estimate is the injected excitation, which noise under feedback \
-             does not bias; the hold of the converter is divided out.",
+            "{} blocks averaged, resolution {} Hz. {estimator}; the hold of the converter is divided out.",
             measurement.estimate.blocks, measurement.estimate.resolution_hz
         )],
+        blocks,
+    }
+}
+
+/// A saved response and the model fitted to it.
+pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantModel) -> Section {
+    let modelled = modelled(model, response);
+    let curves = [
+        Curve {
+            name: "measured".to_owned(),
+            response,
+            style: Style::points(Colour::Ink),
+        },
+        Curve {
+            name: "fitted model".to_owned(),
+            response: &modelled,
+            style: Style::solid(Colour::Blue),
+        },
+    ];
+    let mut blocks: Vec<Block> =
+        bode_figures("response", "Response, position over voltage", &curves).into();
+    blocks.push(Block::Figure(quality_figure(response)));
+    Section {
+        id: "response".to_owned(),
+        heading: "Frequency response".to_owned(),
+        prose: Vec::new(),
         blocks,
     }
 }

@@ -19,7 +19,7 @@ pub use comparison::{comparison_page, comparison_tables};
 pub use design_npid::NonlinearPage;
 pub use design_pid::{PidPage, margins_table, pid_table, step_table};
 pub use friction::{friction_section, friction_table, gms_table, presliding_section};
-pub use identify::{motor_constant_table, plant_tables, response_section};
+pub use identify::{fitted_response_section, motor_constant_table, plant_tables, response_section};
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};

@@ -74,7 +74,16 @@ pub(super) enum Purpose {
     Experiment,
 }
 
-pub(super) fn read(path: &Path, purpose: Purpose) -> Result<Columns, RecordError> {
+/// Rows between two reports of progress.
+const PROGRESS_ROWS: u64 = 1 << 16;
+
+/// `progress` is told the share of the file that is read, 0 to 1.
+pub(super) fn read(
+    path: &Path,
+    purpose: Purpose,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Columns, RecordError> {
+    let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
     let mut reader = ReaderBuilder::new()
         .from_path(path)
         .map_err(|error| refuse(path, error))?;
@@ -107,11 +116,17 @@ pub(super) fn read(path: &Path, purpose: Purpose) -> Result<Columns, RecordError
     }
 
     let mut row = ByteRecord::new();
+    let mut rows: u64 = 0;
     while reader
         .read_byte_record(&mut row)
         .map_err(|error| refuse(path, error))?
     {
         let line = row.position().map_or(0, csv::Position::line);
+        if rows.is_multiple_of(PROGRESS_ROWS) {
+            let read = row.position().map_or(0, csv::Position::byte);
+            progress((read as f64 / bytes.max(1) as f64).min(1.0));
+        }
+        rows += 1;
         for (column, index) in [
             Some(&mut time),
             reference.as_mut(),

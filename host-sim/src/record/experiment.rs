@@ -20,8 +20,19 @@ impl Recording {
     /// A file that cannot be read, with gaps or uneven time, or whose position or voltage cannot be identified from; names
     /// line or column, the value, and what is allowed.
     pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        Self::read_csv_with(path, &mut |_| {})
+    }
+
+    /// As [`read_csv`](Self::read_csv), for long files: `progress` is told the share that is read, 0 to 1.
+    ///
+    /// # Errors
+    /// As [`read_csv`](Self::read_csv).
+    pub fn read_csv_with(
+        path: impl AsRef<Path>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, RecordError> {
         let path = path.as_ref();
-        let columns = columns::read(path, Purpose::Experiment)?;
+        let columns = columns::read(path, Purpose::Experiment, progress)?;
         let sample_time_s = time::check(path, &columns.time)?;
         let position_mm = columns
             .position

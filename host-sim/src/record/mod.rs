@@ -65,7 +65,7 @@ impl Record {
     /// Reads and checks a record for an axis with `limits`.
     pub fn read(path: impl AsRef<Path>, limits: &AxisLimits) -> Result<Self, RecordError> {
         let path = path.as_ref();
-        let columns = columns::read(path, Purpose::Motion)?;
+        let columns = columns::read(path, Purpose::Motion, &mut |_| {})?;
         let sample_time_s = time::check(path, &columns.time)?;
         plausible::check(path, &columns, sample_time_s, limits)?;
         let reference_mm = columns

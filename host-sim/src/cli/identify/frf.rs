@@ -1,20 +1,39 @@
 //! `quadrant identify frf`.
 
+use std::path::PathBuf;
+
 use clap::Args;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
-use quadrant_sim::identify::frf::{FrfMeasurement, FrfSettings, measure};
+use quadrant_sim::identify::frf::{
+    FrfMeasurement, FrfSettings, SavedSettings, measure, response_of,
+};
 use quadrant_sim::presentation::{provenance, response_section};
 
 use super::rig::Axis;
-use super::{page, simulated};
+use super::{page, recorded, simulated};
 use crate::cli::output::{Output, share};
+
+/// The settling time of a fresh measurement, s.
+const SETTLING_S: f64 = 0.7;
 
 /// Options of `quadrant identify frf`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
     /// The axis of the simulated stage.
-    #[arg(long, value_enum)]
-    axis: Axis,
+    #[arg(
+        long,
+        value_enum,
+        required_unless_present = "record",
+        conflicts_with = "record"
+    )]
+    axis: Option<Axis>,
+    /// Saved recordings instead, made alike: CSV files with t_s, position_mm (or position_m), voltage_v, injection_v and,
+    /// if the axis moved, reference_mm. Of the excitation's options only the band and the period count then.
+    #[arg(long, value_name = "FILE", num_args = 1..)]
+    record: Vec<PathBuf>,
+    /// Time after a recorded axis has become steady before the first block, s.
+    #[arg(long, default_value_t = SETTLING_S, value_name = "S")]
+    settling_s: f64,
     #[command(flatten)]
     measurement: Measurement,
     #[command(flatten)]
@@ -74,6 +93,41 @@ impl Measurement {
         Ok(found)
     }
 
+    /// The options that repeat it, as far as they are not the usual ones.
+    pub(in crate::cli) fn options(&self) -> String {
+        let FrfSettings {
+            excitation: usual,
+            periods,
+            bias_velocity_mm_s,
+            ..
+        } = FrfSettings::default();
+        let mut options = String::new();
+        if self.waveform != usual.waveform {
+            options += &format!(" --waveform {}", self.waveform);
+        }
+        for (name, value, usual) in [
+            ("amplitude-v", self.amplitude_v, usual.rms_v),
+            ("from-hz", self.from_hz, usual.band_hz.0),
+            ("to-hz", self.to_hz, usual.band_hz.1),
+            ("rise-hz", self.rise_hz, usual.rise_hz),
+            ("period-s", self.period_s, usual.period_s),
+            ("averages", self.averages as f64, periods as f64),
+            (
+                "bias-velocity-mm-s",
+                self.bias_velocity_mm_s,
+                bias_velocity_mm_s,
+            ),
+        ] {
+            if value != usual {
+                options += &format!(" --{name} {value}");
+            }
+        }
+        if self.open_loop {
+            options += " --open-loop";
+        }
+        options
+    }
+
     fn settings(&self, seed: u64) -> FrfSettings {
         FrfSettings {
             excitation: Excitation {
@@ -95,31 +149,74 @@ impl Measurement {
     }
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+/// The response of saved recordings, which is saved too.
+fn response_of_saved(arguments: &Arguments) -> anyhow::Result<FrfMeasurement> {
     let Arguments {
-        axis,
+        record,
+        settling_s,
         measurement,
         output,
+        ..
     } = arguments;
-    let found = measurement.run(*axis, output)?;
+    let recordings = record
+        .iter()
+        .map(|path| recorded::read(path))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    let settings = SavedSettings {
+        period_s: measurement.period_s,
+        band_hz: (measurement.from_hz, measurement.to_hz),
+        settling_s: *settling_s,
+    };
+    let found = response_of(recordings, &settings)?;
+    found.estimate.response.write_csv(output.file("frf.csv")?)?;
+    Ok(found)
+}
+
+pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Arguments {
+        record,
+        measurement,
+        output,
+        ..
+    } = arguments;
+    let (found, title, source) = match arguments.axis {
+        Some(axis) => {
+            let found = measurement.run(axis, output)?;
+            println!("Simulated, not measured.");
+            let source = format!(" --axis {}", axis.name());
+            (found, simulated(axis), source)
+        }
+        None => {
+            let mut source = recorded::option(record);
+            if arguments.settling_s != SETTLING_S {
+                source += &format!(" --settling-s {}", arguments.settling_s);
+            }
+            (
+                response_of_saved(arguments)?,
+                recorded::title(record),
+                source,
+            )
+        }
+    };
     let points = &found.estimate.response.points;
     let coherent = points.iter().filter(|point| point.coherence > 0.95).count();
     println!(
-        "Simulated, not measured. {} lines from {:.1} to {:.1} Hz, {coherent} of them with a coherence above 0.95; resolution {} Hz, {} blocks",
+        "{} lines from {:.1} to {:.1} Hz, {coherent} of them with a coherence above 0.95; resolution {} Hz, {} blocks, {} loop",
         points.len(),
         points.first().map_or(f64::NAN, |point| point.frequency_hz),
         points.last().map_or(f64::NAN, |point| point.frequency_hz),
         found.estimate.resolution_hz,
-        found.estimate.blocks
+        found.estimate.blocks,
+        if found.closed_loop { "closed" } else { "open" }
     );
     let command = format!(
-        "quadrant identify frf --axis {} --seed {}",
-        axis.name(),
+        "quadrant identify frf{source}{} --seed {}",
+        measurement.options(),
         output.seed
     );
     let page = page(
         "Frequency response",
-        &simulated(*axis),
+        &title,
         vec![response_section(&found, None)],
         provenance(&command, output.seed),
     );

@@ -9,7 +9,7 @@ use quadrant_sim::identify::static_friction::{
 use quadrant_sim::presentation::{friction_section, friction_table, provenance};
 
 use super::rig::Axis;
-use super::{page, simulated};
+use super::{page, recorded, simulated};
 use crate::cli::output::{Output, share};
 
 /// Options of `quadrant identify static-friction`.
@@ -19,13 +19,13 @@ pub(in crate::cli) struct Arguments {
     #[arg(
         long,
         value_enum,
-        required_unless_present = "map",
-        conflicts_with = "map"
+        required_unless_present = "record",
+        conflicts_with = "record"
     )]
     axis: Option<Axis>,
-    /// A friction map, as this command saves it: velocity_mm_s, voltage_v, deviation_v, stick_slip.
-    #[arg(long, value_name = "FILE")]
-    map: Option<PathBuf>,
+    /// A recorded friction map instead, as this command saves it: velocity_mm_s, voltage_v, deviation_v, stick_slip.
+    #[arg(long, visible_alias = "map", value_name = "FILE")]
+    record: Option<PathBuf>,
     /// Slowest velocity, mm/s.
     #[arg(long, default_value_t = 0.1, value_name = "MM_S")]
     from_mm_s: f64,
@@ -48,7 +48,7 @@ pub(in crate::cli) struct Arguments {
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let exponent = arguments.exponent.map_or(Exponent::Free, Exponent::Fixed);
-    let (map, title, command) = match (&arguments.map, arguments.axis) {
+    let (map, title, command) = match (&arguments.record, arguments.axis) {
         (None, Some(axis)) => {
             let settings = StaticFrictionSettings {
                 velocities_mm_s: (arguments.from_mm_s, arguments.to_mm_s),
@@ -66,12 +66,12 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                     .write_csv(output.file(&format!("friction-recording-{}.csv", index + 1))?)?;
             }
             println!("Simulated, not measured.");
-            (map, simulated(axis), format!("--axis {}", axis.name()))
+            (map, simulated(axis), format!(" --axis {}", axis.name()))
         }
         (Some(path), _) => (
             FrictionMap::read_csv(path)?,
-            "a recorded friction map".to_owned(),
-            format!("--map {}", path.display()),
+            recorded::title(std::slice::from_ref(path)),
+            recorded::option(std::slice::from_ref(path)),
         ),
         (None, None) => return Ok(()),
     };
@@ -79,7 +79,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let found = fit_map(&map, exponent)?;
     output.table(&friction_table(&found))?;
     let command = format!(
-        "quadrant identify static-friction {command} --seed {}",
+        "quadrant identify static-friction{command} --seed {}",
         output.seed
     );
     let page = page(

@@ -4,6 +4,7 @@ mod frf;
 mod friction;
 mod motor_constant;
 mod plant;
+mod recorded;
 pub(super) mod rig;
 mod validate;
 mod virgin_curve;

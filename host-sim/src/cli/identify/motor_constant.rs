@@ -1,9 +1,14 @@
 //! `quadrant identify motor-constant`.
 
+use std::path::PathBuf;
+
 use clap::Args;
-use quadrant_sim::identify::motor_constant::{MotorConstantSettings, measure};
+use quadrant_sim::identify::motor_constant::{
+    MotorConstant, MotorConstantSettings, evaluate, measure,
+};
 use quadrant_sim::presentation::motor_constant_table;
 
+use super::recorded;
 use super::rig::Axis;
 use crate::cli::output::{Output, share};
 
@@ -11,26 +16,74 @@ use crate::cli::output::{Output, share};
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
     /// The axis of the simulated stage.
-    #[arg(long, value_enum)]
-    axis: Axis,
+    #[arg(
+        long,
+        value_enum,
+        required_unless_present = "record",
+        conflicts_with = "record"
+    )]
+    axis: Option<Axis>,
+    /// A saved test instead, of voltage steps between two levels of one sign, passes both ways: a CSV file with t_s,
+    /// position_mm (or position_m), voltage_v.
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Time at each level of the voltage, s.
+    #[arg(long, default_value_t = MotorConstantSettings::default().dwell_s, value_name = "S",
+        value_parser = dwell)]
+    dwell_s: f64,
+    /// Length of an encoder count in a saved test, mm; the axis must slide by hundreds of counts at each level.
+    #[arg(long, default_value_t = 5e-4, value_name = "MM", value_parser = above_zero)]
+    resolution_mm: f64,
     /// Moving mass, kg: with it the force per volt is given too.
-    #[arg(long, value_name = "KG")]
+    #[arg(long, value_name = "KG", value_parser = above_zero)]
     moving_mass_kg: Option<f64>,
     #[command(flatten)]
     output: Output,
 }
 
+fn above_zero(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    let holds = value.is_finite() && value > 0.0;
+    holds
+        .then_some(value)
+        .ok_or_else(|| "it must be above zero".to_owned())
+}
+
+fn dwell(text: &str) -> Result<f64, String> {
+    let value = above_zero(text)?;
+    (1e-3..=1.0)
+        .contains(&value)
+        .then_some(value)
+        .ok_or_else(|| "it must be 0.001 to 1 s, several times the axis' dead time".to_owned())
+}
+
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
-    let bar = share("voltage steps in open loop");
-    let motor = measure(
-        &mut arguments.axis.rig(output.seed),
-        &MotorConstantSettings::default(),
-        &mut |done| bar.set_position((1000.0 * done) as u64),
-    )?;
-    bar.finish_and_clear();
-    motor
-        .recording
-        .write_csv(output.file("motor-constant-recording.csv")?)?;
+    let settings = MotorConstantSettings {
+        dwell_s: arguments.dwell_s,
+        ..MotorConstantSettings::default()
+    };
+    let motor = match (&arguments.record, arguments.axis) {
+        (Some(path), _) => evaluate(recorded::read(path)?, &settings, arguments.resolution_mm)?,
+        (None, Some(axis)) => measured(axis, &settings, output)?,
+        (None, None) => return Ok(()),
+    };
     output.table(&motor_constant_table(&motor, arguments.moving_mass_kg))
+}
+
+/// The test on an axis of the simulated stage, whose recording is saved.
+fn measured(
+    axis: Axis,
+    settings: &MotorConstantSettings,
+    output: &Output,
+) -> anyhow::Result<MotorConstant> {
+    let bar = share("voltage steps in open loop");
+    let motor = measure(&mut axis.rig(output.seed), settings, &mut |done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.finish_and_clear();
+    println!("Simulated, not measured.");
+    let path = output.file("motor-constant-recording.csv")?;
+    motor.recording.write_csv(path)?;
+    Ok(motor)
 }

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::presentation::{plant_tables, provenance, response_section};
+use quadrant_sim::presentation::{
+    fitted_response_section, plant_tables, provenance, response_section,
+};
 use quadrant_sim::report::Block;
 
 use super::frf::Measurement;
@@ -46,33 +48,42 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         stiffness: arguments.stiffness,
         ..PlantFitSettings::default()
     };
-    if let Some(path) = &arguments.frf {
-        let found = fit_plant(&FrequencyResponse::read_csv(path)?, &settings)?;
-        for table in plant_tables(&found) {
-            output.table(&table)?;
+    let (found, mut section, title, source) = match (&arguments.frf, arguments.axis) {
+        (Some(path), _) => {
+            let response = FrequencyResponse::read_csv(path)?;
+            let found = fit_plant(&response, &settings)?;
+            let section = fitted_response_section(&response, &found.plant);
+            let name = path.file_name().unwrap_or(path.as_os_str()).display();
+            (
+                found,
+                section,
+                format!("recorded: {name}"),
+                format!(" --frf {name}"),
+            )
         }
-        return Ok(());
-    }
-    let Some(axis) = arguments.axis else {
-        return Ok(());
+        (None, Some(axis)) => {
+            let measured = arguments.measurement.run(axis, output)?;
+            println!("Simulated, not measured.");
+            let found = fit_plant(&measured.estimate.response, &settings)?;
+            let section = response_section(&measured, Some(&found.plant));
+            let options = arguments.measurement.options();
+            let source = format!(" --axis {}{options}", axis.name());
+            (found, section, simulated(axis), source)
+        }
+        (None, None) => return Ok(()),
     };
-    let measured = arguments.measurement.run(axis, output)?;
-    let found = fit_plant(&measured.estimate.response, &settings)?;
-    println!("Simulated, not measured.");
     let tables = plant_tables(&found);
     for table in &tables {
         output.table(table)?;
     }
-    let mut section = response_section(&measured, Some(&found.plant));
     section.blocks.splice(0..0, tables.map(Block::Table));
     let command = format!(
-        "quadrant identify plant --axis {} --seed {}",
-        axis.name(),
-        output.seed
+        "quadrant identify plant{source} --least-coherence {} --stiffness {} --seed {}",
+        arguments.least_coherence, arguments.stiffness, output.seed
     );
     let page = page(
         "Linear model",
-        &simulated(axis),
+        &title,
         vec![section],
         provenance(&command, output.seed),
     );

@@ -9,22 +9,23 @@ use quadrant_sim::rig::Recording;
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::rig::Axis;
-use super::{page, simulated};
+use super::{page, recorded, simulated};
 use crate::cli::output::{Output, share};
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage; with --record, the axis of --settings.
-    #[arg(long, value_enum)]
-    axis: Axis,
-    /// A recorded slow sine: t_s, position_mm, voltage_v.
+    /// The axis of the simulated stage; with --record, which axis of --settings it is.
+    #[arg(long, value_enum, required_unless_present = "record")]
+    axis: Option<Axis>,
+    /// A recorded slow sine instead: a CSV file with t_s, position_mm (or position_m), voltage_v.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Settings with the static friction of the axis; without them the record's own plateau stands for it.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", requires = "axis")]
     settings: Option<PathBuf>,
-    /// Amplitude of the sine, um.
+    /// Amplitude of the sine, um: it must outrun the controller's error at breakaway; too small a one is refused with one that
+    /// does.
     #[arg(long, default_value_t = 10.0, value_name = "UM")]
     amplitude_um: f64,
     /// Its frequency, Hz.
@@ -45,30 +46,30 @@ pub(in crate::cli) struct Arguments {
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
-    let axis = arguments.axis;
-    let known = arguments
-        .settings
-        .as_ref()
-        .map(SettingsFile::read)
-        .transpose()?
-        .map(|file| file.stage.axes[axis.index()].friction.sliding);
-    let recording = match &arguments.record {
-        Some(path) => Recording::read_csv(path)?,
-        None => {
-            let bar = share("moving slowly to and fro");
-            let settings = VirginCurveSettings {
-                amplitude_mm: 1e-3 * arguments.amplitude_um,
-                frequency_hz: arguments.frequency_hz,
-                cycles: arguments.cycles,
-            };
-            let recording = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
-                bar.set_position((1000.0 * done) as u64);
-            })?;
-            bar.finish_and_clear();
-            println!("Simulated, not measured.");
-            recording.write_csv(output.file("virgin-curve-recording.csv")?)?;
-            recording
+    let known = match (&arguments.settings, arguments.axis) {
+        (Some(path), Some(axis)) => {
+            let stage = SettingsFile::read(path)?.stage;
+            Some(stage.axes[axis.index()].friction.sliding)
         }
+        _ => None,
+    };
+    let (recording, title, source) = match (&arguments.record, arguments.axis) {
+        (Some(path), _) => {
+            let paths = std::slice::from_ref(path);
+            let (title, option) = (recorded::title(paths), recorded::option(paths));
+            (recorded::read(path)?, title, option)
+        }
+        (None, Some(axis)) => {
+            let source = format!(
+                " --axis {} --amplitude-um {} --frequency-hz {} --cycles {}",
+                axis.name(),
+                arguments.amplitude_um,
+                arguments.frequency_hz,
+                arguments.cycles
+            );
+            (measured(arguments, axis)?, simulated(axis), source)
+        }
+        (None, None) => return Ok(()),
     };
     let knots = if arguments.knots_um.is_empty() {
         Knots::Automatic(arguments.blocks)
@@ -84,21 +85,53 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .zip(&found.knots_mm)
         .map(|(element, knot)| element.stiffness_v_per_mm * knot)
         .sum();
-    let source = arguments
-        .record
-        .as_ref()
-        .map_or_else(String::new, |path| format!(" --record {}", path.display()));
     let command = format!(
-        "quadrant identify virgin-curve --axis {}{source} --amplitude-um {} --seed {}",
-        axis.name(),
-        arguments.amplitude_um,
+        "quadrant identify virgin-curve{source}{} --seed {}",
+        arguments.options(),
         output.seed
     );
     let page = page(
         "Pre-sliding friction",
-        &simulated(axis),
+        &title,
         vec![presliding_section(&found, breakaway_v)],
         provenance(&command, output.seed),
     );
     output.page(&page, "virgin-curve.html")
+}
+
+/// The slow sine on an axis of the simulated stage, whose recording is saved.
+fn measured(arguments: &Arguments, axis: Axis) -> anyhow::Result<Recording> {
+    let output = &arguments.output;
+    let settings = VirginCurveSettings {
+        amplitude_mm: 1e-3 * arguments.amplitude_um,
+        frequency_hz: arguments.frequency_hz,
+        cycles: arguments.cycles,
+    };
+    let bar = share("moving slowly to and fro");
+    let recording = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.finish_and_clear();
+    println!("Simulated, not measured.");
+    recording.write_csv(output.file("virgin-curve-recording.csv")?)?;
+    Ok(recording)
+}
+
+impl Arguments {
+    /// The options that repeat the identification.
+    fn options(&self) -> String {
+        let mut options = if self.knots_um.is_empty() {
+            format!(" --blocks {}", self.blocks)
+        } else {
+            let knots: Vec<String> = self.knots_um.iter().map(f64::to_string).collect();
+            format!(" --knots-um {}", knots.join(","))
+        };
+        if let (Some(path), Some(axis)) = (&self.settings, self.axis) {
+            options += &format!(" --settings {}", path.display());
+            if self.record.is_some() {
+                options += &format!(" --axis {}", axis.name());
+            }
+        }
+        options
+    }
 }

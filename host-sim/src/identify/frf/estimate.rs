@@ -46,7 +46,7 @@ struct Sums {
 /// Estimates the response at `lines` (multiples of the inverse block length) from equally long blocks, each a recording
 /// and the range of its samples; at least two blocks.
 ///
-/// Positions are taken relative to the reference, so that a motion at constant velocity is no part of them. A Hann window
+/// Mean and slope are taken off each block, so that a motion at constant velocity is no part of it. A Hann window
 /// keeps what is not periodic (the screw's ripple, what is left of a transient) out of distant lines; a block of two
 /// periods of a periodic excitation puts its lines two apart, so that the window does not mix them.
 pub fn estimate(
@@ -63,29 +63,26 @@ pub fn estimate(
     };
     let length = range.len();
     let transform = Transform::new(length);
+    // Of each block only the lines are kept: an hour's recording has thousands of blocks.
     let spectra: Vec<[Vec<Complex64>; 3]> = blocks
         .iter()
         .map(|(recording, range)| {
             let range = range.clone();
-            let deviation: Vec<f64> = recording.position_mm[range.clone()]
-                .iter()
-                .zip(&recording.reference_mm[range.clone()])
-                .map(|(position, reference)| position - reference)
-                .collect();
             [
-                transform.spectrum(&deviation),
-                transform.spectrum(&recording.voltage_v[range.clone()]),
-                transform.spectrum(&recording.injection_v[range]),
+                transform.lines(&recording.position_mm[range.clone()], lines),
+                transform.lines(&recording.voltage_v[range.clone()], lines),
+                transform.lines(&recording.injection_v[range], lines),
             ]
         })
         .collect();
     let resolution_hz = 1.0 / (length as f64 * first.sample_time_s);
     let points = lines
         .iter()
-        .map(|&line| {
+        .enumerate()
+        .map(|(index, &line)| {
             let hold = hold(PI * line as f64 / length as f64);
             let frequency_hz = line as f64 * resolution_hz;
-            point(&spectra, line, frequency_hz, hold, estimator)
+            point(&spectra, index, frequency_hz, hold, estimator)
         })
         .collect();
     Estimate {
@@ -100,16 +97,17 @@ fn hold(half_angle: f64) -> Complex64 {
     Complex64::from_polar(half_angle.sin() / half_angle, -half_angle)
 }
 
+/// The response at the line of `index`.
 fn point(
     spectra: &[[Vec<Complex64>; 3]],
-    line: usize,
+    index: usize,
     frequency_hz: f64,
     hold: Complex64,
     estimator: Estimator,
 ) -> ResponsePoint {
     let mut sums = Sums::default();
     for [y, u, r] in spectra {
-        let (y, u, r) = (y[line], u[line], r[line]);
+        let (y, u, r) = (y[index], u[index], r[index]);
         sums.yr += y * r.conj();
         sums.ur += u * r.conj();
         sums.yu += y * u.conj();
@@ -120,7 +118,8 @@ fn point(
     let (sampled, coherence, input_power) = match estimator {
         Estimator::Instrument => (
             sums.yr / sums.ur,
-            sums.yr.norm_sqr() / (sums.yy * sums.rr),
+            // A line at which the loop hides the excitation from the voltage is worth no more than one hidden in noise.
+            (sums.yr.norm_sqr() / sums.yy).min(sums.ur.norm_sqr() / sums.uu) / sums.rr,
             sums.ur.norm_sqr() / sums.rr,
         ),
         Estimator::H1 => (
@@ -132,7 +131,7 @@ fn point(
     // What the response does not explain, over the power that it was measured with.
     let unexplained: f64 = spectra
         .iter()
-        .map(|[y, u, _]| (y[line] - sampled * u[line]).norm_sqr())
+        .map(|[y, u, _]| (y[index] - sampled * u[index]).norm_sqr())
         .sum();
     let freedom = (spectra.len().max(2) - 1) as f64;
     let variance = unexplained / freedom / input_power;
@@ -160,8 +159,8 @@ impl Transform {
         }
     }
 
-    /// The spectrum of a block without its mean and slope.
-    fn spectrum(&self, block: &[f64]) -> Vec<Complex64> {
+    /// Lines of the spectrum of a block without its mean and slope.
+    fn lines(&self, block: &[f64], lines: &[usize]) -> Vec<Complex64> {
         let count = block.len() as f64;
         let middle = 0.5 * (count - 1.0);
         let mean = block.iter().sum::<f64>() / count;
@@ -181,6 +180,6 @@ impl Transform {
             })
             .collect();
         self.fft.process(&mut spectrum);
-        spectrum
+        lines.iter().map(|&line| spectrum[line]).collect()
     }
 }

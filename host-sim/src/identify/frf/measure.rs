@@ -49,6 +49,8 @@ pub struct FrfMeasurement {
     pub estimate: Estimate,
     /// The response by H1: under feedback, for comparison only.
     pub plain: Estimate,
+    /// Whether a feedback law was at work.
+    pub closed_loop: bool,
 }
 
 /// Why there is no response.
@@ -172,7 +174,13 @@ pub fn measure(
             } else {
                 -1.0
             };
-            pass(settings, axis.travel_mm, axis.rate_hz, missing, direction)?
+            // A new realisation in every pass: what depends on the signal (leakage, friction) then scatters, and is seen.
+            let mut anew = *settings;
+            anew.excitation.seed = settings
+                .excitation
+                .seed
+                .wrapping_add(recordings.len() as u64);
+            pass(&anew, axis.travel_mm, axis.rate_hz, missing, direction)?
         } else {
             (standstill(settings, axis.rate_hz), settings.periods)
         };
@@ -216,6 +224,7 @@ pub fn measure(
     Ok(FrfMeasurement {
         estimate: found,
         plain,
+        closed_loop: !settings.open_loop,
         recordings,
     })
 }

@@ -10,6 +10,8 @@
 
 mod estimate;
 mod measure;
+mod saved;
 
 pub use estimate::{Estimate, Estimator, estimate};
 pub use measure::{FrfError, FrfMeasurement, FrfSettings, measure};
+pub use saved::{SavedError, SavedSettings, response_of};

@@ -8,10 +8,14 @@
 
 mod branches;
 mod elements;
+mod error;
 mod measure;
+mod plateau;
 mod predict;
+mod shape;
 
 pub use branches::{VirginCurve, VirginPoint};
-pub use elements::{ASSUMED_ATTRACTION_V_S, GmsFit, Knots, VirginCurveError, identify};
+pub use elements::{ASSUMED_ATTRACTION_V_S, GmsFit, Knots, identify};
+pub use error::VirginCurveError;
 pub use measure::{VirginCurveSettings, measure};
 pub use predict::Prediction;

@@ -1,0 +1,275 @@
+//! The frequency response of saved recordings, of which only the signals and the excitation's period are known.
+//!
+//! What an experiment knows of itself is found in the signals: whether the loop was closed, where the axis was steady,
+//! which lines were excited. The estimate is that of a fresh measurement.
+
+use std::ops::Range;
+
+use num_complex::Complex64;
+use rustfft::FftPlanner;
+
+use super::{Estimator, FrfMeasurement, estimate};
+use crate::rig::Recording;
+
+/// How recordings are turned into a response.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SavedSettings {
+    /// Period of the excitation, or half a block of a random one, s; at least 16 samples.
+    pub period_s: f64,
+    /// Lowest and highest frequency looked at, Hz.
+    pub band_hz: (f64, f64),
+    /// Time after the axis has become steady before the first block, s; zero or more.
+    pub settling_s: f64,
+}
+
+/// Why recordings give no response.
+#[derive(Debug, thiserror::Error)]
+pub enum SavedError {
+    /// A setting that cannot be.
+    #[error("{field} = {value}: {expected}")]
+    Setting {
+        /// Which.
+        field: &'static str,
+        /// What it is.
+        value: f64,
+        /// What it must be.
+        expected: &'static str,
+    },
+    /// The recordings were not sampled alike.
+    #[error(
+        "recording {index} has a sample time of {found_s} s, the first one {expected_s} s; resample it, or take it by itself"
+    )]
+    SampleTime {
+        /// Which, from 1.
+        index: usize,
+        /// Its sample time.
+        found_s: f64,
+        /// That of the first.
+        expected_s: f64,
+    },
+    /// Nothing was injected.
+    #[error(
+        "the recordings hold no injected voltage between {low_hz} and {high_hz} Hz; a response needs an excitation"
+    )]
+    NoExcitation {
+        /// The band.
+        low_hz: f64,
+        /// The band.
+        high_hz: f64,
+    },
+    /// Not enough to average.
+    #[error(
+        "{blocks} blocks of two periods of {period_s} s are steady, and a response takes at least 2: record longer, or \
+         state a shorter period"
+    )]
+    TooShort {
+        /// Blocks found.
+        blocks: usize,
+        /// The period.
+        period_s: f64,
+    },
+}
+
+/// Periods in a block: the window then leaves the lines of a periodic excitation apart.
+const BLOCK_PERIODS: usize = 2;
+/// Fewest samples of a period.
+const LEAST_PERIOD: usize = 16;
+/// Power of the injection at an excited line at least, of that at the strongest: 60 dB.
+const EXCITED: f64 = 1e-6;
+/// Power between the lines of the period, of that at them, from which on the excitation is not periodic.
+const APERIODIC: f64 = 1e-3;
+/// Voltage beyond the injection, V RMS, from which on a feedback law was at work: some steps of a 16-bit converter.
+const FEEDBACK_V: f64 = 1e-3;
+/// Time over which the reference's velocity is looked at, s.
+const VELOCITY_S: f64 = 0.01;
+/// Deviation of the reference from its steady velocity, of that velocity.
+const STEADY: f64 = 1e-3;
+/// Velocity below which the reference stands still, mm/s.
+const STANDSTILL_MM_S: f64 = 1e-3;
+/// Deviation of a time step from the first, of it.
+const UNEVEN: f64 = 1e-3;
+
+/// Estimates the response of recordings made alike: the same axis, law, excitation and, but for its sign, velocity.
+///
+/// # Errors
+/// Recordings that hold no excitation, are too short, or were not sampled alike.
+pub fn response_of(
+    recordings: Vec<Recording>,
+    settings: &SavedSettings,
+) -> Result<FrfMeasurement, SavedError> {
+    let sample_time_s = check(&recordings, settings)?;
+    let period = (settings.period_s / sample_time_s).round() as usize;
+    let length = BLOCK_PERIODS * period;
+    let closed_loop = recordings.iter().any(is_closed_loop);
+    let blocks: Vec<(&Recording, Range<usize>)> = recordings
+        .iter()
+        .flat_map(|recording| {
+            let steady = steady_range(recording, closed_loop, period, settings.settling_s);
+            // A block begins where a period does, so that the excitation is the same in each.
+            (steady.start.div_ceil(period)..)
+                .map(move |index| index * period..index * period + length)
+                .take_while(move |block| block.end <= steady.end)
+                .map(move |block| (recording, block))
+        })
+        .collect();
+    if blocks.len() < 2 {
+        return Err(SavedError::TooShort {
+            blocks: blocks.len(),
+            period_s: settings.period_s,
+        });
+    }
+    let lines = excited_lines(&blocks, length, sample_time_s, settings.band_hz);
+    if lines.is_empty() {
+        return Err(SavedError::NoExcitation {
+            low_hz: settings.band_hz.0,
+            high_hz: settings.band_hz.1,
+        });
+    }
+    let suited = if closed_loop {
+        Estimator::Instrument
+    } else {
+        Estimator::H1
+    };
+    let found = estimate(&blocks, &lines, suited);
+    let plain = estimate(&blocks, &lines, Estimator::H1);
+    Ok(FrfMeasurement {
+        estimate: found,
+        plain,
+        closed_loop,
+        recordings,
+    })
+}
+
+/// The common sample time.
+fn check(recordings: &[Recording], settings: &SavedSettings) -> Result<f64, SavedError> {
+    let sample_time_s = recordings.first().map_or(f64::NAN, |r| r.sample_time_s);
+    for (index, recording) in recordings.iter().enumerate() {
+        if (recording.sample_time_s / sample_time_s - 1.0).abs() > UNEVEN {
+            return Err(SavedError::SampleTime {
+                index: index + 1,
+                found_s: recording.sample_time_s,
+                expected_s: sample_time_s,
+            });
+        }
+    }
+    let (low, high) = settings.band_hz;
+    let checks = [
+        (
+            "period",
+            settings.period_s,
+            settings.period_s >= LEAST_PERIOD as f64 * sample_time_s && settings.period_s <= 100.0,
+            "it must be 16 samples to 100 s",
+        ),
+        (
+            "band",
+            low,
+            low >= 0.0,
+            "the lowest frequency must be zero or more, in Hz",
+        ),
+        (
+            "band",
+            high,
+            high > low,
+            "the highest frequency must be above the lowest",
+        ),
+        (
+            "settling time",
+            settings.settling_s,
+            settings.settling_s >= 0.0,
+            "it must be zero or more, in s",
+        ),
+    ];
+    for (field, value, holds, expected) in checks {
+        if !holds {
+            return Err(SavedError::Setting {
+                field,
+                value,
+                expected,
+            });
+        }
+    }
+    Ok(sample_time_s)
+}
+
+/// Whether the voltage is more than the injection.
+fn is_closed_loop(recording: &Recording) -> bool {
+    let square: f64 = recording
+        .voltage_v
+        .iter()
+        .zip(&recording.injection_v)
+        .map(|(voltage, injection)| (voltage - injection).powi(2))
+        .sum();
+    (square / recording.len() as f64).sqrt() > FEEDBACK_V
+}
+
+/// The longest stretch at the reference's largest velocity, without the settling time; all but the first period when
+/// there is no motion.
+fn steady_range(
+    recording: &Recording,
+    closed_loop: bool,
+    period: usize,
+    settling_s: f64,
+) -> Range<usize> {
+    let at_rest = period..recording.len().max(period);
+    let span = ((VELOCITY_S / recording.sample_time_s) as usize).max(1);
+    let reference = &recording.reference_mm;
+    if !closed_loop || reference.len() <= span {
+        return at_rest;
+    }
+    let velocities: Vec<f64> = reference
+        .windows(span + 1)
+        .map(|window| (window[span] - window[0]) / (span as f64 * recording.sample_time_s))
+        .collect();
+    let fastest = velocities.iter().fold(0.0_f64, |most, v| most.max(v.abs()));
+    if fastest < STANDSTILL_MM_S {
+        return at_rest;
+    }
+    let (mut best, mut start) = (0..0, 0);
+    for (index, velocity) in velocities.iter().enumerate() {
+        if (velocity.abs() - fastest).abs() > STEADY * fastest {
+            start = index + 1;
+        } else if index + 1 - start > best.len() {
+            best = start..index + 1;
+        }
+    }
+    let settling = (settling_s / recording.sample_time_s) as usize;
+    (best.start + settling).min(best.end)..best.end
+}
+
+/// The lines of a block in the band at which the injection has power, away from what its window spreads.
+fn excited_lines(
+    blocks: &[(&Recording, Range<usize>)],
+    length: usize,
+    sample_time_s: f64,
+    (low_hz, high_hz): (f64, f64),
+) -> Vec<usize> {
+    let fft = FftPlanner::new().plan_fft_forward(length);
+    let mut power = vec![0.0; length / 2];
+    for (recording, range) in blocks {
+        let mut spectrum: Vec<Complex64> = recording.injection_v[range.clone()]
+            .iter()
+            .map(|volts| Complex64::from(*volts))
+            .collect();
+        fft.process(&mut spectrum);
+        for (power, value) in power.iter_mut().zip(&spectrum) {
+            *power += value.norm_sqr();
+        }
+    }
+    let resolution_hz = 1.0 / (length as f64 * sample_time_s);
+    // The lines of a periodic excitation are those of the period; a random one has power between them too.
+    let lines = (BLOCK_PERIODS..length / 2)
+        .step_by(BLOCK_PERIODS)
+        .filter(|&line| (low_hz..=high_hz).contains(&(line as f64 * resolution_hz)));
+    let most = lines
+        .clone()
+        .fold(0.0_f64, |most, line| most.max(power[line]));
+    let excited: Vec<usize> = lines
+        .filter(|&line| most > 0.0 && power[line] > EXCITED * most)
+        .collect();
+    let sum = |offset: usize| -> f64 { excited.iter().map(|line| power[line - offset]).sum() };
+    if sum(1) < APERIODIC * sum(0) || excited.len() < 3 {
+        return excited;
+    }
+    // At the edges of its band a random excitation leaks from one side only.
+    excited[1..excited.len() - 1].to_vec()
+}

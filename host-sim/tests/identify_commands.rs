@@ -1,0 +1,95 @@
+//! The commands `quadrant identify frf` and `plant`, from end to end.
+
+use std::path::Path;
+use std::process::{Command, Output};
+
+use quadrant_sim::identify::response::FrequencyResponse;
+
+fn identify(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_quadrant"))
+        .arg("identify")
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let output = identify(folder, arguments);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+fn fail(folder: &Path, arguments: &[&str]) -> String {
+    let output = identify(folder, arguments);
+    assert!(!output.status.success(), "{arguments:?} succeeded");
+    String::from_utf8(output.stderr).unwrap()
+}
+
+/// The value of a parameter in a table's CSV file.
+fn value(path: &Path, parameter: &str) -> f64 {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let row = reader
+        .records()
+        .map(Result::unwrap)
+        .find(|row| &row[0] == parameter)
+        .unwrap();
+    row[2].parse().unwrap()
+}
+
+#[test]
+fn a_measured_response_its_recordings_and_its_model_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let shown = succeed(
+        at,
+        &["frf", "--axis", "y", "--out", "measured", "--seed", "3"],
+    );
+    assert!(shown.contains("Simulated, not measured"), "{shown}");
+    succeed(
+        at,
+        &["plant", "--frf", "measured/frf.csv", "--out", "measured"],
+    );
+    let gain = value(&at.join("measured/linear-model.csv"), "A");
+    assert!((gain / 61_200.0 - 1.0).abs() < 2e-3, "{gain}");
+
+    let recordings: Vec<String> = (1..)
+        .map(|index| format!("measured/frf-recording-{index}.csv"))
+        .take_while(|name| at.join(name).exists())
+        .collect();
+    assert!(recordings.len() > 1);
+    let mut arguments = vec!["frf", "--out", "saved", "--record"];
+    arguments.extend(recordings.iter().map(String::as_str));
+    succeed(at, &arguments);
+    let read = |name: &str| FrequencyResponse::read_csv(at.join(name)).unwrap();
+    let (measured, saved) = (read("measured/frf.csv"), read("saved/frf.csv"));
+    assert_eq!(measured.points.len(), saved.points.len());
+    for (a, b) in measured.points.iter().zip(&saved.points) {
+        let apart = (a.response / b.response - 1.0).norm();
+        assert!(
+            apart < 1e-6 + 5.0 * a.relative_deviation,
+            "{} Hz",
+            a.frequency_hz
+        );
+    }
+    for page in ["measured/frf.html", "measured/plant.html", "saved/frf.html"] {
+        assert!(at.join(page).exists(), "{page}");
+    }
+}
+
+#[test]
+fn what_cannot_be_measured_or_fitted_is_refused_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let band = ["plant", "--axis", "x", "--from-hz", "150"];
+    assert!(fail(at, &band).contains("misses the corner"));
+    let strong = ["frf", "--axis", "x", "--amplitude-v", "0.6"];
+    assert!(fail(at, &strong).contains("lower its amplitude"));
+    assert!(fail(at, &["frf"]).contains("--axis"));
+    let missing = fail(at, &["frf", "--record", "none.csv"]);
+    assert!(missing.contains("none.csv"), "{missing}");
+    std::fs::write(at.join("short.csv"), "t_s,position_mm\n0,0\n").unwrap();
+    let column = fail(at, &["frf", "--record", "short.csv"]);
+    assert!(column.contains("no column voltage_v"), "{column}");
+}

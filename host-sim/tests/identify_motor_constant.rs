@@ -1,0 +1,103 @@
+//! The motor constant of the simulated stage's axes, judged against their truth.
+
+use quadrant_sim::identify::motor_constant::{
+    MotorConstant, MotorConstantError, MotorConstantSettings, evaluate, measure,
+};
+use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::rig::{Recording, SimulatedRig};
+
+const RESOLUTION_MM: f64 = 5e-4;
+
+fn test_of(truth: &AxisTruth, index: usize, seed: u64) -> MotorConstant {
+    let mut rig = SimulatedRig::new(index, truth.clone(), seed);
+    measure(&mut rig, &MotorConstantSettings::default(), &mut |_| {}).unwrap()
+}
+
+fn evaluated(recording: Recording) -> Result<MotorConstant, MotorConstantError> {
+    evaluate(recording, &MotorConstantSettings::default(), RESOLUTION_MM)
+}
+
+#[test]
+fn every_axis_shows_its_acceleration_per_volt() {
+    for (index, truth) in StageTruth::real().axes.iter().enumerate() {
+        for seed in 1..=3 {
+            let found = test_of(truth, index, seed);
+            let error = found.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2 - 1.0;
+            // The ripple of the screw makes it low; a first controller bears a factor of two.
+            assert!(error.abs() < 0.1, "axis {index}, seed {seed}: {error}");
+        }
+    }
+}
+
+#[test]
+fn without_the_screw_s_ripple_the_gain_is_accurate() {
+    let mut truth = StageTruth::real().axes[0].clone();
+    truth.imperfections.ripple_v = 0.0;
+    let found = test_of(&truth, 0, 1);
+    let error = found.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2 - 1.0;
+    assert!(error.abs() < 0.01, "{error}");
+}
+
+#[test]
+fn a_saved_test_gives_what_the_fresh_one_gave() {
+    let fresh = test_of(&StageTruth::real().axes[0], 0, 1);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("test.csv");
+    fresh.recording.write_csv(&path).unwrap();
+    let saved = evaluated(Recording::read_csv(&path).unwrap()).unwrap();
+    assert!((saved.gain_mm_per_v_s2 / fresh.gain_mm_per_v_s2 - 1.0).abs() < 1e-9);
+    assert!((saved.level_v / fresh.level_v - 1.0).abs() < 1e-9);
+}
+
+#[test]
+fn the_moving_mass_turns_it_into_newtons_per_volt() {
+    let found = test_of(&StageTruth::real().axes[0], 0, 1);
+    // 12 kg at 1 mm/s² take 12 mN.
+    let expected = 12e-3 * found.gain_mm_per_v_s2;
+    assert!((found.force_n_per_v(12.0) / expected - 1.0).abs() < 1e-12);
+}
+
+#[test]
+fn an_axis_that_moves_the_wrong_way_is_refused() {
+    let mut recording = test_of(&StageTruth::real().axes[0], 0, 1).recording;
+    for position in &mut recording.position_mm {
+        *position = -*position;
+    }
+    let error = evaluated(recording).unwrap_err();
+    assert!(matches!(error, MotorConstantError::Reversed), "{error}");
+}
+
+#[test]
+fn an_axis_that_friction_holds_is_refused() {
+    let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
+    let settings = MotorConstantSettings {
+        most_level_v: 0.04,
+        ..MotorConstantSettings::default()
+    };
+    let error = measure(&mut rig, &settings, &mut |_| {}).unwrap_err();
+    assert!(
+        matches!(error, MotorConstantError::Still { level_v } if level_v == 0.04),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_recording_of_something_else_is_refused() {
+    let recording = test_of(&StageTruth::real().axes[0], 0, 1).recording;
+    // A single pass has no scatter.
+    let pass = recording.slice(0..2500);
+    let error = evaluated(pass).unwrap_err();
+    assert!(
+        matches!(error, MotorConstantError::NoPasses { passes: 1 }),
+        "{error}"
+    );
+    let mut sine = recording;
+    for (index, voltage) in sine.voltage_v.iter_mut().enumerate() {
+        *voltage = 0.1 * (0.2 * index as f64).sin();
+    }
+    let error = evaluated(sine).unwrap_err();
+    assert!(
+        matches!(error, MotorConstantError::NoPasses { passes: 0 }),
+        "{error}"
+    );
+}
