@@ -70,3 +70,11 @@ pub(super) fn progress(runs: u64, what: &'static str) -> ProgressBar {
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(runs).with_style(style).with_message(what)
 }
+
+/// The command line as it was given: what a reader repeats.
+pub(super) fn command_line() -> String {
+    std::iter::once("quadrant".to_owned())
+        .chain(std::env::args().skip(1))
+        .collect::<Vec<_>>()
+        .join(" ")
+}

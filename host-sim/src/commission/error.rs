@@ -15,31 +15,31 @@ use crate::rig::RigError;
 #[derive(Debug, thiserror::Error)]
 pub enum CommissionError {
     /// Settings that the firmware refuses.
-    #[error("settings refused: {0}")]
+    #[error("settings refused")]
     Settings(#[from] SettingsError),
     /// The open-loop test.
-    #[error("motor constant: {0}")]
+    #[error("motor constant")]
     Motor(#[from] MotorConstantError),
     /// The response.
-    #[error("frequency response: {0}")]
+    #[error("frequency response")]
     Response(#[from] FrfError),
     /// The linear model.
-    #[error("linear model: {0}")]
+    #[error("linear model")]
     Plant(#[from] PlantError),
     /// The PID.
-    #[error("PID: {0}")]
+    #[error("PID")]
     Pid(#[from] DesignError),
     /// The runs at constant velocity.
-    #[error("friction at constant velocity: {0}")]
+    #[error("friction at constant velocity")]
     Friction(#[from] StaticFrictionError),
     /// Their model.
-    #[error("friction model: {0}")]
+    #[error("friction model")]
     FrictionFit(#[from] FrictionFitError),
     /// A run of the slow sine.
-    #[error("pre-sliding friction: {0}")]
+    #[error("pre-sliding friction")]
     Sine(#[from] RigError),
     /// The GMS model.
-    #[error("pre-sliding friction: {0}")]
+    #[error("pre-sliding friction")]
     Presliding(#[from] VirginCurveError),
     /// The GMS model does not predict what was measured.
     #[error(
@@ -51,6 +51,6 @@ pub enum CommissionError {
         percent: f64,
     },
     /// The verdict.
-    #[error("verdict: {0}")]
+    #[error("verdict")]
     Verify(#[from] VerifyError),
 }

@@ -13,6 +13,7 @@
 //! - [`static_friction`]: the friction-velocity map and its model;
 //! - [`virgin_curve`]: pre-sliding friction, the GMS model.
 
+pub mod at_rest;
 pub mod excitation;
 pub mod fit;
 pub mod frf;

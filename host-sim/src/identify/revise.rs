@@ -104,10 +104,10 @@ pub enum ReviseError {
         least_coherence: f64,
     },
     /// The model cannot be run as the axis was.
-    #[error("the simulated axis: {0}")]
+    #[error(transparent)]
     Rig(#[from] RigError),
     /// The settings are refused.
-    #[error("the settings of the measurement: {0}")]
+    #[error(transparent)]
     Settings(#[from] SettingsError),
     /// The search failed.
     #[error(transparent)]

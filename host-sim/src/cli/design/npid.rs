@@ -11,8 +11,8 @@ use quadrant_sim::design::time_varying::VaryingLoop;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::presentation::{NonlinearPage, provenance};
 
-use super::process::{Model, command_line};
-use crate::cli::output::{Output, share};
+use super::process::Model;
+use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant design npid`.
 #[derive(Clone, Debug, Args)]

@@ -10,8 +10,8 @@ use quadrant_sim::design::{Form, PidRequest, Process, Target, design_pid};
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::presentation::{PidPage, provenance};
 
-use super::process::{Model, command_line};
-use crate::cli::output::Output;
+use super::process::Model;
+use crate::cli::output::{Output, command_line};
 
 /// Options of `quadrant design pid`.
 #[derive(Clone, Debug, Args)]

@@ -142,11 +142,3 @@ impl Model {
         Ok(())
     }
 }
-
-/// The command line as it was given: what a reader repeats.
-pub(super) fn command_line() -> String {
-    std::iter::once("quadrant".to_owned())
-        .chain(std::env::args().skip(1))
-        .collect::<Vec<_>>()
-        .join(" ")
-}

@@ -5,6 +5,7 @@ mod friction;
 mod motor_constant;
 mod plant;
 mod recorded;
+mod revise;
 pub(super) mod rig;
 mod validate;
 mod virgin_curve;
@@ -21,6 +22,8 @@ pub(super) enum Command {
     Plant(plant::Arguments),
     /// Measure the acceleration per volt in open loop (thesis, Fig 3.7).
     MotorConstant(motor_constant::Arguments),
+    /// Revise the linear model for explicit friction, excited as the axis was (thesis, Table 3.4, Figs 3.16-3.21).
+    Revise(revise::Arguments),
     /// Measure friction at constant velocity, both ways, and fit the static model (thesis, Table 3.2).
     StaticFriction(friction::Arguments),
     /// Judge identification on the simulated stage by the truth that it does not know: a table of errors and honesty.
@@ -34,6 +37,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Frf(arguments) => frf::run(arguments),
         Command::Plant(arguments) => plant::run(arguments),
         Command::MotorConstant(arguments) => motor_constant::run(arguments),
+        Command::Revise(arguments) => revise::run(arguments),
         Command::StaticFriction(arguments) => friction::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),
         Command::VirginCurve(arguments) => virgin_curve::run(arguments),

@@ -240,7 +240,7 @@ fn too_short(settings: &FrfSettings, travel_mm: f64) -> FrfError {
 }
 
 /// The excitation at rest, in closed or open loop; one period settles.
-fn standstill(settings: &FrfSettings, rate_hz: f64) -> Experiment {
+pub fn standstill(settings: &FrfSettings, rate_hz: f64) -> Experiment {
     let periods = settings.periods + 1;
     Experiment {
         name: "frequency response at standstill".to_owned(),

@@ -13,5 +13,5 @@ mod measure;
 mod saved;
 
 pub use estimate::{Estimate, Estimator, estimate};
-pub use measure::{FrfError, FrfMeasurement, FrfSettings, measure};
+pub use measure::{FrfError, FrfMeasurement, FrfSettings, measure, standstill};
 pub use saved::{SavedError, SavedSettings, response_of};

@@ -26,7 +26,7 @@ pub struct FrictionMap {
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The file cannot be read or written.
-    #[error("{}: {source}", path.display())]
+    #[error("{}", path.display())]
     Csv {
         /// The file.
         path: PathBuf,

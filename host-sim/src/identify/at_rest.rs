@@ -1,0 +1,110 @@
+//! The response of an axis at rest, where friction bends it: measured, and as a model with friction predicts it.
+
+use quadrant::control::plant_model::PlantModel;
+use quadrant::settings::AxisSettings;
+
+use super::excitation::Excitation;
+use super::frf::{FrfSettings, SavedSettings, response_of, standstill};
+use super::response::FrequencyResponse;
+use super::revise::{
+    ExplicitFriction, Measurement, ReviseError, Revision, candidate, revise, simulated_response,
+};
+use crate::commission::bootstrap::measuring_settings;
+use crate::rig::{Experiment, Recording, Rig};
+
+/// An excitation at rest, and what it gave.
+#[derive(Clone, Debug)]
+pub struct AtRest {
+    /// The excitation.
+    pub excitation: Excitation,
+    /// The settings in force: the axis' own feedback, without feedforward.
+    settings: AxisSettings,
+    experiment: Experiment,
+    /// What was recorded.
+    pub recording: Recording,
+}
+
+/// Lowest coherence of a line that a revision counts: with friction no response is quite coherent.
+const LEAST_COHERENCE: f64 = 0.8;
+
+impl AtRest {
+    /// Excites the axis at rest under the feedback of `settings`, for `periods` periods.
+    ///
+    /// # Errors
+    /// Settings that are refused, or a run that is stopped.
+    pub fn measure(
+        rig: &mut dyn Rig,
+        settings: &AxisSettings,
+        excitation: Excitation,
+        periods: usize,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, ReviseError> {
+        let settings = measuring_settings(settings);
+        rig.apply(&settings)?;
+        let request = FrfSettings {
+            excitation,
+            periods,
+            bias_velocity_mm_s: 0.0,
+            open_loop: false,
+        };
+        let experiment = standstill(&request, rig.axis().rate_hz);
+        let recording = rig.perform(&experiment, progress)?;
+        Ok(Self {
+            excitation,
+            settings,
+            experiment,
+            recording,
+        })
+    }
+
+    /// The response of a recording of this experiment.
+    pub fn estimate(&self, recording: &Recording) -> Option<FrequencyResponse> {
+        let settings = SavedSettings {
+            period_s: self.excitation.period_s,
+            band_hz: self.excitation.band_hz,
+            settling_s: 0.0,
+        };
+        let found = response_of(vec![recording.clone()], &settings).ok()?;
+        Some(found.estimate.response)
+    }
+
+    /// The measured response.
+    ///
+    /// # Errors
+    /// A recording without one.
+    pub fn response(&self) -> Result<FrequencyResponse, ReviseError> {
+        self.estimate(&self.recording)
+            .ok_or(ReviseError::NoResponse)
+    }
+
+    /// The linear model revised for each kind of explicit friction. The model and the friction are those of the settings.
+    ///
+    /// # Errors
+    /// Settings without a model, or a revision that fails.
+    pub fn revise(&self, original: &PlantModel) -> Result<Vec<Revision>, ReviseError> {
+        self.with_measurement(|measurement| revise(measurement, original, &self.settings.friction))
+    }
+
+    /// The response that a linear model with the settings' friction shows to this excitation.
+    ///
+    /// # Errors
+    /// A model that cannot be run as the axis was.
+    pub fn predict(
+        &self,
+        plant: &PlantModel,
+        kind: ExplicitFriction,
+    ) -> Result<FrequencyResponse, ReviseError> {
+        let truth = candidate(plant, &self.settings.friction, kind, &self.settings);
+        self.with_measurement(|measurement| simulated_response(measurement, truth))
+    }
+
+    fn with_measurement<T>(&self, use_it: impl FnOnce(&Measurement<'_>) -> T) -> T {
+        use_it(&Measurement {
+            experiment: &self.experiment,
+            settings: &self.settings,
+            recording: &self.recording,
+            estimate: &|recording| self.estimate(recording),
+            least_coherence: LEAST_COHERENCE,
+        })
+    }
+}
