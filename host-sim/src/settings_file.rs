@@ -47,7 +47,7 @@ pub struct Provenance {
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsFileError {
     /// The file cannot be read or written.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
@@ -55,7 +55,7 @@ pub enum SettingsFileError {
         source: std::io::Error,
     },
     /// It is no TOML, a field is missing, misspelt, or of the wrong type.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     Syntax {
         /// The file.
         path: PathBuf,
@@ -63,7 +63,7 @@ pub enum SettingsFileError {
         source: Box<toml::de::Error>,
     },
     /// It cannot be expressed as TOML.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     Serialise {
         /// The file.
         path: PathBuf,
@@ -79,7 +79,7 @@ pub enum SettingsFileError {
         form: u32,
     },
     /// A value is refused.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     Refused {
         /// The file.
         path: PathBuf,

@@ -25,8 +25,8 @@ const BEST: Configuration = Configuration {
 };
 
 #[test]
-fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_a_wrong_model() {
-    for setup in Setup::both() {
+fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_an_identified_model() {
+    for setup in Setup::both().unwrap() {
         let pid = run_configuration::<f32>(PID, &setup, 1).unwrap();
         let best = run_configuration::<f32>(BEST, &setup, 1).unwrap();
         for (pid, best) in pid.iter().zip(&best) {
@@ -39,7 +39,7 @@ fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_a_wro
 
 #[test]
 fn the_same_seed_gives_the_same_outcome() {
-    let [_, setup] = Setup::both();
+    let [_, setup] = Setup::both().unwrap();
     let run = |seed| {
         run_configuration::<f32>(BEST, &setup, seed)
             .unwrap()
@@ -51,7 +51,7 @@ fn the_same_seed_gives_the_same_outcome() {
 
 #[test]
 fn combined_feedforward_makes_the_circle_rounder() {
-    let [_, setup] = Setup::both();
+    let [_, setup] = Setup::both().unwrap();
     let circles = run_circles::<f32>(&[PID, BEST], &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);

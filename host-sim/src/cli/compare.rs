@@ -61,7 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Both setups; the virtual machine's with the settings of a file, if there is one.
 fn setups(settings: Option<&Path>) -> anyhow::Result<[Setup; 2]> {
     let Some(path) = settings else {
-        return Ok(Setup::both());
+        return Ok(Setup::both()?);
     };
     let stage = SettingsFile::read(path)?.stage;
     Ok([Setup::matched(), Setup::virtual_machine(stage)])

@@ -17,7 +17,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let bar = progress(numerics::RUNS, "comparing number types");
-    let numerics = numerics::run_all(&Setup::both(), output.seed, &bar)?;
+    let numerics = numerics::run_all(&Setup::both()?, output.seed, &bar)?;
     bar.finish_and_clear();
     output.table(&numerics_table(&numerics))
 }

@@ -15,31 +15,31 @@ use crate::rig::RigError;
 #[derive(Debug, thiserror::Error)]
 pub enum CommissionError {
     /// Settings that the firmware refuses.
-    #[error("settings refused")]
+    #[error("settings refused: {0}")]
     Settings(#[from] SettingsError),
     /// The open-loop test.
-    #[error("motor constant")]
+    #[error("motor constant: {0}")]
     Motor(#[from] MotorConstantError),
     /// The response.
-    #[error("frequency response")]
+    #[error("frequency response: {0}")]
     Response(#[from] FrfError),
     /// The linear model.
-    #[error("linear model")]
+    #[error("linear model: {0}")]
     Plant(#[from] PlantError),
     /// The PID.
-    #[error("PID")]
+    #[error("PID: {0}")]
     Pid(#[from] DesignError),
     /// The runs at constant velocity.
-    #[error("friction at constant velocity")]
+    #[error("friction at constant velocity: {0}")]
     Friction(#[from] StaticFrictionError),
     /// Their model.
-    #[error("friction model")]
+    #[error("friction model: {0}")]
     FrictionFit(#[from] FrictionFitError),
     /// A run of the slow sine.
-    #[error("pre-sliding friction")]
+    #[error("pre-sliding friction: {0}")]
     Sine(#[from] RigError),
     /// The GMS model.
-    #[error("pre-sliding friction")]
+    #[error("pre-sliding friction: {0}")]
     Presliding(#[from] VirginCurveError),
     /// The GMS model does not predict what was measured.
     #[error(
@@ -51,6 +51,6 @@ pub enum CommissionError {
         percent: f64,
     },
     /// The verdict.
-    #[error("verdict")]
+    #[error("verdict: {0}")]
     Verify(#[from] VerifyError),
 }

@@ -68,7 +68,7 @@ pub enum DesignError {
     #[error(transparent)]
     Shaping(#[from] ShapingError),
     /// The loop that the gains close has no margins.
-    #[error("the loop that these gains close cannot be judged")]
+    #[error("the loop that these gains close cannot be judged: {0}")]
     Margins(#[from] MarginError),
     /// The margins asked for have another crossover.
     #[error(

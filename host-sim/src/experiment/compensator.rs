@@ -1,27 +1,25 @@
 //! What the control law is told about the simulated axes.
 //!
 //! *Matched*: the plant's own parameters, as in the thesis' simulation. *Virtual machine*: the truth is hidden, and the
-//! law has a set of parameters that is deliberately wrong by the factors below; it stands for an identification
-//! until one exists.
+//! law has the settings that a commissioning of the stage found, axis by axis, as in the thesis' experiment.
 
-use quadrant::friction::PerDirection;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::settings::{AxisSettings, FrictionSettings, StageSettings};
+use std::path::Path;
+
+use quadrant::friction::stribeck::StaticFriction;
+use quadrant::settings::{FrictionSettings, StageSettings};
 
 use crate::plant::{AxisTruth, StageTruth};
+use crate::settings_file::{SettingsFile, SettingsFileError};
 
-/// How the virtual machine's compensator errs: assumed over true.
-pub mod wrong {
-    /// Coulomb level.
-    pub const COULOMB: f64 = 1.08;
-    /// Breakaway level.
-    pub const BREAKAWAY: f64 = 0.92;
-    /// Stribeck velocity.
-    pub const STRIBECK_VELOCITY: f64 = 1.3;
-    /// Viscous friction.
-    pub const VISCOUS: f64 = 0.85;
-    /// Stiffness of all elements.
-    pub const STIFFNESS: f64 = 1.2;
+/// The stage as `quadrant commission` found it, on x, then y, then z; a test commissions it again and compares.
+const IDENTIFIED: &str = include_str!("../../data/identified-stage.toml");
+
+/// The settings that commissioning the simulated stage gave.
+///
+/// # Errors
+/// Settings that this version refuses.
+pub fn identified() -> Result<SettingsFile, SettingsFileError> {
+    SettingsFile::parse(IDENTIFIED, Path::new("host-sim/data/identified-stage.toml"))
 }
 
 /// Which knowledge the compensator has.
@@ -29,7 +27,7 @@ pub mod wrong {
 pub enum Knowledge {
     /// The plant's own parameters.
     Matched,
-    /// Deliberately wrong ones, and an imperfect plant.
+    /// Identified ones, and an imperfect plant.
     VirtualMachine,
 }
 
@@ -42,44 +40,6 @@ impl Knowledge {
         match self {
             Self::Matched => "matched",
             Self::VirtualMachine => "virtual machine",
-        }
-    }
-
-    /// The default stage's settings with this knowledge of the truth's friction.
-    fn settings(self) -> StageSettings {
-        let mut stage = StageSettings::default();
-        for (axis, truth) in stage.axes.iter_mut().zip(&StageTruth::real().axes) {
-            self.tell(axis, truth);
-        }
-        stage
-    }
-
-    fn tell(self, axis: &mut AxisSettings, truth: &AxisTruth) {
-        match self {
-            Self::Matched => {
-                axis.friction = FrictionSettings {
-                    sliding: truth.friction.map(|model| with_total_damping(model, truth)),
-                    gms: truth.gms.clone(),
-                };
-            }
-            Self::VirtualMachine => {
-                // The law's own four elements, one curve for both senses, and the errors above.
-                let mean = mean(&truth.friction);
-                axis.friction.sliding = PerDirection::both(StaticFriction {
-                    curve: StribeckCurve {
-                        coulomb_v: mean.curve.coulomb_v * wrong::COULOMB,
-                        breakaway_v: mean.curve.breakaway_v * wrong::BREAKAWAY,
-                        stribeck_velocity_mm_s: mean.curve.stribeck_velocity_mm_s
-                            * wrong::STRIBECK_VELOCITY,
-                        exponent: mean.curve.exponent,
-                    },
-                    viscous_v_s_per_mm: with_total_damping(&mean, truth).viscous_v_s_per_mm
-                        * wrong::VISCOUS,
-                });
-                for element in &mut axis.friction.gms.elements {
-                    element.stiffness_v_per_mm *= wrong::STIFFNESS;
-                }
-            }
         }
     }
 }
@@ -96,12 +56,18 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The ideal stage, and settings that hold its own parameters.
+    /// The ideal stage, and the default settings with its own friction.
     pub fn matched() -> Self {
-        let knowledge = Knowledge::Matched;
+        let mut stage = StageSettings::default();
+        for (axis, truth) in stage.axes.iter_mut().zip(&StageTruth::real().axes) {
+            axis.friction = FrictionSettings {
+                sliding: truth.friction.map(|model| with_total_damping(model, truth)),
+                gms: truth.gms.clone(),
+            };
+        }
         Self {
-            knowledge,
-            stage: knowledge.settings(),
+            knowledge: Knowledge::Matched,
+            stage,
             truth: StageTruth::ideal(),
         }
     }
@@ -115,12 +81,12 @@ impl Setup {
         }
     }
 
-    /// Both, the virtual machine with its own settings.
-    pub fn both() -> [Self; 2] {
-        [
-            Self::matched(),
-            Self::virtual_machine(Knowledge::VirtualMachine.settings()),
-        ]
+    /// Both, the virtual machine with the settings that its commissioning found.
+    ///
+    /// # Errors
+    /// Settings that this version refuses.
+    pub fn both() -> Result<[Self; 2], SettingsFileError> {
+        Ok([Self::matched(), Self::virtual_machine(identified()?.stage)])
     }
 }
 
@@ -130,18 +96,5 @@ fn with_total_damping(model: &StaticFriction, truth: &AxisTruth) -> StaticFricti
     StaticFriction {
         viscous_v_s_per_mm: model.viscous_v_s_per_mm + truth.damping_per_s / truth.gain_mm_per_v_s2,
         ..*model
-    }
-}
-
-fn mean(both: &PerDirection<StaticFriction>) -> StaticFriction {
-    let (positive, negative) = (&both.positive, &both.negative);
-    let middle = |pick: fn(&StaticFriction) -> f64| 0.5 * (pick(positive) + pick(negative));
-    StaticFriction {
-        curve: StribeckCurve {
-            coulomb_v: middle(|model| model.curve.coulomb_v),
-            breakaway_v: middle(|model| model.curve.breakaway_v),
-            ..positive.curve
-        },
-        viscous_v_s_per_mm: middle(|model| model.viscous_v_s_per_mm),
     }
 }

@@ -214,7 +214,7 @@ pub enum ReplayError {
     #[error(transparent)]
     Run(#[from] RunError),
     /// No PID has the margins.
-    #[error("no PID for the axis")]
+    #[error("no PID for the axis: {0}")]
     Design(#[from] ShapingError),
     /// The record's sample time is no multiple of the control period.
     #[error(

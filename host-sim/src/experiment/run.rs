@@ -31,7 +31,7 @@ impl AxisTrace {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RunError {
     /// The settings are refused.
-    #[error("settings refused")]
+    #[error("settings refused: {0}")]
     Settings(#[from] quadrant::settings::SettingsError),
     /// The stage switched off.
     #[error("fault {number} on {axis} at tick {tick}: {cause}; {remedy}", number = .0.code.number(),

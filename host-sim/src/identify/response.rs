@@ -28,7 +28,7 @@ pub struct FrequencyResponse {
 #[derive(Debug, thiserror::Error)]
 pub enum ResponseError {
     /// The file cannot be read or written, or is no CSV.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     Csv {
         /// The file.
         path: PathBuf,

@@ -6,7 +6,7 @@ use crate::experiment::circle::CircleOutcome;
 use crate::experiment::comparison::{
     AMPLITUDE_MM, Configuration, Controller, Outcome, VELOCITIES_MM_S, find, mean_change_percent,
 };
-use crate::experiment::compensator::{Knowledge, wrong};
+use crate::experiment::compensator::Knowledge;
 use crate::experiment::metrics::{GLITCH_WINDOW, Score};
 use crate::experiment::thesis::HEADLINES;
 use crate::report::{
@@ -230,17 +230,10 @@ fn metric_prose() -> String {
 }
 
 fn knowledge_prose() -> String {
-    format!(
-        "Matched: the compensator has the plant's own friction parameters, and the plant no imperfections but \
-         quantisation. Virtual machine: the plant adds encoder noise, offset and ripple, and the compensator has four \
-         elements, one curve for both senses, and parameters that are deliberately wrong by the factors Fc {}, Fs {}, \
-         Vs {}, viscous {}, stiffness {}.",
-        wrong::COULOMB,
-        wrong::BREAKAWAY,
-        wrong::STRIBECK_VELOCITY,
-        wrong::VISCOUS,
-        wrong::STIFFNESS
-    )
+    "Matched: the compensator has the plant's own friction parameters, and the plant no imperfections but quantisation. \
+     Virtual machine: the plant adds encoder noise, offset and ripple, and everything that the law knows of it, gains \
+     included, is what commissioning the simulated axes found, with the four GMS elements that the firmware has room for."
+        .to_owned()
 }
 
 fn error_figure(outcomes: &[Outcome], knowledge: Knowledge, velocity_mm_s: f64) -> Figure {

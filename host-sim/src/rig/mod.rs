@@ -88,7 +88,7 @@ pub trait Rig {
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RigError {
     /// The motion cannot be built.
-    #[error("{experiment}: the motion is refused")]
+    #[error("{experiment}: the motion is refused: {source}")]
     Motion {
         /// The experiment.
         experiment: String,

@@ -26,7 +26,7 @@ pub struct FrictionMap {
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The file cannot be read or written.
-    #[error("{}", path.display())]
+    #[error("{}: {source}", path.display())]
     Csv {
         /// The file.
         path: PathBuf,
