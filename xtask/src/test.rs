@@ -1,5 +1,6 @@
 //! `cargo xtask test`: every check there is, one after the other.
 
+use std::path::Path;
 use std::time::Instant;
 
 use anyhow::Result;
@@ -12,6 +13,9 @@ use crate::{command, count, emulate, fault_paths, prove, setup, twin};
 const COUNTED_TICKS: u32 = 250;
 /// Seconds of firmware time of the emulated runs.
 const EMULATED_SECONDS: f64 = 10.0;
+/// Settings that a commissioning left, and seconds that the firmware runs on them.
+const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
+const COMMISSIONED_SECONDS: f64 = 2.0;
 
 /// What was checked, and how it went.
 #[derive(Default)]
@@ -129,6 +133,13 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
         report.step(format!("emulation in lockstep, {target}"), || {
             emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, false)
         });
+        report.step(
+            format!("emulation on commissioned settings, {target}"),
+            || {
+                let job = twin::job_with(Path::new(COMMISSIONED))?;
+                emulate::run(toolchain, scalar, job, COMMISSIONED_SECONDS, false)
+            },
+        );
         report.step(format!("emulation paced by the timer, {target}"), || {
             emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, true)
         });
