@@ -20,7 +20,8 @@ fn quiet_rig(index: usize, seed: u64) -> (SimulatedRig, f64) {
     let plant = rig.settings().plant.unwrap();
     let quiet = quiet_settings(rig.settings(), &plant, rig.axis().rate_hz);
     rig.apply(&quiet).unwrap();
-    (rig, 2.0 * breakaway_v / quiet.feedback.pid.kp_v_per_mm)
+    let usual = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
+    (rig, usual.amplitude_mm)
 }
 
 fn sine(amplitude_mm: f64) -> VirginCurveSettings {
