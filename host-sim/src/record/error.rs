@@ -82,6 +82,14 @@ pub enum RecordError {
         /// Rows after the header.
         rows: usize,
     },
+    /// More than memory is meant to bear.
+    #[error("{}: more than {most_rows} rows of data; split the recording, or keep every tenth row of a slow one", path.display())]
+    TooManyRows {
+        /// The file.
+        path: PathBuf,
+        /// Rows that are allowed.
+        most_rows: usize,
+    },
     /// Time does not run as a clock does.
     #[error("{}, line {line}, column t_s: {value} s {fault}", path.display())]
     Time {
