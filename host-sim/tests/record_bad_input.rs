@@ -270,6 +270,38 @@ fn too_short_a_recording_is_refused_with_what_it_takes() {
 }
 
 #[test]
+fn a_position_that_does_not_follow_the_voltage_is_pointed_out() {
+    // The same numbers in another order.
+    let rows = GOOD.rows.len();
+    let shuffled = spoilt(HEADER, |row, cells| {
+        let other = &GOOD.rows[(row * 7919) % rows];
+        cells[2] = other.split(',').nth(2).unwrap().to_owned();
+    });
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("shuffled.csv"), shuffled).unwrap();
+    let (done, message) = identify(folder.path(), &["frf", "--record", "shuffled.csv"]);
+    assert!(
+        done && message.contains("hardly a line is coherent"),
+        "{message}"
+    );
+    let (done, message) = identify(folder.path(), &["plant", "--frf", "quadrant-out/frf.csv"]);
+    assert!(
+        !done && message.contains("have a coherence of 0.9"),
+        "{message}"
+    );
+}
+
+#[test]
+fn an_axis_that_moved_needs_its_reference() {
+    let moved = spoilt("t_s,note,position_mm,voltage_v,injection_v", |_, _| ());
+    let message = refusal(&moved, &[]);
+    assert!(
+        message.contains("give the column reference_mm"),
+        "{message}"
+    );
+}
+
+#[test]
 fn options_that_cannot_be_are_refused() {
     let good = spoilt(HEADER, |_, _| ());
     for (options, word) in [

@@ -227,6 +227,12 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         found.estimate.blocks,
         if found.closed_loop { "closed" } else { "open" }
     );
+    if 10 * coherent < points.len() {
+        eprintln!(
+            "note: hardly a line is coherent: the position does not follow the voltage. Are columns swapped, is the period right, is the \
+             excitation lost in noise or friction?"
+        );
+    }
     let command = format!(
         "quadrant identify frf{source}{} --seed {}",
         measurement.options(),

@@ -59,8 +59,8 @@ pub enum SavedError {
     },
     /// Not enough to average.
     #[error(
-        "{blocks} blocks of two periods of {period_s} s are steady, and a response takes at least 2: record longer, or \
-         state a shorter period"
+        "{blocks} blocks of two periods of {period_s} s are steady, and a response takes at least 2: record longer, state a \
+         shorter period, or give the column reference_mm of an axis that moved"
     )]
     TooShort {
         /// Blocks found.
