@@ -133,6 +133,8 @@ fn what_was_measured_is_identified_again_from_its_files() {
         }
         let again = succeed(at, &arguments);
         assert!(!again.contains("Simulated"), "{again}");
+        let page = format!("{step}.html");
+        assert!(at.join(step).join(&page).exists() && at.join("again").join(&page).exists());
         assert_same(
             &text(at, &format!("{step}/{table}")),
             &text(at, &format!("again/{table}")),
