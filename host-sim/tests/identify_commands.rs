@@ -93,3 +93,67 @@ fn what_cannot_be_measured_or_fitted_is_refused_with_a_remedy() {
     let column = fail(at, &["frf", "--record", "short.csv"]);
     assert!(column.contains("no column voltage_v"), "{column}");
 }
+
+/// The text of a file in the folder.
+fn text(folder: &Path, name: &str) -> String {
+    std::fs::read_to_string(folder.join(name)).unwrap()
+}
+
+#[test]
+fn what_was_measured_is_identified_again_from_its_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (step, measure, file, table) in [
+        (
+            "motor-constant",
+            "--moving-mass-kg=12",
+            "motor-constant-recording.csv",
+            "motor-constant.csv",
+        ),
+        (
+            "static-friction",
+            "--from-mm-s=0.4",
+            "friction-map.csv",
+            "static-friction.csv",
+        ),
+        (
+            "virgin-curve",
+            "--frequency-hz=0.2",
+            "virgin-curve-recording.csv",
+            "slip-blocks.csv",
+        ),
+    ] {
+        let measured = succeed(at, &[step, "--axis", "z", measure, "--out", step]);
+        assert!(measured.contains("Simulated, not measured"), "{measured}");
+        let record = format!("{step}/{file}");
+        let mass = "--moving-mass-kg=12";
+        let mut arguments = vec![step, "--record", &record, "--out", "again"];
+        if step == "motor-constant" {
+            arguments.push(mass);
+        }
+        let again = succeed(at, &arguments);
+        assert!(!again.contains("Simulated"), "{again}");
+        let page = format!("{step}.html");
+        assert!(at.join(step).join(&page).exists() && at.join("again").join(&page).exists());
+        assert_same(
+            &text(at, &format!("{step}/{table}")),
+            &text(at, &format!("again/{table}")),
+        );
+    }
+}
+
+/// Two tables whose numbers agree to a millionth: a recording's clock is read back with its digits' rounding.
+fn assert_same(one: &str, other: &str) {
+    let cells = |text: &str| -> Vec<String> {
+        let cells = text.split([',', '\n']);
+        cells.map(str::to_owned).collect()
+    };
+    let (one, other) = (cells(one), cells(other));
+    assert_eq!(one.len(), other.len());
+    for (a, b) in one.iter().zip(&other) {
+        match (a.parse::<f64>(), b.parse::<f64>()) {
+            (Ok(a), Ok(b)) => assert!((a - b).abs() <= 1e-6 * a.abs(), "{a} and {b}"),
+            _ => assert_eq!(a, b),
+        }
+    }
+}

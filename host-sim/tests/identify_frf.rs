@@ -93,6 +93,15 @@ fn every_waveform_shows_the_sliding_axis() {
 }
 
 #[test]
+fn every_axis_shows_its_response() {
+    for (seed, truth) in (1..).zip(&StageTruth::real().axes) {
+        let found = measured(&mut slow_rig(truth, seed), &gentle());
+        let lines = found.estimate.response.points.len();
+        assert_true(&found.estimate.response, &sliding(truth), lines - 4);
+    }
+}
+
+#[test]
 fn a_stiff_loop_leaves_no_wrong_line_with_a_high_coherence() {
     let truth = x_truth();
     for seed in 1..=5 {

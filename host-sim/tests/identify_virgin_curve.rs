@@ -20,7 +20,8 @@ fn quiet_rig(index: usize, seed: u64) -> (SimulatedRig, f64) {
     let plant = rig.settings().plant.unwrap();
     let quiet = quiet_settings(rig.settings(), &plant, rig.axis().rate_hz);
     rig.apply(&quiet).unwrap();
-    (rig, 2.0 * breakaway_v / quiet.feedback.pid.kp_v_per_mm)
+    let usual = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
+    (rig, usual.amplitude_mm)
 }
 
 fn sine(amplitude_mm: f64) -> VirginCurveSettings {
@@ -138,9 +139,8 @@ fn knots_can_be_given() {
     );
 }
 
-/// Friction of one level, as the library's own model makes it along a sine of 25 um.
-fn ideal(truth: &GmsParameters, level_v: f64) -> Recording {
-    let step_s = 1e-3;
+/// Friction of one level, as the library's own model makes it along a sine of 50 um.
+fn ideal(truth: &GmsParameters, level_v: f64, step_s: f64) -> Recording {
     let mut flat = StageTruth::real().axes[0].friction.positive.curve;
     flat.coulomb_v = level_v;
     flat.breakaway_v = level_v;
@@ -156,7 +156,7 @@ fn ideal(truth: &GmsParameters, level_v: f64) -> Recording {
         ..Recording::default()
     };
     let mut last_mm = 0.0;
-    for index in 0..50_000 {
+    for index in 0..(50.0 / step_s) as u32 {
         let position_mm = 0.05 * (TAU * 0.1 * f64::from(index) * step_s).sin();
         let moved = position_mm - last_mm;
         last_mm = position_mm;
@@ -179,7 +179,7 @@ fn ideal(truth: &GmsParameters, level_v: f64) -> Recording {
 fn every_branch_seen_from_its_reversal_is_the_virgin_curve_doubled() {
     let truth = &StageTruth::real().axes[0].gms;
     let level_v = 0.15;
-    let record = ideal(truth, level_v);
+    let record = ideal(truth, level_v, 1e-3);
     let found = identify(&record, None, &Knots::Automatic(4)).unwrap();
     assert!(found.curve.branches >= 7, "{}", found.curve.branches);
     let worst = found.curve.points.iter().fold(0.0, |worst, point| {
@@ -191,4 +191,23 @@ fn every_branch_seen_from_its_reversal_is_the_virgin_curve_doubled() {
     let finer = identify(&record, None, &Knots::Automatic(7)).unwrap();
     let [coarse, fine] = [&found, &finer].map(|found| found.prediction.relative_error);
     assert!(coarse < 0.015 && fine < 0.007, "{coarse}, {fine}");
+}
+
+#[test]
+fn a_recording_at_another_rate_gives_the_same_model() {
+    let truth = &StageTruth::real().axes[0].gms;
+    let [usual, fast, slow] = [1e-3, 1e-4, 2e-3].map(|step_s| {
+        let record = ideal(truth, 0.15, step_s);
+        identify(&record, None, &Knots::Automatic(3)).unwrap()
+    });
+    for other in [fast, slow] {
+        let worst = (1..=60).fold(0.0, |worst, step| {
+            let displacement_mm = 5e-4 * f64::from(step);
+            let [one, two] =
+                [&other, &usual].map(|found| found.gms.virgin_curve_v(displacement_mm, 0.15));
+            f64::max(worst, (one - two).abs() / 0.15)
+        });
+        let samples = other.prediction.position_mm.len();
+        assert!(worst < 0.02 && samples <= 50_000, "{worst}, {samples}");
+    }
 }

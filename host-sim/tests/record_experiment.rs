@@ -88,7 +88,7 @@ fn a_saturated_voltage_is_refused_with_its_share() {
     };
     let message = read(&table(clipped)).unwrap_err();
     assert!(
-        message.contains("% of the rows are at the amplifier's limit of 10 V"),
+        message.contains("% of the rows, from line 2 on, are at the amplifier's limit of 10 V"),
         "{message}"
     );
 }

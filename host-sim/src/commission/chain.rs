@@ -89,8 +89,6 @@ const STEPS: [(&str, f64); 6] = [
 const HOME_MM: f64 = 0.0;
 /// How often the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
-/// Amplitude of the slow sine over the tracking error at which the axis breaks away.
-const AMPLITUDE: f64 = 2.0;
 /// Largest relative error of the predicted hysteresis.
 const MOST_HYSTERESIS_ERROR: f64 = 0.10;
 
@@ -151,10 +149,7 @@ pub fn commission(
     let quiet = quiet_settings(&settings, &plant.plant, rate_hz);
     rig.apply(&quiet)?;
     let (_, breakaway_v) = friction.mean_levels_v();
-    let sine = VirginCurveSettings {
-        amplitude_mm: AMPLITUDE * breakaway_v / quiet.feedback.pid.kp_v_per_mm,
-        ..VirginCurveSettings::default()
-    };
+    let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
     let recording = virgin_curve::measure(rig, &sine, &mut |share| report(step, share))?;
     let sliding = friction.models();
     let knots = Knots::Automatic(FIRMWARE_ELEMENTS);

@@ -75,12 +75,24 @@ pub(super) enum Purpose {
 }
 
 /// Rows between two reports of progress.
-const PROGRESS_ROWS: u64 = 1 << 16;
+const PROGRESS_ROWS: usize = 1 << 16;
+
+/// Most rows of a record: more than an hour at 10 kHz. All columns of an experiment then take less than 3 GiB of memory.
+const MOST_ROWS: usize = 50_000_000;
 
 /// `progress` is told the share of the file that is read, 0 to 1.
 pub(super) fn read(
     path: &Path,
     purpose: Purpose,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Columns, RecordError> {
+    read_at_most(path, purpose, MOST_ROWS, progress)
+}
+
+fn read_at_most(
+    path: &Path,
+    purpose: Purpose,
+    most_rows: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Columns, RecordError> {
     let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
@@ -116,7 +128,7 @@ pub(super) fn read(
     }
 
     let mut row = ByteRecord::new();
-    let mut rows: u64 = 0;
+    let mut rows: usize = 0;
     while reader
         .read_byte_record(&mut row)
         .map_err(|error| refuse(path, error))?
@@ -127,6 +139,12 @@ pub(super) fn read(
             progress((read as f64 / bytes.max(1) as f64).min(1.0));
         }
         rows += 1;
+        if rows > most_rows {
+            return Err(RecordError::TooManyRows {
+                path: path.to_owned(),
+                most_rows,
+            });
+        }
         for (column, index) in [
             Some(&mut time),
             reference.as_mut(),
@@ -141,7 +159,6 @@ pub(super) fn read(
             column.push(value, line);
         }
     }
-    let rows = time.0.values.len();
     if rows < MIN_ROWS {
         return Err(RecordError::TooFewRows {
             path: path.to_owned(),
@@ -270,5 +287,30 @@ impl Header<'_> {
             }
             _ => "",
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_of_more_rows_than_memory_bears_is_refused_while_it_is_read() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("endless.csv");
+        // What comes after the last row that is allowed is not looked at.
+        let rows = "0,1\n".repeat(20) + "nonsense,\n";
+        std::fs::write(&path, format!("t_s,reference_mm\n{rows}")).unwrap();
+        let error = read_at_most(&path, Purpose::Motion, 19, &mut |_| {}).unwrap_err();
+        let message = error.to_string();
+        assert!(
+            message.contains("more than 19 rows") && message.contains("split"),
+            "{message}"
+        );
+        let error = read_at_most(&path, Purpose::Motion, 21, &mut |_| {}).unwrap_err();
+        assert!(
+            matches!(error, RecordError::Cell { line: 22, .. }),
+            "{error}"
+        );
     }
 }

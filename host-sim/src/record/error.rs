@@ -82,6 +82,14 @@ pub enum RecordError {
         /// Rows after the header.
         rows: usize,
     },
+    /// More than memory is meant to bear.
+    #[error("{}: more than {most_rows} rows of data; split the recording, or keep every tenth row of a slow one", path.display())]
+    TooManyRows {
+        /// The file.
+        path: PathBuf,
+        /// Rows that are allowed.
+        most_rows: usize,
+    },
     /// Time does not run as a clock does.
     #[error("{}, line {line}, column t_s: {value} s {fault}", path.display())]
     Time {
@@ -135,6 +143,8 @@ pub enum UselessFault {
         percent: f64,
         /// The limit, V.
         limit_v: f64,
+        /// Line of the first of them.
+        line: u64,
     },
     /// It is no voltage.
     NotVoltage {
@@ -151,9 +161,13 @@ impl fmt::Display for UselessFault {
                 "it is {} in every row; an experiment needs a signal that moves",
                 Brief(*value)
             ),
-            Self::Saturated { percent, limit_v } => write!(
+            Self::Saturated {
+                percent,
+                limit_v,
+                line,
+            } => write!(
                 f,
-                "{} % of the rows are at the amplifier's limit of {} V, where voltage and motion have nothing to do with each other; at \
+                "{} % of the rows, from line {line} on, are at the amplifier's limit of {} V, where voltage and motion have nothing to do with each other; at \
                  most 1 % may be: lower the amplitude",
                 Brief(*percent),
                 Brief(*limit_v)

@@ -2,8 +2,8 @@
 
 use std::path::Path;
 
-use super::columns::{self, Purpose};
-use super::{RecordError, UselessFault, time};
+use super::columns::{self, Columns, Purpose};
+use super::{RecordError, UselessFault, plausible, time};
 use crate::rig::Recording;
 
 /// Largest voltage of an amplifier's input, V.
@@ -34,13 +34,16 @@ impl Recording {
         let path = path.as_ref();
         let columns = columns::read(path, Purpose::Experiment, progress)?;
         let sample_time_s = time::check(path, &columns.time)?;
+        check(path, &columns)?;
+        plausible::check_experiment(path, &columns)?;
+        // A long recording need not hold its time as well.
+        drop(columns.time);
         let position_mm = columns
             .position
             .map_or_else(Vec::new, columns::Column::into_mm);
         let voltage_v = columns
             .voltage
             .map_or_else(Vec::new, |column| column.values);
-        check(path, &position_mm, &voltage_v)?;
         let rows = position_mm.len();
         Ok(Self {
             sample_time_s,
@@ -56,7 +59,7 @@ impl Recording {
     }
 }
 
-fn check(path: &Path, position_mm: &[f64], voltage_v: &[f64]) -> Result<(), RecordError> {
+fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
     let refuse = |column, fault| {
         Err(RecordError::Useless {
             path: path.to_owned(),
@@ -64,30 +67,43 @@ fn check(path: &Path, position_mm: &[f64], voltage_v: &[f64]) -> Result<(), Reco
             fault,
         })
     };
-    for (column, values) in [("position", position_mm), ("voltage_v", voltage_v)] {
-        if let Some(first) = values.first()
+    for (name, column) in [
+        ("position", &columns.position),
+        ("voltage_v", &columns.voltage),
+    ] {
+        if let Some(values) = column.as_ref().map(|column| &column.values)
+            && let Some(first) = values.first()
             && values.iter().all(|value| value == first)
         {
-            return refuse(column, UselessFault::Constant { value: *first });
+            return refuse(name, UselessFault::Constant { value: *first });
         }
     }
-    let largest = voltage_v
+    let Some(voltage) = &columns.voltage else {
+        return Ok(());
+    };
+    let largest = voltage
+        .values
         .iter()
         .fold(0.0_f64, |most, value| most.max(value.abs()));
     if largest > MOST_VOLTS {
         return refuse("voltage_v", UselessFault::NotVoltage { largest });
     }
-    let saturated = voltage_v
+    let at_limit = |value: &f64| value.abs() >= 0.9999 * LIMIT_V;
+    let saturated = voltage
+        .values
         .iter()
-        .filter(|value| value.abs() >= 0.9999 * LIMIT_V)
+        .filter(|value| at_limit(value))
         .count();
-    let share = saturated as f64 / voltage_v.len() as f64;
-    if share > MOST_SATURATED {
-        let fault = UselessFault::Saturated {
-            percent: 100.0 * share,
-            limit_v: LIMIT_V,
-        };
-        return refuse("voltage_v", fault);
+    let share = saturated as f64 / voltage.values.len() as f64;
+    match voltage.values.iter().position(at_limit) {
+        Some(first) if share > MOST_SATURATED => refuse(
+            "voltage_v",
+            UselessFault::Saturated {
+                percent: 100.0 * share,
+                limit_v: LIMIT_V,
+                line: voltage.line(first),
+            },
+        ),
+        _ => Ok(()),
     }
-    Ok(())
 }

@@ -55,20 +55,42 @@ pub(super) fn check(
             },
         );
     }
-    if let Some(position) = &columns.position {
-        let travel_mm = travel_mm(position);
-        let ratio = travel_mm / motion.travel_mm;
-        if !(1.0 / MAX_DISAGREEMENT..=MAX_DISAGREEMENT).contains(&ratio) {
-            return refuse(
-                position,
-                UnitFault::Disagrees {
-                    travel_mm,
-                    reference_mm: motion.travel_mm,
-                },
-            );
-        }
+    match &columns.position {
+        Some(position) => agreement(path, position, motion.travel_mm),
+        None => Ok(()),
     }
-    Ok(())
+}
+
+/// Whether a measured position moves like a reference that moves by `reference_mm`, within what a controller can be to blame
+/// for.
+fn agreement(path: &Path, position: &Column, reference_mm: f64) -> Result<(), RecordError> {
+    let travel_mm = travel_mm(position);
+    let ratio = travel_mm / reference_mm;
+    if (1.0 / MAX_DISAGREEMENT..=MAX_DISAGREEMENT).contains(&ratio) {
+        return Ok(());
+    }
+    Err(RecordError::Unit {
+        path: path.to_owned(),
+        column: position.name.to_owned(),
+        fault: UnitFault::Disagrees {
+            travel_mm,
+            reference_mm,
+        },
+    })
+}
+
+/// Travel of a reference from which on an experiment is a motion that the axis follows, mm: a smaller one it may not have
+/// followed, which friction experiments are about.
+const FOLLOWED_MM: f64 = 1.0;
+
+/// The same for an experiment, whose reference may stand still.
+pub(super) fn check_experiment(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    match (&columns.reference, &columns.position) {
+        (Some(reference), Some(position)) if travel_mm(reference) > FOLLOWED_MM => {
+            agreement(path, position, travel_mm(reference))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// What a reference asks of an axis.

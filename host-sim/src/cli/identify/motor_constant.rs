@@ -6,10 +6,10 @@ use clap::Args;
 use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantSettings, evaluate, measure,
 };
-use quadrant_sim::presentation::motor_constant_table;
+use quadrant_sim::presentation::{motor_constant_section, motor_constant_table, provenance};
 
-use super::recorded;
 use super::rig::Axis;
+use super::{page, recorded, simulated};
 use crate::cli::output::{Output, share};
 
 /// Options of `quadrant identify motor-constant`.
@@ -63,12 +63,34 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         dwell_s: arguments.dwell_s,
         ..MotorConstantSettings::default()
     };
-    let motor = match (&arguments.record, arguments.axis) {
-        (Some(path), _) => evaluate(recorded::read(path)?, &settings, arguments.resolution_mm)?,
-        (None, Some(axis)) => measured(axis, &settings, output)?,
+    let (motor, title, source) = match (&arguments.record, arguments.axis) {
+        (Some(path), _) => {
+            let found = evaluate(recorded::read(path)?, &settings, arguments.resolution_mm)?;
+            let paths = std::slice::from_ref(path);
+            let resolution = format!(" --resolution-mm {}", arguments.resolution_mm);
+            let source = recorded::option(paths) + &resolution;
+            (found, recorded::title(paths), source)
+        }
+        (None, Some(axis)) => {
+            let source = format!(" --axis {}", axis.name());
+            (measured(axis, &settings, output)?, simulated(axis), source)
+        }
         (None, None) => return Ok(()),
     };
-    output.table(&motor_constant_table(&motor, arguments.moving_mass_kg))
+    let mass = arguments.moving_mass_kg;
+    output.table(&motor_constant_table(&motor, mass))?;
+    let mass_option = mass.map_or_else(String::new, |mass| format!(" --moving-mass-kg {mass}"));
+    let command = format!(
+        "quadrant identify motor-constant{source} --dwell-s {}{mass_option} --seed {}",
+        arguments.dwell_s, output.seed
+    );
+    let page = page(
+        "Motor constant",
+        &title,
+        vec![motor_constant_section(&motor, mass)],
+        provenance(&command, output.seed),
+    );
+    output.page(&page, "motor-constant.html")
 }
 
 /// The test on an axis of the simulated stage, whose recording is saved.

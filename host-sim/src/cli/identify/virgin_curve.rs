@@ -2,10 +2,13 @@
 
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
+use quadrant::settings::AxisSettings;
+use quadrant_sim::commission::bootstrap::quiet_settings;
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveSettings, identify, measure};
 use quadrant_sim::presentation::{gms_table, presliding_section, provenance};
-use quadrant_sim::rig::Recording;
+use quadrant_sim::rig::{Recording, Rig};
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::rig::Axis;
@@ -21,13 +24,14 @@ pub(in crate::cli) struct Arguments {
     /// A recorded slow sine instead: a CSV file with t_s, position_mm (or position_m), voltage_v.
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Settings with the static friction of the axis; without them the record's own plateau stands for it.
+    /// Settings with the static friction of the axis and the linear model that its quiet controller is made for. Without them the
+    /// record's own plateau stands for the friction, and the simulated axis is measured under its default settings.
     #[arg(long, value_name = "FILE", requires = "axis")]
     settings: Option<PathBuf>,
     /// Amplitude of the sine, um: it must outrun the controller's error at breakaway; too small a one is refused with one that
-    /// does.
-    #[arg(long, default_value_t = 10.0, value_name = "UM")]
-    amplitude_um: f64,
+    /// does. Without it twice that error.
+    #[arg(long, value_name = "UM")]
+    amplitude_um: Option<f64>,
     /// Its frequency, Hz.
     #[arg(long, default_value_t = 0.1, value_name = "HZ")]
     frequency_hz: f64,
@@ -46,13 +50,7 @@ pub(in crate::cli) struct Arguments {
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
-    let known = match (&arguments.settings, arguments.axis) {
-        (Some(path), Some(axis)) => {
-            let stage = SettingsFile::read(path)?.stage;
-            Some(stage.axes[axis.index()].friction.sliding)
-        }
-        _ => None,
-    };
+    let settings = arguments.axis_settings()?;
     let (recording, title, source) = match (&arguments.record, arguments.axis) {
         (Some(path), _) => {
             let paths = std::slice::from_ref(path);
@@ -60,17 +58,19 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             (recorded::read(path)?, title, option)
         }
         (None, Some(axis)) => {
+            let (recording, sine) = measured(arguments, axis, settings.as_ref())?;
             let source = format!(
                 " --axis {} --amplitude-um {} --frequency-hz {} --cycles {}",
                 axis.name(),
-                arguments.amplitude_um,
-                arguments.frequency_hz,
-                arguments.cycles
+                1e3 * sine.amplitude_mm,
+                sine.frequency_hz,
+                sine.cycles
             );
-            (measured(arguments, axis)?, simulated(axis), source)
+            (recording, simulated(axis), source)
         }
         (None, None) => return Ok(()),
     };
+    let known = settings.map(|settings| settings.friction.sliding);
     let knots = if arguments.knots_um.is_empty() {
         Knots::Automatic(arguments.blocks)
     } else {
@@ -99,25 +99,51 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     output.page(&page, "virgin-curve.html")
 }
 
-/// The slow sine on an axis of the simulated stage, whose recording is saved.
-fn measured(arguments: &Arguments, axis: Axis) -> anyhow::Result<Recording> {
+/// The slow sine on an axis of the simulated stage under a quiet controller, whose recording is saved.
+fn measured(
+    arguments: &Arguments,
+    axis: Axis,
+    settings: Option<&AxisSettings>,
+) -> anyhow::Result<(Recording, VirginCurveSettings)> {
     let output = &arguments.output;
-    let settings = VirginCurveSettings {
-        amplitude_mm: 1e-3 * arguments.amplitude_um,
+    let mut rig = axis.rig(output.seed);
+    let base = settings.unwrap_or(rig.settings()).clone();
+    let plant = base.plant.context(
+        "the settings hold no linear model to make a quiet controller for; run `quadrant commission` first",
+    )?;
+    let quiet = quiet_settings(&base, &plant, rig.axis().rate_hz);
+    rig.apply(&quiet)?;
+    let usual = VirginCurveSettings::outrunning(
+        quiet.feedback.pid.kp_v_per_mm,
+        base.friction.sliding.positive.curve.breakaway_v,
+    );
+    let sine = VirginCurveSettings {
+        amplitude_mm: arguments
+            .amplitude_um
+            .map_or(usual.amplitude_mm, |um| 1e-3 * um),
         frequency_hz: arguments.frequency_hz,
         cycles: arguments.cycles,
     };
     let bar = share("moving slowly to and fro");
-    let recording = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
+    let recording = measure(&mut rig, &sine, &mut |done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();
     println!("Simulated, not measured.");
     recording.write_csv(output.file("virgin-curve-recording.csv")?)?;
-    Ok(recording)
+    Ok((recording, sine))
 }
 
 impl Arguments {
+    /// The settings of the axis, if a file is given.
+    fn axis_settings(&self) -> anyhow::Result<Option<AxisSettings>> {
+        let (Some(path), Some(axis)) = (&self.settings, self.axis) else {
+            return Ok(None);
+        };
+        let stage = SettingsFile::read(path)?.stage;
+        Ok(Some(stage.axes[axis.index()].clone()))
+    }
+
     /// The options that repeat the identification.
     fn options(&self) -> String {
         let mut options = if self.knots_um.is_empty() {

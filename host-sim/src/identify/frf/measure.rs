@@ -27,7 +27,7 @@ impl Default for FrfSettings {
         Self {
             excitation: Excitation {
                 waveform: Waveform::Multisine,
-                rms_v: 0.1,
+                rms_v: 0.08,
                 band_hz: (4.0, 400.0),
                 rise_hz: 200.0,
                 period_s: 0.5,

@@ -18,7 +18,7 @@ pub struct SavedSettings {
     pub period_s: f64,
     /// Lowest and highest frequency looked at, Hz.
     pub band_hz: (f64, f64),
-    /// Time after the axis has become steady before the first block, s; zero or more.
+    /// Time after the axis has become steady before the first block, s; 0 to 1000.
     pub settling_s: f64,
 }
 
@@ -59,8 +59,8 @@ pub enum SavedError {
     },
     /// Not enough to average.
     #[error(
-        "{blocks} blocks of two periods of {period_s} s are steady, and a response takes at least 2: record longer, or \
-         state a shorter period"
+        "{blocks} blocks of two periods of {period_s} s are steady, and a response takes at least 2: record longer, state a \
+         shorter period, or give the column reference_mm of an axis that moved"
     )]
     TooShort {
         /// Blocks found.
@@ -175,8 +175,8 @@ fn check(recordings: &[Recording], settings: &SavedSettings) -> Result<f64, Save
         (
             "settling time",
             settings.settling_s,
-            settings.settling_s >= 0.0,
-            "it must be zero or more, in s",
+            (0.0..=1e3).contains(&settings.settling_s),
+            "it must be 0 to 1000 s",
         ),
     ];
     for (field, value, holds, expected) in checks {

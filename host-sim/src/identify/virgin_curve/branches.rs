@@ -30,6 +30,9 @@ pub(super) struct Smooth {
 
 /// Time over which signals are averaged, s; twice, so that the average is triangular and centred.
 const SMOOTHING_S: f64 = 0.03;
+/// Time between the samples that are kept of them, s: much shorter than the smoothing, and every sample costs the refinement
+/// time.
+const STEP_S: f64 = 1e-3;
 /// Points of the averaged curve.
 const POINTS: usize = 120;
 /// Share of the whole travel by which the axis must come back to have turned round.
@@ -38,9 +41,13 @@ const TURNED: f64 = 0.2;
 impl Smooth {
     pub(super) fn of(recording: &Recording) -> Self {
         let half = ((0.5 * SMOOTHING_S / recording.sample_time_s).round() as usize).max(1);
-        let smooth = |signal: &[f64]| centred_mean(&centred_mean(signal, half), half);
+        let step = ((STEP_S / recording.sample_time_s).round() as usize).max(1);
+        let smooth = |signal: &[f64]| -> Vec<f64> {
+            let smooth = centred_mean(&centred_mean(signal, half), half);
+            smooth.into_iter().step_by(step).collect()
+        };
         Self {
-            sample_time_s: recording.sample_time_s,
+            sample_time_s: recording.sample_time_s * step as f64,
             position_mm: smooth(&recording.position_mm),
             voltage_v: smooth(&recording.voltage_v),
         }

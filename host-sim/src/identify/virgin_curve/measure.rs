@@ -27,6 +27,20 @@ impl Default for VirginCurveSettings {
     }
 }
 
+/// Amplitude over the tracking error at which the axis breaks away.
+const AMPLITUDE: f64 = 2.0;
+
+impl VirginCurveSettings {
+    /// The usual sine with an amplitude that outruns a controller of proportional gain `kp_v_per_mm` on an axis that breaks
+    /// away at `breakaway_v`.
+    pub fn outrunning(kp_v_per_mm: f64, breakaway_v: f64) -> Self {
+        Self {
+            amplitude_mm: AMPLITUDE * breakaway_v / kp_v_per_mm,
+            ..Self::default()
+        }
+    }
+}
+
 /// Rate of the recording, Hz.
 const RATE_HZ: f64 = 1000.0;
 
