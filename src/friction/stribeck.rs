@@ -34,7 +34,7 @@ impl StribeckCurve {
 
     /// The velocity in mm/s from which s(v) is Fc to within 0.02 % of Fs.
     pub fn flat_velocity_mm_s(&self) -> f64 {
-        let drop = 2e-4 * self.breakaway_v / (self.breakaway_v - self.coulomb_v);
+        let drop = 2e-4 * self.breakaway_v / libm::fabs(self.breakaway_v - self.coulomb_v);
         // A curve without a drop still needs a table with an end.
         let depth = if drop < 1.0 { -libm::log(drop) } else { 1.0 };
         self.stribeck_velocity_mm_s * libm::pow(depth, 1.0 / self.exponent)

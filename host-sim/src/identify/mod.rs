@@ -17,6 +17,7 @@ pub mod at_rest;
 pub mod excitation;
 pub mod fit;
 pub mod frf;
+pub mod motion;
 pub mod motor_constant;
 pub mod plant;
 pub mod response;

@@ -2,6 +2,7 @@
 
 mod frf;
 mod friction;
+mod motion;
 mod motor_constant;
 mod plant;
 mod recorded;
@@ -20,6 +21,8 @@ pub(super) enum Command {
     Frf(frf::Arguments),
     /// Fit the linear model A exp(-s Td) / (s² + B s + C) to a response (thesis, Table 3.1).
     Plant(plant::Arguments),
+    /// Find inertia and friction in an ordinary motion record, without any special excitation.
+    Motion(motion::Arguments),
     /// Measure the acceleration per volt in open loop (thesis, Fig 3.7).
     MotorConstant(motor_constant::Arguments),
     /// Revise the linear model for explicit friction, excited as the axis was (thesis, Table 3.4, Figs 3.16-3.21).
@@ -36,6 +39,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
     match command {
         Command::Frf(arguments) => frf::run(arguments),
         Command::Plant(arguments) => plant::run(arguments),
+        Command::Motion(arguments) => motion::run(arguments),
         Command::MotorConstant(arguments) => motor_constant::run(arguments),
         Command::Revise(arguments) => revise::run(arguments),
         Command::StaticFriction(arguments) => friction::run(arguments),

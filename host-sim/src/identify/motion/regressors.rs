@@ -1,0 +1,231 @@
+//! The columns that voltage is explained by.
+
+use nalgebra::{DMatrix, DVector};
+
+use super::model::Structure;
+use super::signals::{MotionFitSettings, Signals};
+
+/// The parts of a model that are linear, each the coefficient of a column.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Term {
+    /// M', V s²/mm.
+    Inertia,
+    /// Viscous friction, both ways or one, V s/mm.
+    Viscous(Way),
+    /// Coulomb friction as a sign, V.
+    Coulomb,
+    /// An element that slips at this knot, V.
+    Element(usize),
+    /// Fs - Fc, V.
+    Drop,
+    /// Offset, V.
+    Offset,
+}
+
+/// A sense of motion.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Way {
+    /// Both alike.
+    Both,
+    /// To larger positions.
+    Positive,
+    /// To smaller positions.
+    Negative,
+}
+
+impl Term {
+    /// Whether a negative coefficient would be no friction.
+    fn is_level(self) -> bool {
+        matches!(self, Self::Element(_))
+    }
+}
+
+/// The regression of one record: its columns but for those that depend on the Stribeck velocity.
+#[derive(Clone, Debug)]
+pub(super) struct Regression<'a> {
+    signals: &'a Signals,
+    settings: &'a MotionFitSettings,
+    pub(super) terms: Vec<Term>,
+    /// Decimated columns; that of `Drop` is filled in by the velocity.
+    columns: DMatrix<f64>,
+    /// Hysteresis without weights, at the full rate: what the drop acts on.
+    hysteresis: Vec<f64>,
+    /// The voltage, smoothed, at the full rate.
+    voltage_v: Vec<f64>,
+    /// Velocity at the decimated samples, mm/s.
+    pub(super) velocity_mm_s: Vec<f64>,
+}
+
+impl<'a> Regression<'a> {
+    pub(super) fn new(
+        signals: &'a Signals,
+        settings: &'a MotionFitSettings,
+        structure: Structure,
+    ) -> Self {
+        let velocity = &signals.velocity_mm_s;
+        let one_way = |sign: f64| -> Vec<f64> {
+            velocity
+                .iter()
+                .map(|v| if v * sign > 0.0 { *v } else { 0.0 })
+                .collect()
+        };
+        let mut terms = vec![Term::Inertia];
+        let mut columns = vec![signals.acceleration_mm_s2.clone()];
+        if structure.directed_viscous {
+            terms.extend([Term::Viscous(Way::Positive), Term::Viscous(Way::Negative)]);
+            columns.extend([one_way(1.0), one_way(-1.0)]);
+        } else {
+            terms.push(Term::Viscous(Way::Both));
+            columns.push(velocity.clone());
+        }
+        let hysteresis = if structure.presliding {
+            let elements: Vec<Vec<f64>> = settings
+                .knots_mm
+                .iter()
+                .map(|&knot| maxwell_slip(&signals.position_mm, knot))
+                .collect();
+            let share = 1.0 / elements.len() as f64;
+            let mean = (0..velocity.len())
+                .map(|k| share * elements.iter().map(|element| element[k]).sum::<f64>())
+                .collect();
+            terms.extend((0..elements.len()).map(Term::Element));
+            columns.extend(elements);
+            mean
+        } else {
+            let sign: Vec<f64> = velocity
+                .iter()
+                .map(|v| if *v == 0.0 { 0.0 } else { v.signum() })
+                .collect();
+            terms.push(Term::Coulomb);
+            columns.push(sign.clone());
+            sign
+        };
+        terms.push(Term::Offset);
+        columns.push(vec![1.0; velocity.len()]);
+        if structure.stribeck {
+            terms.push(Term::Drop);
+            columns.push(vec![0.0; velocity.len()]);
+        }
+        let columns: Vec<DVector<f64>> = columns
+            .iter()
+            .map(|column| DVector::from_vec(signals.decimated(column, settings)))
+            .collect();
+        Self {
+            signals,
+            settings,
+            terms,
+            columns: DMatrix::from_columns(&columns),
+            hysteresis,
+            voltage_v: signals.smoothed(&signals.voltage_v, settings),
+            velocity_mm_s: signals.decimated(velocity, settings),
+        }
+    }
+
+    /// The dead time, if it is given.
+    pub(super) fn known_dead_time_s(&self) -> Option<f64> {
+        self.settings.dead_time_s
+    }
+
+    /// The part of the dead time that is the voltage's hold, s.
+    pub(super) fn hold_s(&self) -> f64 {
+        self.signals.hold_s
+    }
+
+    /// Rows.
+    pub(super) fn rows(&self) -> usize {
+        self.columns.nrows()
+    }
+
+    /// The columns at a Stribeck velocity.
+    pub(super) fn columns_at(&self, stribeck_velocity_mm_s: f64) -> DMatrix<f64> {
+        let mut columns = self.columns.clone();
+        if let Some(index) = self.terms.iter().position(|term| *term == Term::Drop) {
+            let drop: Vec<f64> = self
+                .hysteresis
+                .iter()
+                .zip(&self.signals.velocity_mm_s)
+                .map(|(h, v)| h * (-v.abs() / stribeck_velocity_mm_s).exp())
+                .collect();
+            let drop = self.signals.decimated(&drop, self.settings);
+            columns.set_column(index, &DVector::from_vec(drop));
+        }
+        columns
+    }
+
+    /// The voltage that was commanded a dead time before each row.
+    pub(super) fn voltage_at(&self, dead_time_s: f64) -> DVector<f64> {
+        let late = dead_time_s / self.signals.sample_time_s;
+        let last = self.voltage_v.len() - 1;
+        let decimation = self.settings.decimation(self.signals.sample_time_s);
+        DVector::from_fn(self.rows(), |row, _| {
+            let place = ((row * decimation) as f64 - late).max(0.0);
+            let below = (place as usize).min(last);
+            let share = place - below as f64;
+            let above = (below + 1).min(last);
+            (1.0 - share) * self.voltage_v[below] + share * self.voltage_v[above]
+        })
+    }
+}
+
+/// The force of an element of unit level that slips at `knot_mm`, driven by a position, -1 to 1.
+fn maxwell_slip(position_mm: &[f64], knot_mm: f64) -> Vec<f64> {
+    let mut stretch = 0.0;
+    let mut previous = position_mm.first().copied().unwrap_or(0.0);
+    position_mm
+        .iter()
+        .map(|&position| {
+            stretch = f64::clamp(stretch + position - previous, -knot_mm, knot_mm);
+            previous = position;
+            stretch / knot_mm
+        })
+        .collect()
+}
+
+/// Least squares over some rows, with no negative level: a term that wants one is left out.
+pub(super) fn solve(
+    terms: &[Term],
+    columns: &DMatrix<f64>,
+    voltage_v: &DVector<f64>,
+    rows: &[usize],
+) -> Option<DVector<f64>> {
+    let mut kept: Vec<usize> = (0..terms.len()).collect();
+    let targets = voltage_v.select_rows(rows);
+    loop {
+        let chosen = columns.select_columns(&kept).select_rows(rows);
+        // Columns of one size, so that the cut-off of the singular values means dependence and not units.
+        let sizes: Vec<f64> = chosen.column_iter().map(|column| column.norm()).collect();
+        if sizes.contains(&0.0) {
+            return None;
+        }
+        let mut scaled = chosen;
+        for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
+            column /= *size;
+        }
+        let decomposition = scaled.svd(true, true);
+        let smallest = decomposition.singular_values.min();
+        if smallest < DEPENDENT * decomposition.singular_values.max() {
+            return None;
+        }
+        let solution = decomposition.solve(&targets, 0.0).ok()?;
+        let worst = kept
+            .iter()
+            .enumerate()
+            .filter(|&(place, &term)| terms[term].is_level() && solution[place] < 0.0)
+            .min_by(|a, b| solution[a.0].total_cmp(&solution[b.0]));
+        match worst {
+            Some((place, _)) => {
+                kept.remove(place);
+            }
+            None => {
+                let mut coefficients = DVector::zeros(terms.len());
+                for (place, &term) in kept.iter().enumerate() {
+                    coefficients[term] = solution[place] / sizes[place];
+                }
+                return Some(coefficients);
+            }
+        }
+    }
+}
+
+/// Smallest over largest singular value of the scaled columns below which some cannot be told apart.
+const DEPENDENT: f64 = 1e-9;

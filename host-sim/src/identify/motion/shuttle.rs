@@ -1,0 +1,69 @@
+//! An ordinary motion: moves to and fro at several velocities, and a brisk sine.
+
+use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+
+use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+
+/// Velocities of the moves, mm/s: each there and back.
+const VELOCITIES_MM_S: [f64; 6] = [5.0, 80.0, 10.0, 40.0, 20.0, 120.0];
+/// Length of each move, mm; slow ones are shorter by time.
+const LENGTH_MM: f64 = 60.0;
+/// Longest time of a move, s.
+const LONGEST_S: f64 = 2.0;
+/// Acceleration and jerk of the moves.
+const ACCELERATION_MM_S2: f64 = 1500.0;
+const JERK_MM_S3: f64 = 5e4;
+/// The sine: its inertia is felt while it slides, away from the reversals.
+const SINE_AMPLITUDE_MM: f64 = 20.0;
+const SINE_VELOCITY_MM_S: f64 = 180.0;
+const SINE_CYCLES: f64 = 8.0;
+const SINE_LEAD_S: f64 = 0.5;
+
+/// Moves the axis under the settings in force, `rounds` times, and joins the recordings.
+///
+/// # Errors
+/// A move that is stopped.
+pub fn shuttle(
+    rig: &mut dyn Rig,
+    rounds: usize,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Recording, RigError> {
+    let there_and_back = VELOCITIES_MM_S.into_iter().flat_map(|velocity_mm_s| {
+        let distance_mm = LENGTH_MM.min(velocity_mm_s * LONGEST_S);
+        [distance_mm, -distance_mm].map(|distance_mm| {
+            MotionSettings::PointToPoint(PointToPointSettings {
+                distance_mm,
+                max_velocity_mm_s: velocity_mm_s,
+                max_acceleration_mm_s2: ACCELERATION_MM_S2,
+                max_jerk_mm_s3: JERK_MM_S3,
+            })
+        })
+    });
+    let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(
+        SINE_AMPLITUDE_MM,
+        SINE_VELOCITY_MM_S,
+        SINE_CYCLES,
+        SINE_LEAD_S,
+    ));
+    let round: Vec<MotionSettings> = there_and_back.chain([sine]).collect();
+    let motions: Vec<MotionSettings> = (0..rounds).flat_map(|_| round.clone()).collect();
+    let mut joined = Recording::default();
+    for (index, motion) in motions.iter().enumerate() {
+        let experiment = Experiment {
+            name: "moving to and fro".to_owned(),
+            drive: Drive::ClosedLoop(*motion),
+            injection_v: Vec::new(),
+            decimation: 1,
+            time_limit_s: 60.0,
+        };
+        let recording = rig.perform(&experiment, &mut |share| {
+            progress((index as f64 + share) / motions.len() as f64);
+        })?;
+        joined.sample_time_s = recording.sample_time_s;
+        joined.reference_mm.extend(recording.reference_mm);
+        joined.position_mm.extend(recording.position_mm);
+        joined.voltage_v.extend(recording.voltage_v);
+        joined.injection_v.extend(recording.injection_v);
+    }
+    Ok(joined)
+}
