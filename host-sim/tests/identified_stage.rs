@@ -1,7 +1,14 @@
-//! The settings of the virtual machine are what commissioning its axes gives.
+//! The settings of the virtual machine are what commissioning its axes gives, and as good as the truth.
 
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::friction::gms::GmsParameters;
+use quadrant::friction::stribeck::StaticFriction;
+use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, commission};
-use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::experiment::comparison::{Configuration, Controller, run_configuration};
+use quadrant_sim::experiment::compensator::{Setup, identified};
+use quadrant_sim::experiment::metrics::Score;
+use quadrant_sim::identify::virgin_curve::{Knots, identify};
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::rig::SimulatedRig;
 use quadrant_sim::settings_file::SettingsFile;
@@ -10,7 +17,7 @@ use rayon::prelude::*;
 #[test]
 fn commissioning_the_axes_again_gives_the_committed_settings() {
     let committed = identified().unwrap();
-    let mut again = SettingsFile::new(quadrant::settings::StageSettings::default());
+    let mut again = SettingsFile::new(StageSettings::default());
     again
         .stage
         .axes
@@ -25,4 +32,80 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
                 .settings;
         });
     assert_eq!(again.stage, committed.stage);
+}
+
+/// N-PID with the combined feedforward on the x axis of the virtual machine: largest and RMS tracking error, and glitch, mean over
+/// three velocities and three seeds, mm.
+fn performance(stage: &StageSettings) -> [f64; 3] {
+    let best = Configuration {
+        controller: Controller::NPid,
+        feedforward: FeedforwardKind::Combined,
+    };
+    let setup = Setup::virtual_machine(stage.clone());
+    let outcomes: Vec<_> = [1, 2, 3]
+        .into_par_iter()
+        .flat_map(|seed| run_configuration::<f32>(best, &setup, seed).unwrap())
+        .collect();
+    let mean = |score: fn(&Score) -> f64| {
+        let sum: f64 = outcomes.iter().map(|outcome| score(&outcome.score)).sum();
+        sum / outcomes.len() as f64
+    };
+    [
+        mean(|score| score.largest_mm),
+        mean(|score| score.rms_mm),
+        mean(|score| score.glitch_mm),
+    ]
+}
+
+/// The committed settings, but the feedforward of x told the truth, on the given elements.
+fn truth_told(elements: &GmsParameters) -> StageSettings {
+    let mut stage = identified().unwrap().stage;
+    let [truth, _, _] = StageTruth::real().axes;
+    let axis = &mut stage.axes[0];
+    let damping_v = truth.damping_per_s / truth.gain_mm_per_v_s2;
+    axis.friction.sliding = truth.friction.map(|model| StaticFriction {
+        viscous_v_s_per_mm: model.viscous_v_s_per_mm + damping_v,
+        ..*model
+    });
+    axis.friction.gms = GmsParameters {
+        elements: elements.elements.clone(),
+        attraction_v_s: truth.gms.attraction_v_s,
+    };
+    axis.feedforward.gains.inertia_v_s2_per_mm = 1.0 / truth.gain_mm_per_v_s2;
+    axis.feedforward.preview_s = truth.delay_s;
+    axis.amplifier.offset_v = -truth.imperfections.offset_v;
+    stage
+}
+
+#[test]
+fn identified_settings_do_as_well_as_the_truth_on_as_many_elements() {
+    let identified = performance(&identified().unwrap().stage);
+    let four = StageSettings::default().axes[0].friction.gms.clone();
+    let told = performance(&truth_told(&four));
+    for (found, exact) in identified.iter().zip(&told) {
+        assert!(*found < 1.1 * exact, "{identified:?} against {told:?}");
+    }
+}
+
+#[test]
+fn identified_with_eight_elements_the_axis_does_as_well_as_on_its_own_ten() {
+    let [truth, _, _] = StageTruth::real().axes;
+    let base = &StageSettings::default().axes[0];
+    let mut rig = SimulatedRig::new(0, truth.clone(), 1);
+    let found = commission(
+        &mut rig,
+        base,
+        &CommissionSettings::default(),
+        &mut |_, _| {},
+    )
+    .unwrap();
+    let sliding = found.settings.friction.sliding;
+    let finer = identify(&found.presliding.1, Some(&sliding), &Knots::Automatic(8)).unwrap();
+    let mut stage = identified().unwrap().stage;
+    stage.axes[0].friction.gms = finer.gms;
+    let eight = performance(&stage);
+    let told = performance(&truth_told(&truth.gms));
+    for (found, exact) in eight.iter().zip(&told) {
+        assert!(*found < 1.1 * exact, "{eight:?} against {told:?}");
+    }
 }
