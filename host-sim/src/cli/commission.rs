@@ -1,14 +1,15 @@
 //! `quadrant commission`.
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
 use quadrant::settings::StageSettings;
-use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
+use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
 use quadrant_sim::presentation::{
     commission_page, friction_table, gains_table, gms_table, motor_constant_table, plant_tables,
-    provenance, verdict_table,
+    provenance, revise_table, verdict_table,
 };
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
@@ -30,6 +31,10 @@ pub(super) struct Arguments {
     /// Phase margin of the PID, deg.
     #[arg(long, default_value_t = 54.2, value_name = "DEG")]
     phase_margin_deg: f64,
+    /// Leave out the cross-checks: the response at rest, with the linear model revised for explicit friction, and an ordinary
+    /// motion.
+    #[arg(long)]
+    quick: bool,
     #[command(flatten)]
     output: Output,
 }
@@ -59,6 +64,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             bar.set_position((1000.0 * done) as u64);
         },
     )?;
+    let checked = if arguments.quick {
+        None
+    } else {
+        bar.enable_steady_tick(Duration::from_millis(200));
+        let report = &mut |step, done: f64| {
+            bar.set_message(step);
+            bar.set_position((1000.0 * done) as u64);
+        };
+        Some(CrossCheck::run(
+            &mut rig,
+            &found.settings,
+            output.seed,
+            report,
+        )?)
+    };
     bar.finish_and_clear();
     println!(
         "Simulated, not measured: {} axis, seed {}\n",
@@ -78,12 +98,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     ] {
         output.table(&table)?;
     }
+    if let Some(checked) = &checked {
+        output.table(&revise_table(&found.plant.plant, &checked.revisions))?;
+        if let Some(agreement) = checked.inertia_agreement(&found.settings) {
+            println!(
+                "An ordinary motion gives {agreement:.3} times the A of the frequency response.\n"
+            );
+        }
+    }
     let command = format!(
         "quadrant commission --axis {} --seed {}",
         axis.name(),
         output.seed
     );
-    let records = write_records(output, &found)?;
+    let records = write_records(output, &found, checked.as_ref())?;
     file.stage.axes[axis.index()] = found.settings.clone();
     file.provenance.push(Provenance {
         command: command.clone(),
@@ -100,13 +128,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let page = commission_page(
         &format!("the {} axis of the simulated stage", axis.name()),
         &found,
+        checked.as_ref(),
         provenance(&command, output.seed),
     );
     output.page(&page, "commission.html")
 }
 
 /// Saves every recording that the settings rest on; their names.
-fn write_records(output: &Output, found: &Commissioned) -> anyhow::Result<Vec<String>> {
+fn write_records(
+    output: &Output,
+    found: &Commissioned,
+    checked: Option<&CrossCheck>,
+) -> anyhow::Result<Vec<String>> {
     let mut records = vec![(
         "motor-constant-recording.csv".to_owned(),
         &found.motor.recording,
@@ -116,6 +149,10 @@ fn write_records(output: &Output, found: &Commissioned) -> anyhow::Result<Vec<St
         responses.map(|(index, record)| (format!("frf-recording-{}.csv", index + 1), record)),
     );
     records.push(("virgin-curve-recording.csv".to_owned(), &found.presliding.1));
+    if let Some(CrossCheck { recordings, .. }) = checked {
+        let named = ["at-rest-recording.csv", "motion-recording.csv"].map(str::to_owned);
+        records.extend(named.into_iter().zip(recordings));
+    }
     let mut names = Vec::new();
     for (name, recording) in records {
         recording.write_csv(output.file(&name)?)?;

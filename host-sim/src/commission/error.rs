@@ -5,8 +5,10 @@ use quadrant::settings::SettingsError;
 use super::verify::VerifyError;
 use crate::design::DesignError;
 use crate::identify::frf::FrfError;
+use crate::identify::motion::MotionFitError;
 use crate::identify::motor_constant::MotorConstantError;
 use crate::identify::plant::PlantError;
+use crate::identify::revise::ReviseError;
 use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
 use crate::rig::RigError;
@@ -50,6 +52,12 @@ pub enum CommissionError {
         /// The miss.
         percent: f64,
     },
+    /// The response at rest.
+    #[error("linear model with friction: {0}")]
+    Revise(#[from] ReviseError),
+    /// The ordinary motion.
+    #[error("ordinary motion: {0}")]
+    Motion(#[from] MotionFitError),
     /// The verdict.
     #[error("verdict: {0}")]
     Verify(#[from] VerifyError),

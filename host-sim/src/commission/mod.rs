@@ -7,8 +7,10 @@
 
 pub mod bootstrap;
 mod chain;
+mod cross_check;
 mod error;
 pub mod verify;
 
 pub use chain::{CommissionSettings, Commissioned, commission};
+pub use cross_check::CrossCheck;
 pub use error::CommissionError;

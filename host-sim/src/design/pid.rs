@@ -115,6 +115,9 @@ const CROSSOVER_TOLERANCE_HZ: f64 = 0.05;
 /// The share of each bound that proportional and derivative gain may use up; the rest is for integral action.
 const PROPORTIONAL_SHARE: f64 = 0.98;
 
+/// Whether a target still holds with integral action.
+type Acceptance = Box<dyn Fn(&Margins) -> bool>;
+
 /// Designs a PID: proportional and derivative gain for the target, then as much integral action as the target does not
 /// notice. That is a Ki which moves neither margin by more than 0.05 dB or 0.05 deg, or, with bounds on `|S|` and `|T|`, one
 /// that uses up the last 2 % of them; rounded down to two significant digits.
@@ -123,7 +126,7 @@ const PROPORTIONAL_SHARE: f64 = 0.98;
 /// A target out of reach; says what is.
 pub fn design_pid(process: &Process, request: &PidRequest) -> Result<PidDesign, DesignError> {
     let (form, filter_s) = (request.form, request.derivative_filter_s);
-    let (gains, acceptable): (PidGains, Box<dyn Fn(&Margins) -> bool>) = match request.target {
+    let (gains, acceptable): (PidGains, Acceptance) = match request.target {
         Target::Margins {
             gain_margin_db,
             phase_margin_deg,

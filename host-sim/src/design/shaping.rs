@@ -107,12 +107,11 @@ pub fn shape_to_margins(
         let unit = proportional_derivative(1.0, ratio_s, derivative_filter_s);
         scale_to_gain_margin(process, form, &unit, gain_margin_db)
     };
-    let phase_margin_at =
-        |ratio_s: f64| Ok(process.margins(&gains_at(ratio_s)?, form)?.phase_margin_deg);
-    // A ratio without margins counts as one without phase margin.
-    let falls_short = |ratio_s: f64| {
-        phase_margin_at(ratio_s).unwrap_or_else(|_: MarginError| 0.0) < phase_margin_deg
+    let phase_margin_at = |ratio_s: f64| -> Result<f64, MarginError> {
+        Ok(process.margins(&gains_at(ratio_s)?, form)?.phase_margin_deg)
     };
+    // A ratio without margins counts as one without phase margin.
+    let falls_short = |ratio_s: f64| phase_margin_at(ratio_s).unwrap_or(0.0) < phase_margin_deg;
 
     let span = LARGEST_RATIO / SMALLEST_RATIO;
     let smallest_s = SMALLEST_RATIO / (TAU * half_turn_hz);

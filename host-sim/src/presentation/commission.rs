@@ -2,9 +2,12 @@
 
 use super::friction::{friction_section, presliding_section};
 use super::identify::{motor_constant_table, plant_tables, response_section};
+use super::motion::motion_table;
+use super::revise::revise_sections;
 use super::{UM_PER_MM, error_curve};
-use crate::commission::Commissioned;
 use crate::commission::verify::Verdict;
+use crate::commission::{Commissioned, CrossCheck};
+use crate::identify::motion::recommended;
 use crate::report::{
     Block, Cell, Column, Figure, Lines, Page, Plot, Provenance, Section, Style, Table,
 };
@@ -89,7 +92,12 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
 }
 
 /// The whole commissioning of one axis.
-pub fn commission_page(axis: &str, found: &Commissioned, provenance: Provenance) -> Page {
+pub fn commission_page(
+    axis: &str,
+    found: &Commissioned,
+    checked: Option<&CrossCheck>,
+    provenance: Provenance,
+) -> Page {
     let verdict_curves = found
         .verdicts
         .iter()
@@ -120,34 +128,65 @@ pub fn commission_page(axis: &str, found: &Commissioned, provenance: Provenance)
     response
         .blocks
         .extend([parameters, bands].map(Block::Table));
+    let mut sections = vec![
+        Section {
+            id: "result".to_owned(),
+            heading: "What it achieves".to_owned(),
+            prose: Vec::new(),
+            blocks: vec![
+                Block::Table(verdict_table(&found.verdicts)),
+                Block::Figure(Figure {
+                    id: "verdict-errors".to_owned(),
+                    caption: "Tracking error, by the axis' own encoder".to_owned(),
+                    plot: Plot::Lines(Lines {
+                        x_label: "time (s)".to_owned(),
+                        y_label: "tracking error (um)".to_owned(),
+                        series: verdict_curves,
+                        ..Lines::default()
+                    }),
+                }),
+                Block::Table(gains_table(found)),
+            ],
+        },
+        response,
+        friction_section(map, friction),
+        presliding_section(gms, friction.mean_levels_v().1),
+    ];
+    sections.extend(
+        checked
+            .into_iter()
+            .flat_map(|checked| check_sections(found, checked)),
+    );
     Page {
         title: format!("Commissioning of {axis}"),
         subtitle: "From an unknown axis to settings, every step measured on the axis itself"
             .to_owned(),
         provenance,
-        sections: vec![
-            Section {
-                id: "result".to_owned(),
-                heading: "What it achieves".to_owned(),
-                prose: Vec::new(),
-                blocks: vec![
-                    Block::Table(verdict_table(&found.verdicts)),
-                    Block::Figure(Figure {
-                        id: "verdict-errors".to_owned(),
-                        caption: "Tracking error, by the axis' own encoder".to_owned(),
-                        plot: Plot::Lines(Lines {
-                            x_label: "time (s)".to_owned(),
-                            y_label: "tracking error (um)".to_owned(),
-                            series: verdict_curves,
-                            ..Lines::default()
-                        }),
-                    }),
-                    Block::Table(gains_table(found)),
-                ],
-            },
-            response,
-            friction_section(map, friction),
-            presliding_section(gms, friction.mean_levels_v().1),
-        ],
+        sections,
     }
+}
+
+/// The cross-checks: the model revised for explicit friction, and an ordinary motion.
+fn check_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
+    let mut sections = revise_sections(
+        &checked.at_rest,
+        &found.plant.plant,
+        &checked.revisions,
+        &[],
+    );
+    if let Some(chosen) = recommended(&checked.motion) {
+        let agreement = checked
+            .inertia_agreement(&found.settings)
+            .unwrap_or(f64::NAN);
+        sections.push(Section {
+            id: "motion".to_owned(),
+            heading: "An ordinary motion".to_owned(),
+            prose: vec![format!(
+                "Inertia and friction of an ordinary motion, by inverse dynamics, the dead time taken from the linear model: its A is {agreement:.3} \
+                 times that of the frequency response. A motion record cannot tell much of the pre-sliding friction."
+            )],
+            blocks: vec![Block::Table(motion_table(&chosen.model, None))],
+        });
+    }
+    sections
 }

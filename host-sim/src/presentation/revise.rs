@@ -93,6 +93,21 @@ pub fn revise_page(
     amplitudes: &[AmplitudeResponse],
     provenance: Provenance,
 ) -> Page {
+    Page {
+        title: "Linear model revised for explicit friction".to_owned(),
+        subtitle: axis.to_owned(),
+        provenance,
+        sections: revise_sections(measured, original, revisions, amplitudes),
+    }
+}
+
+/// Its sections; that on amplitudes is left out where there are none.
+pub(super) fn revise_sections(
+    measured: &FrequencyResponse,
+    original: &PlantModel,
+    revisions: &[Revision],
+    amplitudes: &[AmplitudeResponse],
+) -> Vec<Section> {
     let mut blocks = vec![Block::Table(revise_table(original, revisions))];
     for revision in revisions {
         let name = match revision.friction {
@@ -170,10 +185,5 @@ pub fn revise_page(
             blocks: bode_figures("amplitude", "Response by RMS of the excitation", &curves).into(),
         });
     }
-    Page {
-        title: "Linear model revised for explicit friction".to_owned(),
-        subtitle: axis.to_owned(),
-        provenance,
-        sections,
-    }
+    sections
 }

@@ -1,0 +1,89 @@
+//! What a finished commissioning is held against: the response at rest, which friction bends, and an ordinary motion.
+
+use quadrant::settings::AxisSettings;
+
+use super::bootstrap::measuring_settings;
+use super::error::CommissionError;
+use crate::identify::at_rest::AtRest;
+use crate::identify::excitation::{Excitation, Waveform};
+use crate::identify::motion::{Candidate, MotionFitSettings, fit_motion, recommended, shuttle};
+use crate::identify::response::FrequencyResponse;
+use crate::identify::revise::{ReviseError, Revision};
+use crate::rig::{Recording, Rig, approach};
+
+/// What the checks found.
+#[derive(Clone, Debug)]
+pub struct CrossCheck {
+    /// The response at rest.
+    pub at_rest: FrequencyResponse,
+    /// The linear model revised until it and the friction together show that response.
+    pub revisions: Vec<Revision>,
+    /// Models of an ordinary motion, the dead time being known.
+    pub motion: Vec<Candidate>,
+    /// The recordings: at rest, in motion.
+    pub recordings: [Recording; 2],
+}
+
+/// RMS of the excitation at rest over the friction at breakaway: enough to slide most of the time.
+const EXCITATION: f64 = 2.6;
+/// Band, Hz, and period, s, of the excitation, and its periods.
+const BAND_HZ: (f64, f64) = (4.0, 400.0);
+const PERIOD_S: f64 = 0.5;
+const PERIODS: usize = 12;
+
+impl CrossCheck {
+    /// Excites the axis at rest and moves it to and fro, under the feedback of finished settings; `progress` is told step
+    /// and share.
+    ///
+    /// # Errors
+    /// A run that is stopped, or data that yield no model.
+    pub fn run(
+        rig: &mut dyn Rig,
+        settings: &AxisSettings,
+        seed: u64,
+        progress: &mut dyn FnMut(&'static str, f64),
+    ) -> Result<Self, CommissionError> {
+        let plant = settings.plant.ok_or(ReviseError::NoResponse)?;
+        let sliding = &settings.friction.sliding;
+        let breakaway_v =
+            0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
+        let excitation = Excitation {
+            waveform: Waveform::Multisine,
+            rms_v: EXCITATION * breakaway_v,
+            band_hz: BAND_HZ,
+            rise_hz: 0.0,
+            period_s: PERIOD_S,
+            seed,
+        };
+        rig.apply(&measuring_settings(settings))?;
+        approach(rig, 0.0)?;
+        let at_rest = AtRest::measure(rig, settings, excitation, PERIODS, &mut |share| {
+            progress("response at rest", share);
+        })?;
+
+        let rate_hz = rig.axis().rate_hz;
+        approach(rig, 0.0)?;
+        let moved = shuttle(rig, 1, &mut |share| progress("ordinary motion", share))?;
+        let motion = MotionFitSettings {
+            dead_time_s: Some(plant.delay_s + 0.5 / rate_hz),
+            ..MotionFitSettings::default()
+        };
+        let motion = fit_motion(&moved, &motion, &|_| {})?;
+
+        progress("revising the linear model", 0.0);
+        let revisions = at_rest.revise(&plant)?;
+        Ok(Self {
+            at_rest: at_rest.response()?,
+            revisions,
+            motion,
+            recordings: [at_rest.recording, moved],
+        })
+    }
+
+    /// A of the ordinary motion over that of the settings' model; nothing when the motion yields none.
+    pub fn inertia_agreement(&self, settings: &AxisSettings) -> Option<f64> {
+        let found = recommended(&self.motion)?;
+        let plant = settings.plant?;
+        Some(1.0 / (found.model.inertia_v_s2_per_mm * plant.gain_mm_per_v_s2))
+    }
+}
