@@ -1,0 +1,84 @@
+//! The linear model revised for explicit friction, on the simulated x axis at rest.
+
+use quadrant::settings::AxisSettings;
+use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::identify::at_rest::AtRest;
+use quadrant_sim::identify::excitation::{Excitation, Waveform};
+use quadrant_sim::identify::response::FrequencyResponse;
+use quadrant_sim::identify::revise::ExplicitFriction;
+use quadrant_sim::plant::StageTruth;
+use quadrant_sim::rig::SimulatedRig;
+
+fn excited(rms_v: f64) -> (AtRest, AxisSettings) {
+    let settings = identified().unwrap().stage.axes[0].clone();
+    let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
+    let excitation = Excitation {
+        waveform: Waveform::Multisine,
+        rms_v,
+        band_hz: (4.0, 400.0),
+        rise_hz: 0.0,
+        period_s: 0.5,
+        seed: 1,
+    };
+    let measured = AtRest::measure(&mut rig, &settings, excitation, 6, &mut |_| {}).unwrap();
+    (measured, settings)
+}
+
+/// Mean gain between two frequencies, dB.
+fn gain_db(response: &FrequencyResponse, low_hz: f64, high_hz: f64) -> f64 {
+    let gains: Vec<f64> = response
+        .points
+        .iter()
+        .filter(|point| (low_hz..high_hz).contains(&point.frequency_hz))
+        .map(|point| 20.0 * point.response.norm().log10())
+        .collect();
+    gains.iter().sum::<f64>() / gains.len() as f64
+}
+
+#[test]
+fn with_both_frictions_the_revised_model_shows_the_measured_response() {
+    let (measured, settings) = excited(0.4);
+    let original = settings.plant.unwrap();
+    let revisions = measured.revise(&original).unwrap();
+    let [fixed, gms, both] = &revisions[..] else {
+        panic!("{} revisions", revisions.len());
+    };
+    assert_eq!(
+        [fixed, gms, both].map(|revision| revision.friction),
+        ExplicitFriction::ALL
+    );
+    let truth = &StageTruth::real().axes[0];
+    let gain = both.plant.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2;
+    assert!((gain - 1.0).abs() < 0.01, "{gain}");
+    // The friction carries the whole viscous damping.
+    assert!(both.plant.damping_per_s < 5.0, "{:?}", both.plant);
+    assert!(both.misfit.1.gain_db < 0.1 && both.misfit.1.phase_deg < 1.0);
+    // Neither half of the friction alone shows what was measured.
+    for half in [fixed, gms] {
+        assert!(
+            half.misfit.1.gain_db > 3.0 * both.misfit.1.gain_db,
+            "{:?}",
+            half.misfit
+        );
+    }
+    for revision in &revisions {
+        assert!(revision.misfit.1.gain_db <= revision.misfit.0.gain_db);
+    }
+}
+
+#[test]
+fn the_response_depends_on_the_amplitude_as_the_model_with_friction_predicts() {
+    let mut levels = Vec::new();
+    for rms_v in [0.2, 0.6] {
+        let (measured, settings) = excited(rms_v);
+        let mut sliding = settings.plant.unwrap();
+        // Of the damping, the friction model has its share: all of it.
+        sliding.damping_per_s = 0.0;
+        let response = measured.response().unwrap();
+        let predicted = measured.predict(&sliding, ExplicitFriction::Both).unwrap();
+        let level = gain_db(&response, 10.0, 60.0);
+        assert!((level - gain_db(&predicted, 10.0, 60.0)).abs() < 1.0);
+        levels.push(level);
+    }
+    assert!(levels[1] - levels[0] > 3.0, "{levels:?}");
+}
