@@ -1,9 +1,11 @@
-//! The commands `quadrant identify frf` and `plant`, from end to end.
+//! The commands `quadrant identify frf`, `plant` and `motion`, from end to end.
 
 use std::path::Path;
 use std::process::{Command, Output};
 
+use quadrant::settings::StageSettings;
 use quadrant_sim::identify::response::FrequencyResponse;
+use quadrant_sim::settings_file::SettingsFile;
 
 fn identify(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_quadrant"))
@@ -156,4 +158,51 @@ fn assert_same(one: &str, other: &str) {
             _ => assert_eq!(a, b),
         }
     }
+}
+
+#[test]
+fn a_motion_record_is_saved_read_again_and_put_into_settings() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let fresh = succeed(
+        at,
+        &[
+            "motion",
+            "--axis",
+            "z",
+            "--dead-time-s",
+            "0.00135",
+            "--out",
+            "a",
+        ],
+    );
+    assert!(fresh.contains("Simulated, not measured"), "{fresh}");
+    let file = SettingsFile::new(StageSettings::default());
+    file.write(at.join("stage.toml")).unwrap();
+    succeed(
+        at,
+        &[
+            "motion",
+            "--record",
+            "a/motion-recording.csv",
+            "--dead-time-s",
+            "0.00135",
+            "--force-per-volt",
+            "35",
+            "--settings",
+            "stage.toml",
+            "--axis",
+            "z",
+            "--out",
+            "b",
+        ],
+    );
+    let inertia = |folder: &str| value(&at.join(folder).join("motion-parameters.csv"), "M'");
+    assert!((inertia("a") / inertia("b") - 1.0).abs() < 1e-6);
+    let written = SettingsFile::read(at.join("b/settings.toml")).unwrap();
+    let gain = written.stage.axes[2].plant.unwrap().gain_mm_per_v_s2;
+    assert!((gain / 48_500.0 - 1.0).abs() < 0.03, "{gain}");
+    assert_eq!(written.provenance[0].records, ["a/motion-recording.csv"]);
+    let cascade = ["motion", "--axis", "x", "--cascade-kp", "160"];
+    assert!(fail(at, &cascade).contains("--cascade-kv"));
 }

@@ -5,9 +5,9 @@ use quadrant_sim::experiment::compensator::identified;
 use quadrant_sim::identify::at_rest::AtRest;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::identify::revise::ExplicitFriction;
+use quadrant_sim::identify::revise::{ExplicitFriction, ReviseError};
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::rig::SimulatedRig;
+use quadrant_sim::rig::{Recording, SimulatedRig};
 
 fn excited(rms_v: f64) -> (AtRest, AxisSettings) {
     let settings = identified().unwrap().stage.axes[0].clone();
@@ -81,4 +81,21 @@ fn the_response_depends_on_the_amplitude_as_the_model_with_friction_predicts() {
         levels.push(level);
     }
     assert!(levels[1] - levels[0] > 3.0, "{levels:?}");
+}
+
+#[test]
+fn a_saved_recording_shows_the_same_response_and_one_at_another_rate_is_refused() {
+    let (measured, settings) = excited(0.4);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("at-rest.csv");
+    measured.recording.write_csv(&path).unwrap();
+    let read = Recording::read_csv(&path).unwrap();
+    let saved = AtRest::saved(read.clone(), &settings, 1e4, measured.excitation).unwrap();
+    let (fresh, again) = (measured.response().unwrap(), saved.response().unwrap());
+    assert_eq!(fresh.points.len(), again.points.len());
+    for (a, b) in fresh.points.iter().zip(&again.points) {
+        assert!((a.response / b.response - 1.0).norm() < 1e-6);
+    }
+    let error = AtRest::saved(read, &settings, 5e3, measured.excitation).unwrap_err();
+    assert!(matches!(error, ReviseError::Rate { .. }), "{error}");
 }

@@ -1,6 +1,7 @@
 //! The response of an axis at rest, where friction bends it: measured, and as a model with friction predicts it.
 
 use quadrant::control::plant_model::PlantModel;
+use quadrant::reference::MotionSettings;
 use quadrant::settings::AxisSettings;
 
 use super::excitation::Excitation;
@@ -10,7 +11,7 @@ use super::revise::{
     ExplicitFriction, Measurement, ReviseError, Revision, candidate, revise, simulated_response,
 };
 use crate::commission::bootstrap::measuring_settings;
-use crate::rig::{Experiment, Recording, Rig};
+use crate::rig::{Drive, Experiment, Recording, Rig};
 
 /// An excitation at rest, and what it gave.
 #[derive(Clone, Debug)]
@@ -26,6 +27,9 @@ pub struct AtRest {
 
 /// Lowest coherence of a line that a revision counts: with friction no response is quite coherent.
 const LEAST_COHERENCE: f64 = 0.8;
+
+/// Relative difference from which on two rates are not the same.
+const UNEQUAL: f64 = 1e-3;
 
 impl AtRest {
     /// Excites the axis at rest under the feedback of `settings`, for `periods` periods.
@@ -55,6 +59,39 @@ impl AtRest {
             experiment,
             recording,
         })
+    }
+
+    /// A saved recording of such an excitation, made under the feedback of `settings` at their control rate; the
+    /// excitation is that which the recording holds, its period and band are stated.
+    ///
+    /// # Errors
+    /// A recording at another rate, or without a response.
+    pub fn saved(
+        recording: Recording,
+        settings: &AxisSettings,
+        rate_hz: f64,
+        excitation: Excitation,
+    ) -> Result<Self, ReviseError> {
+        if (recording.sample_time_s * rate_hz - 1.0).abs() > UNEQUAL {
+            return Err(ReviseError::Rate {
+                recorded_hz: recording.sample_time_s.recip(),
+                rate_hz,
+            });
+        }
+        let saved = Self {
+            excitation,
+            settings: measuring_settings(settings),
+            experiment: Experiment {
+                name: "the saved excitation".to_owned(),
+                drive: Drive::ClosedLoop(MotionSettings::Hold),
+                injection_v: recording.injection_v.clone(),
+                decimation: 1,
+                time_limit_s: 10.0 + 2.0 * recording.duration_s(),
+            },
+            recording,
+        };
+        saved.response()?;
+        Ok(saved)
     }
 
     /// The response of a recording of this experiment.

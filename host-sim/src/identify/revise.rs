@@ -93,6 +93,16 @@ pub enum ReviseError {
     /// The recording gives no response.
     #[error("the recording gives no frequency response; it needs an injected excitation")]
     NoResponse,
+    /// The recording was not made at the control rate, at which the candidates run.
+    #[error(
+        "the recording has {recorded_hz:.1} samples a second and the settings a control rate of {rate_hz} Hz: record every tick"
+    )]
+    Rate {
+        /// Of the recording.
+        recorded_hz: f64,
+        /// Of the settings.
+        rate_hz: f64,
+    },
     /// Too little of the response can be trusted.
     #[error(
         "only {lines} lines have a coherence of {least_coherence} or more; a revision takes {LEAST_LINES}: raise the excitation"

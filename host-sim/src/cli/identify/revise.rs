@@ -1,10 +1,11 @@
 //! `quadrant identify revise`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
 use clap::Args;
+use indicatif::ProgressBar;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, commission};
 use quadrant_sim::identify::at_rest::AtRest;
@@ -14,15 +15,19 @@ use quadrant_sim::presentation::{AmplitudeResponse, provenance, revise_page, rev
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::rig::Axis;
-use super::simulated;
+use super::{recorded, simulated};
 use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify revise`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage.
+    /// The axis of the simulated stage; with --record, which axis of --settings it is.
     #[arg(long, value_enum)]
     axis: Axis,
+    /// A recording of the axis at rest under its own PID instead, excited by an injected voltage: a CSV file with t_s,
+    /// position_mm (or position_m), reference_mm, voltage_v and injection_v, a row each control period.
+    #[arg(long, value_name = "FILE", requires = "settings", conflicts_with_all = ["amplitude_v", "further_v", "averages"])]
+    record: Option<PathBuf>,
     /// Settings with the model, the friction and the PID of the axis, as `quadrant commission` writes them; without it the
     /// axis is commissioned first.
     #[arg(long, value_name = "FILE")]
@@ -36,38 +41,26 @@ pub(in crate::cli) struct Arguments {
     /// Blocks that are averaged.
     #[arg(long, default_value_t = 12)]
     averages: usize,
+    /// Lowest frequency of the excitation, Hz.
+    #[arg(long, default_value_t = 4.0, value_name = "HZ")]
+    from_hz: f64,
+    /// Highest frequency of the excitation, Hz.
+    #[arg(long, default_value_t = 400.0, value_name = "HZ")]
+    to_hz: f64,
+    /// Period of the excitation, s.
+    #[arg(long, default_value_t = 0.5, value_name = "S")]
+    period_s: f64,
     #[command(flatten)]
     output: Output,
 }
 
-/// Band of the excitation, Hz, and its period, s.
-const BAND_HZ: (f64, f64) = (4.0, 400.0);
-const PERIOD_S: f64 = 0.5;
-
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { axis, output, .. } = arguments;
-    let mut amplitudes_v = vec![arguments.amplitude_v];
-    amplitudes_v.extend(&arguments.further_v);
-    for amplitude_v in &amplitudes_v {
-        if !(*amplitude_v > 0.0 && *amplitude_v <= 5.0) {
-            bail!("amplitude {amplitude_v} V: it must be above zero and at most 5 V RMS");
-        }
-    }
-    if !(2..=1000).contains(&arguments.averages) {
-        bail!("--averages {}: it must be 2 to 1000", arguments.averages);
-    }
+    arguments.check()?;
     let bar = share("commissioning");
-    let mut rig = axis.rig(output.seed);
-    let settings: AxisSettings = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?.stage.axes[axis.index()].clone(),
-        None => {
-            let base = &StageSettings::default().axes[axis.index()];
-            let request = CommissionSettings::default();
-            commission(&mut rig, base, &request, &mut |_, done| {
-                bar.set_position((1000.0 * done) as u64);
-            })?
-            .settings
-        }
+    let (measured, settings, subject) = match &arguments.record {
+        Some(path) => arguments.recorded(path)?,
+        None => arguments.measured(&bar)?,
     };
     let original = settings.plant.with_context(|| {
         format!(
@@ -75,30 +68,6 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             axis.name()
         )
     })?;
-
-    bar.set_message("exciting the axis at rest");
-    let mut measured = Vec::new();
-    for (index, &rms_v) in amplitudes_v.iter().enumerate() {
-        let excitation = Excitation {
-            waveform: Waveform::Multisine,
-            rms_v,
-            band_hz: BAND_HZ,
-            rise_hz: 0.0,
-            period_s: PERIOD_S,
-            seed: output.seed,
-        };
-        let done = index as f64;
-        measured.push(AtRest::measure(
-            &mut rig,
-            &settings,
-            excitation,
-            arguments.averages,
-            &mut |share| {
-                let all = (done + share) / amplitudes_v.len() as f64;
-                bar.set_position((1000.0 * all) as u64);
-            },
-        )?);
-    }
     bar.set_message("revising the model, three times");
     bar.enable_steady_tick(Duration::from_millis(200));
     let [at_amplitude, ..] = &measured[..] else {
@@ -110,7 +79,9 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .iter()
         .find(|revision| revision.friction == ExplicitFriction::Both);
     let mut predicted = Vec::new();
-    if let Some(both) = both {
+    if let Some(both) = both
+        && measured.len() > 1
+    {
         for at in &measured {
             predicted.push(AmplitudeResponse {
                 amplitude_v: at.excitation.rms_v,
@@ -122,15 +93,17 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     predicted.sort_by(|a, b| a.amplitude_v.total_cmp(&b.amplitude_v));
     bar.finish_and_clear();
 
-    println!("Simulated, not measured.");
-    for (at, name) in measured.iter().zip(1..) {
-        let file = output.file(&format!("revise-recording-{name}.csv"))?;
-        at.recording.write_csv(file)?;
+    if arguments.record.is_none() {
+        println!("Simulated, not measured.");
+        for (at, number) in measured.iter().zip(1..) {
+            let file = output.file(&format!("revise-recording-{number}.csv"))?;
+            at.recording.write_csv(file)?;
+        }
     }
     response.write_csv(output.file("revise-frf.csv")?)?;
     output.table(&revise_table(&original, &revisions))?;
     let page = revise_page(
-        &simulated(*axis),
+        &subject,
         &response,
         &original,
         &revisions,
@@ -138,4 +111,95 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         provenance(&command_line(), output.seed),
     );
     output.page(&page, "revise.html")
+}
+
+/// Responses at rest, the settings they were measured under, and what a page calls the axis.
+type Measured = (Vec<AtRest>, AxisSettings, String);
+
+impl Arguments {
+    fn amplitudes_v(&self) -> Vec<f64> {
+        let mut amplitudes_v = vec![self.amplitude_v];
+        amplitudes_v.extend(&self.further_v);
+        amplitudes_v
+    }
+
+    fn check(&self) -> anyhow::Result<()> {
+        for amplitude_v in self.amplitudes_v() {
+            if !(amplitude_v > 0.0 && amplitude_v <= 5.0) {
+                bail!("amplitude {amplitude_v} V: it must be above zero and at most 5 V RMS");
+            }
+        }
+        if !(2..=1000).contains(&self.averages) {
+            bail!("--averages {}: it must be 2 to 1000", self.averages);
+        }
+        if !(0.01..=100.0).contains(&self.period_s) {
+            bail!("--period-s {}: it must be 0.01 to 100 s", self.period_s);
+        }
+        if !(self.from_hz * self.period_s >= 1.0 && self.to_hz > self.from_hz) {
+            bail!(
+                "--from-hz {} --to-hz {}: the lowest must be a cycle in a period at least, the highest above it",
+                self.from_hz,
+                self.to_hz
+            );
+        }
+        Ok(())
+    }
+
+    fn excitation(&self, rms_v: f64) -> Excitation {
+        Excitation {
+            waveform: Waveform::Multisine,
+            rms_v,
+            band_hz: (self.from_hz, self.to_hz),
+            rise_hz: 0.0,
+            period_s: self.period_s,
+            seed: self.output.seed,
+        }
+    }
+
+    /// A saved recording.
+    fn recorded(&self, path: &Path) -> anyhow::Result<Measured> {
+        let stage = match &self.settings {
+            Some(settings) => SettingsFile::read(settings)?.stage,
+            None => bail!("--record needs --settings"),
+        };
+        let settings = stage.axes[self.axis.index()].clone();
+        let recording = recorded::read(path)?;
+        let square: f64 = recording.injection_v.iter().map(|v| v * v).sum();
+        let rms_v = (square / recording.len() as f64).sqrt();
+        let saved = AtRest::saved(recording, &settings, stage.rate_hz, self.excitation(rms_v))?;
+        let subject = recorded::title(&[path.to_owned()]);
+        Ok((vec![saved], settings, subject))
+    }
+
+    /// The axis of the simulated stage, excited at every amplitude; without settings it is commissioned first.
+    fn measured(&self, bar: &ProgressBar) -> anyhow::Result<Measured> {
+        let mut rig = self.axis.rig(self.output.seed);
+        let index = self.axis.index();
+        let settings = match &self.settings {
+            Some(path) => SettingsFile::read(path)?.stage.axes[index].clone(),
+            None => {
+                let base = &StageSettings::default().axes[index];
+                let request = CommissionSettings::default();
+                commission(&mut rig, base, &request, &mut |_, done| {
+                    bar.set_position((1000.0 * done) as u64);
+                })?
+                .settings
+            }
+        };
+        bar.set_message("exciting the axis at rest");
+        let amplitudes_v = self.amplitudes_v();
+        let mut measured = Vec::new();
+        for (rms_v, place) in amplitudes_v.iter().zip(0..) {
+            let excitation = self.excitation(*rms_v);
+            let report = &mut |share: f64| {
+                let done = (f64::from(place) + share) / amplitudes_v.len() as f64;
+                bar.set_position((1000.0 * done) as u64);
+            };
+            let averages = self.averages;
+            measured.push(AtRest::measure(
+                &mut rig, &settings, excitation, averages, report,
+            )?);
+        }
+        Ok((measured, settings, simulated(self.axis)))
+    }
 }

@@ -16,15 +16,19 @@
 //! Source: Janot, Gautier and Brunot, *Data Set and Reference Models of EMPS*, 2019; Gautier, *Dynamic identification of
 //! robots with power model*, ICRA 1997.
 
+mod error;
 mod fit;
 mod model;
 mod regressors;
 mod shuttle;
 mod signals;
 mod simulate;
+mod solution;
+mod uncertainty;
 mod zero_phase;
 
-pub use fit::{Candidate, MotionFitError, Rows, fit_motion, recommended};
+pub use error::MotionFitError;
+pub use fit::{Candidate, Rows, fit_motion, recommended};
 pub use model::{Estimate, MotionModel, Structure};
 pub use shuttle::shuttle;
 pub use signals::{MotionFitSettings, Signals};

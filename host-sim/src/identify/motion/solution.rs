@@ -1,0 +1,156 @@
+//! One fit: the parameters that are not linear are searched for, the others follow.
+
+use nalgebra::DVector;
+use quadrant::friction::PerDirection;
+
+use super::error::MotionFitError;
+use super::model::{MotionModel, Structure, sliding};
+use super::regressors::{Regression, Term, Way, solve};
+use super::signals::MotionFitSettings;
+use super::uncertainty::estimates;
+use crate::identify::fit::{Loss, Parameter, fit};
+
+/// Largest dead time, s.
+pub(super) const MOST_DEAD_TIME_S: f64 = 0.02;
+/// Stribeck velocity over the largest velocity: start and bounds of the search.
+const STRIBECK: (f64, f64, f64) = (0.1, 2e-3, 0.7);
+
+/// The parameters of one fit.
+pub(super) struct Solution {
+    pub(super) coefficients: DVector<f64>,
+    pub(super) dead_time_s: f64,
+    pub(super) stribeck_velocity_mm_s: f64,
+}
+
+impl Solution {
+    /// The two parameters that are not linear are searched for; the others follow from them.
+    pub(super) fn find(
+        regression: &Regression<'_>,
+        structure: Structure,
+        rows: &[usize],
+    ) -> Result<Self, MotionFitError> {
+        let fastest = regression
+            .velocity_mm_s
+            .iter()
+            .fold(0.0_f64, |most, v| most.max(v.abs()));
+        let (start, low, high) = STRIBECK;
+        let mut searched = Vec::new();
+        let known_s = regression
+            .known_dead_time_s()
+            .filter(|_| structure.dead_time);
+        if structure.dead_time && known_s.is_none() {
+            searched.push(Parameter {
+                name: "dead time",
+                start: 1e-3,
+                bounds: (0.0, MOST_DEAD_TIME_S),
+            });
+        }
+        if structure.stribeck {
+            searched.push(Parameter {
+                name: "Stribeck velocity",
+                start: start * fastest,
+                bounds: (low * fastest, high * fastest),
+            });
+        }
+        let split = |values: &[f64]| {
+            let dead_time_s = match known_s {
+                Some(known_s) => known_s,
+                None if structure.dead_time => values[0],
+                None => 0.0,
+            };
+            let velocity = values.last().copied().filter(|_| structure.stribeck);
+            (dead_time_s, velocity.unwrap_or(start * fastest))
+        };
+        let solved = |values: &[f64]| {
+            let (dead_time_s, stribeck_velocity_mm_s) = split(values);
+            let columns = regression.columns_at(stribeck_velocity_mm_s);
+            let voltage = regression.voltage_at(dead_time_s);
+            solve(&regression.terms, &columns, &voltage, rows).map(|coefficients| Self {
+                coefficients,
+                dead_time_s,
+                stribeck_velocity_mm_s,
+            })
+        };
+        let dependent = || MotionFitError::Dependent {
+            structure: structure.name(),
+        };
+        let start: Vec<f64> = searched.iter().map(|parameter| parameter.start).collect();
+        solved(&start).ok_or_else(dependent)?;
+        if searched.is_empty() {
+            return solved(&[]).ok_or_else(dependent);
+        }
+        let found = fit(&searched, Loss::Squares, |values| {
+            solved(values).map_or_else(
+                || vec![f64::NAN; rows.len()],
+                |solution| solution.residual(regression, rows).as_slice().to_vec(),
+            )
+        })?;
+        solved(&found.values).ok_or_else(dependent)
+    }
+
+    pub(super) fn residual(&self, regression: &Regression<'_>, rows: &[usize]) -> DVector<f64> {
+        let columns = regression.columns_at(self.stribeck_velocity_mm_s);
+        let voltage = regression.voltage_at(self.dead_time_s);
+        (voltage - columns * &self.coefficients).select_rows(rows)
+    }
+
+    /// The model, in its own terms.
+    pub(super) fn model(
+        &self,
+        regression: &Regression<'_>,
+        structure: Structure,
+        settings: &MotionFitSettings,
+        residual: &DVector<f64>,
+    ) -> Result<MotionModel, MotionFitError> {
+        let sum = |wanted: &dyn Fn(Term) -> bool| -> f64 {
+            let terms = regression.terms.iter().zip(self.coefficients.iter());
+            terms
+                .filter(|(term, _)| wanted(**term))
+                .map(|(_, value)| value)
+                .sum()
+        };
+        let inertia = sum(&|term| term == Term::Inertia);
+        let coulomb = sum(&|term| matches!(term, Term::Coulomb | Term::Element(_)));
+        let drop = sum(&|term| term == Term::Drop);
+        let viscous =
+            |way: Way| sum(&|term| term == Term::Viscous(way) || term == Term::Viscous(Way::Both));
+        let way = |way: Way| {
+            sliding(
+                coulomb,
+                drop,
+                self.stribeck_velocity_mm_s,
+                viscous(way).max(0.0),
+            )
+        };
+        for (name, value, unit) in [("M'", inertia, "V s²/mm"), ("Fc", coulomb, "V")] {
+            if value <= 0.0 {
+                return Err(MotionFitError::Unphysical {
+                    structure: structure.name(),
+                    name: name.to_owned(),
+                    value,
+                    unit,
+                });
+            }
+        }
+        let elements = regression.terms.iter().zip(self.coefficients.iter());
+        let elements = elements.filter_map(|(term, level_v)| match term {
+            Term::Element(knot) if *level_v > 0.0 => Some((settings.knots_mm[*knot], *level_v)),
+            _ => None,
+        });
+        let voltage = regression.voltage_at(self.dead_time_s);
+        Ok(MotionModel {
+            structure,
+            inertia_v_s2_per_mm: inertia,
+            friction: PerDirection {
+                positive: way(Way::Positive),
+                negative: way(Way::Negative),
+            },
+            offset_v: sum(&|term| term == Term::Offset),
+            dead_time_s: self.dead_time_s,
+            hold_s: regression.hold_s(),
+            elements: elements.collect(),
+            estimates: estimates(self, regression, structure, settings, residual),
+            relative_error: residual.norm() / voltage.norm(),
+        })
+    }
+}
