@@ -1,22 +1,13 @@
 //! From an unknown axis to settings that a replay runs on, by the commands alone.
 
+mod command;
+
 use std::fmt::Write as _;
 use std::path::Path;
-use std::process::Command;
 
+use command::succeed;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::settings_file::SettingsFile;
-
-fn succeed(folder: &Path, arguments: &[&str]) -> String {
-    let output = Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap();
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    String::from_utf8(output.stdout).unwrap()
-}
 
 /// A column of the verdict, law by law.
 fn verdict(path: &Path, heading: &str) -> Vec<(String, f64)> {

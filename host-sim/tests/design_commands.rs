@@ -1,30 +1,17 @@
 //! The commands `quadrant design pid` and `npid`, from end to end.
 
+mod command;
+
 use std::path::Path;
-use std::process::{Command, Output};
 
 use quadrant_sim::settings_file::SettingsFile;
 
-fn design(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .arg("design")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
-    let output = design(folder, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    String::from_utf8(output.stdout).unwrap()
+    command::succeed(folder, &[&["design"], arguments].concat())
 }
 
 fn fail(folder: &Path, arguments: &[&str]) -> String {
-    let output = design(folder, arguments);
-    assert!(!output.status.success(), "{arguments:?} succeeded");
-    String::from_utf8(output.stderr).unwrap()
+    command::fail(folder, &[&["design"], arguments].concat())
 }
 
 /// The cells of a row of a table's CSV file.

@@ -1,32 +1,19 @@
 //! The commands `quadrant identify frf`, `plant` and `motion`, from end to end.
 
+mod command;
+
 use std::path::Path;
-use std::process::{Command, Output};
 
 use quadrant::settings::StageSettings;
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::settings_file::SettingsFile;
 
-fn identify(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .arg("identify")
-        .args(arguments)
-        .current_dir(folder)
-        .output()
-        .unwrap()
-}
-
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
-    let output = identify(folder, arguments);
-    let errors = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {errors}");
-    String::from_utf8(output.stdout).unwrap()
+    command::succeed(folder, &[&["identify"], arguments].concat())
 }
 
 fn fail(folder: &Path, arguments: &[&str]) -> String {
-    let output = identify(folder, arguments);
-    assert!(!output.status.success(), "{arguments:?} succeeded");
-    String::from_utf8(output.stderr).unwrap()
+    command::fail(folder, &[&["identify"], arguments].concat())
 }
 
 /// The value of a parameter in a table's CSV file.

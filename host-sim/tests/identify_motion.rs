@@ -6,6 +6,7 @@ use quadrant_sim::identify::motion::{
     Candidate, CascadeLoop, MotionFitError, MotionFitSettings, MotionModel, fit_motion,
     recommended, replay_closed_loop, replay_open_loop, shuttle,
 };
+use quadrant_sim::identify::setting::SettingError;
 use quadrant_sim::plant::{AxisTruth, StageTruth};
 use quadrant_sim::rig::{Recording, SimulatedRig};
 
@@ -206,9 +207,9 @@ fn records_that_tell_too_little_are_refused_with_what_they_lack() {
     };
     assert!(matches!(
         refusal(&whole, &coarse),
-        MotionFitError::Setting {
+        MotionFitError::Setting(SettingError {
             field: "cut-off",
             ..
-        }
+        })
     ));
 }

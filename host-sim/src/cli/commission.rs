@@ -14,7 +14,7 @@ use quadrant_sim::presentation::{
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
 use super::identify::rig::Axis;
-use super::output::{Output, share};
+use super::output::{Output, command_line, share};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]
@@ -106,11 +106,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             );
         }
     }
-    let command = format!(
-        "quadrant commission --axis {} --seed {}",
-        axis.name(),
-        output.seed
-    );
+    let command = command_line();
     let records = write_records(output, &found, checked.as_ref())?;
     file.stage.axes[axis.index()] = found.settings.clone();
     file.provenance.push(Provenance {

@@ -71,10 +71,16 @@ pub(super) fn progress(runs: u64, what: &'static str) -> ProgressBar {
     ProgressBar::new(runs).with_style(style).with_message(what)
 }
 
-/// The command line as it was given: what a reader repeats.
+/// The command line as it was given, but for the folder of the results: what a reader repeats.
 pub(super) fn command_line() -> String {
-    std::iter::once("quadrant".to_owned())
-        .chain(std::env::args().skip(1))
-        .collect::<Vec<_>>()
-        .join(" ")
+    let mut words = vec!["quadrant".to_owned()];
+    let mut given = std::env::args().skip(1);
+    while let Some(word) = given.next() {
+        if word == "--out" {
+            given.next();
+        } else if !word.starts_with("--out=") {
+            words.push(word);
+        }
+    }
+    words.join(" ")
 }

@@ -22,5 +22,6 @@ pub mod motor_constant;
 pub mod plant;
 pub mod response;
 pub mod revise;
+pub mod setting;
 pub mod static_friction;
 pub mod virgin_curve;

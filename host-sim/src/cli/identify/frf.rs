@@ -11,7 +11,7 @@ use quadrant_sim::presentation::{provenance, response_section};
 
 use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, share};
+use crate::cli::output::{Output, command_line, share};
 
 /// The settling time of a fresh measurement, s.
 const SETTLING_S: f64 = 0.7;
@@ -94,43 +94,6 @@ impl Measurement {
         Ok(found)
     }
 
-    /// The options that repeat it, as far as they are not the usual ones.
-    pub(in crate::cli) fn options(&self) -> String {
-        let FrfSettings {
-            excitation: usual,
-            periods,
-            bias_velocity_mm_s,
-            ..
-        } = FrfSettings::default();
-        let mut options = String::new();
-        if self.waveform != usual.waveform {
-            options += &format!(" --waveform {}", self.waveform);
-        }
-        if let Some(volts) = self.amplitude_v {
-            options += &format!(" --amplitude-v {volts}");
-        }
-        for (name, value, usual) in [
-            ("from-hz", self.from_hz, usual.band_hz.0),
-            ("to-hz", self.to_hz, usual.band_hz.1),
-            ("rise-hz", self.rise_hz, usual.rise_hz),
-            ("period-s", self.period_s, usual.period_s),
-            ("averages", self.averages as f64, periods as f64),
-            (
-                "bias-velocity-mm-s",
-                self.bias_velocity_mm_s,
-                bias_velocity_mm_s,
-            ),
-        ] {
-            if value != usual {
-                options += &format!(" --{name} {value}");
-            }
-        }
-        if self.open_loop {
-            options += " --open-loop";
-        }
-        options
-    }
-
     /// The velocity of the axis, mm/s: it slides under feedback only.
     fn velocity_mm_s(&self) -> f64 {
         if self.open_loop {
@@ -191,30 +154,14 @@ fn response_of_saved(arguments: &Arguments) -> anyhow::Result<FrfMeasurement> {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let Arguments {
-        record,
-        measurement,
-        output,
-        ..
-    } = arguments;
-    let (found, title, source) = match arguments.axis {
+    let Arguments { record, output, .. } = arguments;
+    let (found, title) = match arguments.axis {
         Some(axis) => {
-            let found = measurement.run(axis, output)?;
+            let found = arguments.measurement.run(axis, output)?;
             println!("Simulated, not measured.");
-            let source = format!(" --axis {}", axis.name());
-            (found, simulated(axis), source)
+            (found, simulated(axis))
         }
-        None => {
-            let mut source = recorded::option(record);
-            if arguments.settling_s != SETTLING_S {
-                source += &format!(" --settling-s {}", arguments.settling_s);
-            }
-            (
-                response_of_saved(arguments)?,
-                recorded::title(record),
-                source,
-            )
-        }
+        None => (response_of_saved(arguments)?, recorded::title(record)),
     };
     let points = &found.estimate.response.points;
     let coherent = points.iter().filter(|point| point.coherence > 0.95).count();
@@ -233,16 +180,11 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
              excitation lost in noise or friction?"
         );
     }
-    let command = format!(
-        "quadrant identify frf{source}{} --seed {}",
-        measurement.options(),
-        output.seed
-    );
     let page = page(
         "Frequency response",
         &title,
         vec![response_section(&found, None)],
-        provenance(&command, output.seed),
+        provenance(&command_line(), output.seed),
     );
     output.page(&page, "frf.html")
 }

@@ -10,7 +10,7 @@ use quadrant_sim::presentation::{friction_section, friction_table, provenance};
 
 use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, share};
+use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]
@@ -48,7 +48,7 @@ pub(in crate::cli) struct Arguments {
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let exponent = arguments.exponent.map_or(Exponent::Free, Exponent::Fixed);
-    let (map, title, command) = match (&arguments.record, arguments.axis) {
+    let (map, title) = match (&arguments.record, arguments.axis) {
         (None, Some(axis)) => {
             let settings = StaticFrictionSettings {
                 velocities_mm_s: (arguments.from_mm_s, arguments.to_mm_s),
@@ -66,27 +66,22 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                     .write_csv(output.file(&format!("friction-recording-{}.csv", index + 1))?)?;
             }
             println!("Simulated, not measured.");
-            (map, simulated(axis), format!(" --axis {}", axis.name()))
+            (map, simulated(axis))
         }
         (Some(path), _) => (
             FrictionMap::read_csv(path)?,
             recorded::title(std::slice::from_ref(path)),
-            recorded::option(std::slice::from_ref(path)),
         ),
         (None, None) => return Ok(()),
     };
     map.write_csv(output.file("friction-map.csv")?)?;
     let found = fit_map(&map, exponent)?;
     output.table(&friction_table(&found))?;
-    let command = format!(
-        "quadrant identify static-friction{command} --seed {}",
-        output.seed
-    );
     let page = page(
         "Static friction",
         &title,
         vec![friction_section(&map, &found)],
-        provenance(&command, output.seed),
+        provenance(&command_line(), output.seed),
     );
     output.page(&page, "static-friction.html")
 }

@@ -10,7 +10,7 @@ use quadrant_sim::presentation::{motor_constant_section, motor_constant_table, p
 
 use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, share};
+use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]
@@ -63,32 +63,22 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         dwell_s: arguments.dwell_s,
         ..MotorConstantSettings::default()
     };
-    let (motor, title, source) = match (&arguments.record, arguments.axis) {
+    let (motor, title) = match (&arguments.record, arguments.axis) {
         (Some(path), _) => {
             let found = evaluate(recorded::read(path)?, &settings, arguments.resolution_mm)?;
             let paths = std::slice::from_ref(path);
-            let resolution = format!(" --resolution-mm {}", arguments.resolution_mm);
-            let source = recorded::option(paths) + &resolution;
-            (found, recorded::title(paths), source)
+            (found, recorded::title(paths))
         }
-        (None, Some(axis)) => {
-            let source = format!(" --axis {}", axis.name());
-            (measured(axis, &settings, output)?, simulated(axis), source)
-        }
+        (None, Some(axis)) => (measured(axis, &settings, output)?, simulated(axis)),
         (None, None) => return Ok(()),
     };
     let mass = arguments.moving_mass_kg;
     output.table(&motor_constant_table(&motor, mass))?;
-    let mass_option = mass.map_or_else(String::new, |mass| format!(" --moving-mass-kg {mass}"));
-    let command = format!(
-        "quadrant identify motor-constant{source} --dwell-s {}{mass_option} --seed {}",
-        arguments.dwell_s, output.seed
-    );
     let page = page(
         "Motor constant",
         &title,
         vec![motor_constant_section(&motor, mass)],
-        provenance(&command, output.seed),
+        provenance(&command_line(), output.seed),
     );
     output.page(&page, "motor-constant.html")
 }

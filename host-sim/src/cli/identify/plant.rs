@@ -13,7 +13,7 @@ use quadrant_sim::report::Block;
 use super::frf::Measurement;
 use super::rig::Axis;
 use super::{page, simulated};
-use crate::cli::output::Output;
+use crate::cli::output::{Output, command_line};
 
 /// Options of `quadrant identify plant`.
 #[derive(Clone, Debug, Args)]
@@ -48,27 +48,20 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         stiffness: arguments.stiffness,
         ..PlantFitSettings::default()
     };
-    let (found, mut section, title, source) = match (&arguments.frf, arguments.axis) {
+    let (found, mut section, title) = match (&arguments.frf, arguments.axis) {
         (Some(path), _) => {
             let response = FrequencyResponse::read_csv(path)?;
             let found = fit_plant(&response, &settings)?;
             let section = fitted_response_section(&response, &found.plant);
             let name = path.file_name().unwrap_or(path.as_os_str()).display();
-            (
-                found,
-                section,
-                format!("recorded: {name}"),
-                format!(" --frf {name}"),
-            )
+            (found, section, format!("recorded: {name}"))
         }
         (None, Some(axis)) => {
             let measured = arguments.measurement.run(axis, output)?;
             println!("Simulated, not measured.");
             let found = fit_plant(&measured.estimate.response, &settings)?;
             let section = response_section(&measured, Some(&found.plant));
-            let options = arguments.measurement.options();
-            let source = format!(" --axis {}{options}", axis.name());
-            (found, section, simulated(axis), source)
+            (found, section, simulated(axis))
         }
         (None, None) => return Ok(()),
     };
@@ -77,15 +70,11 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output.table(table)?;
     }
     section.blocks.splice(0..0, tables.map(Block::Table));
-    let command = format!(
-        "quadrant identify plant{source} --least-coherence {} --stiffness {} --seed {}",
-        arguments.least_coherence, arguments.stiffness, output.seed
-    );
     let page = page(
         "Linear model",
         &title,
         vec![section],
-        provenance(&command, output.seed),
+        provenance(&command_line(), output.seed),
     );
     output.page(&page, "plant.html")
 }

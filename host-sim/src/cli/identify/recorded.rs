@@ -31,11 +31,6 @@ pub(super) fn title(paths: &[PathBuf]) -> String {
     format!("recorded: {}", names(paths).join(", "))
 }
 
-/// The option that repeats the reading.
-pub(super) fn option(paths: &[PathBuf]) -> String {
-    format!(" --record {}", names(paths).join(" "))
-}
-
 fn names(paths: &[PathBuf]) -> Vec<String> {
     paths
         .iter()

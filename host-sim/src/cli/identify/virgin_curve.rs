@@ -13,7 +13,7 @@ use quadrant_sim::settings_file::SettingsFile;
 
 use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, share};
+use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]
@@ -51,22 +51,19 @@ pub(in crate::cli) struct Arguments {
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let settings = arguments.axis_settings()?;
-    let (recording, title, source) = match (&arguments.record, arguments.axis) {
+    let (recording, title) = match (&arguments.record, arguments.axis) {
         (Some(path), _) => {
             let paths = std::slice::from_ref(path);
-            let (title, option) = (recorded::title(paths), recorded::option(paths));
-            (recorded::read(path)?, title, option)
+            (recorded::read(path)?, recorded::title(paths))
         }
         (None, Some(axis)) => {
             let (recording, sine) = measured(arguments, axis, settings.as_ref())?;
-            let source = format!(
-                " --axis {} --amplitude-um {} --frequency-hz {} --cycles {}",
-                axis.name(),
+            println!(
+                "Sine of {:.0} um at {} Hz",
                 1e3 * sine.amplitude_mm,
-                sine.frequency_hz,
-                sine.cycles
+                sine.frequency_hz
             );
-            (recording, simulated(axis), source)
+            (recording, simulated(axis))
         }
         (None, None) => return Ok(()),
     };
@@ -85,16 +82,11 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .zip(&found.knots_mm)
         .map(|(element, knot)| element.stiffness_v_per_mm * knot)
         .sum();
-    let command = format!(
-        "quadrant identify virgin-curve{source}{} --seed {}",
-        arguments.options(),
-        output.seed
-    );
     let page = page(
         "Pre-sliding friction",
         &title,
         vec![presliding_section(&found, breakaway_v)],
-        provenance(&command, output.seed),
+        provenance(&command_line(), output.seed),
     );
     output.page(&page, "virgin-curve.html")
 }
@@ -142,22 +134,5 @@ impl Arguments {
         };
         let stage = SettingsFile::read(path)?.stage;
         Ok(Some(stage.axes[axis.index()].clone()))
-    }
-
-    /// The options that repeat the identification.
-    fn options(&self) -> String {
-        let mut options = if self.knots_um.is_empty() {
-            format!(" --blocks {}", self.blocks)
-        } else {
-            let knots: Vec<String> = self.knots_um.iter().map(f64::to_string).collect();
-            format!(" --knots-um {}", knots.join(","))
-        };
-        if let (Some(path), Some(axis)) = (&self.settings, self.axis) {
-            options += &format!(" --settings {}", path.display());
-            if self.record.is_some() {
-                options += &format!(" --axis {}", axis.name());
-            }
-        }
-        options
     }
 }

@@ -6,6 +6,7 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::estimate::{Estimate, Estimator, estimate};
 use crate::identify::excitation::{Excitation, Waveform};
+use crate::identify::setting::SettingError;
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
 /// How a frequency response is measured.
@@ -57,15 +58,8 @@ pub struct FrfMeasurement {
 #[derive(Debug, thiserror::Error)]
 pub enum FrfError {
     /// A setting that cannot be.
-    #[error("{field} = {value}: {expected}")]
-    Setting {
-        /// Which.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// The travel does not allow a pass at this velocity.
     #[error(
         "a pass at {velocity_mm_s} mm/s needs {needed_mm:.0} mm of travel for a single period of {period_s} s, and there are \
@@ -112,11 +106,12 @@ const TRAVEL_SHARE: f64 = 0.9;
 impl FrfSettings {
     fn check(&self, rate_hz: f64) -> Result<(), FrfError> {
         let refuse = |field, value, expected| {
-            Err(FrfError::Setting {
+            Err(SettingError {
                 field,
                 value,
                 expected,
-            })
+            }
+            .into())
         };
         let Excitation {
             rms_v,

@@ -9,6 +9,7 @@ use num_complex::Complex64;
 use rustfft::FftPlanner;
 
 use super::{Estimator, FrfMeasurement, estimate};
+use crate::identify::setting::SettingError;
 use crate::rig::Recording;
 
 /// How recordings are turned into a response.
@@ -26,15 +27,8 @@ pub struct SavedSettings {
 #[derive(Debug, thiserror::Error)]
 pub enum SavedError {
     /// A setting that cannot be.
-    #[error("{field} = {value}: {expected}")]
-    Setting {
-        /// Which.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// The recordings were not sampled alike.
     #[error(
         "recording {index} has a sample time of {found_s} s, the first one {expected_s} s; resample it, or take it by itself"
@@ -181,11 +175,12 @@ fn check(recordings: &[Recording], settings: &SavedSettings) -> Result<f64, Save
     ];
     for (field, value, holds, expected) in checks {
         if !holds {
-            return Err(SavedError::Setting {
+            return Err(SettingError {
                 field,
                 value,
                 expected,
-            });
+            }
+            .into());
         }
     }
     Ok(sample_time_s)

@@ -1,20 +1,14 @@
 //! Why a record yields no model.
 
 use crate::identify::fit::FitError;
+use crate::identify::setting::SettingError;
 
 /// Why a record yields no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionFitError {
     /// A setting that cannot be.
-    #[error("{field} = {value}: {expected}")]
-    Setting {
-        /// Which.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// Too short.
     #[error(
         "{rows} rows are left of the record, and a fit takes {LEAST_ROWS}: record longer, raise the row rate, or cut less at the edges"

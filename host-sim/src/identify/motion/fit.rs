@@ -7,6 +7,7 @@ use super::model::{MotionModel, Structure};
 use super::regressors::Regression;
 use super::signals::{MotionFitSettings, Signals};
 use super::solution::{MOST_DEAD_TIME_S, Solution};
+use crate::identify::setting::SettingError;
 use crate::rig::Recording;
 
 /// A model, and how it does where it was not fitted.
@@ -65,11 +66,12 @@ pub fn fit_motion(
 
 fn check(recording: &Recording, settings: &MotionFitSettings) -> Result<(), MotionFitError> {
     let refuse = |field, value, expected| {
-        Err(MotionFitError::Setting {
+        Err(SettingError {
             field,
             value,
             expected,
-        })
+        }
+        .into())
     };
     let half_rate_hz = 0.5 / recording.sample_time_s;
     if !(settings.cutoff_hz > 0.0 && settings.cutoff_hz < 0.9 * half_rate_hz) {

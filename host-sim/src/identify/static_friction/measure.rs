@@ -3,6 +3,7 @@
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::map::{FrictionMap, FrictionRun};
+use crate::identify::setting::SettingError;
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
 /// How the friction-velocity map is measured.
@@ -33,15 +34,8 @@ impl Default for StaticFrictionSettings {
 #[derive(Debug, thiserror::Error)]
 pub enum StaticFrictionError {
     /// A setting that cannot be.
-    #[error("{field} = {value}: {expected}")]
-    Setting {
-        /// Which.
-        field: &'static str,
-        /// What it is.
-        value: f64,
-        /// What it must be.
-        expected: &'static str,
-    },
+    #[error(transparent)]
+    Setting(#[from] SettingError),
     /// A run does not fit into the travel.
     #[error(
         "a run at {velocity_mm_s:.2} mm/s needs {needed_mm:.0} mm, and there are {travel_mm:.0} mm: lower the fastest velocity, the \
@@ -112,11 +106,12 @@ impl StaticFrictionSettings {
         ];
         for (field, value, holds, expected) in checks {
             if !(value.is_finite() && holds) {
-                return Err(StaticFrictionError::Setting {
+                return Err(SettingError {
                     field,
                     value,
                     expected,
-                });
+                }
+                .into());
             }
         }
         Ok(())
