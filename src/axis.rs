@@ -1,7 +1,6 @@
 //! One axis, one tick: counts in, a converter's word out.
 
-use crate::control::npid::NonlinearGainTable;
-use crate::control::pid::{Pid, PidState};
+use crate::control::feedback::{Feedback, FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::encoder::{Encoder, EncoderState};
 use crate::feedforward::{Feedforward, ReferenceStep};
 use crate::friction::gms::GmsState;
@@ -11,11 +10,11 @@ use crate::scalar::{Quantity, Scalar};
 use crate::telemetry::{AxisTelemetry, LimitedBy};
 use crate::units::{DacCode, Position};
 
-/// Ticks that the feedforward can look ahead at most: 3.1 ms at 10 kHz.
-pub const MAX_PREVIEW_TICKS: usize = 31;
+/// Ticks that the feedforward can look ahead at most: 3 ms at 10 kHz.
+pub const MAX_PREVIEW_TICKS: usize = 30;
 
-/// Room for the reference positions between the feedforward's tick and the feedback's; a power of two.
-const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 1;
+/// Room for the reference positions from the feedforward's tick back to the one before the feedback's; a power of two.
+const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 2;
 
 /// The output stage of an axis.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,8 +41,9 @@ impl<S: Scalar> Amplifier<S> {
 pub struct Axis<S: Scalar, const N: usize> {
     pub(crate) encoder: Encoder,
     pub(crate) unit_mm: S::Gain,
-    pub(crate) nonlinear: Option<NonlinearGainTable<S>>,
-    pub(crate) pid: Pid<S>,
+    /// A displacement in a tick as a velocity.
+    pub(crate) unit_mm_s: S::Gain,
+    pub(crate) feedback: Feedback<S>,
     pub(crate) feedforward: Feedforward<S, N>,
     pub(crate) preview_ticks: usize,
     pub(crate) amplifier: Amplifier<S>,
@@ -64,7 +64,9 @@ pub struct AxisState<S: Scalar, const N: usize> {
     /// The reference at the feedforward's tick, ahead of the feedback's.
     ahead: Position,
     preview: [Position; PREVIEW_ROOM],
-    pid: PidState<S>,
+    /// Velocity of the feedback's reference, for a law that needs it.
+    velocity: S,
+    feedback: FeedbackState<S>,
     gms: GmsState<S, N>,
     transfer: S,
     last_output: S,
@@ -81,7 +83,8 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             step: ReferenceStep::default(),
             ahead: Position::ZERO,
             preview: [Position::ZERO; PREVIEW_ROOM],
-            pid: PidState::default(),
+            velocity: S::ZERO,
+            feedback: FeedbackState::default(),
             gms: GmsState::default(),
             transfer: S::ZERO,
             last_output: S::ZERO,
@@ -121,7 +124,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             telemetry: state.telemetry,
             ..AxisState::default()
         };
-        self.pid.reset(&mut state.pid, S::ZERO);
     }
 
     /// Starts a motion from where the reference stands.
@@ -152,6 +154,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.preview[slot] = ahead.position;
         let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
         let reference = state.preview[delayed];
+        if self.feedback.needs_velocity() {
+            let before = state.preview[delayed.wrapping_sub(1) % PREVIEW_ROOM];
+            let displacement = (reference - before).clipped();
+            state.velocity = S::scale_integer(displacement, self.unit_mm_s);
+        }
 
         let measured = state.encoder.position();
         let error = S::scale_wide((reference - measured).0, self.unit_mm);
@@ -169,27 +176,18 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// it was, and the difference fades.
     #[inline(never)]
     pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
-        let error = state.telemetry.error;
-        let scaled = match &self.nonlinear {
-            Some(gain) => gain.scaled_error(error),
-            None => error,
-        };
         let feedforward = self.feedforward.step(&mut state.gms, state.step);
-        let limit = self.amplifier.limit;
+        let total = feedforward.total();
+        let input = FeedbackInput {
+            error: state.telemetry.error,
+            velocity: state.velocity,
+        };
         if changed {
-            self.pid.take_over(&mut state.pid, scaled);
-            // What the new settings would put out, computed on a copy, decides the offset.
-            let base = feedforward.total();
-            let mut trial = state.pid.clone();
-            let terms = self
-                .pid
-                .step(&mut trial, scaled, -limit - base, limit - base);
-            state.transfer = state.last_output - (terms.output + base);
+            self.transfer(state, input, total);
         }
-        let base = feedforward.total() + state.transfer;
-        let feedback = self
-            .pid
-            .step(&mut state.pid, scaled, -limit - base, limit - base);
+        let base = total + state.transfer;
+        let feedback = self.feed_back(&mut state.feedback, input, base);
+        let limit = self.amplifier.limit;
         let output = (feedback.output + base).limit(-limit, limit);
         state.transfer = state
             .transfer
@@ -208,6 +206,30 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             LimitedBy::Nothing
         };
         code
+    }
+
+    /// The law, within what the output limit leaves beside `base`.
+    #[inline(always)]
+    fn feed_back(
+        &self,
+        state: &mut FeedbackState<S>,
+        input: FeedbackInput<S>,
+        base: S,
+    ) -> FeedbackTerms<S> {
+        let limit = self.amplifier.limit;
+        self.feedback
+            .step(state, input, -limit - base, limit - base)
+    }
+
+    /// Makes a change of settings bumpless: the output starts from where it was.
+    #[cold]
+    #[inline(never)]
+    fn transfer(&self, state: &mut AxisState<S, N>, input: FeedbackInput<S>, base: S) {
+        self.feedback.take_over(&mut state.feedback, input.error);
+        // What the new settings would put out, computed on a copy, decides the offset.
+        let mut trial = state.feedback.clone();
+        let terms = self.feed_back(&mut trial, input, base);
+        state.transfer = state.last_output - (terms.output + base);
     }
 
     /// Shows an axis whose outputs are off.

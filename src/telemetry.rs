@@ -1,6 +1,6 @@
 //! What one tick can show: every term of the law, though none of it is state.
 
-use crate::control::pid::PidTerms;
+use crate::control::feedback::FeedbackTerms;
 use crate::feedforward::FeedforwardTerms;
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{DacCode, EncoderCount, Position};
@@ -25,7 +25,7 @@ pub struct AxisTelemetry<S> {
     /// Tracking error e, reference minus measured, mm.
     pub error: S,
     /// Feedback, term by term.
-    pub feedback: PidTerms<S>,
+    pub feedback: FeedbackTerms<S>,
     /// Feedforward, term by term.
     pub feedforward: FeedforwardTerms<S>,
     /// What remains of the offset that made the last change of settings bumpless, V.

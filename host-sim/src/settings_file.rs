@@ -160,6 +160,7 @@ impl SettingsFile {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use quadrant::control::feedback::LawKind;
 
     fn file() -> SettingsFile {
         SettingsFile {
@@ -183,6 +184,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("stage.toml");
         let mut written = file();
+        written.stage.axes[1].feedback.law = LawKind::Pid;
         written.stage.axes[1].feedback.nonlinear = None;
         written.stage.axes[2].plant = None;
         written.stage.axes[0].feedback.pid.kp_v_per_mm = 1.0 / 3.0;

@@ -1,6 +1,7 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
 use indicatif::ProgressBar;
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -8,7 +9,7 @@ use quadrant::safety::{Command, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::supervisor::Event;
 use quadrant_sim::experiment::circle::run_circles;
-use quadrant_sim::experiment::comparison::{Configuration, Controller, run_configuration};
+use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
 use quadrant_sim::experiment::compensator::Setup;
 use quadrant_sim::experiment::recorded::{RecordedAxis, replay};
 use quadrant_sim::machine::{Machine, Operator};
@@ -16,11 +17,11 @@ use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::record::Record;
 
 const PID: Configuration = Configuration {
-    controller: Controller::Pid,
+    controller: LawKind::Pid,
     feedforward: FeedforwardKind::None,
 };
 const BEST: Configuration = Configuration {
-    controller: Controller::NPid,
+    controller: LawKind::NPid,
     feedforward: FeedforwardKind::Combined,
 };
 

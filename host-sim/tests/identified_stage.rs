@@ -1,11 +1,12 @@
 //! The settings of the virtual machine are what commissioning its axes gives, and as good as the truth.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::GmsParameters;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, commission};
-use quadrant_sim::experiment::comparison::{Configuration, Controller, run_configuration};
+use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
 use quadrant_sim::experiment::compensator::{Setup, identified};
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::identify::virgin_curve::{Knots, identify};
@@ -38,7 +39,7 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
 /// three velocities and three seeds, mm.
 fn performance(stage: &StageSettings) -> [f64; 3] {
     let best = Configuration {
-        controller: Controller::NPid,
+        controller: LawKind::NPid,
         feedforward: FeedforwardKind::Combined,
     };
     let setup = Setup::virtual_machine(stage.clone());

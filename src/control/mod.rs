@@ -1,6 +1,27 @@
 //! Feedback: the laws, the model they are designed on, and the bound that keeps the nonlinear one stable.
+//!
+//! An axis runs one law of [`feedback::LawKind`], chosen in its settings and exchanged without a jolt. All of them close
+//! in the same way ([`integrator`]) and keep the same memory ([`feedback::FeedbackState`]), and at small errors each is
+//! a PID ([`crate::settings::FeedbackSettings::linear_gains`]): that is what their stability is judged by.
+//!
+//! | law | module | acts on |
+//! |-----|--------|---------|
+//! | PD, PID | [`pid`] | the error |
+//! | N-PID | [`npid`] | the error times a gain that grows with it |
+//! | gain scheduling | [`schedule`] | the error, with gains that depend on the reference's speed |
+//! | cascade P/PI | [`cascade`] | a velocity error, its set point made from the error |
+//! | sliding mode | [`sliding_mode`] | the distance from a line in the phase plane, saturated |
+//! | NCTF | [`nctf`] | the distance from a measured trajectory in the phase plane |
 
+pub mod cascade;
+mod derivative;
+pub mod feedback;
+mod integrator;
+pub mod nctf;
 pub mod npid;
 pub mod pid;
 pub mod plant_model;
 pub mod popov;
+pub mod schedule;
+pub mod sliding_mode;
+pub mod surface;

@@ -2,8 +2,6 @@
 
 use super::{AxisSettings, PlanSettings, SettingsError, StageSettings};
 use crate::axis::{Amplifier, Axis};
-use crate::control::npid::NonlinearGainTable;
-use crate::control::pid::Pid;
 use crate::encoder::Encoder;
 use crate::feedforward::Feedforward;
 use crate::reference::{Motion, MotionScale};
@@ -54,8 +52,12 @@ impl AxisSettings {
                 Quantity::Integer,
                 Quantity::Length,
             ),
-            nonlinear: feedback.nonlinear.as_ref().map(NonlinearGainTable::build),
-            pid: Pid::build(&feedback.pid, feedback.integral_limit_v, period_s),
+            unit_mm_s: S::gain(
+                encoder.resolution_mm / POSITION_UNITS_PER_COUNT / period_s,
+                Quantity::Integer,
+                Quantity::Velocity,
+            ),
+            feedback: feedback.build(period_s),
             feedforward: Feedforward::build(
                 feedforward.kind,
                 &feedforward.gains,

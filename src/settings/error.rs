@@ -28,6 +28,12 @@ pub enum Reason {
         /// The bound.
         bound: f64,
     },
+    /// The law that is chosen has no parameters.
+    Missing,
+    /// The loop that the law closes at small errors is not shown to be stable on the plant.
+    Unstable,
+    /// It is not above the point before it.
+    NotRising,
     /// The table made from the curve errs by more than 0.1 % of the breakaway level.
     TableError,
     /// The pre-sliding spring on the plant's inertia swings too fast for the control rate.
@@ -60,8 +66,17 @@ impl fmt::Display for SettingsError {
         if let Some(axis) = self.axis {
             write!(f, "{axis}.")?;
         }
+        if self.reason == Reason::Missing {
+            return write!(f, "{} is missing, which the chosen law needs", self.field);
+        }
         write!(f, "{} = {}", self.field, self.value)?;
         match self.reason {
+            Reason::Missing => Ok(()),
+            Reason::Unstable => f.write_str(
+                ": the loop that the law closes at small errors is not shown to be stable on the axis' plant; \
+                 lower its gains",
+            ),
+            Reason::NotRising => f.write_str(" must lie above the point before it"),
             Reason::NotFinite => f.write_str(" is not a finite number"),
             Reason::OutOfRange { least, most } => {
                 write!(f, " is outside {least} to {most}")

@@ -6,6 +6,7 @@
 mod build;
 mod defaults;
 mod error;
+mod feedback;
 mod validate;
 
 pub use defaults::{x_axis, y_axis, z_axis};
@@ -13,9 +14,14 @@ pub use error::{Reason, SettingsError};
 
 use serde::{Deserialize, Serialize};
 
+use crate::control::cascade::CascadeGains;
+use crate::control::feedback::LawKind;
+use crate::control::nctf::NctfGains;
 use crate::control::npid::NonlinearGain;
 use crate::control::plant_model::PlantModel;
 use crate::control::popov::PidGains;
+use crate::control::schedule::GainSchedule;
+use crate::control::sliding_mode::SlidingModeGains;
 use crate::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::friction::PerDirection;
 use crate::friction::gms::GmsParameters;
@@ -78,18 +84,29 @@ pub struct AmplifierSettings {
     pub reversed: bool,
 }
 
-/// The feedback law.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The feedback law, and the parameters of every law that the axis has some for: the law can be changed without losing
+/// them, but only to one that has its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct FeedbackSettings {
-    /// The PID's gains.
-    pub pid: PidGains,
-    /// The integral stays within plus and minus this, V; above zero, at most the output limit.
+    /// The law that acts.
+    pub law: LawKind,
+    /// The integral of any law stays within plus and minus this, V; above zero, at most the output limit.
     pub integral_limit_v: f64,
-    /// The nonlinear gain that makes the PID an N-PID.
-    pub nonlinear: Option<NonlinearGain>,
     /// Time constant with which the offset of a bumpless change of settings fades, s; 0.001 to 10.
     pub transfer_s: f64,
+    /// The gains of PD, PID, N-PID and of the scheduled PID; the derivative's filter is every law's.
+    pub pid: PidGains,
+    /// The nonlinear gain that makes the PID an N-PID.
+    pub nonlinear: Option<NonlinearGain>,
+    /// The schedule of the scheduled PID: shares of the PID's gains over the reference's speed.
+    pub schedule: Option<GainSchedule>,
+    /// The cascade.
+    pub cascade: Option<CascadeGains>,
+    /// Sliding mode.
+    pub sliding_mode: Option<SlidingModeGains>,
+    /// NCTF.
+    pub nctf: Option<NctfGains>,
 }
 
 /// The friction of an axis, as identified.

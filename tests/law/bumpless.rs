@@ -1,5 +1,6 @@
 //! A change of settings in motion does not jolt the machine.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::scalar::{Fixed, Quantity, Scalar};
@@ -98,7 +99,7 @@ fn all_scalars(what: &str, first: &StageSettings, second: &StageSettings) {
 type Change = (&'static str, fn(&mut AxisSettings));
 
 fn linear(axis: &mut AxisSettings) {
-    axis.feedback.nonlinear = None;
+    axis.feedback.law = LawKind::Pid;
 }
 
 #[test]
@@ -124,10 +125,15 @@ fn gains_change_without_a_jump() {
 }
 
 #[test]
-fn pid_and_npid_exchange_without_a_jump() {
-    let (pid, npid) = (with_x(linear), StageSettings::default());
-    all_scalars("to N-PID", &pid, &npid);
-    all_scalars("to PID", &npid, &pid);
+fn any_two_laws_exchange_without_a_jump() {
+    let with = |law| with_x(|axis| axis.feedback.law = law);
+    for from in LawKind::ALL {
+        for to in LawKind::ALL {
+            let what = format!("{from:?} to {to:?}");
+            check::<f32>(&what, &with(from), &with(to));
+            check::<Fixed>(&what, &with(from), &with(to));
+        }
+    }
 }
 
 #[test]

@@ -1,6 +1,7 @@
 //! No stored parameter is inert: each changes the outputs, brings about a fault, or decides whether settings and plan
 //! are accepted.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -98,6 +99,7 @@ fn perturbed(path: &str, value: &Value) -> Value {
     let field = path.rsplit('/').next().unwrap_or_default();
     match value {
         Value::Bool(flag) => Value::Bool(!flag),
+        Value::String(_) if field == "law" => Value::from("pid"),
         Value::String(kind) => Value::from(if kind == "static" { "gms" } else { "static" }),
         Value::Null => panic!("{path} is not set by default"),
         Value::Number(number) if number.is_u64() => Value::from(number.as_u64().expect("u64") - 1),
@@ -118,7 +120,8 @@ fn perturbed(path: &str, value: &Value) -> Value {
     }
 }
 
-fn inert(base: &StageSettings) -> Vec<String> {
+/// The parameters that change nothing, of those whose path is of interest.
+fn inert(base: &StageSettings, of_interest: impl Fn(&str) -> bool) -> Vec<String> {
     let tree = serde_json::to_value(base).expect("plain data");
     let mut paths = vec![];
     leaves(&tree, "", &mut paths);
@@ -126,6 +129,7 @@ fn inert(base: &StageSettings) -> Vec<String> {
     let unchanged = [0, 1, 2].map(|axis| run::<f32>(base, axis).expect("valid"));
     paths
         .into_iter()
+        .filter(|path| of_interest(path))
         .filter(|path| {
             let mut tree = tree.clone();
             let leaf = tree.pointer_mut(path).expect("a leaf");
@@ -161,19 +165,59 @@ fn with_kind(kind: FeedforwardKind) -> StageSettings {
     settings
 }
 
+/// Parameters of a law that does not act.
+fn is_of_another_law(path: &str) -> bool {
+    ["schedule", "cascade", "sliding_mode", "nctf"]
+        .iter()
+        .any(|law| path.contains(&format!("/feedback/{law}/")))
+}
+
 #[test]
 fn every_parameter_acts_with_combined_feedforward_or_with_static() {
-    let combined = inert(&with_kind(FeedforwardKind::Combined));
+    let others = |path: &str| !is_of_another_law(path);
+    let combined = inert(&with_kind(FeedforwardKind::Combined), others);
     // The share of the static level acts where the static level does.
     let level: Vec<String> = (0..3)
         .map(|axis| format!("/axes/{axis}/feedforward/gains/level"))
         .collect();
     assert_eq!(combined, level);
-    let statically = inert(&with_kind(FeedforwardKind::Static));
+    let statically = inert(&with_kind(FeedforwardKind::Static), others);
     assert!(
         level.iter().all(|path| !statically.contains(path)),
         "{statically:?}"
     );
+}
+
+#[test]
+fn every_parameter_of_a_law_acts_where_the_law_does() {
+    for (law, field) in [
+        (LawKind::Scheduled, "schedule"),
+        (LawKind::Cascade, "cascade"),
+        (LawKind::SlidingMode, "sliding_mode"),
+        (LawKind::Nctf, "nctf"),
+    ] {
+        let mut settings = with_kind(FeedforwardKind::Combined);
+        for axis in &mut settings.axes {
+            axis.feedback.law = law;
+            // Within reach of the scenario: the integrals, the limits, a knee.
+            let feedback = &mut axis.feedback;
+            let cascade = feedback.cascade.as_mut().expect("by default");
+            cascade.velocity_limit_mm_s = 40.0;
+            cascade.velocity_feedforward = 0.9;
+            let sliding = feedback.sliding_mode.as_mut().expect("by default");
+            sliding.boundary_mm_s *= 0.5 / sliding.switching_v;
+            sliding.switching_v = 0.5;
+            let nctf = feedback.nctf.as_mut().expect("by default");
+            nctf.characteristic[0].error_mm *= 0.1;
+            nctf.characteristic[0].velocity_mm_s *= 0.1;
+        }
+        for axis in 0..3 {
+            let own = format!("/axes/{axis}/feedback/{field}/");
+            let idle = inert(&settings, |path| path.starts_with(&own));
+            // The first point of a schedule is at rest, whatever else is tried.
+            assert!(idle.is_empty(), "{idle:?}");
+        }
+    }
 }
 
 /// The weights act on the outputs too, not only through their sum.

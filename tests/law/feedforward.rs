@@ -206,7 +206,7 @@ fn preview_shifts_the_feedbacks_reference_by_whole_ticks() {
         (1.2e-3, 12),
         (1.24e-3, 12),
         (1.26e-3, 13),
-        (3.1e-3, 31),
+        (3.0e-3, 30),
     ] {
         let ahead = run(preview_s);
         for tick in 0..300 {

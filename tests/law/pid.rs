@@ -1,8 +1,9 @@
 //! The PID: bounds, filter, and its start.
 
 use proptest::prelude::*;
+use quadrant::control::feedback::FeedbackState;
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
-use quadrant::control::pid::{Pid, PidGains, PidState};
+use quadrant::control::pid::{Pid, PidGains};
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::x_axis;
 
@@ -42,7 +43,7 @@ proptest! {
             rate_per_mm: 15.0,
             range_mm: 0.1,
         });
-        let mut state = PidState::default();
+        let mut state = FeedbackState::default();
         for error in errors {
             let error = if nonlinear { shape.scaled_error(error) } else { error };
             let terms = pid.step(&mut state, error, low, high);
@@ -62,7 +63,7 @@ proptest! {
     ) {
         let pid = Pid::<Fixed>::build(&gains, 10.0, PERIOD_S);
         let high = Fixed::quantise(10.0, Quantity::Voltage);
-        let mut state = PidState::default();
+        let mut state = FeedbackState::default();
         for error in errors {
             let terms = pid.step(&mut state, Fixed(error), -high, high);
             prop_assert!(terms.output >= -high && terms.output <= high, "{terms:?}");
@@ -74,10 +75,10 @@ proptest! {
 #[test]
 fn an_error_that_is_not_a_number_counts_as_none() {
     let pid = Pid::<f32>::build(&x_gains(), 2.0, PERIOD_S);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     let terms = pid.step(&mut state, f32::NAN, -10.0, 10.0);
     assert_eq!(terms.output, 0.0);
-    assert_eq!(state, PidState::default());
+    assert_eq!(state, FeedbackState::default());
 }
 
 #[test]
@@ -88,7 +89,7 @@ fn proportional_and_integral_terms_are_their_definitions() {
         ..x_gains()
     };
     let pid = Pid::<f64>::build(&gains, 2.0, PERIOD_S);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     for tick in 1..=1000 {
         let terms = pid.step(&mut state, 0.1, -10.0, 10.0);
         assert!((terms.proportional - 0.1 * gains.kp_v_per_mm).abs() < 1e-15);
@@ -106,7 +107,7 @@ fn proportional_and_integral_terms_are_their_definitions() {
 fn derivative_step_response_is_the_bilinear_one() {
     let gains = x_gains();
     let pid = Pid::<f64>::build(&gains, 2.0, PERIOD_S);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     // s = 2/T (z-1)/(z+1) in Kd s / (1 + tau s).
     let (tau, kd) = (gains.derivative_filter_s, gains.kd_v_s_per_mm);
     let pole = (2.0 * tau - PERIOD_S) / (2.0 * tau + PERIOD_S);
@@ -126,7 +127,7 @@ fn derivative_has_the_analytic_gain_and_phase_at_frequencies() {
     // Frequencies with a whole number of cycles in 10 000 ticks.
     for frequency_hz in [1.0, 65.0, 500.0, 2000.0] {
         let angle = |tick: i32| TAU * frequency_hz * f64::from(tick) * PERIOD_S;
-        let mut state = PidState::default();
+        let mut state = FeedbackState::default();
         let (mut re, mut im) = (0.0, 0.0);
         for tick in -1000..10_000 {
             let terms = pid.step(&mut state, 1e-3 * angle(tick).sin(), -10.0, 10.0);
@@ -149,7 +150,7 @@ fn derivative_has_the_analytic_gain_and_phase_at_frequencies() {
 #[test]
 fn reset_gives_no_derivative_kick() {
     let pid = Pid::<f32>::build(&x_gains(), 2.0, PERIOD_S);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     pid.step(&mut state, 3.0, -10.0, 10.0);
     pid.reset(&mut state, 0.5);
     let terms = pid.step(&mut state, 0.5, -10.0, 10.0);
@@ -166,7 +167,7 @@ fn integral_stops_at_its_limit_and_leaves_it_at_once() {
     };
     for sign in [1.0, -1.0] {
         let pid = Pid::<f64>::build(&gains, 0.5, PERIOD_S);
-        let mut state = PidState::default();
+        let mut state = FeedbackState::default();
         for _ in 0..10_000 {
             pid.step(&mut state, sign * 0.1, -10.0, 10.0);
         }
@@ -186,7 +187,7 @@ fn integral_takes_nothing_that_pushes_a_cut_output_further_out() {
     };
     for sign in [1.0, -1.0] {
         let pid = Pid::<f64>::build(&gains, 5.0, PERIOD_S);
-        let mut state = PidState::default();
+        let mut state = FeedbackState::default();
         for _ in 0..10_000 {
             let terms = pid.step(&mut state, sign * 5.0, -3.0, 3.0);
             assert!(terms.saturated);
@@ -212,7 +213,7 @@ fn a_fixed_point_integral_collects_terms_below_its_step() {
     };
     // One step of error, 15 pm, adds 2e-15 V a tick: 1e-7 of the voltage's step.
     let pid = Pid::<Fixed>::build(&gains, 2.0, PERIOD_S);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     let high = Fixed::quantise(10.0, Quantity::Voltage);
     let mut terms = pid.step(&mut state, Fixed(1), -high, high);
     assert_eq!(terms.integral, Fixed(0));

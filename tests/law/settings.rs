@@ -1,6 +1,8 @@
 //! Every number out of its range is refused by name, with the value and what is allowed.
 
+use quadrant::control::nctf::NctfGains;
 use quadrant::control::plant_model::PlantModel;
+use quadrant::control::schedule::SchedulePoint;
 use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, PlanSettings, Reason, SettingsError, StageSettings};
 
@@ -120,6 +122,171 @@ const FIELDS: &[(&str, Field, f64, f64)] = &[
         |a| &mut nonlinear(a).rate_per_mm,
         -0.1,
         34.1,
+    ),
+    (
+        "feedback.schedule.speed_mm_s",
+        |a| &mut schedule(a)[0].speed_mm_s,
+        -0.1,
+        0.1,
+    ),
+    (
+        "feedback.schedule.proportional",
+        |a| &mut schedule(a)[0].proportional,
+        -0.1,
+        30.1,
+    ),
+    (
+        "feedback.schedule.integral",
+        |a| &mut schedule(a)[0].integral,
+        -0.1,
+        30.1,
+    ),
+    (
+        "feedback.schedule.derivative",
+        |a| &mut schedule(a)[0].derivative,
+        -0.1,
+        30.1,
+    ),
+    (
+        "feedback.cascade.position_gain_per_s",
+        |a| {
+            &mut a
+                .feedback
+                .cascade
+                .as_mut()
+                .expect("by default")
+                .position_gain_per_s
+        },
+        0.0,
+        1.1e4,
+    ),
+    (
+        "feedback.cascade.velocity_gain_v_s_per_mm",
+        |a| {
+            &mut a
+                .feedback
+                .cascade
+                .as_mut()
+                .expect("by default")
+                .velocity_gain_v_s_per_mm
+        },
+        0.0,
+        101.0,
+    ),
+    (
+        "feedback.cascade.velocity_integral_per_s",
+        |a| {
+            &mut a
+                .feedback
+                .cascade
+                .as_mut()
+                .expect("by default")
+                .velocity_integral_per_s
+        },
+        -0.1,
+        1.1e4,
+    ),
+    (
+        "feedback.cascade.velocity_feedforward",
+        |a| {
+            &mut a
+                .feedback
+                .cascade
+                .as_mut()
+                .expect("by default")
+                .velocity_feedforward
+        },
+        -0.1,
+        1.1,
+    ),
+    (
+        "feedback.cascade.velocity_limit_mm_s",
+        |a| {
+            &mut a
+                .feedback
+                .cascade
+                .as_mut()
+                .expect("by default")
+                .velocity_limit_mm_s
+        },
+        0.0,
+        1001.0,
+    ),
+    (
+        "feedback.sliding_mode.slope_per_s",
+        |a| {
+            &mut a
+                .feedback
+                .sliding_mode
+                .as_mut()
+                .expect("by default")
+                .slope_per_s
+        },
+        0.0,
+        1.1e4,
+    ),
+    (
+        "feedback.sliding_mode.switching_v",
+        |a| {
+            &mut a
+                .feedback
+                .sliding_mode
+                .as_mut()
+                .expect("by default")
+                .switching_v
+        },
+        0.0,
+        10.1,
+    ),
+    (
+        "feedback.sliding_mode.boundary_mm_s",
+        |a| {
+            &mut a
+                .feedback
+                .sliding_mode
+                .as_mut()
+                .expect("by default")
+                .boundary_mm_s
+        },
+        0.0,
+        1001.0,
+    ),
+    (
+        "feedback.sliding_mode.integral_per_s",
+        |a| {
+            &mut a
+                .feedback
+                .sliding_mode
+                .as_mut()
+                .expect("by default")
+                .integral_per_s
+        },
+        -0.1,
+        1.1e4,
+    ),
+    (
+        "feedback.nctf.characteristic.error_mm",
+        |a| &mut nctf(a).characteristic[0].error_mm,
+        0.0,
+        30.1,
+    ),
+    (
+        "feedback.nctf.characteristic.velocity_mm_s",
+        |a| &mut nctf(a).characteristic[0].velocity_mm_s,
+        0.0,
+        1001.0,
+    ),
+    (
+        "feedback.nctf.gain_v_s_per_mm",
+        |a| &mut nctf(a).gain_v_s_per_mm,
+        0.0,
+        101.0,
+    ),
+    (
+        "feedback.nctf.integral_per_s",
+        |a| &mut nctf(a).integral_per_s,
+        -0.1,
+        1.1e4,
     ),
     (
         "feedforward.gains.level",
@@ -242,6 +409,14 @@ pub(crate) fn nonlinear(axis: &mut AxisSettings) -> &mut quadrant::control::npid
         .expect("an N-PID by default")
 }
 
+fn schedule(axis: &mut AxisSettings) -> &mut [SchedulePoint] {
+    axis.feedback.schedule.as_mut().expect("by default")
+}
+
+fn nctf(axis: &mut AxisSettings) -> &mut NctfGains {
+    axis.feedback.nctf.as_mut().expect("by default")
+}
+
 pub(crate) fn refusal(settings: &StageSettings) -> SettingsError {
     settings.validate(ROOM).expect_err("refused")
 }
@@ -307,8 +482,12 @@ fn the_list_of_fields_is_complete() {
     let axis = quadrant::settings::x_axis();
     let elements = axis.friction.gms.elements.len();
     let stored = numbers(&serde_json::to_value(&axis).expect("plain data"));
-    // One element stands for all; the counter's width is no f64.
-    assert_eq!(stored, FIELDS.len() + 2 * (elements - 1) + 1);
+    let points = axis.feedback.schedule.expect("by default").len();
+    // One element and one point stand for all; the counter's width is no f64.
+    assert_eq!(
+        stored,
+        FIELDS.len() + 2 * (elements - 1) + 4 * (points - 1) + 1
+    );
 }
 
 #[test]

@@ -6,6 +6,8 @@ use quadrant::settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::with_x;
 use crate::settings::{ROOM, check_message, nonlinear, refusal};
+use quadrant::control::feedback::LawKind;
+use quadrant::control::nctf::CharacteristicPoint;
 
 fn reason(change: impl FnOnce(&mut AxisSettings)) -> (&'static str, Reason, String) {
     let error = refusal(&with_x(change));
@@ -153,4 +155,82 @@ fn following_error_must_fit_the_position_difference() {
         axis.limits.following_error_mm = 17.0;
     });
     check_message(&refusal(&fine), AxisName::X, "limits.following_error_mm");
+}
+
+#[test]
+fn a_law_without_its_parameters_is_refused_by_name() {
+    for (law, field) in [
+        (LawKind::NPid, "feedback.nonlinear"),
+        (LawKind::Scheduled, "feedback.schedule"),
+        (LawKind::Cascade, "feedback.cascade"),
+        (LawKind::SlidingMode, "feedback.sliding_mode"),
+        (LawKind::Nctf, "feedback.nctf"),
+    ] {
+        let bare = with_x(|axis| {
+            let feedback = &mut axis.feedback;
+            feedback.law = law;
+            feedback.nonlinear = None;
+            feedback.schedule = None;
+            feedback.cascade = None;
+            feedback.sliding_mode = None;
+            feedback.nctf = None;
+        });
+        let error = refusal(&bare);
+        assert_eq!((error.field, error.reason), (field, Reason::Missing));
+        let text = format!("x.{field} is missing, which the chosen law needs");
+        assert_eq!(error.to_string(), text);
+    }
+}
+
+#[test]
+fn an_unstable_law_is_refused_when_a_plant_is_given() {
+    for law in LawKind::ALL {
+        let wild = |axis: &mut AxisSettings| {
+            let feedback = &mut axis.feedback;
+            feedback.law = law;
+            feedback.nonlinear.as_mut().expect("by default").rate_per_mm = 0.0;
+            feedback.pid.kp_v_per_mm *= 4.0;
+            feedback.pid.kd_v_s_per_mm *= 4.0;
+            feedback
+                .sliding_mode
+                .as_mut()
+                .expect("by default")
+                .boundary_mm_s /= 4.0;
+            let cascade = feedback.cascade.as_mut().expect("by default");
+            cascade.velocity_gain_v_s_per_mm *= 4.0;
+            feedback.nctf.as_mut().expect("by default").gain_v_s_per_mm *= 4.0;
+        };
+        let (_, reason, text) = reason(wild);
+        let refused = matches!(reason, Reason::Unstable | Reason::BeyondPopov { .. });
+        assert!(refused, "{law:?}: {text}");
+        let unknown = with_x(|axis| {
+            wild(axis);
+            axis.plant = None;
+        });
+        assert_eq!(unknown.validate(ROOM), Ok(()), "{law:?}");
+    }
+}
+
+#[test]
+fn points_that_do_not_rise_are_refused() {
+    let (field, reason_given, _) = reason(|axis| {
+        let schedule = axis.feedback.schedule.as_mut().expect("by default");
+        schedule[1].speed_mm_s = 0.0;
+    });
+    assert_eq!(field, "feedback.schedule.speed_mm_s");
+    assert_eq!(reason_given, Reason::NotRising);
+    for (error_mm, velocity_mm_s, field) in [
+        (1.0, 300.0, "feedback.nctf.characteristic.error_mm"),
+        (2.0, 200.0, "feedback.nctf.characteristic.velocity_mm_s"),
+    ] {
+        let (refused, reason, text) = reason(|axis| {
+            let nctf = axis.feedback.nctf.as_mut().expect("by default");
+            let point = CharacteristicPoint {
+                error_mm,
+                velocity_mm_s,
+            };
+            nctf.characteristic.push(point).expect("room");
+        });
+        assert_eq!((refused, reason), (field, Reason::NotRising), "{text}");
+    }
 }

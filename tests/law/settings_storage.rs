@@ -1,5 +1,6 @@
 //! Stored settings come back as they were.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::settings::{PlanSettings, StageSettings};
 
@@ -23,7 +24,9 @@ fn plan() -> PlanSettings {
 fn stages() -> [StageSettings; 2] {
     let bare = with_x(|axis| {
         axis.plant = None;
+        axis.feedback.law = LawKind::Pid;
         axis.feedback.nonlinear = None;
+        axis.feedback.nctf = None;
         axis.amplifier.reversed = true;
     });
     [StageSettings::default(), bare]

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use quadrant::control::feedback::LawKind;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::PidGains;
 use quadrant::feedforward::FeedforwardKind;
@@ -38,7 +39,7 @@ pub fn first_settings(base: &AxisSettings, gain_mm_per_v_s2: f64, rate_hz: f64) 
 /// `base` as an axis is measured with it: its PID alone, and room for the error that it makes.
 pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     let mut settings = base.clone();
-    settings.feedback.nonlinear = None;
+    settings.feedback.law = LawKind::Pid;
     settings.feedforward.kind = FeedforwardKind::None;
     settings.limits.following_error_mm = FOLLOWING_ERROR_MM;
     settings

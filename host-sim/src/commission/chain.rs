@@ -1,5 +1,6 @@
 //! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::settings::{AxisSettings, FrictionSettings};
@@ -170,6 +171,9 @@ pub fn commission(
             range: Range::Breakaway(breakaway_v),
         },
     );
+    if settings.feedback.nonlinear.is_some() {
+        settings.feedback.law = LawKind::NPid;
+    }
     settings.friction = FrictionSettings {
         sliding,
         gms: gms.gms.clone(),

@@ -68,7 +68,7 @@ pub fn verify(
 ) -> Result<Vec<Verdict>, VerifyError> {
     let pid = measuring_settings(settings);
     let npid = AxisSettings {
-        feedback: settings.feedback,
+        feedback: settings.feedback.clone(),
         ..pid.clone()
     };
     let mut full = settings.clone();

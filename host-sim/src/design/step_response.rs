@@ -1,7 +1,8 @@
 //! The step response of a linear axis under the firmware's own law, sample by sample.
 
+use quadrant::control::feedback::FeedbackState;
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
-use quadrant::control::pid::{Pid, PidState};
+use quadrant::control::pid::Pid;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::PidGains;
 
@@ -75,7 +76,7 @@ pub fn step_response(
     let table = nonlinear.map(NonlinearGainTable::<f64>::build);
     let held = HeldPlant::new(plant, period_s, request.computation_delay_s);
     let mut axis = HeldPlantRun::at_rest(held, 0.0);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     let samples = (request.duration_s / period_s).ceil() as usize;
     let (mut position_mm, mut voltage_v) = (Vec::new(), Vec::new());
     for _ in 0..samples {

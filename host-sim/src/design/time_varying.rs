@@ -7,7 +7,8 @@
 
 use std::f64::consts::{PI, TAU};
 
-use quadrant::control::pid::{Pid, PidState};
+use quadrant::control::feedback::FeedbackState;
+use quadrant::control::pid::Pid;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::PidGains;
 use rayon::prelude::*;
@@ -78,7 +79,7 @@ impl VaryingLoop {
         let pid = Pid::<f64>::build(&self.gains, NO_LIMIT_V, period_s);
         let held = HeldPlant::new(&self.plant, period_s, 0.0);
         let mut axis = HeldPlantRun::at_rest(held, START_MM);
-        let mut state = PidState::default();
+        let mut state = FeedbackState::default();
         let mut previous = -START_MM;
         pid.reset(&mut state, previous);
         let samples = (FOLLOWED_S / period_s) as usize;

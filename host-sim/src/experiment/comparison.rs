@@ -2,6 +2,7 @@
 //! velocities.
 
 use indicatif::ProgressBar;
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -29,20 +30,11 @@ const LEAD_S: f64 = 0.5;
 /// Room for GMS elements: the matched compensator has the plant's ten.
 pub const ELEMENTS: usize = 10;
 
-/// A feedback law.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Controller {
-    /// PID.
-    Pid,
-    /// PID behind the nonlinear gain.
-    NPid,
-}
-
 /// Feedback and feedforward together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Configuration {
     /// Feedback.
-    pub controller: Controller,
+    pub controller: LawKind,
     /// Feedforward.
     pub feedforward: FeedforwardKind,
 }
@@ -50,7 +42,7 @@ pub struct Configuration {
 impl Configuration {
     /// All eight, in the order of the thesis' tables.
     pub fn all() -> Vec<Self> {
-        [Controller::Pid, Controller::NPid]
+        [LawKind::Pid, LawKind::NPid]
             .into_iter()
             .flat_map(|controller| {
                 FeedforwardKind::ALL.map(|feedforward| Self {
@@ -63,10 +55,7 @@ impl Configuration {
 
     /// Its name in tables.
     pub fn name(self) -> String {
-        let controller = match self.controller {
-            Controller::Pid => "PID",
-            Controller::NPid => "N-PID",
-        };
+        let controller = self.controller.name();
         match self.feedforward {
             FeedforwardKind::None => controller.to_owned(),
             FeedforwardKind::Static => format!("{controller} + static"),
@@ -78,9 +67,7 @@ impl Configuration {
     /// Sets the stage up for it.
     pub fn apply(self, stage: &mut StageSettings) {
         for axis in &mut stage.axes {
-            if self.controller == Controller::Pid {
-                axis.feedback.nonlinear = None;
-            }
+            axis.feedback.law = self.controller;
             axis.feedforward.kind = self.feedforward;
         }
     }

@@ -4,6 +4,7 @@ use std::fmt;
 
 use heapless::Vec as ShortVec;
 use indicatif::ProgressBar;
+use quadrant::control::feedback::LawKind;
 use quadrant::control::npid::NonlinearGain;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::friction::PerDirection;
@@ -150,6 +151,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
     pid.ki_v_per_mm_s = INTEGRAL_RATIO_PER_S * pid.kp_v_per_mm;
     settings.encoder.resolution_mm = emps::RESOLUTION_MM;
     settings.feedback.pid = pid;
+    settings.feedback.law = LawKind::NPid;
     settings.feedback.nonlinear = Some(NonlinearGain {
         // The x axis' largest gain, over the errors that this far finer axis has.
         rate_per_mm: 150.0,

@@ -37,9 +37,10 @@ impl Metric {
 
 /// The headlines, in the order of the abstract.
 pub const HEADLINES: [Headline; 7] = {
-    use super::comparison::{Configuration, Controller::*};
+    use super::comparison::Configuration;
+    use quadrant::control::feedback::LawKind::{self, NPid, Pid};
     use quadrant::feedforward::FeedforwardKind as F;
-    const fn c(controller: super::comparison::Controller, feedforward: F) -> Configuration {
+    const fn c(controller: LawKind, feedforward: F) -> Configuration {
         Configuration {
             controller,
             feedforward,

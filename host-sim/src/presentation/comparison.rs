@@ -4,7 +4,7 @@ use super::circle::{circle_figures, circle_table};
 use super::{UM_PER_MM, error_curve};
 use crate::experiment::circle::CircleOutcome;
 use crate::experiment::comparison::{
-    AMPLITUDE_MM, Configuration, Controller, Outcome, VELOCITIES_MM_S, find, mean_change_percent,
+    AMPLITUDE_MM, Configuration, Outcome, VELOCITIES_MM_S, find, mean_change_percent,
 };
 use crate::experiment::compensator::Knowledge;
 use crate::experiment::metrics::{GLITCH_WINDOW, Score};
@@ -12,6 +12,7 @@ use crate::experiment::thesis::HEADLINES;
 use crate::report::{
     Block, Cell, Column, Figure, Lines, Page, Plot, Provenance, Section, Style, Table,
 };
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 
 /// Control period of the outcomes' traces, s.
@@ -44,7 +45,7 @@ const READINGS: [Reading; 3] = [
 
 /// PID without feedforward: what all changes are counted from.
 const BASELINE: Configuration = Configuration {
-    controller: Controller::Pid,
+    controller: LawKind::Pid,
     feedforward: FeedforwardKind::None,
 };
 

@@ -1,5 +1,6 @@
 //! One axis of the simulated stage as a rig: its truth is on the other side of encoder and converter.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::reference::MotionSettings;
@@ -42,7 +43,7 @@ impl SimulatedRig {
     pub fn new(index: usize, truth: AxisTruth, seed: u64) -> Self {
         let mut stage = StageSettings::default();
         let mut axis = stage.axes[index].clone();
-        axis.feedback.nonlinear = None;
+        axis.feedback.law = LawKind::Pid;
         axis.feedforward.kind = FeedforwardKind::None;
         stage.axes[0] = axis;
         Self {
