@@ -7,8 +7,8 @@ use quadrant::control::plant_model::PlantModel;
 use quadrant_sim::design::measured::{MeasuredError, MeasuredResponse};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::{
-    DesignError, Form, MarginError, PidDesign, PidRequest, PrintedMargins, Process, ShapingError,
-    Target, design_pid,
+    DesignError, Form, INTEGRAL_SHARE, MarginError, PidDesign, PidRequest, PrintedMargins, Process,
+    ShapingError, Target, design_pid,
 };
 use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
 
@@ -149,6 +149,7 @@ fn the_stiffest_loop_reaches_its_bounds_and_no_stiffer_one_does() {
     let target = Target::Bandwidth {
         sensitivity_peak,
         complementary_peak,
+        integral_share: INTEGRAL_SHARE,
     };
     let process = Process::Model(X_PLANT);
     let found = design(&process, target, SAMPLED).unwrap();
@@ -179,6 +180,7 @@ fn bounds_that_no_loop_keeps_say_by_how_much_they_are_missed() {
     let target = Target::Bandwidth {
         sensitivity_peak: 1.05,
         complementary_peak: 1.01,
+        integral_share: INTEGRAL_SHARE,
     };
     let error = design(&Process::Model(X_PLANT), target, Form::Continuous).unwrap_err();
     assert!(

@@ -7,15 +7,9 @@ use super::{
     AmplifierSettings, AxisSettings, EncoderSettings, FeedbackSettings, FeedforwardSettings,
     FrictionSettings, LimitSettings, StageSettings,
 };
-use crate::control::cascade::CascadeGains;
-use crate::control::feedback::LawKind;
-use crate::control::nctf::{CharacteristicPoint, NctfGains};
 use crate::control::npid::NonlinearGain;
 use crate::control::plant_model::PlantModel;
 use crate::control::popov::PidGains;
-use crate::control::schedule::SchedulePoint;
-use crate::control::sliding_mode::SlidingModeGains;
-use crate::control::surface::SurfaceGains;
 use crate::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::friction::PerDirection;
 use crate::friction::gms::{GmsElement, GmsParameters};
@@ -39,57 +33,6 @@ const MAX_VELOCITY_MM_S: f64 = 250.0;
 /// Break points of the virgin curve as shares of the pre-sliding range, and the weights that break there.
 const VIRGIN_CURVE: [(f64, f64); 4] = [(0.07, 0.30), (0.20, 0.30), (0.47, 0.25), (1.0, 0.15)];
 
-/// Output of the default sliding mode, V: several times the friction of any axis.
-const SWITCHING_V: f64 = 1.0;
-
-/// N-PID, and every other law such that at small errors it is the same PID.
-fn feedback(character: &Character) -> FeedbackSettings {
-    // The gains below have real zeros; a test holds them to that.
-    let surface = SurfaceGains::from_pid(&character.pid).unwrap_or(SurfaceGains {
-        slope_per_s: 1.0,
-        gain_v_s_per_mm: character.pid.kd_v_s_per_mm,
-        integral_per_s: 0.0,
-    });
-    let point = |speed_mm_s, integral| SchedulePoint {
-        speed_mm_s,
-        proportional: 1.0,
-        integral,
-        derivative: 1.0,
-    };
-    FeedbackSettings {
-        law: LawKind::NPid,
-        integral_limit_v: 2.0,
-        transfer_s: 0.05,
-        pid: character.pid,
-        nonlinear: Some(character.nonlinear),
-        // Where friction turns round, a faster integral.
-        schedule: Some(Vec::from_iter([point(0.0, 4.0), point(5.0, 1.0)])),
-        cascade: Some(CascadeGains {
-            position_gain_per_s: surface.slope_per_s,
-            velocity_gain_v_s_per_mm: surface.gain_v_s_per_mm,
-            velocity_integral_per_s: surface.integral_per_s,
-            velocity_feedforward: 1.0,
-            velocity_limit_mm_s: MAX_VELOCITY_MM_S,
-        }),
-        sliding_mode: Some(SlidingModeGains {
-            slope_per_s: surface.slope_per_s,
-            switching_v: SWITCHING_V,
-            boundary_mm_s: SWITCHING_V / surface.gain_v_s_per_mm,
-            integral_per_s: surface.integral_per_s,
-        }),
-        // The friction of these axes brakes so hard that stability, not the measured trajectory, bounds the slope up to
-        // their largest velocity.
-        nctf: Some(NctfGains {
-            characteristic: Vec::from_iter([CharacteristicPoint {
-                error_mm: MAX_VELOCITY_MM_S / surface.slope_per_s,
-                velocity_mm_s: MAX_VELOCITY_MM_S,
-            }]),
-            gain_v_s_per_mm: surface.gain_v_s_per_mm,
-            integral_per_s: surface.integral_per_s,
-        }),
-    }
-}
-
 fn axis(character: &Character) -> AxisSettings {
     let elements: Vec<GmsElement, _> = VIRGIN_CURVE
         .iter()
@@ -110,7 +53,11 @@ fn axis(character: &Character) -> AxisSettings {
             offset_v: 0.0,
             reversed: false,
         },
-        feedback: feedback(character),
+        feedback: FeedbackSettings::all_laws(
+            character.pid,
+            Some(character.nonlinear),
+            MAX_VELOCITY_MM_S,
+        ),
         friction: FrictionSettings {
             sliding: PerDirection::both(StaticFriction {
                 curve: StribeckCurve {

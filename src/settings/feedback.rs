@@ -3,17 +3,78 @@
 use heapless::Vec;
 
 use super::FeedbackSettings;
-use crate::control::cascade::Cascade;
+use crate::control::cascade::{Cascade, CascadeGains};
 use crate::control::feedback::{Feedback, LawKind};
-use crate::control::nctf::Nctf;
-use crate::control::npid::NonlinearGainTable;
+use crate::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
+use crate::control::npid::{NonlinearGain, NonlinearGainTable};
 use crate::control::pid::Pid;
 use crate::control::popov::PidGains;
-use crate::control::schedule::{MAX_POINTS, ScheduledPid};
-use crate::control::sliding_mode::SlidingMode;
+use crate::control::schedule::{MAX_POINTS, SchedulePoint, ScheduledPid};
+use crate::control::sliding_mode::{SlidingMode, SlidingModeGains};
+use crate::control::surface::SurfaceGains;
 use crate::scalar::Scalar;
 
+/// Output of sliding mode before anybody has chosen it, V: several times the friction of the axes this was written for.
+const SWITCHING_V: f64 = 1.0;
+
+/// Of the schedule before anybody has chosen it: the integral's share at rest, and the speed from which it is one, mm/s.
+const INTEGRAL_AT_REST: (f64, f64) = (4.0, 5.0);
+
 impl FeedbackSettings {
+    /// Every law such that at small errors it is the PID given: N-PID if there is a nonlinear gain, else PID, acts. The
+    /// schedule integrates faster at rest. Cascade, sliding mode and NCTF are left out when the PID's zeros are complex.
+    pub fn all_laws(
+        pid: PidGains,
+        nonlinear: Option<NonlinearGain>,
+        max_velocity_mm_s: f64,
+    ) -> Self {
+        let surface = SurfaceGains::from_pid(&pid);
+        let (at_rest, speed_mm_s) = INTEGRAL_AT_REST;
+        let point = |speed_mm_s, integral| SchedulePoint {
+            speed_mm_s,
+            proportional: 1.0,
+            integral,
+            derivative: 1.0,
+        };
+        Self {
+            law: if nonlinear.is_some() {
+                LawKind::NPid
+            } else {
+                LawKind::Pid
+            },
+            integral_limit_v: 2.0,
+            transfer_s: 0.05,
+            pid,
+            nonlinear,
+            schedule: Some(Vec::from_iter([
+                point(0.0, at_rest),
+                point(speed_mm_s, 1.0),
+            ])),
+            cascade: surface.map(|surface| CascadeGains {
+                position_gain_per_s: surface.slope_per_s,
+                velocity_gain_v_s_per_mm: surface.gain_v_s_per_mm,
+                velocity_integral_per_s: surface.integral_per_s,
+                velocity_feedforward: 1.0,
+                velocity_limit_mm_s: max_velocity_mm_s,
+            }),
+            sliding_mode: surface.map(|surface| SlidingModeGains {
+                slope_per_s: surface.slope_per_s,
+                switching_v: SWITCHING_V,
+                boundary_mm_s: SWITCHING_V / surface.gain_v_s_per_mm,
+                integral_per_s: surface.integral_per_s,
+            }),
+            // A straight line up to the largest velocity, until a trajectory is measured.
+            nctf: surface.map(|surface| NctfGains {
+                characteristic: Vec::from_iter([CharacteristicPoint {
+                    error_mm: max_velocity_mm_s / surface.slope_per_s,
+                    velocity_mm_s: max_velocity_mm_s,
+                }]),
+                gain_v_s_per_mm: surface.gain_v_s_per_mm,
+                integral_per_s: surface.integral_per_s,
+            }),
+        }
+    }
+
     /// The PIDs that the law is at small errors: one, or one for each point of the schedule. None of a law that has no
     /// parameters.
     pub fn linear_gains(&self) -> Vec<PidGains, MAX_POINTS> {

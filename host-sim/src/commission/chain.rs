@@ -1,9 +1,8 @@
 //! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
 
-use quadrant::control::feedback::LawKind;
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
-use quadrant::settings::{AxisSettings, FrictionSettings};
+use quadrant::settings::{AxisSettings, FeedbackSettings, FrictionSettings};
 
 use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
 use super::error::CommissionError;
@@ -163,7 +162,7 @@ pub fn commission(
 
     step += 1;
     let bound = sector_bound(&plant.plant, &pid, 1.0 / rate_hz);
-    settings.feedback.nonlinear = choose_nonlinear(
+    let nonlinear = choose_nonlinear(
         &pid,
         bound,
         &NonlinearRule {
@@ -171,9 +170,11 @@ pub fn commission(
             range: Range::Breakaway(breakaway_v),
         },
     );
-    if settings.feedback.nonlinear.is_some() {
-        settings.feedback.law = LawKind::NPid;
-    }
+    settings.feedback = FeedbackSettings {
+        integral_limit_v: base.feedback.integral_limit_v,
+        transfer_s: base.feedback.transfer_s,
+        ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
+    };
     settings.friction = FrictionSettings {
         sliding,
         gms: gms.gms.clone(),

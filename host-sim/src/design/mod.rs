@@ -26,7 +26,7 @@ pub use integral_gain::{
 };
 pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
-pub use pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
+pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
 pub use process::{Form, Process};
 pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 

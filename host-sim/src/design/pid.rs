@@ -36,6 +36,9 @@ pub enum Target {
         sensitivity_peak: f64,
         /// Bound on `|T|`, above 1.
         complementary_peak: f64,
+        /// The share of each bound that proportional and derivative gain leave to integral action, 0 to 0.5:
+        /// [`INTEGRAL_SHARE`] is stiff, more integrates faster.
+        integral_share: f64,
     },
 }
 
@@ -112,15 +115,15 @@ pub enum DesignError {
 const INTEGRAL_COST: f64 = 0.05;
 /// How near a crossover must come to the one asked for, Hz: half of the last digit that is printed of it.
 const CROSSOVER_TOLERANCE_HZ: f64 = 0.05;
-/// The share of each bound that proportional and derivative gain may use up; the rest is for integral action.
-const PROPORTIONAL_SHARE: f64 = 0.98;
+/// The usual share of the bounds for integral action: little, for the stiffest loop.
+pub const INTEGRAL_SHARE: f64 = 0.02;
 
 /// Whether a target still holds with integral action.
 type Acceptance = Box<dyn Fn(&Margins) -> bool>;
 
 /// Designs a PID: proportional and derivative gain for the target, then as much integral action as the target does not
 /// notice. That is a Ki which moves neither margin by more than 0.05 dB or 0.05 deg, or, with bounds on `|S|` and `|T|`, one
-/// that uses up the last 2 % of them; rounded down to two significant digits.
+/// that uses up the share left to it; rounded down to two significant digits.
 ///
 /// # Errors
 /// A target out of reach; says what is.
@@ -175,10 +178,12 @@ pub fn design_pid(process: &Process, request: &PidRequest) -> Result<PidDesign, 
         Target::Bandwidth {
             sensitivity_peak,
             complementary_peak,
+            integral_share,
         } => {
+            let proportional_share = 1.0 - integral_share;
             let bounds = PeakBounds {
-                sensitivity: PROPORTIONAL_SHARE * sensitivity_peak,
-                complementary: PROPORTIONAL_SHARE * complementary_peak,
+                sensitivity: proportional_share * sensitivity_peak,
+                complementary: proportional_share * complementary_peak,
             };
             let gains =
                 stiffest(process, form, filter_s, &bounds).map_err(|reason| match reason {
@@ -186,7 +191,7 @@ pub fn design_pid(process: &Process, request: &PidRequest) -> Result<PidDesign, 
                     NoLoop::Excess(excess) => DesignError::Bounds {
                         sensitivity_peak,
                         complementary_peak,
-                        percent: 100.0 * (PROPORTIONAL_SHARE * excess - 1.0),
+                        percent: 100.0 * (proportional_share * excess - 1.0),
                     },
                 })?;
             let kept = move |with: &Margins| {

@@ -14,6 +14,7 @@
 //! - [`virgin_curve`]: pre-sliding friction, the GMS model.
 
 pub mod at_rest;
+pub mod characteristic;
 pub mod excitation;
 pub mod fit;
 pub mod frf;

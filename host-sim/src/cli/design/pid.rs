@@ -6,7 +6,7 @@ use anyhow::bail;
 use clap::{Args, ValueEnum};
 use quadrant_sim::design::measured::MeasuredResponse;
 use quadrant_sim::design::step_response::{StepRequest, step_response};
-use quadrant_sim::design::{Form, PidRequest, Process, Target, design_pid};
+use quadrant_sim::design::{Form, INTEGRAL_SHARE, PidRequest, Process, Target, design_pid};
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::presentation::{PidPage, provenance};
 
@@ -39,6 +39,9 @@ pub(in crate::cli) struct Arguments {
     /// Bound on |T|.
     #[arg(long, value_name = "PEAK", default_value_t = 1.3)]
     complementary_peak: f64,
+    /// Share of both bounds that is left to integral action, 0 to 0.5: more integrates faster, at less stiffness.
+    #[arg(long, value_name = "SHARE", default_value_t = INTEGRAL_SHARE, requires = "sensitivity_peak")]
+    integral_share: f64,
     /// Ki, V/(mm s); without it, as much as the target does not notice.
     #[arg(long, value_name = "V_PER_MM_S")]
     ki: Option<f64>,
@@ -83,10 +86,17 @@ impl Arguments {
                 bail!("{option} {value}: it must be above {least}");
             }
         }
+        if !(0.0..=0.5).contains(&self.integral_share) {
+            bail!(
+                "--integral-share {}: it must be within 0 to 0.5",
+                self.integral_share
+            );
+        }
         if let Some(sensitivity_peak) = self.sensitivity_peak {
             return Ok(Target::Bandwidth {
                 sensitivity_peak,
                 complementary_peak: self.complementary_peak,
+                integral_share: self.integral_share,
             });
         }
         let phase_margin_deg = self.phase_margin_deg.unwrap_or(PHASE_MARGIN_DEG);

@@ -4,6 +4,7 @@ mod frf;
 mod friction;
 mod motion;
 mod motor_constant;
+mod nctf;
 mod plant;
 mod recorded;
 mod revise;
@@ -25,6 +26,8 @@ pub(super) enum Command {
     Motion(motion::Arguments),
     /// Measure the acceleration per volt in open loop (thesis, Fig 3.7).
     MotorConstant(motor_constant::Arguments),
+    /// Measure the trajectory that NCTF control follows: how the axis comes to rest by itself.
+    Nctf(nctf::Arguments),
     /// Revise the linear model for explicit friction, excited as the axis was (thesis, Table 3.4, Figs 3.16-3.21).
     Revise(revise::Arguments),
     /// Measure friction at constant velocity, both ways, and fit the static model (thesis, Table 3.2).
@@ -41,6 +44,7 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Plant(arguments) => plant::run(arguments),
         Command::Motion(arguments) => motion::run(arguments),
         Command::MotorConstant(arguments) => motor_constant::run(arguments),
+        Command::Nctf(arguments) => nctf::run(arguments),
         Command::Revise(arguments) => revise::run(arguments),
         Command::StaticFriction(arguments) => friction::run(arguments),
         Command::Validate(arguments) => validate::run(arguments),
