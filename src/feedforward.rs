@@ -37,6 +37,16 @@ impl FeedforwardKind {
     /// All kinds, in the order of the thesis' tables.
     pub const ALL: [Self; 4] = [Self::None, Self::Static, Self::Gms, Self::Combined];
 
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Static => "static",
+            Self::Gms => "GMS",
+            Self::Combined => "static + GMS",
+        }
+    }
+
     /// Whether the static model's `s(v) sgn(v)` acts.
     const fn has_static_level(self) -> bool {
         matches!(self, Self::Static)

@@ -44,6 +44,7 @@ mod app {
     use core::sync::atomic::{AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
+    use quadrant::friction::gms::FIRMWARE_ELEMENTS;
     use quadrant::hal::{Amplifiers as _, Encoders as _};
     use quadrant::safety::{AxisName, Command};
     use quadrant::scalar::{Quantity, Scalar};
@@ -121,7 +122,7 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         // Tables are filled and bounds are searched before the first tick is due.
         let job = job::take(board::job());
-        let stage = job::built(job.stage.build::<Number, 4>());
+        let stage = job::built(job.stage.build::<Number, FIRMWARE_ELEMENTS>());
         let plan = job::built(job.plan.build::<Number>(&job.stage));
         let rate_hz = job.stage.rate_hz as u32;
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);

@@ -1,6 +1,7 @@
 //! Three axes, one tick: a pure function of settings, memory and inputs.
 
 use crate::axis::{Axis, AxisState};
+use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::reference::Motion;
 use crate::safety::{AxisName, Command, Fault, FaultCode, SafetyState};
 use crate::scalar::Scalar;
@@ -34,13 +35,13 @@ pub struct Outputs {
 /// The stage ready for the tick; `N` is the room for GMS elements. Made by
 /// [`StageSettings::build`](crate::settings::StageSettings::build).
 #[derive(Clone, Debug, PartialEq)]
-pub struct Stage<S: Scalar, const N: usize = 4> {
+pub struct Stage<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     pub(crate) axes: [Axis<S, N>; 3],
 }
 
 /// The memory of the stage.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StageState<S: Scalar, const N: usize = 4> {
+pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     axes: [AxisState<S, N>; 3],
     safety: SafetyState,
     tick: u32,

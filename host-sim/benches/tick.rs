@@ -5,6 +5,7 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
@@ -14,7 +15,7 @@ use quadrant_sim::scenario::circle_and_sine;
 
 /// A machine on its stage, moving.
 struct Rig<S: Scalar> {
-    machine: Machine<S, 4>,
+    machine: Machine<S, FIRMWARE_ELEMENTS>,
     plant: SimulatedStage,
     operator: Operator,
     tick: u32,

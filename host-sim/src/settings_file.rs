@@ -6,13 +6,12 @@
 
 use std::path::{Path, PathBuf};
 
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::{SettingsError, StageSettings};
 use serde::{Deserialize, Serialize};
 
 /// Form of the file; a file of another form is refused.
 const FORM: u32 = 1;
-/// Room for GMS elements in the firmware.
-pub const FIRMWARE_ELEMENTS: usize = 4;
 
 /// A stage's settings and where they come from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -161,7 +161,7 @@ fn the_friction_of_a_record_makes_settings_that_the_firmware_takes() {
     let mut stage = quadrant::settings::StageSettings::default();
     stage.axes[0].friction = model.friction_settings();
     stage
-        .validate(quadrant_sim::settings_file::FIRMWARE_ELEMENTS)
+        .validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)
         .unwrap();
 }
 

@@ -19,6 +19,9 @@ use crate::scalar::{Quantity, Scalar};
 /// Elements in a settings file at most.
 pub const MAX_ELEMENTS: usize = 10;
 
+/// Elements that the firmware has room for: with eight, identification and not their number decides the accuracy.
+pub const FIRMWARE_ELEMENTS: usize = 8;
+
 /// One block of the model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -9,7 +9,7 @@ use std::path::PathBuf;
 use std::process::Stdio;
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::link::lockstep::Mode;
+use quadrant::link::lockstep::{Job, Mode};
 use serde::{Deserialize, Serialize};
 
 use crate::attribution::Attribution;
@@ -38,22 +38,18 @@ struct Figure {
 struct Count {
     ticks: u32,
     total: Figure,
+    /// Empty where only the whole is held.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     stages: BTreeMap<String, Figure>,
 }
 
-/// The committed figures, by number type.
+/// The committed figures, by number type, and law and feedforward if they are not the default's.
 type Expected = BTreeMap<String, Count>;
 
-/// Counts, prints, and holds the figures against the committed ones.
+/// Counts the default job stage by stage, prints, and holds the figures against the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
-    let image = image::build(
-        toolchain,
-        Target {
-            board: Board::Mps2,
-            scalar,
-        },
-    )?;
-    let count = count(&image, ticks)?;
+    let image = emulated(toolchain, scalar)?;
+    let count = count(&image, twin::job(), ticks)?;
     println!(
         "{}: instructions per control tick over {ticks} ticks",
         image.target
@@ -71,14 +67,59 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: b
     }
     let key = image.target.scalar_name();
     if overwrite {
-        store(&key, count)
+        store([(key, count)])
     } else {
         compare(&key, &count)
     }
 }
 
+/// Counts some jobs, prints a line for each, and holds the figures against the committed ones.
+pub(crate) fn run_all(
+    toolchain: Toolchain,
+    scalar: Scalar,
+    jobs: Vec<(String, Job)>,
+    ticks: u32,
+    overwrite: bool,
+) -> Result<()> {
+    let image = emulated(toolchain, scalar)?;
+    println!(
+        "{}: instructions per control tick, three axes, over {ticks} ticks",
+        image.target
+    );
+    println!(
+        "  {:<28} {:>9} {:>6} {:>6}",
+        "law, feedforward", "mean", "min", "max"
+    );
+    let mut counts = Vec::new();
+    for (name, job) in jobs {
+        let count = count(&image, job, ticks)?;
+        let Figure { mean, min, max } = count.total;
+        println!("  {name:<28} {mean:>9.1} {min:>6} {max:>6}");
+        let whole = Count {
+            stages: BTreeMap::new(),
+            ..count
+        };
+        counts.push((format!("{}, {name}", image.target.scalar_name()), whole));
+    }
+    if overwrite {
+        return store(counts);
+    }
+    counts
+        .iter()
+        .try_for_each(|(key, count)| compare(key, count))
+}
+
+/// The image that is emulated.
+fn emulated(toolchain: Toolchain, scalar: Scalar) -> Result<Image> {
+    let target = Target {
+        board: Board::Mps2,
+        scalar,
+    };
+    image::build(toolchain, target)
+}
+
 /// Runs the image and counts.
-fn count(image: &Image, ticks: u32) -> Result<Count> {
+fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
     // A missing hot symbol must not look like a fast one.
     let root = image.function(ROOT)?;
     let listing = Listing::of(image)?;
@@ -98,7 +139,6 @@ fn count(image: &Image, ticks: u32) -> Result<Count> {
 
     let memory = Memory::create()?;
     // The rehearsal's beginning is spent at rest and is not counted.
-    let job = twin::job();
     let (inputs, _) = Twin::of(image.target.scalar, job.clone())?.rehearse(SETTLING_TICKS + ticks);
     emulate::load(&memory, Mode::Unpaced, &job, &inputs)?;
     let mut qemu = emulator::command_line(image, &memory, Clock::Host)?;
@@ -300,9 +340,9 @@ fn expected() -> Result<Expected> {
     }
 }
 
-fn store(key: &str, count: Count) -> Result<()> {
+fn store(counts: impl IntoIterator<Item = (String, Count)>) -> Result<()> {
     let mut expected = expected()?;
-    expected.insert(key.to_owned(), count);
+    expected.extend(counts);
     let path = path();
     if let Some(folder) = path.parent() {
         fs::create_dir_all(folder)
@@ -327,10 +367,10 @@ fn compare(key: &str, count: &Count) -> Result<()> {
     ];
     for (name, counted, expected) in pairs {
         let growth = 100.0 * (counted / expected - 1.0);
-        println!("  {name}: {counted} against {expected} expected, {growth:+.1} %");
+        println!("  {key}: {name} {counted} against {expected} expected, {growth:+.1} %");
         ensure!(
             growth <= TOLERANCE_PERCENT,
-            "the {name} has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
+            "{key}: the {name} has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
              `cargo xtask count --overwrite-expected` accepts it"
         );
     }

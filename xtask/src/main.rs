@@ -3,6 +3,7 @@
 
 mod attribution;
 mod call_graph;
+mod combinations;
 mod command;
 mod count;
 mod emulate;
@@ -55,6 +56,8 @@ enum Verb {
     },
     /// Count the instructions of one control tick, stage by stage
     Count(CountArgs),
+    /// Run every feedback law with every feedforward in lockstep, and count what each costs
+    Combinations(CombinationArgs),
     /// Prove from the linked image that the control tick cannot panic
     ProveNoPanic(TargetArgs),
     /// Set up, then run every check there is
@@ -112,6 +115,20 @@ struct CountArgs {
     overwrite_expected: bool,
 }
 
+/// Which combinations.
+#[derive(Args)]
+struct CombinationArgs {
+    /// The firmware's number type
+    #[arg(long, value_enum, default_value_t = Scalar::F32)]
+    scalar: Scalar,
+    /// Control ticks to count in each run; 0 leaves counting out
+    #[arg(long, default_value_t = 60)]
+    ticks: u32,
+    /// Write the figures to the file that later runs are held against
+    #[arg(long)]
+    overwrite_expected: bool,
+}
+
 fn main() -> ExitCode {
     let cli = Cli::parse();
     match run(cli) {
@@ -153,6 +170,13 @@ fn run(cli: Cli) -> Result<bool> {
                 args.ticks,
                 args.overwrite_expected,
             )?;
+        }
+        Verb::Combinations(args) => {
+            let toolchain = toolchain()?;
+            combinations::lockstep(toolchain, args.scalar)?;
+            if args.ticks > 0 {
+                combinations::count(toolchain, args.scalar, args.ticks, args.overwrite_expected)?;
+            }
         }
         Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
         Verb::Test => return test::run(cli.toolchain.unwrap_or(Choice::Auto)),

@@ -7,10 +7,12 @@ use anyhow::Result;
 
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
-use crate::{command, count, emulate, fault_paths, prove, setup, twin};
+use crate::{combinations, command, count, emulate, fault_paths, prove, setup, twin};
 
 /// Ticks of the counting run.
 const COUNTED_TICKS: u32 = 250;
+/// Ticks of the counting run of each law and each feedforward.
+const TICKS_EACH: u32 = 60;
 /// Seconds of firmware time of the emulated runs.
 const EMULATED_SECONDS: f64 = 10.0;
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
@@ -148,6 +150,12 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
         });
         report.step(format!("instructions per tick, {target}"), || {
             count::run(toolchain, scalar, COUNTED_TICKS, false)
+        });
+        report.step(format!("every law and feedforward, {target}"), || {
+            combinations::lockstep(toolchain, scalar)
+        });
+        report.step(format!("instructions of each, {target}"), || {
+            combinations::count(toolchain, scalar, TICKS_EACH, false)
         });
     }
 }

@@ -4,6 +4,7 @@ use std::marker::PhantomData;
 use std::path::Path;
 
 use anyhow::{Context, Result};
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
@@ -14,8 +15,6 @@ use quadrant_sim::settings_file::SettingsFile;
 
 use crate::image;
 
-/// Room for GMS elements in the firmware.
-const ELEMENTS: usize = 4;
 /// Seed of the simulated stage's noise.
 const SEED: u64 = 1;
 
@@ -48,7 +47,7 @@ pub(crate) trait Law {
     fn tick(&mut self, input: &InputRecord) -> Outputs;
 }
 
-impl<S: Scalar> Law for Machine<S, ELEMENTS> {
+impl<S: Scalar> Law for Machine<S, FIRMWARE_ELEMENTS> {
     fn tick(&mut self, input: &InputRecord) -> Outputs {
         Machine::tick(self, input)
     }
@@ -86,7 +85,7 @@ impl Twin {
     /// The twin of a firmware of a number type that runs a job.
     pub(crate) fn of(scalar: image::Scalar, job: Job) -> Result<Self> {
         fn law<S: Scalar>(job: &Job, _: PhantomData<S>) -> Result<Box<dyn Law>> {
-            Ok(Box::new(Machine::<S, ELEMENTS>::new(job)?))
+            Ok(Box::new(Machine::<S, FIRMWARE_ELEMENTS>::new(job)?))
         }
         Ok(Self {
             law: match scalar {

@@ -4,6 +4,7 @@ mod commission;
 mod compare;
 mod design;
 mod identify;
+mod laws;
 mod numerics;
 mod output;
 mod replay;
@@ -33,6 +34,9 @@ enum Command {
     /// Identify an axis: its linear model, its friction, from experiments or from recordings.
     #[command(subcommand)]
     Identify(identify::Command),
+    /// Compare all feedback laws, tuned with equal effort at equal robustness, and see what feedforward is worth when its
+    /// model is wrong.
+    Laws(laws::Arguments),
     /// Say what the number type costs: f32 and fixed point against f64 over the whole comparison.
     Numerics(numerics::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did.
@@ -47,6 +51,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
         Some(Command::Identify(command)) => identify::run(&command),
+        Some(Command::Laws(arguments)) => laws::run(&arguments),
         Some(Command::Numerics(arguments)) => numerics::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
     }

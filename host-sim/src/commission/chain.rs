@@ -2,6 +2,7 @@
 
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::{AxisSettings, FeedbackSettings, FrictionSettings};
 
 use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
@@ -18,7 +19,6 @@ use crate::identify::static_friction::{
 };
 use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveSettings};
 use crate::rig::{Recording, Rig, approach};
-use crate::settings_file::FIRMWARE_ELEMENTS;
 
 /// What a commissioning is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

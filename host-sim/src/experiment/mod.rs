@@ -3,11 +3,14 @@
 pub mod circle;
 pub mod comparison;
 pub mod compensator;
+pub mod laws;
 pub mod metrics;
 pub mod numerics;
 pub mod recorded;
 mod run;
 pub mod thesis;
+mod trial;
 pub mod validation;
 
 pub use run::{AxisTrace, run};
+pub use trial::{Trial, TrialOutcome, try_three};

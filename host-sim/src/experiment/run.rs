@@ -14,6 +14,8 @@ pub struct AxisTrace {
     pub reference_mm: Vec<f64>,
     /// Reference minus true position, mm.
     pub error_mm: Vec<f64>,
+    /// Output of the control law, V.
+    pub output_v: Vec<f64>,
 }
 
 impl AxisTrace {
@@ -23,6 +25,7 @@ impl AxisTrace {
         Self {
             reference_mm: part(&self.reference_mm),
             error_mm: part(&self.error_mm),
+            output_v: part(&self.output_v),
         }
     }
 }
@@ -79,6 +82,7 @@ pub fn run<S: Scalar, const N: usize>(
                 trace
                     .error_mm
                     .push(reference - plant.axes()[index].position_mm());
+                trace.output_v.push(f64::from(telemetry.output_v()));
             }
         }
         plant.step(&outputs);

@@ -233,7 +233,7 @@ fn metric_prose() -> String {
 fn knowledge_prose() -> String {
     "Matched: the compensator has the plant's own friction parameters, and the plant no imperfections but quantisation. \
      Virtual machine: the plant adds encoder noise, offset and ripple, and everything that the law knows of it, gains \
-     included, is what commissioning the simulated axes found, with the four GMS elements that the firmware has room for."
+     included, is what commissioning the simulated axes found, with the eight GMS elements that the firmware has room for."
         .to_owned()
 }
 

@@ -9,6 +9,7 @@ mod design_npid;
 mod design_pid;
 mod friction;
 mod identify;
+mod laws;
 mod loop_figures;
 mod motion;
 mod motor_constant;
@@ -16,6 +17,7 @@ mod numerics;
 mod recorded;
 mod revise;
 mod validation;
+mod wrong_model;
 
 pub use characteristic::{characteristic_section, characteristic_table};
 pub use commission::{commission_page, gains_table, verdict_table};
@@ -24,12 +26,14 @@ pub use design_npid::NonlinearPage;
 pub use design_pid::{PidPage, margins_table, pid_table, step_table};
 pub use friction::{friction_section, friction_table, gms_table, presliding_section};
 pub use identify::{fitted_response_section, motor_constant_table, plant_tables, response_section};
+pub use laws::{laws_section, laws_table, tuning_table};
 pub use motion::{Reruns, candidates_table, motion_page, motion_table};
 pub use motor_constant::motor_constant_section;
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
 pub use validation::validation_table;
+pub use wrong_model::wrong_model_section;
 
 use crate::report::{Provenance, Series, Style};
 
