@@ -10,20 +10,29 @@
 //! - [`PolarDeviation`] draws a circle test as a ball-bar instrument would (ISO 230-4).
 
 mod decimate;
+mod dots;
 mod error;
 mod figure;
+mod html;
 mod lines;
+mod mark;
 mod number;
 mod page;
 mod palette;
 mod polar;
+mod scale;
+mod svg;
 mod table;
+mod write;
 
 pub use decimate::decimate;
+pub use dots::{DotSeries, Dots, Spread};
 pub use error::ReportError;
 pub use figure::{Dash, Figure, Plot, Style};
-pub use lines::{Lines, Scale, Series};
+pub use lines::{Band, Lines, Series};
 pub use page::{Block, Page, Provenance, Section};
 pub use palette::Colour;
 pub use polar::{DeviationTrace, Magnification, PolarDeviation};
+pub use scale::Scale;
 pub use table::{Cell, Column, Table};
+pub use write::Format;

@@ -1,7 +1,9 @@
 //! The circle test, drawn as a ball-bar instrument draws it.
 
-use super::figure::{Style, trace_line};
-use super::{decimate, palette};
+use super::figure::{Style, pick, same_length, trace_line};
+use super::mark::{Entry, Sample};
+use super::scale::rounded;
+use super::{ReportError, decimate, palette};
 use plotly::common::{Anchor, DashType, Font, HoverInfo, Mode};
 use plotly::layout::{
     Annotation, Axis, DragMode, HoverMode, Layout, Shape, ShapeLayer, ShapeLine, ShapeType,
@@ -78,6 +80,51 @@ impl PolarDeviation {
         }
     }
 
+    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
+        self.traces
+            .iter()
+            .map(|trace| Entry {
+                name: &trace.name,
+                colour: trace.style.colour,
+                sample: Sample::Line(trace.style.dash),
+            })
+            .collect()
+    }
+
+    pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
+        if !(self.radius_mm.is_finite() && self.radius_mm > 0.0) {
+            return Err(ReportError::Radius {
+                figure: figure.to_owned(),
+                radius_mm: self.radius_mm,
+            });
+        }
+        self.traces.iter().try_for_each(|trace| {
+            same_length(
+                figure,
+                &trace.name,
+                trace.angle_rad.len(),
+                trace.deviation_um.len(),
+            )
+        })
+    }
+
+    /// The same with at most `points` samples of each circle.
+    pub(super) fn decimated(&self, points: usize) -> Self {
+        let traces = self.traces.iter().map(|trace| {
+            let kept = decimate(&trace.angle_rad, &trace.deviation_um, points);
+            DeviationTrace {
+                name: trace.name.clone(),
+                angle_rad: pick(&trace.angle_rad, &kept),
+                deviation_um: pick(&trace.deviation_um, &kept),
+                style: trace.style,
+            }
+        });
+        Self {
+            traces: traces.collect(),
+            ..self.clone()
+        }
+    }
+
     /// What the reader must know to read the figure.
     pub(super) fn scale_note(&self) -> String {
         let Magnification {
@@ -92,24 +139,24 @@ impl PolarDeviation {
         )
     }
 
-    pub(super) fn to_plotly(&self, points_per_series: usize) -> Plotly {
+    pub(super) fn to_plotly(&self) -> Plotly {
         let scale = self.magnification();
         let mut plot = Plotly::new();
         for trace in &self.traces {
-            let kept = decimate(&trace.angle_rad, &trace.deviation_um, points_per_series);
-            let drawn = |axis: fn(f64) -> f64| -> Vec<f64> {
-                let place = |&i: &usize| {
-                    let radius = self.radius_mm + scale.factor * trace.deviation_um[i] * 1e-3;
-                    rounded(radius * axis(trace.angle_rad[i]), self.radius_mm * 1e-5)
-                };
-                kept.iter().map(place).collect()
-            };
-            let deviation: Vec<f64> = kept
+            let (x, y): (Vec<f64>, Vec<f64>) = (0..trace.angle_rad.len())
+                .map(|i| self.drawn(scale, trace.angle_rad[i], trace.deviation_um[i]))
+                .map(|(x, y)| {
+                    let short = |place| rounded(place, self.radius_mm * 1e-5);
+                    (short(x), short(y))
+                })
+                .unzip();
+            let deviation: Vec<f64> = trace
+                .deviation_um
                 .iter()
-                .map(|&i| rounded(trace.deviation_um[i], scale.division_um * 1e-3))
+                .map(|deviation| rounded(*deviation, scale.division_um * 1e-3))
                 .collect();
             plot.add_trace(
-                Scatter::new(drawn(f64::cos), drawn(f64::sin))
+                Scatter::new(x, y)
                     .mode(Mode::Lines)
                     .name(&trace.name)
                     .line(trace_line(trace.style))
@@ -120,6 +167,28 @@ impl PolarDeviation {
         }
         plot.set_layout(self.layout(scale));
         plot
+    }
+
+    /// Where a sample is drawn, mm from the centre.
+    pub(super) fn drawn(
+        &self,
+        scale: Magnification,
+        angle_rad: f64,
+        deviation_um: f64,
+    ) -> (f64, f64) {
+        let radius = self.radius_mm + scale.factor * deviation_um * 1e-3;
+        (radius * angle_rad.cos(), radius * angle_rad.sin())
+    }
+
+    /// Radii of the division circles, mm as drawn, with the deviation they stand for, um; from the innermost.
+    pub(super) fn divisions(&self, scale: Magnification) -> Vec<(f64, f64)> {
+        let reach = scale.divisions as isize;
+        (-reach..=reach)
+            .map(|division| {
+                let um = division as f64 * scale.division_um;
+                (self.radius_mm + scale.factor * um * 1e-3, um)
+            })
+            .collect()
     }
 
     fn layout(&self, scale: Magnification) -> Layout {
@@ -193,18 +262,6 @@ impl PolarDeviation {
     }
 }
 
-/// `value` rounded to a decimal grid no coarser than `step`: shorter on the page, and the same to the eye.
-pub(super) fn rounded(value: f64, step: f64) -> f64 {
-    let digits = -step.log10().floor();
-    if digits > 0.0 && digits < 300.0 {
-        // Scaling by a whole power of ten and back yields the double nearest to the short decimal.
-        let scale = 10f64.powf(digits).round();
-        (value * scale).round() / scale
-    } else {
-        value
-    }
-}
-
 /// The steps of a readable scale.
 const STEPS: [f64; 4] = [1.0, 2.0, 5.0, 10.0];
 
@@ -239,9 +296,7 @@ fn tidy(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        DeviationTrace, Magnification, PolarDeviation, Style, round_down, round_up, rounded,
-    };
+    use super::{DeviationTrace, Magnification, PolarDeviation, Style, round_down, round_up};
 
     fn circle(radius_mm: f64, deviation_um: Vec<f64>) -> PolarDeviation {
         let angle_rad = (0..deviation_um.len()).map(|i| i as f64).collect();
@@ -294,12 +349,5 @@ mod tests {
             divisions: 2,
         };
         assert_eq!(circle(30.0, vec![0.0, f64::NAN]).magnification(), expected);
-    }
-
-    #[test]
-    fn rounding_shortens_without_moving() {
-        assert_eq!(rounded(0.123_456_789, 1e-4), 0.1235);
-        assert_eq!(rounded(1234.567, 1.0), 1234.567);
-        assert!(rounded(f64::NAN, 1e-3).is_nan());
     }
 }
