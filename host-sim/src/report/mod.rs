@@ -23,6 +23,8 @@ mod polar;
 mod scale;
 mod svg;
 mod table;
+#[cfg(test)]
+mod vision;
 mod write;
 
 pub use decimate::decimate;

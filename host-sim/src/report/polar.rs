@@ -17,6 +17,8 @@ use std::f64::consts::TAU;
 const DEVIATION_SHARE: f64 = 0.3;
 /// Most division circles on either side of the nominal circle.
 const DIVISIONS: f64 = 3.0;
+/// Where divisions are labelled: on the diagonal, away from the axes, where the quadrant glitches are; rad.
+pub(super) const LABEL_ANGLE: f64 = TAU / 8.0;
 
 /// Radial deviation from a circle, magnified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -180,6 +182,12 @@ impl PolarDeviation {
         (radius * angle_rad.cos(), radius * angle_rad.sin())
     }
 
+    /// What is drawn of the plane on either side of the centre, mm.
+    pub(super) fn reach_mm(&self, scale: Magnification) -> f64 {
+        let reach_um = scale.divisions as f64 * scale.division_um;
+        1.06 * (self.radius_mm + scale.factor * reach_um * 1e-3)
+    }
+
     /// Radii of the division circles, mm as drawn, with the deviation they stand for, um; from the innermost.
     pub(super) fn divisions(&self, scale: Magnification) -> Vec<(f64, f64)> {
         let reach = scale.divisions as isize;
@@ -192,16 +200,15 @@ impl PolarDeviation {
     }
 
     fn layout(&self, scale: Magnification) -> Layout {
-        let reach = scale.divisions as isize;
-        let offset_mm = |division: isize| scale.factor * scale.division_um * 1e-3 * division as f64;
-        let circles = (-reach..=reach).map(|division| {
-            let r = self.radius_mm + offset_mm(division);
-            let line = match division {
-                0 => ShapeLine::new()
+        let divisions = self.divisions(scale);
+        let circles = divisions.iter().map(|&(r, um)| {
+            let line = if um == 0.0 {
+                ShapeLine::new()
                     .color(palette::LABEL.0)
                     .width(1.0)
-                    .dash(DashType::Dash),
-                _ => ShapeLine::new().color(palette::GRID.0).width(1.0),
+                    .dash(DashType::Dash)
+            } else {
+                ShapeLine::new().color(palette::GRID.0).width(1.0)
             };
             Shape::new()
                 .shape_type(ShapeType::Circle)
@@ -214,28 +221,24 @@ impl PolarDeviation {
         });
         // The scale stands where ball-bar plots have it: in the empty centre.
         let centre = Annotation::new()
-            .text(format!(
-                "× {}<br>{} µm/div",
-                scale.factor, scale.division_um
-            ))
+            .text(scale.lines().join("<br>"))
             .x(0.0)
             .y(0.0)
             .show_arrow(false)
             .font(Font::new().size(12).color(palette::LABEL.0));
-        // Divisions are labelled on the diagonal, away from the axes, where the quadrant glitches are.
-        let labels = [-reach, reach].into_iter().map(|division| {
-            let place = (self.radius_mm + offset_mm(division)) * (TAU / 8.0).cos();
-            let um = division as f64 * scale.division_um;
+        let ends = [divisions.first(), divisions.last()];
+        let labels = ends.into_iter().flatten().map(|&(radius, um)| {
+            let is_inside = um < 0.0;
             Annotation::new()
-                .text(format!("{um:+} µm").replace('-', "\u{2212}"))
-                .x(place)
-                .y(place)
-                .x_anchor(if division < 0 {
+                .text(division_label(um))
+                .x(radius * LABEL_ANGLE.cos())
+                .y(radius * LABEL_ANGLE.sin())
+                .x_anchor(if is_inside {
                     Anchor::Right
                 } else {
                     Anchor::Left
                 })
-                .y_anchor(if division < 0 {
+                .y_anchor(if is_inside {
                     Anchor::Top
                 } else {
                     Anchor::Bottom
@@ -243,7 +246,7 @@ impl PolarDeviation {
                 .show_arrow(false)
                 .font(Font::new().size(10).color(palette::LABEL.0))
         });
-        let range = 1.06 * (self.radius_mm + offset_mm(reach));
+        let range = self.reach_mm(scale);
         let axis = |label: &str| {
             super::figure::axis(label)
                 .range(vec![-range, range])
@@ -260,6 +263,21 @@ impl PolarDeviation {
             .shapes(circles.collect())
             .annotations(std::iter::once(centre).chain(labels).collect())
     }
+}
+
+impl Magnification {
+    /// What stands in the centre.
+    pub(super) fn lines(&self) -> [String; 2] {
+        [
+            format!("× {}", self.factor),
+            format!("{} µm/div", self.division_um),
+        ]
+    }
+}
+
+/// What a division circle is called.
+pub(super) fn division_label(um: f64) -> String {
+    format!("{um:+} µm").replace('-', "\u{2212}")
 }
 
 /// The steps of a readable scale.

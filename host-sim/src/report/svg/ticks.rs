@@ -27,7 +27,7 @@ fn even(low: f64, high: f64, count: usize) -> Vec<Tick> {
         .into_iter()
         .find(|step| *step >= rough * (1.0 - 1e-9))
         .unwrap_or(rough);
-    let decimals = (-step.log10().floor()).max(0.0) as usize;
+    let names = Names::of(step, low.abs().max(high.abs()));
     let tolerance = 1e-6;
     let first = (low / step - tolerance).ceil() as i64;
     let last = (high / step + tolerance).floor() as i64;
@@ -36,7 +36,7 @@ fn even(low: f64, high: f64, count: usize) -> Vec<Tick> {
             let value = k as f64 * step;
             Tick {
                 place: value,
-                label: Some(name(value, step, decimals)),
+                label: Some(names.of_value(value)),
             }
         })
         .collect()
@@ -66,20 +66,37 @@ fn decades(low: f64, high: f64, count: usize) -> Vec<Tick> {
         .collect()
 }
 
-/// A tick's name on an even axis: a plain number, or one with a power of ten where that is too long.
-fn name(value: f64, step: f64, decimals: usize) -> String {
-    if value == 0.0 {
-        return "0".to_owned();
+/// How the ticks of an even axis are named: as plain numbers, or as multiples of one power of ten where those are long.
+struct Names {
+    exponent: i32,
+    decimals: usize,
+}
+
+impl Names {
+    fn of(step: f64, largest: f64) -> Self {
+        let exponent = if step < 1e-4 || largest >= 1e6 {
+            largest.log10().floor() as i32
+        } else {
+            0
+        };
+        let decimals = f64::from(exponent) - step.log10().floor();
+        Self {
+            exponent,
+            decimals: decimals.max(0.0) as usize,
+        }
     }
-    let is_long = step < 1e-4 || value.abs() >= 1e6;
-    if !is_long {
-        return format!("{value:.decimals$}").replace('-', "\u{2212}");
+
+    fn of_value(&self, value: f64) -> String {
+        if value == 0.0 {
+            return "0".to_owned();
+        }
+        let mantissa = value / 10f64.powi(self.exponent);
+        let mantissa = format!("{mantissa:.*}", self.decimals).replace('-', "\u{2212}");
+        match self.exponent {
+            0 => mantissa,
+            exponent => format!("{mantissa}·10{}", superscript(exponent)),
+        }
     }
-    let exponent = value.abs().log10().floor() as i32;
-    let digits = (f64::from(exponent) - step.log10().floor()).max(0.0) as usize;
-    let mantissa = value / 10f64.powi(exponent);
-    let mantissa = format!("{mantissa:.digits$}").replace('-', "\u{2212}");
-    format!("{mantissa}·10{}", superscript(exponent))
 }
 
 fn power(digit: u32, decade: i32) -> String {
@@ -129,7 +146,10 @@ mod tests {
             ["\u{2212}0.2", "0", "0.2", "0.4"]
         );
         assert_eq!(names(Scale::Linear, 0.0, 37.7), ["0", "10", "20", "30"]);
-        assert_eq!(names(Scale::Linear, 0.0, 3e-5)[1], "1.0·10⁻⁵");
+        assert_eq!(
+            names(Scale::Linear, 0.0, 3e-5)[1..3],
+            ["0.5·10⁻⁵", "1.0·10⁻⁵"]
+        );
         assert_eq!(names(Scale::Linear, 0.0, 5e6)[1], "1·10⁶");
     }
 
