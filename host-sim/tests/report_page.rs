@@ -1,94 +1,9 @@
 //! The page is complete, closed to the network, and the same for the same data.
 
-use quadrant_sim::report::{
-    Block, Cell, Colour, Column, DeviationTrace, Figure, Lines, Page, Plot, PolarDeviation,
-    Provenance, ReportError, Section, Series, Style, Table,
-};
+mod sample;
 
-fn lines(id: &str, series: usize, samples: usize) -> Figure {
-    let x: Vec<f64> = (0..samples).map(|i| i as f64 * 1e-4).collect();
-    let series = (0..series)
-        .map(|s| Series {
-            name: format!("law {s} </script><b>"),
-            x: x.clone(),
-            y: x.iter()
-                .map(|t| (t * 7.0 + s as f64).sin() * 12.345_678_9)
-                .collect(),
-            style: Style::nth(s),
-        })
-        .collect();
-    let plot = Plot::Lines(Lines {
-        x_label: "Time (s)".into(),
-        y_label: "Error (µm)".into(),
-        series,
-        ..Lines::default()
-    });
-    Figure {
-        id: id.into(),
-        caption: "Error over time.".into(),
-        plot,
-    }
-}
-
-fn circle() -> Figure {
-    let angle_rad: Vec<f64> = (0..10_000).map(|i| i as f64 * 1e-3).collect();
-    let deviation_um = angle_rad.iter().map(|a| 4.0 * (2.0 * a).sin()).collect();
-    let trace = DeviationTrace {
-        name: "PID".into(),
-        angle_rad,
-        deviation_um,
-        style: Style::solid(Colour::Blue),
-    };
-    let plot = PolarDeviation {
-        radius_mm: 30.0,
-        x_label: "x (mm)".into(),
-        y_label: "y (mm)".into(),
-        traces: vec![trace],
-    };
-    Figure {
-        id: "circle".into(),
-        caption: "Circle.".into(),
-        plot: Plot::PolarDeviation(plot),
-    }
-}
-
-fn table(id: &str) -> Table {
-    Table {
-        id: id.into(),
-        caption: "Errors & glitches.".into(),
-        columns: vec![Column::new("Law"), Column::with_unit("Error", "µm")],
-        rows: vec![
-            vec![Cell::text("N-PID"), Cell::number(1.25, 1)],
-            vec![Cell::text("<none>"), Cell::Missing],
-        ],
-    }
-}
-
-fn page(blocks: Vec<Block>) -> Page {
-    Page {
-        title: "Friction compensation".into(),
-        subtitle: "A sample.".into(),
-        provenance: Provenance {
-            command: "quadrant --seed 7".into(),
-            seed: Some(7),
-            version: "0.1.0".into(),
-        },
-        sections: vec![Section {
-            id: "section".into(),
-            heading: "Tracking".into(),
-            prose: vec!["Plain text, <b>not</b> markup.".into()],
-            blocks,
-        }],
-    }
-}
-
-fn sample() -> Page {
-    page(vec![
-        Block::Table(table("errors")),
-        Block::Figure(lines("error", 2, 5000)),
-        Block::Figure(circle()),
-    ])
-}
+use quadrant_sim::report::{Block, Plot, ReportError};
+use sample::{circle, lines, page, sample, table};
 
 /// What the page says besides the plotting library.
 fn own_part(html: &str) -> String {
@@ -212,4 +127,39 @@ fn a_page_that_cannot_be_written_is_named() {
         error.to_string().contains("no/such/folder/report.html"),
         "{error}"
     );
+}
+
+#[test]
+fn every_block_says_which_command_made_it() {
+    let own = own_part(&sample::full().to_html().unwrap());
+    assert_eq!(own.matches("class=\"made\"").count(), 6);
+    assert_eq!(own.matches("seed 7 ·").count(), 3, "of the page");
+    assert_eq!(
+        own.matches("seed 9 ·").count(),
+        3,
+        "of the section from elsewhere"
+    );
+}
+
+#[test]
+fn labels_are_kept_and_left_out_of_the_count() {
+    let mut page = sample::full();
+    page.sections.push(quadrant_sim::report::Section {
+        id: "last".into(),
+        heading: "Last".into(),
+        provenance: None,
+        prose: vec![],
+        blocks: vec![
+            Block::Table(table("last-table")),
+            Block::Figure(lines("last-figure", 1, 10)),
+        ],
+    });
+    let own = own_part(&page.to_html().unwrap());
+    for label in ["Table 5.7.", "Figure 5.7.", "Table 2.", "Figure 4."] {
+        assert_eq!(
+            own.matches(&format!("<b>{label}</b>")).count(),
+            1,
+            "{label}"
+        );
+    }
 }

@@ -1,4 +1,4 @@
-//! Finding, or else installing, what building and emulating the firmware take.
+//! Finding, or else installing, what building and emulating the firmware and testing the reports take.
 
 use std::path::Path;
 use std::process::Command;
@@ -16,7 +16,7 @@ struct Tool {
 }
 
 /// What is needed whichever compiler is used.
-const TOOLS: [Tool; 2] = [
+const TOOLS: [Tool; 3] = [
     Tool {
         program: "qemu-system-arm",
         package: "qemu-system-arm",
@@ -24,6 +24,11 @@ const TOOLS: [Tool; 2] = [
     Tool {
         program: "arm-none-eabi-objdump",
         package: "binutils-arm-none-eabi",
+    },
+    // The tests open the reports in it.
+    Tool {
+        program: "chromium",
+        package: "chromium",
     },
 ];
 
@@ -62,7 +67,7 @@ pub(crate) fn run(choice: Choice) -> Result<Toolchain> {
         );
     }
     if missing.is_empty() {
-        println!("setup: QEMU and binutils are installed");
+        println!("setup: QEMU, binutils and Chromium are installed");
     } else {
         install(&missing)?;
     }
@@ -129,8 +134,9 @@ fn install(packages: &[&str]) -> Result<()> {
     println!("setup: missing {}", packages.join(", "));
     if !command::exists("apt-get") {
         bail!(
-            "there is no apt-get here to install it with: please install QEMU for Arm (qemu-system-arm) and the \
-             GNU binutils for arm-none-eabi (arm-none-eabi-objdump) by your system's own means, then try again"
+            "there is no apt-get here to install it with: please install QEMU for Arm (qemu-system-arm), the \
+             GNU binutils for arm-none-eabi (arm-none-eabi-objdump) and Chromium (chromium) by your system's own \
+             means, then try again"
         );
     }
     command::run(apt().arg("update"))?;

@@ -19,5 +19,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let bar = progress(numerics::RUNS, "comparing number types");
     let numerics = numerics::run_all(&Setup::both()?, output.seed, &bar)?;
     bar.finish_and_clear();
-    output.table(&numerics_table(&numerics))
+    output.tables(
+        "What the number type costs",
+        "f32 and fixed point against f64 over the whole comparison; simulated, not measured",
+        vec![numerics_table(&numerics)],
+        "numerics",
+    )
 }

@@ -1,21 +1,25 @@
-//! Where results go: tables to the terminal and to CSV files, pages to HTML.
+//! Where results go: tables to the terminal, pages into files.
 
 use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
-use quadrant_sim::report::{Page, Table};
+use quadrant_sim::presentation::provenance;
+use quadrant_sim::report::{Block, Format, Page, Section, Table};
 
 /// Options that every experiment has.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Output {
-    /// Folder for CSV files and the HTML page; made if it is missing.
+    /// Folder for results; made if it is missing.
     #[arg(long, default_value = Self::FOLDER, value_name = "FOLDER")]
     out: PathBuf,
     /// Seed of the simulated noise; the same seed gives the same results.
     #[arg(long, default_value_t = Self::SEED)]
     pub(super) seed: u64,
+    /// Formats of the results; may be given several times.
+    #[arg(long, value_enum, default_values_t = Self::FORMATS, value_name = "FORMAT")]
+    format: Vec<Format>,
 }
 
 impl Default for Output {
@@ -23,6 +27,7 @@ impl Default for Output {
         Self {
             out: Self::FOLDER.into(),
             seed: Self::SEED,
+            format: Self::FORMATS.into(),
         }
     }
 }
@@ -30,6 +35,7 @@ impl Default for Output {
 impl Output {
     const FOLDER: &str = "quadrant-out";
     const SEED: u64 = 1;
+    const FORMATS: [Format; 2] = [Format::Html, Format::Csv];
 
     /// The path of a file in the folder, which is made.
     pub(super) fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
@@ -38,22 +44,55 @@ impl Output {
         Ok(self.out.join(name))
     }
 
-    /// Prints a table and writes it as CSV.
+    /// Prints a table and, where CSV is wanted, writes it.
     pub(super) fn table(&self, table: &Table) -> anyhow::Result<()> {
         println!("{}\n", table.to_text());
-        table.write_csv(self.file(&format!("{}.csv", table.id))?)?;
+        if self.format.contains(&Format::Csv) {
+            table.write_csv(self.file(&format!("{}.csv", table.id))?)?;
+        }
         Ok(())
     }
 
-    /// Writes a page.
+    /// Writes a page in the formats that are wanted, under the stem of `name`.
     pub(super) fn page(&self, page: &Page, name: &str) -> anyhow::Result<()> {
-        let path = self.file(name)?;
-        page.write_html(&path)?;
-        println!(
-            "{}: open it in a browser; the tables beside it are CSV",
-            path.display()
-        );
+        let stem = name.strip_suffix(".html").unwrap_or(name);
+        page.write(&self.out, stem, &self.format)?;
+        for format in &self.format {
+            let folder = self.out.display();
+            match format {
+                Format::Html => println!("{folder}/{stem}.html: open it in a browser"),
+                Format::Json => println!("{folder}/{stem}.json: the page as data"),
+                Format::Csv => println!("{folder}/*.csv: its tables, and in figures/ its curves"),
+                Format::Svg => println!("{folder}/figures/*.svg: its figures, for print"),
+            }
+        }
         Ok(())
+    }
+
+    /// Prints tables and writes a page of nothing else.
+    pub(super) fn tables(
+        &self,
+        title: &str,
+        subtitle: &str,
+        tables: Vec<Table>,
+        name: &str,
+    ) -> anyhow::Result<()> {
+        for table in &tables {
+            self.table(table)?;
+        }
+        let page = Page {
+            title: title.to_owned(),
+            subtitle: subtitle.to_owned(),
+            provenance: provenance(&command_line(), self.seed),
+            sections: vec![Section {
+                id: "results".to_owned(),
+                heading: "Results".to_owned(),
+                provenance: None,
+                prose: vec![],
+                blocks: tables.into_iter().map(Block::Table).collect(),
+            }],
+        };
+        self.page(&page, name)
     }
 }
 
@@ -71,15 +110,17 @@ pub(super) fn progress(runs: u64, what: &'static str) -> ProgressBar {
     ProgressBar::new(runs).with_style(style).with_message(what)
 }
 
-/// The command line as it was given, but for the folder of the results: what a reader repeats.
+/// The command line as it was given, but for the folder and the formats of the results: what a reader repeats.
 pub(super) fn command_line() -> String {
+    const LEFT_OUT: [&str; 2] = ["--out", "--format"];
     let mut words = vec!["quadrant".to_owned()];
     let mut given = std::env::args().skip(1);
     while let Some(word) = given.next() {
-        if word == "--out" {
-            given.next();
-        } else if !word.starts_with("--out=") {
+        let name = word.split('=').next().unwrap_or_default();
+        if !LEFT_OUT.contains(&name) {
             words.push(word);
+        } else if word == name {
+            given.next();
         }
     }
     words.join(" ")

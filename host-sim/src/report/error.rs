@@ -49,6 +49,41 @@ pub enum ReportError {
         /// The radius given.
         radius_mm: f64,
     },
+    /// A spread that does not enclose its mean.
+    #[error(
+        "figure {figure:?}, series {series:?}, category {category:?}: mean {mean} outside of {low} to {high}; give \
+         low <= mean <= high"
+    )]
+    Spread {
+        /// The figure's id.
+        figure: String,
+        /// The series' name.
+        series: String,
+        /// The category's name.
+        category: String,
+        /// Where the bar begins.
+        low: f64,
+        /// Where the dot is.
+        mean: f64,
+        /// Where the bar ends.
+        high: f64,
+    },
+    /// A text that is no page in JSON.
+    #[error("no page in JSON: {source}; give a file that --format json wrote")]
+    Json {
+        /// Why.
+        source: serde_json::Error,
+    },
+    /// A page in another format's version.
+    #[error(
+        "a page of schema {found:?}; this program reads {expected:?}: make the page again with this version"
+    )]
+    Schema {
+        /// The schema named in the file.
+        found: String,
+        /// The schema that is understood.
+        expected: &'static str,
+    },
     /// The file could not be written.
     #[error("cannot write {}", path.display())]
     Write {
@@ -57,4 +92,10 @@ pub enum ReportError {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl ReportError {
+    pub(super) fn json(source: serde_json::Error) -> Self {
+        Self::Json { source }
+    }
 }

@@ -1,14 +1,17 @@
 //! Figures, and their translation into plotly's description.
 
+use super::dots::Dots;
 use super::lines::Lines;
+use super::mark::Entry;
 use super::polar::PolarDeviation;
 use super::{Colour, ReportError, palette};
 use plotly::Plot as Plotly;
 use plotly::common::{Anchor, DashType, Font, Line, Orientation, Title};
 use plotly::layout::{Axis, Layout, Legend, Margin};
+use serde::{Deserialize, Serialize};
 
 /// A drawing with its caption.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
     /// Unique on its page; also the name of the image a reader saves.
     pub id: String,
@@ -19,16 +22,18 @@ pub struct Figure {
 }
 
 /// The kinds of drawing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Plot {
     /// Curves over a common axis, or paths in a plane.
     Lines(Lines),
     /// Radial deviation from a circle.
     PolarDeviation(PolarDeviation),
+    /// Values by category, with their spread.
+    Dots(Dots),
 }
 
 /// How a curve is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Style {
     /// Its colour.
     pub colour: Colour,
@@ -37,7 +42,7 @@ pub struct Style {
 }
 
 /// The dashes of a line. Colour alone does not carry meaning in print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Dash {
     /// Unbroken.
     Solid,
@@ -90,19 +95,12 @@ impl Style {
 }
 
 impl Figure {
-    /// Name and style of every curve, in drawing order.
-    pub(super) fn legend(&self) -> Vec<(&str, Style)> {
+    /// Name and sample of everything drawn, in drawing order.
+    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
         match &self.plot {
-            Plot::Lines(lines) => lines
-                .series
-                .iter()
-                .map(|s| (s.name.as_str(), s.style))
-                .collect(),
-            Plot::PolarDeviation(circle) => circle
-                .traces
-                .iter()
-                .map(|t| (t.name.as_str(), t.style))
-                .collect(),
+            Plot::Lines(lines) => lines.legend(),
+            Plot::PolarDeviation(circle) => circle.legend(),
+            Plot::Dots(dots) => dots.legend(),
         }
     }
 
@@ -111,46 +109,81 @@ impl Figure {
         match &self.plot {
             Plot::Lines(_) => None,
             Plot::PolarDeviation(circle) => Some(circle.scale_note()),
+            Plot::Dots(_) => None,
         }
     }
 
     pub(super) fn check(&self) -> Result<(), ReportError> {
-        let series: Vec<(&str, usize, usize)> = match &self.plot {
-            Plot::Lines(lines) => lines
-                .series
-                .iter()
-                .map(|s| (s.name.as_str(), s.x.len(), s.y.len()))
-                .collect(),
-            Plot::PolarDeviation(circle) => {
-                if !(circle.radius_mm.is_finite() && circle.radius_mm > 0.0) {
-                    return Err(ReportError::Radius {
-                        figure: self.id.clone(),
-                        radius_mm: circle.radius_mm,
-                    });
-                }
-                let traces = circle.traces.iter();
-                traces
-                    .map(|t| (t.name.as_str(), t.angle_rad.len(), t.deviation_um.len()))
-                    .collect()
-            }
-        };
-        match series.into_iter().find(|(_, x, y)| x != y) {
-            None => Ok(()),
-            Some((name, x, y)) => Err(ReportError::SeriesLength {
-                figure: self.id.clone(),
-                series: name.to_owned(),
-                x,
-                y,
-            }),
+        match &self.plot {
+            Plot::Lines(lines) => lines.check(&self.id),
+            Plot::PolarDeviation(circle) => circle.check(&self.id),
+            Plot::Dots(dots) => dots.check(&self.id),
         }
     }
 
-    pub(super) fn to_plotly(&self, points_per_series: usize) -> Plotly {
-        match &self.plot {
-            Plot::Lines(lines) => lines.to_plotly(points_per_series),
-            Plot::PolarDeviation(circle) => circle.to_plotly(points_per_series),
+    /// The same with at most `points` samples of each curve; no spike is lost.
+    pub(super) fn decimated(&self, points: usize) -> Self {
+        let plot = match &self.plot {
+            Plot::Lines(lines) => Plot::Lines(lines.decimated(points)),
+            Plot::PolarDeviation(circle) => Plot::PolarDeviation(circle.decimated(points)),
+            Plot::Dots(dots) => Plot::Dots(dots.clone()),
+        };
+        Self {
+            id: self.id.clone(),
+            caption: self.caption.clone(),
+            plot,
         }
     }
+
+    /// The figure as plotly's JSON, with every sample.
+    pub(super) fn to_plotly(&self) -> Plotly {
+        match &self.plot {
+            Plot::Lines(lines) => lines.to_plotly(),
+            Plot::PolarDeviation(circle) => circle.to_plotly(),
+            Plot::Dots(dots) => dots.to_plotly(),
+        }
+    }
+}
+
+/// The samples at `kept`.
+pub(super) fn pick(values: &[f64], kept: &[usize]) -> Vec<f64> {
+    kept.iter().map(|&index| values[index]).collect()
+}
+
+/// Refuses a series whose two coordinates differ in length.
+pub(super) fn same_length(
+    figure: &str,
+    series: &str,
+    x: usize,
+    y: usize,
+) -> Result<(), ReportError> {
+    if x == y {
+        return Ok(());
+    }
+    Err(ReportError::SeriesLength {
+        figure: figure.to_owned(),
+        series: series.to_owned(),
+        x,
+        y,
+    })
+}
+
+/// A label of an axis or a unit as it is printed: with the micro sign, which plain text does without.
+pub(super) fn typeset(label: &str) -> String {
+    label
+        .split_inclusive(|c: char| !c.is_alphanumeric())
+        .map(|word| match word.strip_prefix('u') {
+            Some(rest)
+                if matches!(
+                    rest.trim_end_matches(|c: char| !c.is_alphanumeric()),
+                    "m" | "V" | "s"
+                ) =>
+            {
+                format!("µ{rest}")
+            }
+            _ => word.to_owned(),
+        })
+        .collect()
 }
 
 /// The line of a curve.
@@ -171,7 +204,7 @@ pub(super) fn trace_line(style: Style) -> Line {
 /// What all axes share.
 pub(super) fn axis(label: &str) -> Axis {
     Axis::new()
-        .title(Title::with_text(label).font(Font::new().size(13).color(palette::INK.0)))
+        .title(Title::with_text(typeset(label)).font(Font::new().size(13).color(palette::INK.0)))
         .tick_font(Font::new().size(11).color(palette::LABEL.0))
         .tick_color(palette::RULE.0)
         .grid_color(palette::GRID.0)
@@ -206,7 +239,7 @@ pub(super) fn layout() -> Layout {
 
 #[cfg(test)]
 mod tests {
-    use super::{Dash, Figure, Plot, Style};
+    use super::{Dash, Figure, Plot, Style, typeset};
     use crate::report::{Colour, Lines, ReportError, Series};
 
     fn figure(x: Vec<f64>, y: Vec<f64>) -> Figure {
@@ -243,7 +276,7 @@ mod tests {
             vec![0.0, 0.1 + 0.2, 1.0],
             vec![0.123_456_789, f64::NAN, 1.0],
         )
-        .to_plotly(100)
+        .to_plotly()
         .to_json();
         assert!(json.contains("\"x\":[0.0,0.3,1.0]"), "{json}");
         assert!(json.contains("\"y\":[0.123457,null,1.0]"), "{json}");
@@ -262,5 +295,13 @@ mod tests {
                 dash: Dash::Solid
             }
         );
+    }
+
+    #[test]
+    fn micro_is_printed_in_units_only() {
+        assert_eq!(typeset("tracking error (um)"), "tracking error (µm)");
+        assert_eq!(typeset("um/s"), "µm/s");
+        assert_eq!(typeset("sum of um, uV"), "sum of µm, µV");
+        assert_eq!(typeset("us per umbra"), "µs per umbra");
     }
 }

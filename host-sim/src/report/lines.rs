@@ -1,14 +1,15 @@
 //! Curves over a common axis, and paths in a plane.
 
-use super::figure::{axis, layout, trace_line};
-use super::polar::rounded;
-use super::{Dash, Style, decimate, palette};
-use plotly::common::{Marker, Mode};
-use plotly::layout::{Axis, AxisType, DragMode, HoverMode, TicksDirection};
+use super::figure::{axis, layout, pick, same_length, trace_line};
+use super::mark::{BAND_OPACITY, Entry, Sample};
+use super::{Colour, Dash, ReportError, Scale, Style, decimate, palette};
+use plotly::common::{Fill, HoverInfo, Line, Marker, Mode};
+use plotly::layout::{DragMode, HoverMode, TicksDirection};
 use plotly::{Plot as Plotly, Scatter};
+use serde::{Deserialize, Serialize};
 
 /// Curves over a common axis, or paths in a plane.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lines {
     /// Horizontal axis, with its unit.
     pub x_label: String,
@@ -22,79 +23,172 @@ pub struct Lines {
     pub y_scale: Scale,
     /// One unit is as long on both axes, as a Nyquist plot needs; for linear scales.
     pub equal_units: bool,
-}
-
-/// The scale of an axis.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub enum Scale {
-    /// Even.
-    #[default]
-    Linear,
-    /// Decades; samples of zero and below are gaps.
-    Logarithmic,
+    /// Shaded bands, behind the curves.
+    #[serde(default)]
+    pub bands: Vec<Band>,
 }
 
 /// One curve. Samples that are not finite are gaps.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// For the legend.
     pub name: String,
     /// Abscissas.
+    #[serde(with = "super::number::list")]
     pub x: Vec<f64>,
     /// Ordinates, as many.
+    #[serde(with = "super::number::list")]
     pub y: Vec<f64>,
     /// How it is drawn.
     pub style: Style,
 }
 
-impl Scale {
-    /// Where a value lies on the axis, in any even unit.
-    fn place(self, value: f64) -> f64 {
-        match self {
-            Self::Linear => value,
-            Self::Logarithmic if value > 0.0 => value.log10(),
-            Self::Logarithmic => f64::NAN,
+/// A shaded band between two curves. Samples that are not finite are gaps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Band {
+    /// For the legend.
+    pub name: String,
+    /// Abscissas, in order.
+    #[serde(with = "super::number::list")]
+    pub x: Vec<f64>,
+    /// Its lower edge, as many ordinates.
+    #[serde(with = "super::number::list")]
+    pub low: Vec<f64>,
+    /// Its upper edge, as many ordinates.
+    #[serde(with = "super::number::list")]
+    pub high: Vec<f64>,
+    /// Colour of the shade.
+    pub colour: Colour,
+}
+
+impl Band {
+    /// The same with about `points` samples, among them the extremes of both edges.
+    fn decimated(&self, points: usize) -> Self {
+        let mut kept = decimate(&self.x, &self.low, points / 2);
+        kept.extend(decimate(&self.x, &self.high, points / 2));
+        kept.sort_unstable();
+        kept.dedup();
+        Self {
+            name: self.name.clone(),
+            x: pick(&self.x, &kept),
+            low: pick(&self.low, &kept),
+            high: pick(&self.high, &kept),
+            colour: self.colour,
         }
     }
 
-    fn apply(self, axis: Axis) -> Axis {
-        match self {
-            Self::Linear => axis,
-            Self::Logarithmic => axis.type_(AxisType::Log),
-        }
+    /// Outlines of the parts between gaps: along the lower edge, and back along the upper one.
+    pub(super) fn outlines(&self, x: Scale, y: Scale) -> Vec<Vec<(f64, f64)>> {
+        let has_place = |&i: &usize| {
+            x.place(self.x[i]).is_finite()
+                && y.place(self.low[i]).is_finite()
+                && y.place(self.high[i]).is_finite()
+        };
+        let samples: Vec<usize> = (0..self.x.len()).collect();
+        samples
+            .split(|i| !has_place(i))
+            .filter(|part| part.len() > 1)
+            .map(|part| {
+                let low = part.iter().map(|&i| (self.x[i], self.low[i]));
+                let high = part.iter().rev().map(|&i| (self.x[i], self.high[i]));
+                low.chain(high).collect()
+            })
+            .collect()
     }
 }
 
 impl Lines {
-    pub(super) fn to_plotly(&self, points_per_series: usize) -> Plotly {
+    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
+        let bands = self.bands.iter().map(|band| Entry {
+            name: &band.name,
+            colour: band.colour,
+            sample: Sample::Band,
+        });
+        let series = self.series.iter().map(|series| Entry {
+            name: &series.name,
+            colour: series.style.colour,
+            sample: Sample::Line(series.style.dash),
+        });
+        bands.chain(series).collect()
+    }
+
+    pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
+        for band in &self.bands {
+            same_length(figure, &band.name, band.x.len(), band.low.len())?;
+            same_length(figure, &band.name, band.x.len(), band.high.len())?;
+        }
+        self.series
+            .iter()
+            .try_for_each(|s| same_length(figure, &s.name, s.x.len(), s.y.len()))
+    }
+
+    /// The same with at most `points` samples of each curve.
+    pub(super) fn decimated(&self, points: usize) -> Self {
+        let series = self.series.iter().map(|series| {
+            let x = self.x_scale.places(&series.x);
+            let kept = decimate(&x, &self.y_scale.places(&series.y), points);
+            Series {
+                name: series.name.clone(),
+                x: pick(&series.x, &kept),
+                y: pick(&series.y, &kept),
+                style: series.style,
+            }
+        });
+        Self {
+            x_label: self.x_label.clone(),
+            y_label: self.y_label.clone(),
+            series: series.collect(),
+            bands: self.bands.iter().map(|b| b.decimated(points)).collect(),
+            ..*self
+        }
+    }
+
+    /// All abscissas.
+    pub(super) fn abscissas(&self) -> impl Iterator<Item = f64> {
+        let bands = self.bands.iter().flat_map(|band| &band.x);
+        bands
+            .chain(self.series.iter().flat_map(|series| &series.x))
+            .copied()
+    }
+
+    /// All ordinates.
+    pub(super) fn ordinates(&self) -> impl Iterator<Item = f64> {
+        let bands = self.bands.iter();
+        bands
+            .flat_map(|band| band.low.iter().chain(&band.high))
+            .chain(self.series.iter().flat_map(|series| &series.y))
+            .copied()
+    }
+
+    pub(super) fn to_plotly(&self) -> Plotly {
         let mut plot = Plotly::new();
-        let places = |scale: Scale, values: &[f64]| -> Vec<f64> {
-            values.iter().map(|&value| scale.place(value)).collect()
-        };
         // A hundred-thousandth of what an axis spans is a hundredth of a pixel: digits beyond it only cost bytes. The
         // abscissas keep one digit more, for zooming into a long run.
-        let x_span = span(self.x_scale, self.series.iter().flat_map(|s| &s.x));
-        let y_span = span(self.y_scale, self.series.iter().flat_map(|s| &s.y));
-        for series in &self.series {
-            let kept = decimate(
-                &places(self.x_scale, &series.x),
-                &places(self.y_scale, &series.y),
-                points_per_series,
+        let x_step = 1e-6 * self.x_scale.span(self.abscissas());
+        let y_step = 1e-5 * self.y_scale.span(self.ordinates());
+        let short_x = |&x: &f64| self.x_scale.shortened(x, x_step);
+        let short_y = |&y: &f64| self.y_scale.shortened(y, y_step);
+        for band in &self.bands {
+            let mut outline: Vec<(f64, f64)> = Vec::new();
+            for part in band.outlines(self.x_scale, self.y_scale) {
+                outline.extend(part.iter().map(|(x, y)| (short_x(x), short_y(y))));
+                outline.push((f64::NAN, f64::NAN));
+            }
+            let (x, y): (Vec<f64>, Vec<f64>) = outline.into_iter().unzip();
+            plot.add_trace(
+                Scatter::new(x, y)
+                    .name(&band.name)
+                    .mode(Mode::Lines)
+                    .line(Line::new().width(0.0).simplify(false))
+                    .fill(Fill::ToSelf)
+                    .fill_color(band.colour.light())
+                    .opacity(BAND_OPACITY)
+                    .hover_info(HoverInfo::Skip),
             );
-            let shorten = |scale: Scale, values: &[f64], step: f64| -> Vec<f64> {
-                kept.iter()
-                    .map(|&index| match scale {
-                        Scale::Linear => rounded(values[index], step),
-                        // On decades a step is a share of the value.
-                        Scale::Logarithmic if values[index] > 0.0 => {
-                            rounded(values[index], step * values[index])
-                        }
-                        Scale::Logarithmic => f64::NAN,
-                    })
-                    .collect()
-            };
-            let x = shorten(self.x_scale, &series.x, 1e-6 * x_span);
-            let y = shorten(self.y_scale, &series.y, 1e-5 * y_span);
+        }
+        for series in &self.series {
+            let x: Vec<f64> = series.x.iter().map(short_x).collect();
+            let y: Vec<f64> = series.y.iter().map(short_y).collect();
             let trace = Scatter::new(x, y).name(&series.name);
             plot.add_trace(match series.style.dash {
                 Dash::Points => trace
@@ -125,24 +219,13 @@ impl Lines {
     }
 }
 
-/// What the values span on their axis.
-fn span<'a>(scale: Scale, values: impl Iterator<Item = &'a f64>) -> f64 {
-    let (low, high) = values
-        .map(|&value| scale.place(value))
-        .filter(|place| place.is_finite())
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), place| {
-            (low.min(place), high.max(place))
-        });
-    high - low
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Lines, Scale, Series};
-    use crate::report::{Colour, Style};
+    use super::{Band, Lines, Series};
+    use crate::report::{Colour, Scale, Style};
 
     fn json(lines: Lines) -> String {
-        lines.to_plotly(100).to_json()
+        lines.decimated(100).to_plotly().to_json()
     }
 
     fn lines(style: Style) -> Lines {
@@ -182,5 +265,33 @@ mod tests {
             ..lines(Style::solid(Colour::Blue))
         });
         assert!(json.contains("\"scaleanchor\":\"x\""), "{json}");
+    }
+
+    #[test]
+    fn bands_break_at_gaps_and_keep_their_extremes() {
+        let n = 5000;
+        let mut low = vec![-1.0; n];
+        low[1234] = -9.0;
+        let mut high = vec![1.0; n];
+        high[4321] = 9.0;
+        high[2500] = f64::NAN;
+        let band = Band {
+            name: "spread".to_owned(),
+            x: (0..n).map(|i| i as f64).collect(),
+            low,
+            high,
+            colour: Colour::Sky,
+        };
+        let thin = band.decimated(200);
+        assert!(thin.x.len() <= 200, "{}", thin.x.len());
+        assert!(thin.low.contains(&-9.0) && thin.high.contains(&9.0));
+        let outlines = thin.outlines(Scale::Linear, Scale::Linear);
+        assert_eq!(outlines.len(), 2);
+        assert!(
+            outlines
+                .iter()
+                .flatten()
+                .all(|(x, y)| x.is_finite() && y.is_finite())
+        );
     }
 }

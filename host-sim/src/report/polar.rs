@@ -1,22 +1,27 @@
 //! The circle test, drawn as a ball-bar instrument draws it.
 
-use super::figure::{Style, trace_line};
-use super::{decimate, palette};
+use super::figure::{Style, pick, same_length, trace_line};
+use super::mark::{Entry, Sample};
+use super::scale::rounded;
+use super::{ReportError, decimate, palette};
 use plotly::common::{Anchor, DashType, Font, HoverInfo, Mode};
 use plotly::layout::{
     Annotation, Axis, DragMode, HoverMode, Layout, Shape, ShapeLayer, ShapeLine, ShapeType,
     TicksDirection,
 };
 use plotly::{Plot as Plotly, Scatter};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Largest share of the radius that the magnified deviation may take.
 const DEVIATION_SHARE: f64 = 0.3;
 /// Most division circles on either side of the nominal circle.
 const DIVISIONS: f64 = 3.0;
+/// Where divisions are labelled: on the diagonal, away from the axes, where the quadrant glitches are; rad.
+pub(super) const LABEL_ANGLE: f64 = TAU / 8.0;
 
 /// Radial deviation from a circle, magnified.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PolarDeviation {
     /// Radius of the nominal circle, mm.
     pub radius_mm: f64,
@@ -29,13 +34,15 @@ pub struct PolarDeviation {
 }
 
 /// One measured circle.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeviationTrace {
     /// For the legend.
     pub name: String,
     /// Angle of each sample from the horizontal axis, rad.
+    #[serde(with = "super::number::list")]
     pub angle_rad: Vec<f64>,
     /// Radius less the nominal one, um.
+    #[serde(with = "super::number::list")]
     pub deviation_um: Vec<f64>,
     /// How it is drawn.
     pub style: Style,
@@ -75,6 +82,51 @@ impl PolarDeviation {
         }
     }
 
+    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
+        self.traces
+            .iter()
+            .map(|trace| Entry {
+                name: &trace.name,
+                colour: trace.style.colour,
+                sample: Sample::Line(trace.style.dash),
+            })
+            .collect()
+    }
+
+    pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
+        if !(self.radius_mm.is_finite() && self.radius_mm > 0.0) {
+            return Err(ReportError::Radius {
+                figure: figure.to_owned(),
+                radius_mm: self.radius_mm,
+            });
+        }
+        self.traces.iter().try_for_each(|trace| {
+            same_length(
+                figure,
+                &trace.name,
+                trace.angle_rad.len(),
+                trace.deviation_um.len(),
+            )
+        })
+    }
+
+    /// The same with at most `points` samples of each circle.
+    pub(super) fn decimated(&self, points: usize) -> Self {
+        let traces = self.traces.iter().map(|trace| {
+            let kept = decimate(&trace.angle_rad, &trace.deviation_um, points);
+            DeviationTrace {
+                name: trace.name.clone(),
+                angle_rad: pick(&trace.angle_rad, &kept),
+                deviation_um: pick(&trace.deviation_um, &kept),
+                style: trace.style,
+            }
+        });
+        Self {
+            traces: traces.collect(),
+            ..self.clone()
+        }
+    }
+
     /// What the reader must know to read the figure.
     pub(super) fn scale_note(&self) -> String {
         let Magnification {
@@ -89,24 +141,24 @@ impl PolarDeviation {
         )
     }
 
-    pub(super) fn to_plotly(&self, points_per_series: usize) -> Plotly {
+    pub(super) fn to_plotly(&self) -> Plotly {
         let scale = self.magnification();
         let mut plot = Plotly::new();
         for trace in &self.traces {
-            let kept = decimate(&trace.angle_rad, &trace.deviation_um, points_per_series);
-            let drawn = |axis: fn(f64) -> f64| -> Vec<f64> {
-                let place = |&i: &usize| {
-                    let radius = self.radius_mm + scale.factor * trace.deviation_um[i] * 1e-3;
-                    rounded(radius * axis(trace.angle_rad[i]), self.radius_mm * 1e-5)
-                };
-                kept.iter().map(place).collect()
-            };
-            let deviation: Vec<f64> = kept
+            let (x, y): (Vec<f64>, Vec<f64>) = (0..trace.angle_rad.len())
+                .map(|i| self.drawn(scale, trace.angle_rad[i], trace.deviation_um[i]))
+                .map(|(x, y)| {
+                    let short = |place| rounded(place, self.radius_mm * 1e-5);
+                    (short(x), short(y))
+                })
+                .unzip();
+            let deviation: Vec<f64> = trace
+                .deviation_um
                 .iter()
-                .map(|&i| rounded(trace.deviation_um[i], scale.division_um * 1e-3))
+                .map(|deviation| rounded(*deviation, scale.division_um * 1e-3))
                 .collect();
             plot.add_trace(
-                Scatter::new(drawn(f64::cos), drawn(f64::sin))
+                Scatter::new(x, y)
                     .mode(Mode::Lines)
                     .name(&trace.name)
                     .line(trace_line(trace.style))
@@ -119,17 +171,44 @@ impl PolarDeviation {
         plot
     }
 
-    fn layout(&self, scale: Magnification) -> Layout {
+    /// Where a sample is drawn, mm from the centre.
+    pub(super) fn drawn(
+        &self,
+        scale: Magnification,
+        angle_rad: f64,
+        deviation_um: f64,
+    ) -> (f64, f64) {
+        let radius = self.radius_mm + scale.factor * deviation_um * 1e-3;
+        (radius * angle_rad.cos(), radius * angle_rad.sin())
+    }
+
+    /// What is drawn of the plane on either side of the centre, mm.
+    pub(super) fn reach_mm(&self, scale: Magnification) -> f64 {
+        let reach_um = scale.divisions as f64 * scale.division_um;
+        1.06 * (self.radius_mm + scale.factor * reach_um * 1e-3)
+    }
+
+    /// Radii of the division circles, mm as drawn, with the deviation they stand for, um; from the innermost.
+    pub(super) fn divisions(&self, scale: Magnification) -> Vec<(f64, f64)> {
         let reach = scale.divisions as isize;
-        let offset_mm = |division: isize| scale.factor * scale.division_um * 1e-3 * division as f64;
-        let circles = (-reach..=reach).map(|division| {
-            let r = self.radius_mm + offset_mm(division);
-            let line = match division {
-                0 => ShapeLine::new()
+        (-reach..=reach)
+            .map(|division| {
+                let um = division as f64 * scale.division_um;
+                (self.radius_mm + scale.factor * um * 1e-3, um)
+            })
+            .collect()
+    }
+
+    fn layout(&self, scale: Magnification) -> Layout {
+        let divisions = self.divisions(scale);
+        let circles = divisions.iter().map(|&(r, um)| {
+            let line = if um == 0.0 {
+                ShapeLine::new()
                     .color(palette::LABEL.0)
                     .width(1.0)
-                    .dash(DashType::Dash),
-                _ => ShapeLine::new().color(palette::GRID.0).width(1.0),
+                    .dash(DashType::Dash)
+            } else {
+                ShapeLine::new().color(palette::GRID.0).width(1.0)
             };
             Shape::new()
                 .shape_type(ShapeType::Circle)
@@ -142,28 +221,24 @@ impl PolarDeviation {
         });
         // The scale stands where ball-bar plots have it: in the empty centre.
         let centre = Annotation::new()
-            .text(format!(
-                "× {}<br>{} µm/div",
-                scale.factor, scale.division_um
-            ))
+            .text(scale.lines().join("<br>"))
             .x(0.0)
             .y(0.0)
             .show_arrow(false)
             .font(Font::new().size(12).color(palette::LABEL.0));
-        // Divisions are labelled on the diagonal, away from the axes, where the quadrant glitches are.
-        let labels = [-reach, reach].into_iter().map(|division| {
-            let place = (self.radius_mm + offset_mm(division)) * (TAU / 8.0).cos();
-            let um = division as f64 * scale.division_um;
+        let ends = [divisions.first(), divisions.last()];
+        let labels = ends.into_iter().flatten().map(|&(radius, um)| {
+            let is_inside = um < 0.0;
             Annotation::new()
-                .text(format!("{um:+} µm").replace('-', "\u{2212}"))
-                .x(place)
-                .y(place)
-                .x_anchor(if division < 0 {
+                .text(division_label(um))
+                .x(radius * LABEL_ANGLE.cos())
+                .y(radius * LABEL_ANGLE.sin())
+                .x_anchor(if is_inside {
                     Anchor::Right
                 } else {
                     Anchor::Left
                 })
-                .y_anchor(if division < 0 {
+                .y_anchor(if is_inside {
                     Anchor::Top
                 } else {
                     Anchor::Bottom
@@ -171,7 +246,7 @@ impl PolarDeviation {
                 .show_arrow(false)
                 .font(Font::new().size(10).color(palette::LABEL.0))
         });
-        let range = 1.06 * (self.radius_mm + offset_mm(reach));
+        let range = self.reach_mm(scale);
         let axis = |label: &str| {
             super::figure::axis(label)
                 .range(vec![-range, range])
@@ -190,16 +265,19 @@ impl PolarDeviation {
     }
 }
 
-/// `value` rounded to a decimal grid no coarser than `step`: shorter on the page, and the same to the eye.
-pub(super) fn rounded(value: f64, step: f64) -> f64 {
-    let digits = -step.log10().floor();
-    if digits > 0.0 && digits < 300.0 {
-        // Scaling by a whole power of ten and back yields the double nearest to the short decimal.
-        let scale = 10f64.powf(digits).round();
-        (value * scale).round() / scale
-    } else {
-        value
+impl Magnification {
+    /// What stands in the centre.
+    pub(super) fn lines(&self) -> [String; 2] {
+        [
+            format!("× {}", self.factor),
+            format!("{} µm/div", self.division_um),
+        ]
     }
+}
+
+/// What a division circle is called.
+pub(super) fn division_label(um: f64) -> String {
+    format!("{um:+} µm").replace('-', "\u{2212}")
 }
 
 /// The steps of a readable scale.
@@ -236,9 +314,7 @@ fn tidy(value: f64) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use super::{
-        DeviationTrace, Magnification, PolarDeviation, Style, round_down, round_up, rounded,
-    };
+    use super::{DeviationTrace, Magnification, PolarDeviation, Style, round_down, round_up};
 
     fn circle(radius_mm: f64, deviation_um: Vec<f64>) -> PolarDeviation {
         let angle_rad = (0..deviation_um.len()).map(|i| i as f64).collect();
@@ -291,12 +367,5 @@ mod tests {
             divisions: 2,
         };
         assert_eq!(circle(30.0, vec![0.0, f64::NAN]).magnification(), expected);
-    }
-
-    #[test]
-    fn rounding_shortens_without_moving() {
-        assert_eq!(rounded(0.123_456_789, 1e-4), 0.1235);
-        assert_eq!(rounded(1234.567, 1.0), 1234.567);
-        assert!(rounded(f64::NAN, 1e-3).is_nan());
     }
 }

@@ -22,5 +22,10 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let judgements = validate(arguments.seeds, &bar)?;
     bar.finish_and_clear();
     println!("Simulated, not measured.\n");
-    arguments.output.table(&validation_table(&judgements))
+    arguments.output.tables(
+        "Identification judged by the truth",
+        "Axes of the simulated stage, whose truth was hidden from identification; simulated, not measured",
+        vec![validation_table(&judgements)],
+        "validation",
+    )
 }
