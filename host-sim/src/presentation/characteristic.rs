@@ -71,6 +71,7 @@ pub fn characteristic_section(
     );
     Section {
         id: "characteristic-trajectory".to_owned(),
+        provenance: None,
         heading: "Nominal characteristic trajectory".to_owned(),
         prose: vec![
             format!(

@@ -1,5 +1,6 @@
 //! The feedback laws side by side: how they were tuned, and what they did.
 
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 
 use super::UM_PER_MM;
@@ -7,7 +8,9 @@ use super::identify::{columns, lines, series};
 use crate::experiment::TrialOutcome;
 use crate::experiment::laws::comparison::{LawOutcome, Spread};
 use crate::experiment::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw};
-use crate::report::{Block, Cell, Figure, Section, Style, Table};
+use crate::report::{
+    self, Block, Cell, Colour, DotSeries, Dots, Figure, Plot, Scale, Section, Style, Table,
+};
 
 /// How each law was tuned.
 pub fn tuning_table(laws: &[TunedLaw]) -> Table {
@@ -133,10 +136,52 @@ fn tuning_figure(laws: &[TunedLaw]) -> Figure {
     )
 }
 
+/// RMS errors of the laws, without and with feedforward.
+fn laws_figure(outcomes: &[LawOutcome]) -> Figure {
+    let laws: Vec<&str> = LawKind::ALL.map(LawKind::name).into();
+    let spread = |law: &str, kind| {
+        let of = outcomes
+            .iter()
+            .find(|outcome| outcome.law.name() == law && outcome.feedforward == kind);
+        let errors = of.map(|outcome| outcome.spread(|o| o.score.rms_mm));
+        errors.map_or(report::Spread::exact(f64::NAN), |errors| {
+            let (mean, half) = (errors.mean * UM_PER_MM, errors.deviation * UM_PER_MM);
+            report::Spread {
+                mean,
+                low: mean - half,
+                high: mean + half,
+            }
+        })
+    };
+    let series = [
+        ("no feedforward", FeedforwardKind::None, Colour::Vermillion),
+        ("static + GMS", FeedforwardKind::Combined, Colour::Blue),
+    ];
+    Figure {
+        id: "laws-rms".to_owned(),
+        caption: "RMS tracking error of the tuned laws, mean over three velocities; bars: one standard deviation over the seeds"
+            .to_owned(),
+        plot: Plot::Dots(Dots {
+            value_label: "RMS error (um)".to_owned(),
+            categories: laws.iter().map(|law| (*law).to_owned()).collect(),
+            series: series
+                .into_iter()
+                .map(|(name, kind, colour)| DotSeries {
+                    name: name.to_owned(),
+                    values: laws.iter().map(|law| spread(law, kind)).collect(),
+                    colour,
+                })
+                .collect(),
+            scale: Scale::Logarithmic,
+        }),
+    }
+}
+
 /// All that there is to say of the laws.
 pub fn laws_section(laws: &[TunedLaw], outcomes: &[LawOutcome]) -> Section {
     Section {
-        id: "laws".to_owned() + "-compared",
+        id: "laws-compared".to_owned(),
+        provenance: None,
         heading: "Feedback laws, fairly tuned".to_owned(),
         prose: vec![
             "Every law keeps the same bounds on sensitivity at small errors, on the same identified model, and uses them up. What the \
@@ -148,6 +193,7 @@ pub fn laws_section(laws: &[TunedLaw], outcomes: &[LawOutcome]) -> Section {
         blocks: vec![
             Block::Table(tuning_table(laws)),
             Block::Figure(tuning_figure(laws)),
+            Block::Figure(laws_figure(outcomes)),
             Block::Table(laws_table(outcomes)),
         ],
     }
