@@ -3,8 +3,7 @@
 use crate::control::npid::NonlinearGainTable;
 use crate::control::pid::{Pid, PidState};
 use crate::encoder::{Encoder, EncoderState};
-use crate::feedforward::{Feedforward, ReferenceStep};
-use crate::friction::gms::GmsState;
+use crate::feedforward::{Feedforward, FeedforwardState, ReferenceStep};
 use crate::reference::{Motion, MotionState, ReferenceSample};
 use crate::safety::FaultCode;
 use crate::scalar::{Quantity, Scalar};
@@ -65,7 +64,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     ahead: Position,
     preview: [Position; PREVIEW_ROOM],
     pid: PidState<S>,
-    gms: GmsState<S, N>,
+    springs: FeedforwardState<S, N>,
     transfer: S,
     last_output: S,
     telemetry: AxisTelemetry<S>,
@@ -82,7 +81,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             ahead: Position::ZERO,
             preview: [Position::ZERO; PREVIEW_ROOM],
             pid: PidState::default(),
-            gms: GmsState::default(),
+            springs: FeedforwardState::default(),
             transfer: S::ZERO,
             last_output: S::ZERO,
             telemetry: AxisTelemetry::default(),
@@ -174,7 +173,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             Some(gain) => gain.scaled_error(error),
             None => error,
         };
-        let feedforward = self.feedforward.step(&mut state.gms, state.step);
+        let feedforward = self.feedforward.step(&mut state.springs, state.step);
         let limit = self.amplifier.limit;
         if changed {
             self.pid.take_over(&mut state.pid, scaled);

@@ -35,6 +35,8 @@ pub enum Reason {
         /// Largest stiffness, V/mm.
         most: f64,
     },
+    /// It is not there, and the kind of feedforward needs it.
+    Missing,
     /// The sliding friction follows the Stribeck curve faster than the control rate resolves.
     TooFastForRate {
         /// Largest value, V/s.
@@ -60,7 +62,10 @@ impl fmt::Display for SettingsError {
         if let Some(axis) = self.axis {
             write!(f, "{axis}.")?;
         }
-        write!(f, "{} = {}", self.field, self.value)?;
+        f.write_str(self.field)?;
+        if self.reason != Reason::Missing {
+            write!(f, " = {}", self.value)?;
+        }
         match self.reason {
             Reason::NotFinite => f.write_str(" is not a finite number"),
             Reason::OutOfRange { least, most } => {
@@ -81,8 +86,11 @@ impl fmt::Display for SettingsError {
             ),
             Reason::TooStiffForRate { most } => write!(
                 f,
-                ": the elements' summed stiffness exceeds {most:.4} V/mm, beyond which the pre-sliding resonance \
+                ": the stiffness (of GMS elements their sum) exceeds {most:.4} V/mm, beyond which the pre-sliding resonance \
                  on this plant is not resolved at the control rate"
+            ),
+            Reason::Missing => f.write_str(
+                " is missing, and feedforward.kind needs it: `quadrant commission` identifies it; or choose another kind",
             ),
             Reason::TooFastForRate { most } => write!(
                 f,

@@ -2,12 +2,11 @@
 
 use proptest::prelude::*;
 use quadrant::feedforward::{
-    Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardTerms, ReferenceStep,
+    Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
+    ReferenceStep,
 };
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::GmsState;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings, x_axis};
+use quadrant::settings::{FrictionSettings, PlanSettings, StageSettings, x_axis};
 use quadrant::units::DacCode;
 
 use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x};
@@ -21,22 +20,23 @@ const WHOLE: FeedforwardGains = FeedforwardGains {
 };
 
 /// The x axis' friction, with another level backwards.
-fn friction() -> PerDirection<quadrant::friction::stribeck::StaticFriction> {
-    let mut friction = x_axis().friction.sliding;
-    friction.negative.curve.coulomb_v = 0.10;
-    friction.negative.curve.breakaway_v = 0.14;
-    friction.negative.viscous_v_s_per_mm = 0.003;
+fn friction() -> FrictionSettings {
+    let mut friction = x_axis().friction;
+    let negative = &mut friction.sliding.negative;
+    negative.curve.coulomb_v = 0.10;
+    negative.curve.breakaway_v = 0.14;
+    negative.viscous_v_s_per_mm = 0.003;
     friction
 }
 
 fn build<S: Scalar>(kind: FeedforwardKind, gains: &FeedforwardGains) -> Feedforward<S, 4> {
-    Feedforward::build(kind, gains, &friction(), &x_axis().friction.gms, PERIOD_S)
+    Feedforward::build(kind, gains, &friction(), PERIOD_S)
 }
 
 /// The terms after a second at constant velocity.
 fn settled<S: Scalar>(kind: FeedforwardKind, velocity_mm_s: f64) -> FeedforwardTerms<S> {
     let feedforward = build::<S>(kind, &WHOLE);
-    let mut state = GmsState::default();
+    let mut state = FeedforwardState::default();
     let mut terms = FeedforwardTerms::default();
     for _ in 0..10_000 {
         let step = ReferenceStep {
@@ -50,7 +50,7 @@ fn settled<S: Scalar>(kind: FeedforwardKind, velocity_mm_s: f64) -> FeedforwardT
 }
 
 fn each_effect_counts_once<S: Scalar>(tolerance_v: f64) {
-    let friction = friction();
+    let friction = friction().sliding;
     for velocity in [0.5, 1.0, 3.0, 10.0, 40.0, -0.5, -1.0, -3.0, -10.0, -40.0] {
         let (model, sign) = if velocity > 0.0 {
             (friction.positive, 1.0)
@@ -112,7 +112,7 @@ fn inertia_acts_with_every_kind() {
             velocity: 0.0,
             acceleration: 500.0,
         };
-        let terms = feedforward.step(&mut GmsState::default(), step);
+        let terms = feedforward.step(&mut FeedforwardState::default(), step);
         assert!((terms.total() - 500.0 / 69_390.0).abs() < 1e-15, "{kind:?}");
     }
 }
@@ -126,13 +126,13 @@ proptest! {
         kind in prop::sample::select(FeedforwardKind::ALL.to_vec()),
     ) {
         let feedforward = build::<f32>(kind, &WHOLE);
-        let mut state = GmsState::default();
+        let mut state = FeedforwardState::default();
         for (displacement, velocity, acceleration) in steps {
             let step = ReferenceStep { displacement, velocity, acceleration };
             let terms = feedforward.step(&mut state, step);
             prop_assert!(terms.level.abs() <= 0.1501, "{terms:?}");
             prop_assert!(terms.gms.abs() <= 0.1501, "{terms:?}");
-            prop_assert!(state.forces().iter().all(|force| force.is_finite()));
+            prop_assert!(state.elements().forces().iter().all(|force| force.is_finite()));
         }
     }
 }

@@ -53,7 +53,7 @@ impl Configuration {
         [Controller::Pid, Controller::NPid]
             .into_iter()
             .flat_map(|controller| {
-                FeedforwardKind::ALL.map(|feedforward| Self {
+                FeedforwardKind::THESIS.map(|feedforward| Self {
                     controller,
                     feedforward,
                 })
