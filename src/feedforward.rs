@@ -14,10 +14,10 @@
 //!
 //! Inertia (`a / A`) is separate and acts with any kind.
 //!
-//! The springs of the elements move with the first four kinds and with the smoothed GMS, which share them; the bristle
-//! moves with Dahl and LuGre, which share it. A change of kind from one group to the other takes the springs as they
-//! were left, which are right again once the reference has moved over the pre-sliding range in one sense; the step in
-//! the output is met by the axis' bumpless transfer.
+//! The springs of the elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and
+//! LuGre. When a change of settings goes from one group to the other, the force of the springs goes with it: the bristle takes
+//! the elements' sum, the elements take their weights' shares of the bristle's force. What else the elements remember is
+//! right again once the reference has moved over the pre-sliding range in one sense.
 
 use serde::{Deserialize, Serialize};
 
@@ -151,6 +151,8 @@ enum Presliding<S: Scalar, const N: usize> {
 pub struct FeedforwardState<S: Scalar, const N: usize> {
     elements: GmsState<S, N>,
     bristle: Bristle<S>,
+    /// The bristle moved last, and not the elements.
+    on_bristle: bool,
 }
 
 impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
@@ -158,19 +160,39 @@ impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
         Self {
             elements: GmsState::default(),
             bristle: Bristle::default(),
+            on_bristle: false,
         }
     }
 }
 
 impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
-    /// The springs of the GMS and the smoothed GMS.
-    pub fn elements(&self) -> &GmsState<S, N> {
-        &self.elements
+    /// What the springs of the last kind carry, V.
+    pub fn force(&self) -> S {
+        if self.on_bristle {
+            self.bristle.force()
+        } else {
+            self.elements.total()
+        }
     }
 
-    /// The bristle of Dahl's model and LuGre.
-    pub fn bristle(&self) -> &Bristle<S> {
-        &self.bristle
+    /// The elements, loaded by `spread` if the bristle moved last.
+    #[inline(always)]
+    fn elements(&mut self, spread: impl FnOnce(S) -> GmsState<S, N>) -> &mut GmsState<S, N> {
+        if self.on_bristle {
+            self.elements = spread(self.bristle.force());
+            self.on_bristle = false;
+        }
+        &mut self.elements
+    }
+
+    /// The bristle, loaded if the elements moved last.
+    #[inline(always)]
+    fn bristle(&mut self) -> &mut Bristle<S> {
+        if !self.on_bristle {
+            self.bristle = Bristle::bent(self.elements.total());
+            self.on_bristle = true;
+        }
+        &mut self.bristle
     }
 }
 
@@ -252,15 +274,15 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
                     };
                 }
                 // The elements move with any of these kinds: their springs are loaded when a change makes them act.
-                elements.step(&mut state.elements, displacement, sliding)
+                let springs = state.elements(|force| elements.spread(force));
+                elements.step(springs, displacement, sliding)
             }
-            Presliding::Smoothed { elements, surface } => elements.step(
-                &mut state.elements,
-                displacement,
-                surface.at(speed, direction),
-            ),
-            Presliding::Lugre(model) => model.step(&mut state.bristle, displacement, speed),
-            Presliding::Dahl(model) => model.step(&mut state.bristle, displacement),
+            Presliding::Smoothed { elements, surface } => {
+                let springs = state.elements(|force| elements.spread(force));
+                elements.step(springs, displacement, surface.at(speed, direction))
+            }
+            Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
+            Presliding::Dahl(model) => model.step(state.bristle(), displacement),
         };
         if self.kind.has_presliding() {
             terms.gms = force.scale(self.gms_gain);

@@ -9,6 +9,11 @@ pub struct Bristle<S> {
 }
 
 impl<S: Scalar> Bristle<S> {
+    /// Bristles that carry a force, V.
+    pub fn bent(force: S) -> Self {
+        Self { force }
+    }
+
     /// What the bristles carry, `sigma0 z`, V.
     pub fn force(&self) -> S {
         self.force

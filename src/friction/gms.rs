@@ -85,6 +85,15 @@ impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
 }
 
 impl<S: Scalar, const N: usize> GmsState<S, N> {
+    /// Sticking elements that carry `force` by their weights.
+    pub(super) fn carrying(force: S, weights: impl Iterator<Item = S::Gain>) -> Self {
+        let mut state = Self::default();
+        for (slot, weight) in state.forces.iter_mut().zip(weights) {
+            *slot = force.scale(weight);
+        }
+        state
+    }
+
     /// The forces of the elements, V.
     pub fn forces(&self) -> &[S; N] {
         &self.forces
@@ -92,7 +101,7 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
 
     /// The friction, the sum of the elements' forces, V.
     #[inline(always)]
-    pub(super) fn total(&self) -> S {
+    pub fn total(&self) -> S {
         let mut force = S::ZERO;
         for element in self.forces {
             force = force + element;
@@ -124,6 +133,11 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
                 }
             }),
         }
+    }
+
+    /// Sticking elements that carry `force` by their weights.
+    pub fn spread(&self, force: S) -> GmsState<S, N> {
+        GmsState::carrying(force, self.elements.iter().map(|element| element.weight))
     }
 
     /// The friction in V after moving by `displacement` (mm) over the surface `sliding`; without a displacement

@@ -8,8 +8,9 @@
 //!
 //! Discretised by the exact step at the velocity of the tick: `sigma0 z` covers the share `1 - exp(-sigma0 |v| Ts / s(v))`
 //! of its distance to `s(v) sgn(v)`. The share depends on the velocity alone, so it stands beside s(v) in the table; the
-//! share itself, not what is left, since near rest it is far below the resolution of numbers near one. Beyond the
-//! velocity at which the Stribeck curve is flat both stay what they are there.
+//! share itself, not what is left, since near rest it is far below the resolution of numbers near one. The table reaches to
+//! where little is left to cover, unless the Stribeck curve needs its nodes near zero; beyond its end both stay as they
+//! are there.
 
 use serde::{Deserialize, Serialize};
 
@@ -17,7 +18,7 @@ use super::bristle::Bristle;
 use super::stribeck::StribeckCurve;
 use super::{Direction, PerDirection};
 use crate::scalar::{Quantity, Scalar};
-use crate::table::OctaveTable;
+use crate::table::{OctaveTable, interpolation_error};
 
 /// The LuGre model as a person writes it. Its surface is the static model's Stribeck curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -27,6 +28,32 @@ pub struct LugreParameters {
     pub stiffness_v_per_mm: f64,
     /// sigma1, the damping of their bending, V s/mm; 0 to 1.
     pub damping_v_s_per_mm: f64,
+}
+
+/// Step of the bristles, sigma0 |v| Ts / Fc, up to which the table reaches: exp(-4) is left there, or exp(-8).
+const LARGEST_STEP: f64 = 8.0;
+/// Largest error of the tabulated s(v) over Fs for the sake of a longer table.
+const TABLE_TOLERANCE: f64 = 2.5e-4;
+/// Largest velocity of any reference, mm/s.
+const FASTEST_MM_S: f64 = 1e3;
+
+/// The velocity at which the tables end, mm/s.
+fn table_end_mm_s(curve: &StribeckCurve, stiffness_v_per_mm: f64, step_s: f64) -> f64 {
+    let wanted = LARGEST_STEP * curve.coulomb_v / (stiffness_v_per_mm * step_s);
+    let wanted = wanted.min(FASTEST_MM_S);
+    let tolerance_v = TABLE_TOLERANCE * curve.breakaway_v;
+    let mut end = curve.flat_velocity_mm_s();
+    // Doublings from a thousandth of a mm/s, the smallest Vs, to the fastest motion are twenty.
+    for _ in 0..20 {
+        let longer = 2.0 * end;
+        if longer > wanted
+            || interpolation_error(longer, f64::MAX, |v| curve.level_v(v)) > tolerance_v
+        {
+            break;
+        }
+        end = longer;
+    }
+    end
 }
 
 /// The LuGre model ready for the tick.
@@ -49,15 +76,12 @@ impl<S: Scalar> Lugre<S> {
         Self {
             tables: curves.map(|curve| {
                 OctaveTable::build(
-                    curve.flat_velocity_mm_s(),
+                    table_end_mm_s(curve, stiffness, step_s),
                     Quantity::Velocity,
                     [Quantity::Voltage, Quantity::Fraction],
                     |velocity| {
                         let level = curve.level_v(velocity);
-                        [
-                            level,
-                            -libm::expm1(-stiffness * velocity * step_s / level),
-                        ]
+                        [level, -libm::expm1(-stiffness * velocity * step_s / level)]
                     },
                 )
             }),

@@ -86,6 +86,11 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
         }
     }
 
+    /// Elements that carry `force` by their weights.
+    pub fn spread(&self, force: S) -> GmsState<S, N> {
+        GmsState::carrying(force, self.elements.iter().map(|element| element.weight))
+    }
+
     /// The friction in V after moving by `displacement` (mm) over the surface `sliding`; without a displacement
     /// nothing changes.
     #[inline(always)]

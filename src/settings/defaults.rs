@@ -128,10 +128,10 @@ pub fn x_axis() -> AxisSettings {
         viscous_v_s_per_mm: 144.8 / 69_390.0,
         presliding_mm: 0.030,
         dahl: DahlParameters {
-            stiffness_v_per_mm: 20.0,
-            exponent: 1.5,
+            stiffness_v_per_mm: 18.31,
+            exponent: 1.0,
         },
-        lugre_stiffness_v_per_mm: 15.0,
+        lugre_stiffness_v_per_mm: 18.03,
     })
 }
 
@@ -160,10 +160,10 @@ pub fn y_axis() -> AxisSettings {
         viscous_v_s_per_mm: 151.0 / 61_200.0,
         presliding_mm: 0.034,
         dahl: DahlParameters {
-            stiffness_v_per_mm: 20.0,
-            exponent: 1.5,
+            stiffness_v_per_mm: 18.33,
+            exponent: 1.0,
         },
-        lugre_stiffness_v_per_mm: 15.0,
+        lugre_stiffness_v_per_mm: 18.03,
     })
 }
 
@@ -192,10 +192,10 @@ pub fn z_axis() -> AxisSettings {
         viscous_v_s_per_mm: 172.0 / 48_500.0,
         presliding_mm: 0.026,
         dahl: DahlParameters {
-            stiffness_v_per_mm: 20.0,
-            exponent: 1.5,
+            stiffness_v_per_mm: 28.17,
+            exponent: 1.0,
         },
-        lugre_stiffness_v_per_mm: 15.0,
+        lugre_stiffness_v_per_mm: 27.74,
     })
 }
 

@@ -72,6 +72,9 @@ impl Configuration {
             FeedforwardKind::Static => format!("{controller} + static"),
             FeedforwardKind::Gms => format!("{controller} + GMS"),
             FeedforwardKind::Combined => format!("{controller} + static + GMS"),
+            FeedforwardKind::Dahl => format!("{controller} + Dahl"),
+            FeedforwardKind::Lugre => format!("{controller} + LuGre"),
+            FeedforwardKind::SmoothedGms => format!("{controller} + S-GMS"),
         }
     }
 
