@@ -2,8 +2,7 @@
 
 use crate::control::feedback::{Feedback, FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::encoder::{Encoder, EncoderState};
-use crate::feedforward::{Feedforward, ReferenceStep};
-use crate::friction::gms::GmsState;
+use crate::feedforward::{Feedforward, FeedforwardState, ReferenceStep};
 use crate::reference::{Motion, MotionState, ReferenceSample};
 use crate::safety::FaultCode;
 use crate::scalar::{Quantity, Scalar};
@@ -67,7 +66,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     /// Velocity of the feedback's reference, for a law that needs it.
     velocity: S,
     feedback: FeedbackState<S>,
-    gms: GmsState<S, N>,
+    springs: FeedforwardState<S, N>,
     transfer: S,
     last_output: S,
     telemetry: AxisTelemetry<S>,
@@ -85,7 +84,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             preview: [Position::ZERO; PREVIEW_ROOM],
             velocity: S::ZERO,
             feedback: FeedbackState::default(),
-            gms: GmsState::default(),
+            springs: FeedforwardState::default(),
             transfer: S::ZERO,
             last_output: S::ZERO,
             telemetry: AxisTelemetry::default(),
@@ -176,7 +175,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// it was, and the difference fades.
     #[inline(never)]
     pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
-        let feedforward = self.feedforward.step(&mut state.gms, state.step);
+        let feedforward = self.feedforward.step(&mut state.springs, state.step);
         let total = feedforward.total();
         let input = FeedbackInput {
             error: state.telemetry.error,

@@ -2,21 +2,34 @@
 //!
 //! Each effect is counted once, whatever is combined:
 //!
-//! | kind     | Coulomb and Stribeck level            | pre-sliding | viscous |
-//! |----------|---------------------------------------|-------------|---------|
-//! | none     | -                                     | -           | -       |
-//! | static   | `s(v) sgn(v)`                         | -           | `sigma v` |
-//! | GMS      | the elements, on a constant `s = Fs`  | elements    | -       |
-//! | combined | the elements, on `s(v)`               | elements    | `sigma v` |
+//! | kind         | Coulomb and Stribeck level           | pre-sliding       | viscous |
+//! |--------------|--------------------------------------|-------------------|---------|
+//! | none         | -                                    | -                 | -       |
+//! | static       | `s(v) sgn(v)`                        | -                 | `sigma v` |
+//! | GMS          | the elements, on a constant `s = Fs` | elements          | -       |
+//! | combined     | the elements, on `s(v)`              | elements          | `sigma v` |
+//! | Dahl         | the bristle, on a constant `s = Fc`  | bristle           | `sigma v` |
+//! | LuGre        | the bristles, on `s(v)`              | bristles, damped  | `sigma v`, which is LuGre's sigma2 |
+//! | smoothed GMS | the elements, on `s(v)`              | smoothed elements | `sigma v` |
 //!
 //! Inertia (`a / A`) is separate and acts with any kind.
+//!
+//! The springs of the elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and
+//! LuGre. When a change of settings goes from one group to the other, the force of the springs goes with it: the bristle takes
+//! the elements' sum, the elements take their weights' shares of the bristle's force. What else the elements remember is
+//! right again once the reference has moved over the pre-sliding range in one sense.
 
 use serde::{Deserialize, Serialize};
 
-use crate::friction::gms::{Gms, GmsParameters, GmsState};
-use crate::friction::stribeck::{Sliding, SlidingTable, StaticFriction};
+use crate::friction::bristle::Bristle;
+use crate::friction::dahl::Dahl;
+use crate::friction::gms::{Gms, GmsState};
+use crate::friction::lugre::Lugre;
+use crate::friction::smoothed_gms::SmoothedGms;
+use crate::friction::stribeck::{Sliding, SlidingTable};
 use crate::friction::{Direction, PerDirection};
 use crate::scalar::{Quantity, Scalar};
+use crate::settings::FrictionSettings;
 
 /// Which friction models act.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -31,11 +44,28 @@ pub enum FeedforwardKind {
     Gms,
     /// GMS on the Stribeck curve, and the static model's viscous friction.
     Combined,
+    /// Dahl's model at the Coulomb level, and the static model's viscous friction.
+    Dahl,
+    /// The LuGre model on the Stribeck curve.
+    Lugre,
+    /// The smoothed GMS on the Stribeck curve, and the static model's viscous friction.
+    SmoothedGms,
 }
 
 impl FeedforwardKind {
-    /// All kinds, in the order of the thesis' tables.
-    pub const ALL: [Self; 4] = [Self::None, Self::Static, Self::Gms, Self::Combined];
+    /// All kinds.
+    pub const ALL: [Self; 7] = [
+        Self::None,
+        Self::Static,
+        Self::Gms,
+        Self::Combined,
+        Self::Dahl,
+        Self::Lugre,
+        Self::SmoothedGms,
+    ];
+
+    /// Those that the thesis compares, in the order of its tables.
+    pub const THESIS: [Self; 4] = [Self::None, Self::Static, Self::Gms, Self::Combined];
 
     /// Its name in tables.
     pub const fn name(self) -> &'static str {
@@ -44,6 +74,9 @@ impl FeedforwardKind {
             Self::Static => "static",
             Self::Gms => "GMS",
             Self::Combined => "static + GMS",
+            Self::Dahl => "Dahl",
+            Self::Lugre => "LuGre",
+            Self::SmoothedGms => "smoothed GMS",
         }
     }
 
@@ -52,14 +85,14 @@ impl FeedforwardKind {
         matches!(self, Self::Static)
     }
 
-    /// Whether the GMS elements act.
-    const fn has_gms(self) -> bool {
-        matches!(self, Self::Gms | Self::Combined)
+    /// Whether a pre-sliding model acts.
+    const fn has_presliding(self) -> bool {
+        !matches!(self, Self::None | Self::Static)
     }
 
     /// Whether viscous friction acts.
     const fn has_viscous(self) -> bool {
-        matches!(self, Self::Static | Self::Combined)
+        !matches!(self, Self::None | Self::Gms)
     }
 }
 
@@ -71,7 +104,7 @@ pub struct FeedforwardGains {
     pub level: f64,
     /// Share of `sigma v`, 0..=2.
     pub viscous: f64,
-    /// Share of the GMS elements' force, 0..=2.
+    /// Share of the pre-sliding model's force, whichever model acts, 0..=2.
     pub gms: f64,
     /// Inertia, V s^2/mm: 1 / A for the whole of it, 0 for none.
     pub inertia_v_s2_per_mm: f64,
@@ -95,7 +128,7 @@ pub struct FeedforwardTerms<S> {
     pub level: S,
     /// Viscous friction.
     pub viscous: S,
-    /// The GMS elements.
+    /// The pre-sliding model: the GMS elements, smoothed or not, or the bristles.
     pub gms: S,
     /// Inertia.
     pub inertia: S,
@@ -109,13 +142,78 @@ impl<S: Scalar> FeedforwardTerms<S> {
     }
 }
 
+/// The pre-sliding model of a kind, with what only that model needs.
+#[derive(Clone, Debug, PartialEq)]
+enum Presliding<S: Scalar, const N: usize> {
+    /// None, static, GMS, combined: the elements move with each of them.
+    Gms {
+        elements: Gms<S, N>,
+        surface: SlidingTable<S>,
+        breakaway: PerDirection<Sliding<S>>,
+    },
+    Smoothed {
+        elements: SmoothedGms<S, N>,
+        surface: SlidingTable<S>,
+    },
+    Lugre(Lugre<S>),
+    Dahl(Dahl<S>),
+}
+
+/// The memory of the feedforward; springs slack by default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeedforwardState<S: Scalar, const N: usize> {
+    elements: GmsState<S, N>,
+    bristle: Bristle<S>,
+    /// The bristle moved last, and not the elements.
+    on_bristle: bool,
+}
+
+impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
+    fn default() -> Self {
+        Self {
+            elements: GmsState::default(),
+            bristle: Bristle::default(),
+            on_bristle: false,
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
+    /// What the springs of the last kind carry, V.
+    pub fn force(&self) -> S {
+        if self.on_bristle {
+            self.bristle.force()
+        } else {
+            self.elements.total()
+        }
+    }
+
+    /// The elements, loaded by `spread` if the bristle moved last.
+    #[inline(always)]
+    fn elements(&mut self, spread: impl FnOnce(S) -> GmsState<S, N>) -> &mut GmsState<S, N> {
+        if self.on_bristle {
+            self.elements = spread(self.bristle.force());
+            self.on_bristle = false;
+        }
+        &mut self.elements
+    }
+
+    /// The bristle, loaded if the elements moved last.
+    #[inline(always)]
+    fn bristle(&mut self) -> &mut Bristle<S> {
+        if !self.on_bristle {
+            self.bristle = Bristle::bent(self.elements.total());
+            self.on_bristle = true;
+        }
+        &mut self.bristle
+    }
+}
+
 /// The feedforward ready for the tick; `N` is the room for GMS elements.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
-    surface: SlidingTable<S>,
-    breakaway: PerDirection<Sliding<S>>,
-    gms: Gms<S, N>,
+    presliding: Presliding<S, N>,
     level_gain: S::Gain,
     gms_gain: S::Gain,
     viscous: PerDirection<S::Gain>,
@@ -127,25 +225,16 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     pub fn build(
         kind: FeedforwardKind,
         gains: &FeedforwardGains,
-        friction: &PerDirection<StaticFriction>,
-        gms: &GmsParameters,
+        friction: &FrictionSettings,
         period_s: f64,
     ) -> Self {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         Self {
             kind,
-            surface: SlidingTable::build(
-                &friction.map(|model| model.curve),
-                gms.attraction_v_s,
-                period_s,
-            ),
-            breakaway: friction.map(|model| {
-                Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
-            }),
-            gms: Gms::build(&gms.elements),
+            presliding: Presliding::build(kind, friction, period_s),
             level_gain: share(gains.level),
             gms_gain: share(gains.gms),
-            viscous: friction.map(|model| {
+            viscous: friction.sliding.map(|model| {
                 S::gain(
                     gains.viscous * model.viscous_v_s_per_mm,
                     Quantity::Velocity,
@@ -164,7 +253,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     #[inline(always)]
     pub fn step(
         &self,
-        state: &mut GmsState<S, N>,
+        state: &mut FeedforwardState<S, N>,
         reference: ReferenceStep<S>,
     ) -> FeedforwardTerms<S> {
         let mut terms = FeedforwardTerms {
@@ -179,22 +268,71 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         if self.kind.has_viscous() {
             terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
         }
-        let sliding = match self.kind {
-            FeedforwardKind::Gms => *self.breakaway.of(direction),
-            _ => self.surface.at(reference.velocity.magnitude(), direction),
+        let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
+        let force = match &self.presliding {
+            Presliding::Gms {
+                elements,
+                surface,
+                breakaway,
+            } => {
+                let sliding = match self.kind {
+                    FeedforwardKind::Gms => *breakaway.of(direction),
+                    _ => surface.at(speed, direction),
+                };
+                if self.kind.has_static_level() && reference.velocity != S::ZERO {
+                    let level = sliding.level.scale(self.level_gain);
+                    terms.level = match direction {
+                        Direction::Positive => level,
+                        Direction::Negative => -level,
+                    };
+                }
+                // The elements move with any of these kinds: their springs are loaded when a change makes them act.
+                let springs = state.elements(|force| elements.spread(force));
+                elements.step(springs, displacement, sliding)
+            }
+            Presliding::Smoothed { elements, surface } => {
+                let springs = state.elements(|force| elements.spread(force));
+                elements.step(springs, displacement, surface.at(speed, direction))
+            }
+            Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
+            Presliding::Dahl(model) => model.step(state.bristle(), displacement),
         };
-        if self.kind.has_static_level() && reference.velocity != S::ZERO {
-            let level = sliding.level.scale(self.level_gain);
-            terms.level = match direction {
-                Direction::Positive => level,
-                Direction::Negative => -level,
-            };
-        }
-        // The elements move with any kind: their springs are loaded when a change of settings makes them act.
-        let force = self.gms.step(state, reference.displacement, sliding);
-        if self.kind.has_gms() {
+        if self.kind.has_presliding() {
             terms.gms = force.scale(self.gms_gain);
         }
         terms
+    }
+}
+
+impl<S: Scalar, const N: usize> Presliding<S, N> {
+    /// The model of a kind. Settings without the parameters of their kind are refused before they come here; the
+    /// elements would stand in.
+    fn build(kind: FeedforwardKind, friction: &FrictionSettings, period_s: f64) -> Self {
+        let (sliding, gms) = (&friction.sliding, &friction.gms);
+        let curves = sliding.map(|model| model.curve);
+        let surface = || SlidingTable::build(&curves, gms.attraction_v_s, period_s);
+        match (kind, &friction.lugre, &friction.dahl) {
+            (FeedforwardKind::Lugre, Some(lugre), _) => {
+                Self::Lugre(Lugre::build(lugre, &curves, period_s))
+            }
+            (FeedforwardKind::Dahl, _, Some(dahl)) => {
+                Self::Dahl(Dahl::build(dahl, curves.map(|curve| curve.coulomb_v)))
+            }
+            (FeedforwardKind::SmoothedGms, ..) => Self::Smoothed {
+                elements: SmoothedGms::build(
+                    &gms.elements,
+                    &friction.smoothed_gms,
+                    friction.mean_breakaway_v(),
+                ),
+                surface: surface(),
+            },
+            _ => Self::Gms {
+                elements: Gms::build(&gms.elements),
+                surface: surface(),
+                breakaway: sliding.map(|model| {
+                    Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
+                }),
+            },
+        }
     }
 }

@@ -71,7 +71,7 @@ pub struct Gms<S: Scalar, const N: usize> {
 /// The memory of the GMS model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GmsState<S: Scalar, const N: usize> {
-    forces: [S; N],
+    pub(super) forces: [S; N],
     slipping: [bool; N],
     direction: Direction,
 }
@@ -88,9 +88,35 @@ impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
 }
 
 impl<S: Scalar, const N: usize> GmsState<S, N> {
+    /// Sticking elements that carry `force` by their weights.
+    pub(super) fn carrying(force: S, weights: impl Iterator<Item = S::Gain>) -> Self {
+        let mut state = Self::default();
+        for (slot, weight) in state.forces.iter_mut().zip(weights) {
+            *slot = force.scale(weight);
+        }
+        state
+    }
+
     /// The forces of the elements, V.
     pub fn forces(&self) -> &[S; N] {
         &self.forces
+    }
+
+    /// The friction, the sum of the elements' forces, V.
+    #[inline(always)]
+    pub fn total(&self) -> S {
+        let mut force = S::ZERO;
+        for element in self.forces {
+            force = force + element;
+        }
+        force
+    }
+
+    /// Forgets that elements slip, as a reversal does: for a model that does not remember it.
+    #[inline(always)]
+    pub(super) fn stick(&mut self, direction: Direction) {
+        self.direction = direction;
+        self.slipping = [false; N];
     }
 }
 
@@ -112,6 +138,11 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         }
     }
 
+    /// Sticking elements that carry `force` by their weights.
+    pub fn spread(&self, force: S) -> GmsState<S, N> {
+        GmsState::carrying(force, self.elements.iter().map(|element| element.weight))
+    }
+
     /// The friction in V after moving by `displacement` (mm) over the surface `sliding`; without a displacement
     /// nothing changes.
     #[inline(always)]
@@ -121,11 +152,7 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         } else if displacement < S::ZERO {
             self.advance(state, displacement, sliding, Direction::Negative, |f| -f);
         }
-        let mut force = S::ZERO;
-        for element in state.forces {
-            force = force + element;
-        }
-        force
+        state.total()
     }
 
     /// `along` turns a force into its component along the motion, and back.
@@ -139,8 +166,7 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         along: impl Fn(S) -> S,
     ) {
         if state.direction != direction {
-            state.direction = direction;
-            state.slipping = [false; N];
+            state.stick(direction);
         }
         for ((element, force), slipping) in self
             .elements

@@ -4,7 +4,11 @@
 //! in the simulated stage, driven by its motion. Friction is in volts at the amplifier input: force divided by the
 //! motor constant.
 
+pub mod bristle;
+pub mod dahl;
 pub mod gms;
+pub mod lugre;
+pub mod smoothed_gms;
 pub mod stribeck;
 
 use serde::{Deserialize, Serialize};

@@ -61,8 +61,7 @@ impl AxisSettings {
             feedforward: Feedforward::build(
                 feedforward.kind,
                 &feedforward.gains,
-                &self.friction.sliding,
-                &self.friction.gms,
+                &self.friction,
                 period_s,
             ),
             preview_ticks: libm::round(feedforward.preview_s / period_s) as usize,

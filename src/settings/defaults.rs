@@ -12,7 +12,10 @@ use crate::control::plant_model::PlantModel;
 use crate::control::popov::PidGains;
 use crate::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::friction::PerDirection;
+use crate::friction::dahl::DahlParameters;
 use crate::friction::gms::{GmsElement, GmsParameters};
+use crate::friction::lugre::LugreParameters;
+use crate::friction::smoothed_gms::SmoothedGmsParameters;
 use crate::friction::stribeck::{StaticFriction, StribeckCurve};
 
 /// What tells one default axis from another.
@@ -25,6 +28,8 @@ struct Character {
     stribeck_velocity_mm_s: f64,
     viscous_v_s_per_mm: f64,
     presliding_mm: f64,
+    dahl: DahlParameters,
+    lugre_stiffness_v_per_mm: f64,
 }
 
 /// Largest velocity of every axis, mm/s.
@@ -72,6 +77,13 @@ fn axis(character: &Character) -> AxisSettings {
                 elements,
                 attraction_v_s: 5.0,
             },
+            smoothed_gms: SmoothedGmsParameters::default(),
+            dahl: Some(character.dahl),
+            lugre: Some(LugreParameters {
+                stiffness_v_per_mm: character.lugre_stiffness_v_per_mm,
+                // As much damping before sliding as in it.
+                damping_v_s_per_mm: character.viscous_v_s_per_mm,
+            }),
         },
         feedforward: FeedforwardSettings {
             kind: FeedforwardKind::Combined,
@@ -117,6 +129,11 @@ pub fn x_axis() -> AxisSettings {
         // sigma and B / A: what a run at constant velocity cannot tell apart.
         viscous_v_s_per_mm: 144.8 / 69_390.0,
         presliding_mm: 0.030,
+        dahl: DahlParameters {
+            stiffness_v_per_mm: 18.31,
+            exponent: 1.0,
+        },
+        lugre_stiffness_v_per_mm: 18.03,
     })
 }
 
@@ -144,6 +161,11 @@ pub fn y_axis() -> AxisSettings {
         stribeck_velocity_mm_s: 1.2,
         viscous_v_s_per_mm: 151.0 / 61_200.0,
         presliding_mm: 0.034,
+        dahl: DahlParameters {
+            stiffness_v_per_mm: 18.33,
+            exponent: 1.0,
+        },
+        lugre_stiffness_v_per_mm: 18.03,
     })
 }
 
@@ -171,6 +193,11 @@ pub fn z_axis() -> AxisSettings {
         stribeck_velocity_mm_s: 0.9,
         viscous_v_s_per_mm: 172.0 / 48_500.0,
         presliding_mm: 0.026,
+        dahl: DahlParameters {
+            stiffness_v_per_mm: 28.17,
+            exponent: 1.0,
+        },
+        lugre_stiffness_v_per_mm: 27.74,
     })
 }
 

@@ -28,7 +28,7 @@ pub enum Reason {
         /// The bound.
         bound: f64,
     },
-    /// The law that is chosen has no parameters.
+    /// It is not there, and what is chosen needs it.
     Missing,
     /// The loop that the law closes at small errors is not shown to be stable on the plant.
     Unstable,
@@ -66,12 +66,12 @@ impl fmt::Display for SettingsError {
         if let Some(axis) = self.axis {
             write!(f, "{axis}.")?;
         }
-        if self.reason == Reason::Missing {
-            return write!(f, "{} is missing, which the chosen law needs", self.field);
+        f.write_str(self.field)?;
+        if self.reason != Reason::Missing {
+            write!(f, " = {}", self.value)?;
         }
-        write!(f, "{} = {}", self.field, self.value)?;
         match self.reason {
-            Reason::Missing => Ok(()),
+            Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
             Reason::Unstable => f.write_str(
                 ": the loop that the law closes at small errors is not shown to be stable on the axis' plant; \
                  lower its gains",
@@ -96,7 +96,7 @@ impl fmt::Display for SettingsError {
             ),
             Reason::TooStiffForRate { most } => write!(
                 f,
-                ": the elements' summed stiffness exceeds {most:.4} V/mm, beyond which the pre-sliding resonance \
+                ": the stiffness (of GMS elements their sum) exceeds {most:.4} V/mm, beyond which the pre-sliding resonance \
                  on this plant is not resolved at the control rate"
             ),
             Reason::TooFastForRate { most } => write!(

@@ -24,7 +24,10 @@ use crate::control::schedule::GainSchedule;
 use crate::control::sliding_mode::SlidingModeGains;
 use crate::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::friction::PerDirection;
+use crate::friction::dahl::DahlParameters;
 use crate::friction::gms::GmsParameters;
+use crate::friction::lugre::LugreParameters;
+use crate::friction::smoothed_gms::SmoothedGmsParameters;
 use crate::friction::stribeck::StaticFriction;
 use crate::reference::MotionSettings;
 
@@ -117,6 +120,23 @@ pub struct FrictionSettings {
     pub sliding: PerDirection<StaticFriction>,
     /// The GMS model.
     pub gms: GmsParameters,
+    /// What the smoothed GMS has beyond it.
+    #[serde(default)]
+    pub smoothed_gms: SmoothedGmsParameters,
+    /// Dahl's model; needed by its kind of feedforward alone.
+    #[serde(default)]
+    pub dahl: Option<DahlParameters>,
+    /// The LuGre model; needed by its kind of feedforward alone.
+    #[serde(default)]
+    pub lugre: Option<LugreParameters>,
+}
+
+impl FrictionSettings {
+    /// The mean of both directions' breakaway levels, V.
+    pub fn mean_breakaway_v(&self) -> f64 {
+        let PerDirection { positive, negative } = &self.sliding;
+        0.5 * (positive.curve.breakaway_v + negative.curve.breakaway_v)
+    }
 }
 
 /// The feedforward.

@@ -172,20 +172,59 @@ fn is_of_another_law(path: &str) -> bool {
         .any(|law| path.contains(&format!("/feedback/{law}/")))
 }
 
+/// Paths of the fields that act with one kind of feedforward alone, below each axis.
+const OF_ONE_KIND: [(FeedforwardKind, &[&str]); 4] = [
+    (FeedforwardKind::Static, &["feedforward/gains/level"]),
+    (
+        FeedforwardKind::Dahl,
+        &["friction/dahl/exponent", "friction/dahl/stiffness_v_per_mm"],
+    ),
+    (
+        FeedforwardKind::Lugre,
+        &[
+            "friction/lugre/damping_v_s_per_mm",
+            "friction/lugre/stiffness_v_per_mm",
+        ],
+    ),
+    (
+        FeedforwardKind::SmoothedGms,
+        &["friction/smoothed_gms/width"],
+    ),
+];
+
+fn on_each_axis(fields: &[&str]) -> Vec<String> {
+    let paths = |axis| {
+        fields
+            .iter()
+            .map(move |field| format!("/axes/{axis}/{field}"))
+    };
+    (0..3).flat_map(paths).collect()
+}
+
 #[test]
-fn every_parameter_acts_with_combined_feedforward_or_with_static() {
-    let others = |path: &str| !is_of_another_law(path);
-    let combined = inert(&with_kind(FeedforwardKind::Combined), others);
-    // The share of the static level acts where the static level does.
-    let level: Vec<String> = (0..3)
-        .map(|axis| format!("/axes/{axis}/feedforward/gains/level"))
+fn every_parameter_acts_with_combined_feedforward_or_with_its_own_kind() {
+    let other_laws = |path: &str| !is_of_another_law(path);
+    let mut combined = inert(&with_kind(FeedforwardKind::Combined), other_laws);
+    let mut others: Vec<String> = OF_ONE_KIND
+        .iter()
+        .flat_map(|(_, fields)| on_each_axis(fields))
+        // An exponent below one is refused, whatever the kind.
+        .filter(|path| !path.ends_with("exponent"))
         .collect();
-    assert_eq!(combined, level);
-    let statically = inert(&with_kind(FeedforwardKind::Static), others);
-    assert!(
-        level.iter().all(|path| !statically.contains(path)),
-        "{statically:?}"
-    );
+    combined.sort();
+    others.sort();
+    assert_eq!(combined, others);
+    for (kind, fields) in OF_ONE_KIND {
+        let mut base = with_kind(kind);
+        for axis in &mut base.axes {
+            let dahl = axis.friction.dahl.as_mut().expect("by default");
+            dahl.exponent = 1.5;
+        }
+        let inert = inert(&base, other_laws);
+        for path in on_each_axis(fields) {
+            assert!(!inert.contains(&path), "{kind:?}: {path}");
+        }
+    }
 }
 
 #[test]

@@ -396,7 +396,45 @@ const FIELDS: &[(&str, Field, f64, f64)] = &[
         -0.1,
         1.1e6,
     ),
+    (
+        "friction.smoothed_gms.width",
+        |a| &mut a.friction.smoothed_gms.width,
+        9e-4,
+        1.1,
+    ),
+    (
+        "friction.dahl.stiffness_v_per_mm",
+        |a| &mut dahl(a).stiffness_v_per_mm,
+        9e-7,
+        1.1e5,
+    ),
+    (
+        "friction.dahl.exponent",
+        |a| &mut dahl(a).exponent,
+        0.99,
+        3.1,
+    ),
+    (
+        "friction.lugre.stiffness_v_per_mm",
+        |a| &mut lugre(a).stiffness_v_per_mm,
+        9e-7,
+        1.1e5,
+    ),
+    (
+        "friction.lugre.damping_v_s_per_mm",
+        |a| &mut lugre(a).damping_v_s_per_mm,
+        -1e-9,
+        1.1,
+    ),
 ];
+
+fn dahl(axis: &mut AxisSettings) -> &mut quadrant::friction::dahl::DahlParameters {
+    axis.friction.dahl.as_mut().expect("a model by default")
+}
+
+fn lugre(axis: &mut AxisSettings) -> &mut quadrant::friction::lugre::LugreParameters {
+    axis.friction.lugre.as_mut().expect("a model by default")
+}
 
 fn plant(axis: &mut AxisSettings) -> &mut PlantModel {
     axis.plant.as_mut().expect("a plant by default")

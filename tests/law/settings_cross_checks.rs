@@ -1,5 +1,6 @@
 //! What the fields of the settings must hold together.
 
+use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::GmsElement;
 use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
@@ -99,6 +100,60 @@ fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
 }
 
 #[test]
+fn bristles_stiffer_than_the_rate_resolves_are_refused() {
+    let most = 25e6 / 69_390.0;
+    for (expected, stiff) in [
+        (
+            "friction.dahl.stiffness_v_per_mm",
+            with_x(|axis| axis.friction.dahl.as_mut().unwrap().stiffness_v_per_mm = 400.0),
+        ),
+        (
+            "friction.lugre.stiffness_v_per_mm",
+            with_x(|axis| axis.friction.lugre.as_mut().unwrap().stiffness_v_per_mm = 400.0),
+        ),
+    ] {
+        let error = refusal(&stiff);
+        assert_eq!(error.field, expected);
+        assert_eq!(error.reason, Reason::TooStiffForRate { most });
+    }
+}
+
+#[test]
+fn a_kind_whose_model_is_missing_is_refused_by_name() {
+    for (kind, field) in [
+        (FeedforwardKind::Dahl, "friction.dahl"),
+        (FeedforwardKind::Lugre, "friction.lugre"),
+    ] {
+        let bare = |axis: &mut AxisSettings| {
+            axis.friction.dahl = None;
+            axis.friction.lugre = None;
+        };
+        assert_eq!(with_x(bare).validate(ROOM), Ok(()));
+        let (refused, reason, text) = reason(|axis| {
+            bare(axis);
+            axis.feedforward.kind = kind;
+        });
+        assert_eq!((refused, reason), (field, Reason::Missing));
+        assert!(text.starts_with(&format!("x.{field} is missing")), "{text}");
+    }
+}
+
+/// Files from before there were these models.
+#[test]
+fn settings_without_the_single_state_models_still_load() {
+    let mut tree = serde_json::to_value(StageSettings::default()).expect("plain data");
+    for axis in tree["axes"].as_array_mut().expect("axes") {
+        let friction = axis["friction"].as_object_mut().expect("fields");
+        for field in ["dahl", "lugre", "smoothed_gms"] {
+            assert!(friction.remove(field).is_some(), "{field}");
+        }
+    }
+    let loaded: StageSettings = serde_json::from_value(tree).expect("loads");
+    assert_eq!(loaded.validate(ROOM), Ok(()));
+    assert_eq!(loaded.axes[0].friction.dahl, None);
+}
+
+#[test]
 fn attraction_faster_than_the_rate_is_refused() {
     let (field, reason, text) = reason(|axis| axis.friction.gms.attraction_v_s = 1201.0);
     assert_eq!(field, "friction.gms.attraction_v_s");
@@ -177,7 +232,9 @@ fn a_law_without_its_parameters_is_refused_by_name() {
         });
         let error = refusal(&bare);
         assert_eq!((error.field, error.reason), (field, Reason::Missing));
-        let text = format!("x.{field} is missing, which the chosen law needs");
+        let text = format!(
+            "x.{field} is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"
+        );
         assert_eq!(error.to_string(), text);
     }
 }

@@ -3,6 +3,7 @@
 mod commission;
 mod compare;
 mod design;
+mod friction;
 mod identify;
 mod laws;
 mod numerics;
@@ -31,6 +32,8 @@ enum Command {
     /// Design a controller on a model of the axis or on a measured frequency response.
     #[command(subcommand)]
     Design(design::Command),
+    /// Show what each friction model can do, on the same motions: loops, memory, drift, lag.
+    Friction(friction::Arguments),
     /// Identify an axis: its linear model, its friction, from experiments or from recordings.
     #[command(subcommand)]
     Identify(identify::Command),
@@ -50,6 +53,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Commission(arguments)) => commission::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
+        Some(Command::Friction(arguments)) => friction::run(&arguments),
         Some(Command::Identify(command)) => identify::run(&command),
         Some(Command::Laws(arguments)) => laws::run(&arguments),
         Some(Command::Numerics(arguments)) => numerics::run(&arguments),

@@ -3,7 +3,7 @@
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::settings::{AxisSettings, FeedbackSettings, FrictionSettings};
+use quadrant::settings::{AxisSettings, FeedbackSettings};
 
 use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
 use super::error::CommissionError;
@@ -14,6 +14,7 @@ use crate::identify::excitation::Excitation;
 use crate::identify::frf::{self, FrfError, FrfMeasurement, FrfSettings};
 use crate::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
+use crate::identify::single_state::with_all_models;
 use crate::identify::static_friction::{
     self, Exponent, FrictionFit, FrictionMap, StaticFrictionSettings, fit_map,
 };
@@ -175,10 +176,7 @@ pub fn commission(
         transfer_s: base.feedback.transfer_s,
         ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
     };
-    settings.friction = FrictionSettings {
-        sliding,
-        gms: gms.gms.clone(),
-    };
+    settings.friction = with_all_models(sliding, gms.gms.clone());
     settings.feedforward.kind = FeedforwardKind::Combined;
     settings.feedforward.gains = FeedforwardGains {
         level: 1.0,

@@ -45,7 +45,7 @@ impl Configuration {
         [LawKind::Pid, LawKind::NPid]
             .into_iter()
             .flat_map(|controller| {
-                FeedforwardKind::ALL.map(|feedforward| Self {
+                FeedforwardKind::THESIS.map(|feedforward| Self {
                     controller,
                     feedforward,
                 })
@@ -61,6 +61,9 @@ impl Configuration {
             FeedforwardKind::Static => format!("{controller} + static"),
             FeedforwardKind::Gms => format!("{controller} + GMS"),
             FeedforwardKind::Combined => format!("{controller} + static + GMS"),
+            FeedforwardKind::Dahl => format!("{controller} + Dahl"),
+            FeedforwardKind::Lugre => format!("{controller} + LuGre"),
+            FeedforwardKind::SmoothedGms => format!("{controller} + S-GMS"),
         }
     }
 

@@ -6,8 +6,9 @@
 use std::path::Path;
 
 use quadrant::friction::stribeck::StaticFriction;
-use quadrant::settings::{FrictionSettings, StageSettings};
+use quadrant::settings::StageSettings;
 
+use crate::identify::single_state::with_all_models;
 use crate::plant::{AxisTruth, StageTruth};
 use crate::settings_file::{SettingsFile, SettingsFileError};
 
@@ -60,10 +61,10 @@ impl Setup {
     pub fn matched() -> Self {
         let mut stage = StageSettings::default();
         for (axis, truth) in stage.axes.iter_mut().zip(&StageTruth::real().axes) {
-            axis.friction = FrictionSettings {
-                sliding: truth.friction.map(|model| with_total_damping(model, truth)),
-                gms: truth.gms.clone(),
-            };
+            axis.friction = with_all_models(
+                truth.friction.map(|model| with_total_damping(model, truth)),
+                truth.gms.clone(),
+            );
         }
         Self {
             knowledge: Knowledge::Matched,

@@ -3,6 +3,7 @@
 pub mod circle;
 pub mod comparison;
 pub mod compensator;
+pub mod friction_models;
 pub mod laws;
 pub mod metrics;
 pub mod numerics;

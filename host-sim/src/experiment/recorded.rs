@@ -12,7 +12,7 @@ use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::reference::{Motion, RecordedTable};
 use quadrant::scalar::Scalar;
-use quadrant::settings::{AxisSettings, FrictionSettings, StageSettings};
+use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant::units::Position;
 use rayon::prelude::*;
 
@@ -21,8 +21,9 @@ use super::compensator::Setup;
 use super::metrics::{largest, rms};
 use super::run::{RunError, run};
 use crate::design::{Form, Process, ShapingError, shape_to_margins};
+use crate::identify::single_state::with_all_models;
 use crate::machine::Machine;
-use crate::plant::{AxisTruth, Imperfections, SimulatedStage, StageTruth};
+use crate::plant::{AxisTruth, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
 use crate::record::{AxisLimits, Record};
 
 /// An axis that can follow a record.
@@ -157,10 +158,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
         rate_per_mm: 150.0,
         range_mm: 0.01,
     });
-    settings.friction = FrictionSettings {
-        sliding: friction,
-        gms: gms.clone(),
-    };
+    settings.friction = with_all_models(friction, gms.clone());
     settings.feedforward.gains.inertia_v_s2_per_mm = 1.0 / gain;
     settings.feedforward.preview_s = emps::DELAY_S;
     // The published offset is a constant force that the controller must hold against.
@@ -175,6 +173,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
         delay_s: emps::DELAY_S,
         friction,
         gms,
+        model: FrictionTruth::Gms,
         resolution_mm: emps::RESOLUTION_MM,
         full_scale_v: 10.0,
         imperfections: Imperfections {

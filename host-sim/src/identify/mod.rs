@@ -10,6 +10,7 @@
 //! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
 //! - [`revise`]: the linear model once friction stands beside it;
+//! - [`single_state`]: Dahl and LuGre, fitted to a GMS model;
 //! - [`static_friction`]: the friction-velocity map and its model;
 //! - [`virgin_curve`]: pre-sliding friction, the GMS model.
 
@@ -24,5 +25,6 @@ pub mod plant;
 pub mod response;
 pub mod revise;
 pub mod setting;
+pub mod single_state;
 pub mod static_friction;
 pub mod virgin_curve;

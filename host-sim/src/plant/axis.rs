@@ -4,14 +4,12 @@ use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use quadrant::friction::Direction;
-use quadrant::friction::gms::{Gms, GmsState};
-use quadrant::friction::stribeck::SlidingTable;
 use quadrant::units::DacCode;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{AxisTruth, TRUTH_ELEMENTS};
+use super::{AxisTruth, Presliding};
 
 /// Steps of the integration in a control period.
 const SUBSTEPS: usize = 4;
@@ -24,11 +22,9 @@ pub struct SimulatedAxis {
     volts_per_code: f64,
     /// Amplifier voltages on their way, one a substep: the plant's delay.
     pipeline: VecDeque<f64>,
-    gms: Gms<f64, TRUTH_ELEMENTS>,
-    surface: SlidingTable<f64>,
-    friction: GmsState<f64, TRUTH_ELEMENTS>,
-    /// The force of the GMS elements alone, V.
-    elements_v: f64,
+    presliding: Presliding,
+    /// Friction without its viscous part, V.
+    presliding_v: f64,
     friction_v: f64,
     load_v: f64,
     position_mm: f64,
@@ -45,14 +41,8 @@ impl SimulatedAxis {
             step_s,
             volts_per_code: truth.full_scale_v / DacCode::FULL_SCALE,
             pipeline: VecDeque::from(vec![0.0; delay]),
-            gms: Gms::build(&truth.gms.elements),
-            surface: SlidingTable::build(
-                &truth.friction.map(|model| model.curve),
-                truth.gms.attraction_v_s,
-                step_s,
-            ),
-            friction: GmsState::default(),
-            elements_v: 0.0,
+            presliding: Presliding::new(&truth, step_s),
+            presliding_v: 0.0,
             friction_v: 0.0,
             load_v: 0.0,
             position_mm: 0.0,
@@ -135,14 +125,13 @@ impl SimulatedAxis {
             .viscous_v_s_per_mm;
         // The trapezoidal rule on the linear part: a held force moves the mass as it would in continuous time.
         let drag = 0.5 * self.step_s * (truth.damping_per_s + gain * viscous);
-        let push = gain * (force_v - self.elements_v) - truth.stiffness_per_s2 * self.position_mm;
+        let push = gain * (force_v - self.presliding_v) - truth.stiffness_per_s2 * self.position_mm;
         let before = self.velocity_mm_s;
         let after = (before * (1.0 - drag) + push * self.step_s) / (1.0 + drag);
         let displacement = 0.5 * (before + after) * self.step_s;
         self.velocity_mm_s = after;
         self.position_mm += displacement;
-        let sliding = self.surface.at(after.abs(), along(displacement));
-        self.elements_v = self.gms.step(&mut self.friction, displacement, sliding);
-        self.friction_v = self.elements_v + viscous * after;
+        self.presliding_v = self.presliding.step(displacement, after.abs(), self.step_s);
+        self.friction_v = self.presliding_v + viscous * after;
     }
 }

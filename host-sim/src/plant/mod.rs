@@ -1,12 +1,15 @@
 //! The simulated XYZ stage: what is on the other side of the converters and the encoders.
 //!
-//! The truth is in `f64` and sub-stepped. Its friction is the library's own GMS model, with more elements and other
-//! parameters than the control law has.
+//! The truth is in `f64` and sub-stepped. Its friction is one of the library's own models: the GMS, unless asked otherwise,
+//! with more elements and other parameters than the control law has.
 
 mod axis;
+mod friction;
 mod stage;
 mod truth;
 
 pub use axis::SimulatedAxis;
+pub use friction::FrictionTruth;
+pub(crate) use friction::Presliding;
 pub use stage::SimulatedStage;
 pub use truth::{AxisTruth, Imperfections, StageTruth, TRUTH_ELEMENTS, virgin_curve_elements};

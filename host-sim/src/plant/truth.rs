@@ -5,6 +5,8 @@ use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 
+use super::FrictionTruth;
+
 /// GMS elements of the simulated axes' friction.
 pub const TRUTH_ELEMENTS: usize = 10;
 
@@ -21,8 +23,10 @@ pub struct AxisTruth {
     pub delay_s: f64,
     /// Stribeck curve and viscous friction, each way.
     pub friction: PerDirection<StaticFriction>,
-    /// Pre-sliding friction.
+    /// Pre-sliding friction, and the rate at which sliding friction follows the Stribeck curve.
     pub gms: GmsParameters,
+    /// The model that it follows.
+    pub model: FrictionTruth,
     /// Length of an encoder count, mm.
     pub resolution_mm: f64,
     /// Voltage of the converter's largest code, V; the amplifier saturates there.
@@ -124,6 +128,7 @@ fn axis(character: &Character) -> AxisTruth {
             ),
             attraction_v_s: 5.0,
         },
+        model: FrictionTruth::Gms,
         resolution_mm: 5e-4,
         full_scale_v: 10.0,
         imperfections: character.imperfections,

@@ -2,6 +2,7 @@
 
 use super::Place;
 use crate::axis::MAX_PREVIEW_TICKS;
+use crate::feedforward::FeedforwardKind;
 use crate::friction::stribeck::StaticFriction;
 use crate::settings::{AxisSettings, Reason, SettingsError};
 
@@ -66,17 +67,12 @@ impl AxisSettings {
         if libm::fabs(weights - 1.0) > 1e-6 {
             return at.refuse("friction.gms.elements.weight", weights, Reason::WeightsSum);
         }
-        if let Some(plant) = &self.plant {
-            let resonance = RESOLVED_RESONANCE / period_s;
-            let most = resonance * resonance / plant.gain_mm_per_v_s2;
-            if stiffness > most {
-                return at.refuse(
-                    "friction.gms.elements.stiffness_v_per_mm",
-                    stiffness,
-                    Reason::TooStiffForRate { most },
-                );
-            }
-        }
+        self.validate_resolved(
+            at,
+            "friction.gms.elements.stiffness_v_per_mm",
+            stiffness,
+            period_s,
+        )?;
         at.within("friction.gms.attraction_v_s", gms.attraction_v_s, 0.0, 1e6)?;
         let sliding = &self.friction.sliding;
         let lowest = sliding
@@ -88,6 +84,50 @@ impl AxisSettings {
         if gms.attraction_v_s > most {
             let reason = Reason::TooFastForRate { most };
             return at.refuse("friction.gms.attraction_v_s", gms.attraction_v_s, reason);
+        }
+        let width = self.friction.smoothed_gms.width;
+        at.within("friction.smoothed_gms.width", width, 1e-3, 1.0)?;
+        self.validate_bristles(at, period_s)
+    }
+
+    /// The models with a single state.
+    fn validate_bristles(&self, at: Place, period_s: f64) -> Result<(), SettingsError> {
+        let kind = self.feedforward.kind;
+        if let Some(dahl) = &self.friction.dahl {
+            let field = "friction.dahl.stiffness_v_per_mm";
+            at.within(field, dahl.stiffness_v_per_mm, 1e-6, 1e5)?;
+            self.validate_resolved(at, field, dahl.stiffness_v_per_mm, period_s)?;
+            at.within("friction.dahl.exponent", dahl.exponent, 1.0, 3.0)?;
+        } else if kind == FeedforwardKind::Dahl {
+            return at.refuse("friction.dahl", 0.0, Reason::Missing);
+        }
+        if let Some(lugre) = &self.friction.lugre {
+            let field = "friction.lugre.stiffness_v_per_mm";
+            at.within(field, lugre.stiffness_v_per_mm, 1e-6, 1e5)?;
+            self.validate_resolved(at, field, lugre.stiffness_v_per_mm, period_s)?;
+            let damping = lugre.damping_v_s_per_mm;
+            at.within("friction.lugre.damping_v_s_per_mm", damping, 0.0, 1.0)?;
+        } else if kind == FeedforwardKind::Lugre {
+            return at.refuse("friction.lugre", 0.0, Reason::Missing);
+        }
+        Ok(())
+    }
+
+    /// Refuses a spring that swings the plant's inertia too fast for the control rate.
+    fn validate_resolved(
+        &self,
+        at: Place,
+        field: &'static str,
+        stiffness_v_per_mm: f64,
+        period_s: f64,
+    ) -> Result<(), SettingsError> {
+        let Some(plant) = &self.plant else {
+            return Ok(());
+        };
+        let resonance = RESOLVED_RESONANCE / period_s;
+        let most = resonance * resonance / plant.gain_mm_per_v_s2;
+        if stiffness_v_per_mm > most {
+            return at.refuse(field, stiffness_v_per_mm, Reason::TooStiffForRate { most });
         }
         Ok(())
     }

@@ -7,7 +7,8 @@ use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::FrictionSettings;
 
-use crate::plant::{AxisTruth, Imperfections};
+use crate::identify::single_state::with_all_models;
+use crate::plant::{AxisTruth, FrictionTruth, Imperfections};
 
 /// What a model holds beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -159,10 +160,7 @@ impl MotionModel {
             },
             ..*model
         });
-        FrictionSettings {
-            sliding,
-            gms: self.gms(),
-        }
+        with_all_models(sliding, self.gms())
     }
 
     /// The axis' own delay, s: without the hold, and never below zero.
@@ -192,6 +190,7 @@ impl MotionModel {
             delay_s: self.delay_s(),
             friction: self.friction,
             gms: self.gms(),
+            model: FrictionTruth::Gms,
             resolution_mm: 1e-6,
             full_scale_v,
             imperfections: Imperfections {

@@ -1,0 +1,69 @@
+//! `quadrant friction`.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use quadrant::settings::StageSettings;
+use quadrant_sim::experiment::friction_models::{Model, Parameters, compare};
+use quadrant_sim::presentation::{
+    friction_models_page, friction_models_table, friction_parameters_table, provenance,
+};
+use quadrant_sim::settings_file::SettingsFile;
+
+use super::identify::rig::Axis;
+use super::output::{Output, command_line, progress};
+
+/// Options of `quadrant friction`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Arguments {
+    /// The axis of the settings whose friction is modelled.
+    #[arg(long, value_enum, default_value = "x")]
+    axis: Axis,
+    /// Settings with the friction of the axis, as `quadrant commission` leaves them; without them, the default settings.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Width of the smoothed GMS' transition over each element's breakaway level, 0.001 to 1, instead of the settings'.
+    #[arg(long, value_name = "SHARE", value_parser = width)]
+    width: Option<f64>,
+    #[command(flatten)]
+    output: Output,
+}
+
+fn width(text: &str) -> Result<f64, String> {
+    match text.parse() {
+        Ok(value) if (1e-3..=1.0).contains(&value) => Ok(value),
+        Ok(value) => Err(format!("{value} is outside 0.001 to 1")),
+        Err(error) => Err(format!("{error}")),
+    }
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Arguments {
+        axis,
+        settings,
+        width,
+        output,
+    } = arguments;
+    let stage = match settings {
+        Some(path) => SettingsFile::read(path)?.stage,
+        None => StageSettings::default(),
+    };
+    let mut axis_settings = stage.axes[axis.index()].clone();
+    if let Some(width) = width {
+        axis_settings.friction.smoothed_gms.width = *width;
+    }
+    let parameters = Parameters::of(&axis_settings)?;
+    let bar = progress(Model::ALL.len() as u64, "moving the friction models");
+    let behaviours = compare(&parameters, &bar);
+    bar.finish_and_clear();
+    println!("Simulated, not measured. {} axis\n", axis.name());
+    output.table(&friction_parameters_table(&parameters))?;
+    output.table(&friction_models_table(&behaviours))?;
+    let page = friction_models_page(
+        &parameters,
+        &behaviours,
+        &format!("{} axis", axis.name()),
+        provenance(&command_line(), output.seed),
+    );
+    output.page(&page, "friction-models.html")
+}
