@@ -76,6 +76,7 @@ fn page(blocks: Vec<Block>) -> Page {
         sections: vec![Section {
             id: "section".into(),
             heading: "Tracking".into(),
+            provenance: None,
             prose: vec!["Plain text, <b>not</b> markup.".into()],
             blocks,
         }],

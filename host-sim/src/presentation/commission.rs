@@ -132,6 +132,7 @@ pub fn commission_page(
         Section {
             id: "result".to_owned(),
             heading: "What it achieves".to_owned(),
+            provenance: None,
             prose: Vec::new(),
             blocks: vec![
                 Block::Table(verdict_table(&found.verdicts)),
@@ -181,6 +182,7 @@ fn check_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
         sections.push(Section {
             id: "motion".to_owned(),
             heading: "An ordinary motion".to_owned(),
+            provenance: None,
             prose: vec![format!(
                 "Inertia and friction of an ordinary motion, by inverse dynamics, the dead time taken from the linear model: its A is {agreement:.3} \
                  times that of the frequency response. A motion record cannot tell much of the pre-sliding friction."

@@ -263,6 +263,7 @@ impl NonlinearPage {
         let section = |id: &str, heading: &str, prose: &str, blocks: Vec<Block>| Section {
             id: id.to_owned(),
             heading: heading.to_owned(),
+            provenance: None,
             prose: vec![prose.to_owned()],
             blocks,
         };

@@ -156,6 +156,7 @@ impl PidPage<'_> {
             Section {
                 id: "result".to_owned(),
                 heading: "Gains and margins".to_owned(),
+                provenance: None,
                 prose: vec![
                     "The sampled loop drives the axis through the converter's hold with the firmware's difference equations; its margins \
                      are those that the machine has."
@@ -166,6 +167,7 @@ impl PidPage<'_> {
             Section {
                 id: "open-loop".to_owned(),
                 heading: "Open loop".to_owned(),
+                provenance: None,
                 prose: Vec::new(),
                 blocks: bode_blocks(&loops)
                     .into_iter()
@@ -175,6 +177,7 @@ impl PidPage<'_> {
             Section {
                 id: "sensitivities".to_owned(),
                 heading: "Closed loop".to_owned(),
+                provenance: None,
                 prose: Vec::new(),
                 blocks: sensitivity_blocks(&loops).into(),
             },
@@ -183,6 +186,7 @@ impl PidPage<'_> {
             sections.push(Section {
                 id: "step-response".to_owned(),
                 heading: "Step response".to_owned(),
+                provenance: None,
                 prose: Vec::new(),
                 blocks: tables
                     .chain(step_blocks(&[(

@@ -107,6 +107,7 @@ pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>
     Section {
         id: "response".to_owned(),
         heading: "Frequency response".to_owned(),
+        provenance: None,
         prose: vec![format!(
             "{} blocks averaged, resolution {} Hz. {estimator}; the hold of the converter is divided out.",
             measurement.estimate.blocks, measurement.estimate.resolution_hz
@@ -136,6 +137,7 @@ pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantModel)
     Section {
         id: "response".to_owned(),
         heading: "Frequency response".to_owned(),
+        provenance: None,
         prose: Vec::new(),
         blocks,
     }

@@ -141,6 +141,7 @@ pub fn motion_page(
             Section {
                 id: "models".to_owned(),
                 heading: "Models and parameters".to_owned(),
+                provenance: None,
                 prose: vec![
                     "Each model has one part more than the one before. The one whose error is smallest where it was not fitted is \
                      shown below, among those whose friction does not rise with the velocity but for its viscous part."
@@ -151,6 +152,7 @@ pub fn motion_page(
             Section {
                 id: "explained".to_owned(),
                 heading: "What the model explains".to_owned(),
+                provenance: None,
                 prose: Vec::new(),
                 blocks: vec![
                     Block::Figure(lines(

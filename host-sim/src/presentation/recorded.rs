@@ -115,6 +115,7 @@ pub fn recorded_page(
         sections: vec![Section {
             id: "result".to_owned(),
             heading: "Tracking error".to_owned(),
+            provenance: None,
             prose: vec![
                 "The axis' model is the compensator's own (matched), so these errors are what the method can reach on \
                  this reference, not what the machine would show. Errors are drawn from the end of the settling time."

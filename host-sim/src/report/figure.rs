@@ -6,9 +6,10 @@ use super::{Colour, ReportError, palette};
 use plotly::Plot as Plotly;
 use plotly::common::{Anchor, DashType, Font, Line, Orientation, Title};
 use plotly::layout::{Axis, Layout, Legend, Margin};
+use serde::{Deserialize, Serialize};
 
 /// A drawing with its caption.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Figure {
     /// Unique on its page; also the name of the image a reader saves.
     pub id: String,
@@ -19,7 +20,7 @@ pub struct Figure {
 }
 
 /// The kinds of drawing.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Plot {
     /// Curves over a common axis, or paths in a plane.
     Lines(Lines),
@@ -28,7 +29,7 @@ pub enum Plot {
 }
 
 /// How a curve is drawn.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Style {
     /// Its colour.
     pub colour: Colour,
@@ -37,7 +38,7 @@ pub struct Style {
 }
 
 /// The dashes of a line. Colour alone does not carry meaning in print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Dash {
     /// Unbroken.
     Solid,

@@ -6,9 +6,10 @@ use super::{Dash, Style, decimate, palette};
 use plotly::common::{Marker, Mode};
 use plotly::layout::{Axis, AxisType, DragMode, HoverMode, TicksDirection};
 use plotly::{Plot as Plotly, Scatter};
+use serde::{Deserialize, Serialize};
 
 /// Curves over a common axis, or paths in a plane.
-#[derive(Debug, Clone, Default, PartialEq)]
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Lines {
     /// Horizontal axis, with its unit.
     pub x_label: String,
@@ -25,7 +26,7 @@ pub struct Lines {
 }
 
 /// The scale of an axis.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Scale {
     /// Even.
     #[default]
@@ -35,13 +36,15 @@ pub enum Scale {
 }
 
 /// One curve. Samples that are not finite are gaps.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Series {
     /// For the legend.
     pub name: String,
     /// Abscissas.
+    #[serde(with = "super::number::list")]
     pub x: Vec<f64>,
     /// Ordinates, as many.
+    #[serde(with = "super::number::list")]
     pub y: Vec<f64>,
     /// How it is drawn.
     pub style: Style,

@@ -13,6 +13,7 @@ mod decimate;
 mod error;
 mod figure;
 mod lines;
+mod number;
 mod page;
 mod palette;
 mod polar;

@@ -3,6 +3,7 @@
 use super::{Dash, Figure, ReportError, Style, Table, palette};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
+use serde::{Deserialize, Serialize};
 use std::collections::HashSet;
 use std::path::Path;
 
@@ -16,7 +17,7 @@ const POINTS_PER_SERIES: (usize, usize) = (1_000, 8_000);
 const POLICY: &str = "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data: blob:";
 
 /// A report.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Page {
     /// Its title.
     pub title: String,
@@ -29,7 +30,7 @@ pub struct Page {
 }
 
 /// What a reader needs to make the same page again.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The command line.
     pub command: String,
@@ -40,7 +41,7 @@ pub struct Provenance {
 }
 
 /// A section.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Section {
     /// Unique on the page; the section's link target.
     pub id: String,
@@ -50,31 +51,72 @@ pub struct Section {
     pub prose: Vec<String>,
     /// Its tables and figures, after the prose.
     pub blocks: Vec<Block>,
+    /// How it came about, where that is not how the page did.
+    pub provenance: Option<Provenance>,
 }
 
 /// A table or a figure.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Block {
     /// A table.
     Table(Table),
     /// A figure.
     Figure(Figure),
+    /// Either, under a label of its own ("Table 5.7") where the others are counted.
+    Labelled {
+        /// What stands before the caption.
+        label: String,
+        /// The table or figure.
+        block: Box<Self>,
+    },
 }
 
 impl Block {
+    /// The same under a label of its own ("Table 5.7"); it is left out of the page's count.
+    #[must_use]
+    pub fn labelled(self, label: impl Into<String>) -> Self {
+        Self::Labelled {
+            label: label.into(),
+            block: Box::new(self),
+        }
+    }
+
     fn id(&self) -> &str {
-        match self {
-            Self::Table(table) => &table.id,
-            Self::Figure(figure) => &figure.id,
+        match self.content() {
+            Content::Table(table) => &table.id,
+            Content::Figure(figure) => &figure.id,
         }
     }
 
     fn caption(&self) -> &str {
-        match self {
-            Self::Table(table) => &table.caption,
-            Self::Figure(figure) => &figure.caption,
+        match self.content() {
+            Content::Table(table) => &table.caption,
+            Content::Figure(figure) => &figure.caption,
         }
     }
+
+    /// Its own label, if it has one; of several the outermost.
+    fn label(&self) -> Option<&str> {
+        match self {
+            Self::Labelled { label, .. } => Some(label),
+            Self::Table(_) | Self::Figure(_) => None,
+        }
+    }
+
+    /// What it holds, whatever it is labelled.
+    fn content(&self) -> Content<'_> {
+        match self {
+            Self::Table(table) => Content::Table(table),
+            Self::Figure(figure) => Content::Figure(figure),
+            Self::Labelled { block, .. } => block.content(),
+        }
+    }
+}
+
+/// A block without its label.
+enum Content<'a> {
+    Table(&'a Table),
+    Figure(&'a Figure),
 }
 
 /// A block with its number among its kind: "Table 2", "Figure 5".
@@ -157,18 +199,18 @@ impl Page {
                 return Err(ReportError::DuplicateId { id: id.to_owned() });
             }
         }
-        self.blocks().try_for_each(|block| match block {
-            Block::Table(table) => table.check(),
-            Block::Figure(figure) => figure.check(),
+        self.blocks().try_for_each(|block| match block.content() {
+            Content::Table(table) => table.check(),
+            Content::Figure(figure) => figure.check(),
         })
     }
 
     fn points_per_series(&self) -> usize {
         let series: usize = self
             .blocks()
-            .map(|block| match block {
-                Block::Table(_) => 0,
-                Block::Figure(figure) => figure.legend().len(),
+            .map(|block| match block.content() {
+                Content::Table(_) => 0,
+                Content::Figure(figure) => figure.legend().len(),
             })
             .sum();
         (POINTS_PER_PAGE / series.max(1)).clamp(POINTS_PER_SERIES.0, POINTS_PER_SERIES.1)
@@ -180,15 +222,18 @@ impl Page {
         for section in &self.sections {
             let mut blocks = Vec::with_capacity(section.blocks.len());
             for block in &section.blocks {
-                let (kind, count) = match block {
-                    Block::Table(_) => ("Table", &mut tables),
-                    Block::Figure(_) => ("Figure", &mut figures),
-                };
-                *count += 1;
-                blocks.push(Numbered {
-                    label: format!("{kind} {count}"),
-                    block,
-                });
+                let label = block.label().map_or_else(
+                    || {
+                        let (kind, count) = match block.content() {
+                            Content::Table(_) => ("Table", &mut tables),
+                            Content::Figure(_) => ("Figure", &mut figures),
+                        };
+                        *count += 1;
+                        format!("{kind} {count}")
+                    },
+                    str::to_owned,
+                );
+                blocks.push(Numbered { label, block });
             }
             numbered.push((section, blocks));
         }
@@ -242,14 +287,14 @@ impl Numbered<'_> {
                 @if let Some(note) = note { " " span.note { (note) } }
             }
         };
-        match self.block {
-            Block::Table(table) => html! {
+        match self.block.content() {
+            Content::Table(table) => html! {
                 figure.table id=(table.id) {
                     figcaption { (caption(None)) " " (download(table)) }
                     div.scroll tabindex="0" role="region" aria-label=(table.caption) { (table_markup(table)) }
                 }
             },
-            Block::Figure(figure) => html! {
+            Content::Figure(figure) => html! {
                 figure.plot id=(figure.id) {
                     @let kind = match figure.plot {
                         super::Plot::Lines(_) => "lines",

@@ -4,8 +4,10 @@
 //! reader's device prefers a dark page. The series colours are those of Okabe and Ito, which readers with the usual forms
 //! of colour blindness can tell apart; yellow is left out, because thin yellow lines vanish on white paper.
 
+use serde::{Deserialize, Serialize};
+
 /// The colour of a series.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Colour {
     /// Black, or nearly white on a dark page: for references and recorded data.
     Ink,

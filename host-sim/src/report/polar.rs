@@ -8,6 +8,7 @@ use plotly::layout::{
     TicksDirection,
 };
 use plotly::{Plot as Plotly, Scatter};
+use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
 /// Largest share of the radius that the magnified deviation may take.
@@ -16,7 +17,7 @@ const DEVIATION_SHARE: f64 = 0.3;
 const DIVISIONS: f64 = 3.0;
 
 /// Radial deviation from a circle, magnified.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PolarDeviation {
     /// Radius of the nominal circle, mm.
     pub radius_mm: f64,
@@ -29,13 +30,15 @@ pub struct PolarDeviation {
 }
 
 /// One measured circle.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct DeviationTrace {
     /// For the legend.
     pub name: String,
     /// Angle of each sample from the horizontal axis, rad.
+    #[serde(with = "super::number::list")]
     pub angle_rad: Vec<f64>,
     /// Radius less the nominal one, um.
+    #[serde(with = "super::number::list")]
     pub deviation_um: Vec<f64>,
     /// How it is drawn.
     pub style: Style,

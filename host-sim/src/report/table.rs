@@ -2,6 +2,7 @@
 
 use super::ReportError;
 use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// Rules above, below and under the head, as in print.
@@ -15,7 +16,7 @@ const RULE: LineStyle = LineStyle::new('─', '─', '─', '─');
 const HEAD_WIDTH: usize = 12;
 
 /// A table of results.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Table {
     /// Unique on its page; also the name of its CSV file.
     pub id: String,
@@ -28,7 +29,7 @@ pub struct Table {
 }
 
 /// The head of a column.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Column {
     /// What is in it.
     pub heading: String,
@@ -78,13 +79,14 @@ impl Column {
 }
 
 /// One entry of a table.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Cell {
     /// Words.
     Text(String),
     /// A number, shown rounded, exported in full.
     Number {
         /// The value.
+        #[serde(with = "super::number")]
         value: f64,
         /// Digits shown after the decimal point.
         decimals: usize,
