@@ -1,8 +1,10 @@
 //! Experiments on the simulated stage, and what they measure.
 
+pub mod chapter5;
 pub mod circle;
 pub mod comparison;
 pub mod compensator;
+pub mod imperfections;
 pub mod metrics;
 pub mod numerics;
 pub mod recorded;

@@ -1,6 +1,7 @@
 //! From outcomes to tables and figures: what a person reads of an experiment.
 
 mod bode;
+mod chapter5;
 mod circle;
 mod commission;
 mod comparison;
@@ -16,6 +17,7 @@ mod recorded;
 mod revise;
 mod validation;
 
+pub use chapter5::{chapter5_sections, headline_section, study_section};
 pub use commission::{commission_page, gains_table, verdict_table};
 pub use comparison::{comparison_page, comparison_tables};
 pub use design_npid::NonlinearPage;

@@ -23,6 +23,9 @@ pub struct Lines {
     pub y_scale: Scale,
     /// One unit is as long on both axes, as a Nyquist plot needs; for linear scales.
     pub equal_units: bool,
+    /// Ends of the vertical axis, for figures that are compared; without them it fits the curves. For a linear scale.
+    #[serde(default)]
+    pub y_range: Option<(f64, f64)>,
 }
 
 /// The scale of an axis.
@@ -118,6 +121,10 @@ impl Lines {
         } else {
             y_axis
         };
+        let y_axis = match self.y_range {
+            Some((low, high)) => y_axis.range(vec![low, high]),
+            None => y_axis,
+        };
         let layout = layout()
             .x_axis(self.x_scale.apply(x_axis))
             .y_axis(self.y_scale.apply(y_axis))
@@ -170,6 +177,15 @@ mod tests {
         assert!(json.contains("\"x\":[null,1.0,10.0]"), "{json}");
         assert!(json.contains("123.457"), "{json}");
         assert!(json.contains("\"type\":\"log\""), "{json}");
+    }
+
+    #[test]
+    fn figures_that_are_compared_can_have_one_range() {
+        let json = json(Lines {
+            y_range: Some((-2.5, 2.5)),
+            ..lines(Style::solid(Colour::Blue))
+        });
+        assert!(json.contains("\"range\":[-2.5,2.5]"), "{json}");
     }
 
     #[test]
