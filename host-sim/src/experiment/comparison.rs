@@ -21,9 +21,9 @@ pub const AMPLITUDE_MM: f64 = 30.0;
 /// Its largest velocities, mm/s.
 pub const VELOCITIES_MM_S: [f64; 3] = [5.0, 10.0, 15.0];
 /// Cycles at full speed, of which the last whole ones count.
-const CYCLES: f64 = 2.25;
+pub const CYCLES: f64 = 2.25;
 /// Cycles that count.
-const SCORED_CYCLES: usize = 2;
+pub const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 /// Room for GMS elements: the matched compensator has the plant's ten.
