@@ -39,9 +39,21 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let context = Context::new(output.seed, arguments.seeds, arguments.settings.clone())?;
     if arguments.list {
         for part in PARTS {
-            let seconds = (part.expected_s)(&context);
+            let shared_s = if part.needs_comparison {
+                context.comparison_s()
+            } else {
+                0.0
+            };
+            let seconds = shared_s + (part.expected_s)(&context);
             println!("{:<12} {seconds:>5.0} s  {}", part.id, part.title);
         }
+        let sharing = PARTS.iter().filter(|part| part.needs_comparison);
+        let sharing: Vec<&str> = sharing.map(|part| part.id).collect();
+        println!(
+            "On two cores. {:.0} s of {} are the same runs, which one report does once.",
+            context.comparison_s(),
+            sharing.join(", ")
+        );
         return Ok(());
     }
     let wanted = |part: &&Part| only.is_empty() || only.iter().any(|id| id == part.id);

@@ -15,8 +15,8 @@ use super::run::{AxisTrace, RunError};
 /// Amplitudes of the sine, mm: that of most of the chapter, and that of Tables 5.21 and 5.22.
 pub const AMPLITUDES_MM: [f64; 2] = [30.0, 15.0];
 
-/// Seconds that the runs take on one core of a current machine, for each mm of amplitude.
-const SECONDS_PER_MM: f64 = 0.03;
+/// Seconds that a run takes on two cores of a current machine, for each mm of amplitude.
+const SECONDS_PER_MM: f64 = 0.015;
 
 /// What repeated runs gave for one quantity, in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -114,7 +114,7 @@ impl Request<'_> {
         runs
     }
 
-    /// About how long the runs take on one core, s.
+    /// About how long the runs take on two cores, s.
     pub fn expected_s(&self) -> f64 {
         self.runs().iter().map(Run::expected_s).sum()
     }
@@ -165,6 +165,12 @@ impl Run<'_> {
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     entries: Vec<Entry>,
+}
+
+impl From<Vec<Entry>> for Comparison {
+    fn from(entries: Vec<Entry>) -> Self {
+        Self { entries }
+    }
 }
 
 impl Comparison {

@@ -2,18 +2,19 @@
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::friction::gms::MAX_ELEMENTS;
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
+use rayon::prelude::*;
 
 use super::chapter5::{Comparison, Request};
 use super::comparison::{AMPLITUDE_MM, Configuration, Controller};
-use super::compensator::{Knowledge, Setup};
+use super::compensator::Setup;
 use super::run::RunError;
 use crate::commission::bootstrap::quiet_settings;
 use crate::identify::virgin_curve::{self, Knots, VirginCurveError, VirginCurveSettings};
 use crate::plant::Imperfections;
 use crate::rig::{Rig, RigError, SimulatedRig, approach};
+use crate::settings_file::FIRMWARE_ELEMENTS;
 
 /// PID without feedforward.
 pub const PID: Configuration = Configuration {
@@ -26,8 +27,9 @@ pub const BEST: Configuration = Configuration {
     feedforward: FeedforwardKind::Combined,
 };
 
-/// Elements of the finer GMS models that are identified.
-pub const FINER_ELEMENTS: [usize; 2] = [8, MAX_ELEMENTS];
+/// Elements of the GMS models that are identified: the firmware's room, and more. From nine on the search for the
+/// parameters takes minutes or ends without an answer: the record does not determine so many.
+const ELEMENTS: [usize; 3] = [FIRMWARE_ELEMENTS, 6, 8];
 /// How much finer the finer encoder is.
 const FINER_ENCODER: f64 = 10.0;
 
@@ -44,13 +46,15 @@ pub enum Change {
     NoRipple,
     /// An encoder of a tenth of the count.
     FinerEncoder,
+    /// Such an encoder, and no noise.
+    QuietEncoder,
     /// A GMS model of so many elements, identified from a new record of the slow sine.
     Elements(usize),
     /// The GMS model of the truth, the sliding friction as identified.
     TrueElements,
     /// The whole friction of the truth.
     TrueFriction,
-    /// A preview longer by so many tenths of a control period.
+    /// A preview longer by so many control periods; the law rounds it to whole ones.
     Preview(i8),
     /// None of noise, offset and ripple.
     NoImperfections,
@@ -60,18 +64,20 @@ pub enum Change {
 
 impl Change {
     /// All, in the order of the table.
-    pub const ALL: [Self; 13] = [
+    pub const ALL: [Self; 15] = [
         Self::AsItIs,
         Self::NoNoise,
+        Self::FinerEncoder,
+        Self::QuietEncoder,
         Self::NoOffset,
         Self::NoRipple,
-        Self::FinerEncoder,
-        Self::Elements(FINER_ELEMENTS[0]),
-        Self::Elements(FINER_ELEMENTS[1]),
+        Self::Elements(ELEMENTS[0]),
+        Self::Elements(ELEMENTS[1]),
+        Self::Elements(ELEMENTS[2]),
         Self::TrueElements,
         Self::TrueFriction,
-        Self::Preview(5),
-        Self::Preview(10),
+        Self::Preview(-1),
+        Self::Preview(1),
         Self::NoImperfections,
         Self::NothingUnknown,
     ];
@@ -84,12 +90,11 @@ impl Change {
             Self::NoOffset => "no amplifier offset".to_owned(),
             Self::NoRipple => "no screw ripple".to_owned(),
             Self::FinerEncoder => "encoder counts of a tenth".to_owned(),
-            Self::Elements(count) => format!("{count} GMS elements identified"),
+            Self::QuietEncoder => "no noise, counts of a tenth".to_owned(),
+            Self::Elements(count) => format!("{count} GMS elements, identified anew"),
             Self::TrueElements => "true GMS elements".to_owned(),
             Self::TrueFriction => "true friction".to_owned(),
-            Self::Preview(tenths) => {
-                format!("preview {:+.1} control periods", f64::from(tenths) / 10.0)
-            }
+            Self::Preview(periods) => format!("preview {periods:+} control period"),
             Self::NoImperfections => "no noise, offset, ripple".to_owned(),
             Self::NothingUnknown => "no noise, offset, ripple; true friction".to_owned(),
         }
@@ -99,7 +104,7 @@ impl Change {
     pub const fn is_single(self) -> bool {
         !matches!(
             self,
-            Self::AsItIs | Self::NoImperfections | Self::NothingUnknown
+            Self::AsItIs | Self::QuietEncoder | Self::NoImperfections | Self::NothingUnknown
         )
     }
 
@@ -114,11 +119,10 @@ impl Change {
             Self::NoNoise => each(&mut changed, |all| all.encoder_noise_mm = 0.0),
             Self::NoOffset => each(&mut changed, |all| all.offset_v = 0.0),
             Self::NoRipple => each(&mut changed, |all| all.ripple_v = 0.0),
-            Self::FinerEncoder => {
-                for (axis, truth) in changed.stage.axes.iter_mut().zip(&mut changed.truth.axes) {
-                    axis.encoder.resolution_mm /= FINER_ENCODER;
-                    truth.resolution_mm /= FINER_ENCODER;
-                }
+            Self::FinerEncoder => refine_encoder(&mut changed),
+            Self::QuietEncoder => {
+                each(&mut changed, |all| all.encoder_noise_mm = 0.0);
+                refine_encoder(&mut changed);
             }
             Self::Elements(count) => identify_elements(&mut changed, count, seed)?,
             Self::TrueElements => {
@@ -127,8 +131,8 @@ impl Change {
                 }
             }
             Self::TrueFriction => know_friction(&mut changed),
-            Self::Preview(tenths) => {
-                let further_s = f64::from(tenths) / (10.0 * changed.stage.rate_hz);
+            Self::Preview(periods) => {
+                let further_s = f64::from(periods) / changed.stage.rate_hz;
                 for axis in &mut changed.stage.axes {
                     axis.feedforward.preview_s += further_s;
                 }
@@ -143,12 +147,9 @@ impl Change {
     }
 }
 
-/// Why the study ends early.
+/// Why something could not be identified anew.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
-    /// A run of the comparison.
-    #[error(transparent)]
-    Run(#[from] RunError),
     /// Settings that the axis refuses.
     #[error("GMS elements: settings refused: {0}")]
     Settings(#[from] SettingsError),
@@ -169,6 +170,14 @@ pub enum StudyError {
 fn each(setup: &mut Setup, change: impl Fn(&mut Imperfections)) {
     for axis in &mut setup.truth.axes {
         change(&mut axis.imperfections);
+    }
+}
+
+/// Gives stage and law encoders of smaller counts.
+fn refine_encoder(setup: &mut Setup) {
+    for (axis, truth) in setup.stage.axes.iter_mut().zip(&mut setup.truth.axes) {
+        axis.encoder.resolution_mm /= FINER_ENCODER;
+        truth.resolution_mm /= FINER_ENCODER;
     }
 }
 
@@ -200,41 +209,48 @@ fn identify_elements(setup: &mut Setup, count: usize, seed: u64) -> Result<(), S
 }
 
 /// What a changed virtual machine did.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Finding {
     /// What was changed.
     pub change: Change,
-    /// What PID and the best configuration did.
-    pub comparison: Comparison,
+    /// What PID and the best configuration did, or why what was to be changed could not be identified.
+    pub outcome: Result<Comparison, StudyError>,
 }
 
 /// Runs PID and the best configuration on every changed virtual machine, with `seeds` seeds from `seed` on. `advance` is told
 /// the share of the whole that was done since it was last told.
 ///
 /// # Errors
-/// The first run or identification that fails.
+/// The first run that fails. An identification that does is told in its finding: it is an answer, too.
 pub fn study<S: Scalar>(
     setup: &Setup,
     changes: &[Change],
     seed: u64,
     seeds: u64,
     advance: &(dyn Fn(f64) + Sync),
-) -> Result<Vec<Finding>, StudyError> {
-    debug_assert_eq!(setup.knowledge, Knowledge::VirtualMachine);
-    let count = changes.len() as f64;
+) -> Result<Vec<Finding>, RunError> {
+    // The identifications run on one core each, so all at once; the runs of a comparison fill the cores by themselves.
+    let changed: Vec<Result<Setup, StudyError>> = changes
+        .par_iter()
+        .map(|change| change.apply(setup, seed))
+        .collect();
+    let share = 1.0 / changes.len() as f64;
     changes
         .iter()
-        .map(|&change| {
-            let setups = [change.apply(setup, seed)?];
-            let comparison = Request {
-                setups: &setups,
-                configurations: &[PID, BEST],
-                amplitudes_mm: &[AMPLITUDE_MM],
-                seed,
-                seeds,
-            }
-            .run::<S>(&|share| advance(share / count))?;
-            Ok(Finding { change, comparison })
+        .zip(changed)
+        .map(|(&change, changed)| {
+            let outcome = match changed {
+                Ok(setup) => Ok(Request {
+                    setups: &[setup],
+                    configurations: &[PID, BEST],
+                    amplitudes_mm: &[AMPLITUDE_MM],
+                    seed,
+                    seeds,
+                }
+                .run::<S>(&|done| advance(share * done))?),
+                Err(error) => Err(error),
+            };
+            Ok(Finding { change, outcome })
         })
         .collect()
 }

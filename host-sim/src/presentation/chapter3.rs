@@ -16,7 +16,7 @@ const NUMBERS: [Number; 19] = [
     ("voltage", "Figure 3.7a"),
     ("velocity", "Figure 3.7b"),
     ("constant-velocity", "Figure 3.8"),
-    ("friction-map", "Figure 3.9, 3.10"),
+    ("friction-map", "Figure 3.9 and 3.10"),
     ("hysteresis-measured", "Figure 3.11"),
     ("virgin-curve", "Figure 3.12"),
     ("hysteresis", "Figure 3.13"),

@@ -66,7 +66,7 @@ impl Context {
         Ok(self.comparison.get_or_init(|| comparison))
     }
 
-    /// About how long that takes on one core, s.
+    /// About how long that takes on two cores, s; nothing once it was done.
     pub fn comparison_s(&self) -> f64 {
         if self.comparison.get().is_some() {
             return 0.0;

@@ -24,8 +24,10 @@ pub struct Part {
     pub id: &'static str,
     /// What it shows.
     pub title: &'static str,
-    /// About how long it takes on two cores, s: its share of the progress bar.
+    /// About how long it takes on two cores, s, without the runs of chapter 5: its share of the progress bar.
     pub expected_s: fn(&Context) -> f64,
+    /// Whether it needs [`Context::comparison`], the runs of chapter 5, which parts of one report share.
+    pub needs_comparison: bool,
     /// Computes it. The same context must give the same sections, whatever the number of threads.
     pub run: fn(&Context, &Progress) -> anyhow::Result<Vec<Section>>,
 }
@@ -36,24 +38,28 @@ pub const PARTS: &[Part] = &[
         id: "headline",
         title: "The thesis' headline figures beside ours, and what limits ours",
         expected_s: chapters::headline_s,
+        needs_comparison: true,
         run: chapters::headline,
     },
     Part {
         id: "chapter-3",
         title: "Identification of the x axis: Tables 3.1 to 3.4, Figures 3.5 to 3.21",
         expected_s: |_| 20.0,
+        needs_comparison: false,
         run: designs::identification,
     },
     Part {
         id: "chapter-4",
         title: "PID and N-PID: Tables 4.1 to 4.4, Figures 4.2 to 4.11",
-        expected_s: |_| 5.0,
+        expected_s: |_| 1.0,
+        needs_comparison: false,
         run: designs::controllers,
     },
     Part {
         id: "chapter-5",
         title: "Every controller with every feedforward: Tables 5.1 to 5.22, Figures 5.1 to 5.18",
-        expected_s: chapters::chapter5_s,
+        expected_s: |_| 2.0,
+        needs_comparison: true,
         run: chapters::chapter5,
     },
 ];
@@ -107,33 +113,39 @@ pub fn compute(
             Ok((key, sections))
         })
         .collect::<anyhow::Result<_>>()?;
-    let missing = request.parts.iter().zip(&found);
-    let whole_s = missing
-        .filter(|(_, (_, sections))| sections.is_none())
-        .map(|(part, _)| (part.expected_s)(context))
-        .sum();
-    let mut progress = Progress::new(bar, whole_s);
+    let mut comparison_s = context.comparison_s();
+    let expected_s: Vec<f64> = request
+        .parts
+        .iter()
+        .zip(&found)
+        .map(|(part, (_, sections))| match sections {
+            Some(_) => 0.0,
+            None if part.needs_comparison => {
+                (part.expected_s)(context) + std::mem::take(&mut comparison_s)
+            }
+            None => (part.expected_s)(context),
+        })
+        .collect();
+    let mut progress = Progress::new(bar, expected_s.iter().sum());
     request
         .parts
         .iter()
         .zip(found)
-        .map(|(part, (key, sections))| {
+        .zip(expected_s)
+        .map(|((part, (key, sections)), expected_s)| {
             if let Some(sections) = sections {
-                tell(format!(
-                    "{}: kept from {}",
-                    part.id,
-                    store.path(part.id).display()
-                ));
+                let path = store.path(part.id);
+                tell(format!("{}: kept from {}", part.id, path.display()));
                 return Ok(Done {
                     part: *part,
                     sections,
                 });
             }
-            progress.begin(part.id, (part.expected_s)(context));
+            progress.begin(part.id, expected_s);
             let mut sections = (part.run)(context, &progress)
                 .map_err(|error| error.context(format!("part {}", part.id)))?;
-            if let Some(first) = sections.first_mut() {
-                first.provenance = Some(context.provenance(&[part.id]));
+            for section in &mut sections {
+                section.provenance = Some(context.provenance(&[part.id]));
             }
             store.write(part.id, &key, &sections)?;
             progress.end();
