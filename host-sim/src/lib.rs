@@ -3,6 +3,7 @@
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`machine`]: the firmware's application in this process, on the library's own control law;
 //! - [`experiment`]: runs of a machine on a stage, and what they score;
+//! - [`report_parts`]: what `quadrant report` computes, part by part, and keeps;
 //! - [`presentation`]: their tables and pages, made with [`report`];
 //! - [`record`]: recorded motions from CSV files, checked;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
@@ -21,6 +22,7 @@ pub mod plant;
 pub mod presentation;
 pub mod record;
 pub mod report;
+pub mod report_parts;
 pub mod rig;
 pub mod scenario;
 pub mod settings_file;

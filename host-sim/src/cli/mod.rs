@@ -9,6 +9,7 @@ mod laws;
 mod numerics;
 mod output;
 mod replay;
+mod report;
 
 use clap::{Parser, Subcommand};
 
@@ -44,6 +45,9 @@ enum Command {
     Numerics(numerics::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did.
     Replay(replay::Arguments),
+    /// Every table and figure of the thesis' chapters 3 to 5 on the simulated stage, in one page: about three minutes on two
+    /// cores. An interrupted report goes on where it stopped.
+    Report(report::Arguments),
 }
 
 /// Does what the command line asks for.
@@ -58,5 +62,6 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Laws(arguments)) => laws::run(&arguments),
         Some(Command::Numerics(arguments)) => numerics::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
+        Some(Command::Report(arguments)) => report::run(&arguments),
     }
 }

@@ -1,5 +1,5 @@
-//! The thesis' comparison: {PID, N-PID} x {no, static, GMS, combined feedforward} on a sine of 30 mm at three
-//! velocities.
+//! The thesis' comparison: {PID, N-PID} x {no, static, GMS, combined feedforward} on a sine, of 30 mm unless another
+//! amplitude is asked for, at three velocities.
 
 use indicatif::ProgressBar;
 use quadrant::control::feedback::LawKind;
@@ -22,9 +22,9 @@ pub const AMPLITUDE_MM: f64 = 30.0;
 /// Its largest velocities, mm/s.
 pub const VELOCITIES_MM_S: [f64; 3] = [5.0, 10.0, 15.0];
 /// Cycles at full speed, of which the last whole ones count.
-const CYCLES: f64 = 2.25;
+pub const CYCLES: f64 = 2.25;
 /// Cycles that count.
-const SCORED_CYCLES: usize = 2;
+pub const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 /// Room for GMS elements: the matched compensator has the plant's ten.
@@ -83,6 +83,8 @@ pub struct Outcome {
     pub configuration: Configuration,
     /// What the compensator knew.
     pub knowledge: Knowledge,
+    /// Amplitude of the sine, mm.
+    pub amplitude_mm: f64,
     /// Largest velocity of the sine, mm/s.
     pub velocity_mm_s: f64,
     /// What it scored.
@@ -92,7 +94,7 @@ pub struct Outcome {
 }
 
 /// The x axis three times, one for each velocity, and the sines they run.
-fn job(configuration: Configuration, setup: &Setup) -> Job {
+fn job(configuration: Configuration, setup: &Setup, amplitude_mm: f64) -> Job {
     let mut stage = setup.stage.clone();
     let x = stage.axes[0].clone();
     stage.axes = [x.clone(), x.clone(), x];
@@ -102,7 +104,7 @@ fn job(configuration: Configuration, setup: &Setup) -> Job {
         plan: PlanSettings {
             motions: VELOCITIES_MM_S.map(|velocity| {
                 MotionSettings::Harmonic(HarmonicSettings::with_velocity(
-                    AMPLITUDE_MM,
+                    amplitude_mm,
                     velocity,
                     CYCLES,
                     LEAD_S,
@@ -112,9 +114,9 @@ fn job(configuration: Configuration, setup: &Setup) -> Job {
     }
 }
 
-/// Time of one cycle at a largest velocity, s.
-fn cycle_s(velocity_mm_s: f64) -> f64 {
-    std::f64::consts::TAU * AMPLITUDE_MM / velocity_mm_s
+/// Time of one cycle of a sine with a largest velocity, s.
+pub fn cycle_s(amplitude_mm: f64, velocity_mm_s: f64) -> f64 {
+    std::f64::consts::TAU * amplitude_mm / velocity_mm_s
 }
 
 /// All that a run of the comparison needs but the machine itself.
@@ -131,14 +133,19 @@ pub(super) struct Bench {
 
 impl Bench {
     /// The x axis three times, on its job.
-    pub(super) fn new(configuration: Configuration, setup: &Setup, seed: u64) -> Self {
-        let job = job(configuration, setup);
+    pub(super) fn new(
+        configuration: Configuration,
+        setup: &Setup,
+        amplitude_mm: f64,
+        seed: u64,
+    ) -> Self {
+        let job = job(configuration, setup, amplitude_mm);
         let [x, ..] = &setup.truth.axes;
         let truth = StageTruth {
             axes: [x.clone(), x.clone(), x.clone()],
         };
         let rate_hz = job.stage.rate_hz;
-        let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(VELOCITIES_MM_S[0]);
+        let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(amplitude_mm, VELOCITIES_MM_S[0]);
         Self {
             plant: SimulatedStage::new(&truth, rate_hz, seed),
             operator: Operator::runs_the_plan(),
@@ -148,7 +155,7 @@ impl Bench {
     }
 }
 
-/// Runs one configuration at all velocities, side by side, in the arithmetic of `S`.
+/// Runs one configuration at all velocities, side by side, on a sine of 30 mm in the arithmetic of `S`.
 ///
 /// # Errors
 /// Refused settings or a fault.
@@ -157,7 +164,20 @@ pub fn run_configuration<S: Scalar>(
     setup: &Setup,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
-    let mut bench = Bench::new(configuration, setup, seed);
+    run_at_amplitude::<S>(configuration, setup, AMPLITUDE_MM, seed)
+}
+
+/// The same on a sine of any amplitude, mm, above zero and within the axis' travel.
+///
+/// # Errors
+/// Refused settings or a fault.
+pub fn run_at_amplitude<S: Scalar>(
+    configuration: Configuration,
+    setup: &Setup,
+    amplitude_mm: f64,
+    seed: u64,
+) -> Result<[Outcome; 3], RunError> {
+    let mut bench = Bench::new(configuration, setup, amplitude_mm, seed);
     let rate_hz = bench.job.stage.rate_hz;
     let resolution_mm = bench
         .job
@@ -176,12 +196,14 @@ pub fn run_configuration<S: Scalar>(
     let mut velocities = VELOCITIES_MM_S.into_iter();
     Ok(traces.map(|trace| {
         let velocity_mm_s = velocities.next().unwrap_or_default();
-        let cycle = samples(cycle_s(velocity_mm_s));
-        let end = samples(LEAD_S) + samples(CYCLES * cycle_s(velocity_mm_s));
+        let period_s = cycle_s(amplitude_mm, velocity_mm_s);
+        let cycle = samples(period_s);
+        let end = samples(LEAD_S) + samples(CYCLES * period_s);
         let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
         Outcome {
             configuration,
             knowledge: setup.knowledge,
+            amplitude_mm,
             velocity_mm_s,
             score: score(&scored.reference_mm, &scored.error_mm, cycle),
             last_cycle: scored.slice((SCORED_CYCLES - 1) * cycle..SCORED_CYCLES * cycle),

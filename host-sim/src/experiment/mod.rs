@@ -1,9 +1,11 @@
 //! Experiments on the simulated stage, and what they measure.
 
+pub mod chapter5;
 pub mod circle;
 pub mod comparison;
 pub mod compensator;
 pub mod friction_models;
+pub mod imperfections;
 pub mod laws;
 pub mod metrics;
 pub mod numerics;

@@ -9,7 +9,7 @@ use quadrant::link::lockstep::InputRecord;
 use quadrant::scalar::{Fixed, Scalar};
 use rayon::prelude::*;
 
-use super::comparison::{Bench, Configuration, ELEMENTS, Outcome, run_configuration};
+use super::comparison::{AMPLITUDE_MM, Bench, Configuration, ELEMENTS, Outcome, run_configuration};
 use super::compensator::Setup;
 use super::run::RunError;
 use crate::machine::Machine;
@@ -93,7 +93,7 @@ fn shadow(numerics: &mut Numerics, setup: &Setup, seed: u64) -> Result<(), RunEr
         mut plant,
         most_ticks,
         mut operator,
-    } = Bench::new(numerics.configuration, setup, seed);
+    } = Bench::new(numerics.configuration, setup, AMPLITUDE_MM, seed);
     let mut exact = Machine::<f64, ELEMENTS>::new(&job)?;
     let mut single = Machine::<f32, ELEMENTS>::new(&job)?;
     let mut fixed = Machine::<Fixed, ELEMENTS>::new(&job)?;

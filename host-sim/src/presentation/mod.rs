@@ -1,6 +1,9 @@
 //! From outcomes to tables and figures: what a person reads of an experiment.
 
 mod bode;
+mod chapter3;
+mod chapter4;
+mod chapter5;
 mod characteristic;
 mod circle;
 mod commission;
@@ -14,12 +17,16 @@ mod laws;
 mod loop_figures;
 mod motion;
 mod motor_constant;
+mod numbering;
 mod numerics;
 mod recorded;
 mod revise;
 mod validation;
 mod wrong_model;
 
+pub use chapter3::chapter3_sections;
+pub use chapter4::{chapter4_sections, data_section};
+pub use chapter5::{chapter5_sections, headline_section, study_section};
 pub use characteristic::{characteristic_section, characteristic_table};
 pub use commission::{commission_page, gains_table, verdict_table};
 pub use comparison::{comparison_page, comparison_tables};

@@ -23,6 +23,9 @@ pub struct Lines {
     pub y_scale: Scale,
     /// One unit is as long on both axes, as a Nyquist plot needs; for linear scales.
     pub equal_units: bool,
+    /// Ends of the vertical axis, for figures that are compared; without them it fits the curves. For a linear scale.
+    #[serde(default)]
+    pub y_range: Option<(f64, f64)>,
     /// Shaded bands, behind the curves.
     #[serde(default)]
     pub bands: Vec<Band>,
@@ -209,6 +212,10 @@ impl Lines {
         } else {
             y_axis
         };
+        let y_axis = match self.y_range {
+            Some((low, high)) => y_axis.range(vec![low, high]),
+            None => y_axis,
+        };
         let layout = layout()
             .x_axis(self.x_scale.apply(x_axis))
             .y_axis(self.y_scale.apply(y_axis))
@@ -238,6 +245,15 @@ mod tests {
             }],
             ..Lines::default()
         }
+    }
+
+    #[test]
+    fn figures_that_are_compared_can_have_one_range() {
+        let json = json(Lines {
+            y_range: Some((-2.5, 2.5)),
+            ..lines(Style::solid(Colour::Blue))
+        });
+        assert!(json.contains("\"range\":[-2.5,2.5]"), "{json}");
     }
 
     #[test]

@@ -14,7 +14,10 @@ pub(super) fn draw(lines: &Lines) -> Drawing {
     // Curves over time begin at the axis; paths in a plane need room on all sides.
     let x_margin = if lines.equal_units { 0.04 } else { 0.0 };
     let x = Span::over(lines.x_scale, lines.abscissas(), x_margin);
-    let y = Span::over(lines.y_scale, lines.ordinates(), 0.05);
+    let y = match lines.y_range {
+        Some((low, high)) => Span::over(lines.y_scale, [low, high].into_iter(), 0.0),
+        None => Span::over(lines.y_scale, lines.ordinates(), 0.05),
+    };
     let height = if lines.equal_units { SQUARE } else { HEIGHT };
     let frame = Frame::new(height, x, y, lines.equal_units);
     let places = |points: Vec<(f64, f64)>| points.into_iter().map(|(x, y)| frame.place(x, y));

@@ -1,0 +1,46 @@
+//! The headlines, and chapter 5.
+
+use super::{Context, Progress};
+use crate::experiment::chapter5::Request;
+use crate::experiment::comparison::AMPLITUDE_MM;
+use crate::experiment::imperfections::{BEST, Change, PID, study};
+use crate::presentation::{chapter5_sections, headline_section, study_section};
+use crate::report::Section;
+
+/// Most seeds that the study of imperfections is run with: what it asks about is many times the deviations.
+const STUDY_SEEDS: u64 = 3;
+/// Time of the study's identifications, s.
+const IDENTIFICATIONS_S: f64 = 6.0;
+
+/// Time of the study.
+pub(super) fn headline_s(context: &Context) -> f64 {
+    let [_, virtual_machine] = context.setups();
+    let one = Request {
+        setups: &[virtual_machine],
+        configurations: &[PID, BEST],
+        amplitudes_mm: &[AMPLITUDE_MM],
+        seed: context.seed,
+        seeds: context.seeds.min(STUDY_SEEDS),
+    };
+    IDENTIFICATIONS_S + Change::ALL.len() as f64 * one.expected_s()
+}
+
+pub(super) fn headline(context: &Context, progress: &Progress) -> anyhow::Result<Vec<Section>> {
+    let (comparison_s, study_s) = (context.comparison_s(), headline_s(context));
+    let share = comparison_s / (comparison_s + study_s);
+    let comparison = context.comparison(&|done| progress.advance(share * done))?;
+    let [_, virtual_machine] = context.setups();
+    let findings = study::<f32>(
+        &virtual_machine,
+        &Change::ALL,
+        context.seed,
+        context.seeds.min(STUDY_SEEDS),
+        &|done| progress.advance((1.0 - share) * done),
+    )?;
+    Ok(vec![headline_section(comparison), study_section(&findings)])
+}
+
+pub(super) fn chapter5(context: &Context, progress: &Progress) -> anyhow::Result<Vec<Section>> {
+    let comparison = context.comparison(&|done| progress.advance(done))?;
+    Ok(chapter5_sections(comparison))
+}
