@@ -6,6 +6,7 @@ pub mod compensator;
 pub mod metrics;
 pub mod numerics;
 pub mod recorded;
+pub mod robustness;
 mod run;
 pub mod thesis;
 pub mod validation;

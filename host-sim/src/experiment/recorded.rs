@@ -21,7 +21,7 @@ use super::metrics::{largest, rms};
 use super::run::{RunError, run};
 use crate::design::{Form, Process, ShapingError, shape_to_margins};
 use crate::machine::Machine;
-use crate::plant::{AxisTruth, Imperfections, SimulatedStage, StageTruth};
+use crate::plant::{AxisTruth, Drive, Imperfections, SimulatedStage, StageTruth};
 use crate::record::{AxisLimits, Record};
 
 /// An axis that can follow a record.
@@ -179,6 +179,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
             offset_v: -emps::OFFSET_N * per_newton,
             ..Imperfections::default()
         },
+        drive: Drive::BallScrew,
     };
     Ok(Axis { settings, truth })
 }

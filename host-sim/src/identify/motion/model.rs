@@ -7,7 +7,7 @@ use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::FrictionSettings;
 
-use crate::plant::{AxisTruth, Imperfections};
+use crate::plant::{AxisTruth, Drive, Imperfections};
 
 /// What a model holds beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -198,6 +198,7 @@ impl MotionModel {
                 offset_v: -self.offset_v,
                 ..Imperfections::default()
             },
+            drive: Drive::BallScrew,
         }
     }
 }
