@@ -17,7 +17,7 @@ fn ideal() -> AxisTruth {
 
 #[test]
 fn cogging_holds_an_unpowered_table_at_a_pole_and_does_no_net_work() {
-    let truth = ideal().direct_drive();
+    let truth = ideal().direct_drive(0.020);
     let Drive::Direct(cogging) = truth.drive else {
         panic!("not a linear motor: {:?}", truth.drive);
     };

@@ -7,6 +7,7 @@ mod identify;
 mod numerics;
 mod output;
 mod replay;
+mod robustness;
 
 use clap::{Parser, Subcommand};
 
@@ -37,6 +38,9 @@ enum Command {
     Numerics(numerics::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did.
     Replay(replay::Arguments),
+    /// Say what becomes of tracking when mass, friction, delay, amplifier, encoder or drive change, or a tool cuts: named
+    /// scenarios on the simulated stage.
+    Robustness(robustness::Arguments),
 }
 
 /// Does what the command line asks for.
@@ -49,5 +53,6 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Identify(command)) => identify::run(&command),
         Some(Command::Numerics(arguments)) => numerics::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
+        Some(Command::Robustness(arguments)) => robustness::run(&arguments),
     }
 }

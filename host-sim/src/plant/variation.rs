@@ -54,9 +54,10 @@ impl AxisTruth {
     }
 
     /// The axis with a linear motor: no screw and so no ripple, a fifth of the screw's friction (the guides alone) over half
-    /// its pre-sliding range, a third of its linear damping, and cogging.
+    /// its pre-sliding range, a third of its linear damping, and cogging of
+    /// `cogging_v` V once a pole of 16 mm and a quarter of that twice.
     #[must_use]
-    pub fn direct_drive(mut self) -> Self {
+    pub fn direct_drive(mut self, cogging_v: f64) -> Self {
         self = self.with_friction(0.2);
         let breakaway_v = 0.5
             * (self.friction.positive.curve.breakaway_v + self.friction.negative.curve.breakaway_v);
@@ -65,7 +66,7 @@ impl AxisTruth {
         self.imperfections.ripple_v = 0.0;
         self.drive = Drive::Direct(Cogging {
             pole_pitch_mm: 16.0,
-            amplitude_v: [0.020, 0.005],
+            amplitude_v: [cogging_v, 0.25 * cogging_v],
         });
         self
     }

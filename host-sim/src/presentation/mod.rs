@@ -14,6 +14,7 @@ mod motor_constant;
 mod numerics;
 mod recorded;
 mod revise;
+mod robustness;
 mod validation;
 
 pub use commission::{commission_page, gains_table, verdict_table};
@@ -27,6 +28,7 @@ pub use motor_constant::motor_constant_section;
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
+pub use robustness::{RobustnessReport, robustness_sections, robustness_tables};
 pub use validation::validation_table;
 
 use crate::report::{Provenance, Series, Style};

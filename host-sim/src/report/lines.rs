@@ -22,6 +22,8 @@ pub struct Lines {
     pub y_scale: Scale,
     /// One unit is as long on both axes, as a Nyquist plot needs; for linear scales.
     pub equal_units: bool,
+    /// Names at 0, 1, 2 ... of the horizontal axis, in place of numbers; none for an ordinary axis.
+    pub x_names: Vec<String>,
 }
 
 /// The scale of an axis.
@@ -109,6 +111,13 @@ impl Lines {
             .show_grid(self.x_scale == Scale::Logarithmic)
             .zero_line_color(palette::RULE.0)
             .ticks(TicksDirection::Outside);
+        let x_axis = if self.x_names.is_empty() {
+            x_axis
+        } else {
+            x_axis
+                .tick_values((0..self.x_names.len()).map(|place| place as f64).collect())
+                .tick_text(self.x_names.clone())
+        };
         let y_axis = axis(&self.y_label).zero_line_color(palette::RULE.0);
         let y_axis = if self.equal_units {
             y_axis.scale_anchor("x")
@@ -173,6 +182,19 @@ mod tests {
     fn points_are_marks_and_not_joined() {
         let json = json(lines(Style::points(Colour::Blue)));
         assert!(json.contains("\"mode\":\"markers\""), "{json}");
+    }
+
+    #[test]
+    fn names_stand_where_numbers_would() {
+        let json = json(Lines {
+            x_names: vec!["nominal".to_owned(), "cold".to_owned()],
+            ..lines(Style::points(Colour::Blue))
+        });
+        assert!(
+            json.contains("\"ticktext\":[\"nominal\",\"cold\"]"),
+            "{json}"
+        );
+        assert!(json.contains("\"tickvals\":[0.0,1.0]"), "{json}");
     }
 
     #[test]

@@ -18,20 +18,20 @@ use crate::plant::{AxisTruth, SimulatedAxis};
 /// What an axis is asked to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
-    /// The comparison's sine of 30 mm at [`SINE_MM_S`]; its last two cycles are scored.
+    /// The comparison's sine of 30 mm at 10 mm/s; its last two cycles are scored.
     Sine,
-    /// A move of [`FEED_MM`] at [`FEED_MM_S`], scored from its start to its end.
+    /// A move of 10 mm at 2 mm/s, scored from its start to its end.
     SlowFeed,
     /// Nothing: to stay for so many seconds, scored from the share of them that comes second.
     Hold(f64, f64),
 }
 
 /// Largest velocity of the sine, mm/s.
-pub const SINE_MM_S: f64 = 10.0;
+pub(super) const SINE_MM_S: f64 = 10.0;
 /// Length of the slow move, mm.
-pub const FEED_MM: f64 = 10.0;
+pub(super) const FEED_MM: f64 = 10.0;
 /// Its velocity, mm/s.
-pub const FEED_MM_S: f64 = 2.0;
+pub(super) const FEED_MM_S: f64 = 2.0;
 /// Cycles at full speed, of which the last [`SCORED_CYCLES`] count; lead-in and lead-out, s: the comparison's.
 const CYCLES: f64 = 2.25;
 const SCORED_CYCLES: usize = 2;
