@@ -162,8 +162,9 @@ fn grown_friction_holds_against_as_much_more_load() {
     for factor in [0.7, 1.0, 1.5] {
         let held = |load_v: f64| {
             let mut axis = SimulatedAxis::new(ideal().with_friction(factor), RATE_HZ, 1);
-            axis.set_load_v(load_v);
-            for _ in 0..20_000 {
+            // Slowly: a sudden load swings past what it holds at.
+            for tick in 0..30_000 {
+                axis.set_load_v(load_v * (f64::from(tick) / 20_000.0).min(1.0));
                 axis.step(DacCode::ZERO, false);
             }
             axis.velocity_mm_s().abs() < 1e-3 && axis.position_mm() < 0.030

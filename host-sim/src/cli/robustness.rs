@@ -16,7 +16,7 @@ use quadrant_sim::experiment::robustness::{
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::presentation::{
-    RobustnessReport, provenance, robustness_sections, robustness_tables,
+    RobustnessReport, provenance, robustness_full_table, robustness_sections, robustness_tables,
 };
 use quadrant_sim::record::{ForceRecord, write_trace};
 use quadrant_sim::report::Page;
@@ -114,7 +114,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         compliances,
     };
     println!(
-        "Simulated, not measured: {} axis, {} seeds from {}\n",
+        "Simulated, not measured: {} axis; runs of each: {}, seeds from {} on\n",
         axis.name(),
         arguments.seeds,
         output.seed
@@ -122,6 +122,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for table in robustness_tables(&report) {
         output.table(&table)?;
     }
+    let all = robustness_full_table(&report);
+    all.write_csv(output.file(&format!("{}.csv", all.id))?)?;
     write_cutting_force(output)?;
     let page = Page {
         title: "Robustness on the simulated stage".to_owned(),
@@ -185,13 +187,15 @@ fn compliances(
             request.seed,
         )?,
     ];
+    // At rest the feedforward is silent: laws that differ in nothing else are one.
+    let mut seen: Vec<StageSettings> = Vec::new();
     for (name, settings) in &request.competitors {
-        all.push(simulated_compliance(
-            name,
-            &first(settings),
-            &truth,
-            request.seed,
-        )?);
+        let mut silent = first(settings);
+        silent.axes[0].feedforward = own.feedforward;
+        if !seen.contains(&silent) {
+            all.push(simulated_compliance(name, &silent, &truth, request.seed)?);
+            seen.push(silent);
+        }
     }
     Ok(all)
 }

@@ -28,7 +28,9 @@ pub use motor_constant::motor_constant_section;
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
-pub use robustness::{RobustnessReport, robustness_sections, robustness_tables};
+pub use robustness::{
+    RobustnessReport, robustness_full_table, robustness_sections, robustness_tables,
+};
 pub use validation::validation_table;
 
 use crate::report::{Provenance, Series, Style};

@@ -63,7 +63,7 @@ impl RobustnessReport {
 }
 
 /// The tables: one for each score, with the change against the same competitor in the nominal scenario of the task; the
-/// drives that were refused; the compliances; and every number with its spread.
+/// drives that were refused; the compliances.
 pub fn robustness_tables(report: &RobustnessReport) -> Vec<Table> {
     let mut tables: Vec<Table> = READINGS
         .iter()
@@ -75,7 +75,6 @@ pub fn robustness_tables(report: &RobustnessReport) -> Vec<Table> {
     if !report.compliances.is_empty() {
         tables.push(compliance_table(&report.compliances));
     }
-    tables.push(full_table(report));
     tables
 }
 
@@ -137,7 +136,8 @@ fn score_cells(
     ]
 }
 
-fn full_table(report: &RobustnessReport) -> Table {
+/// Every number with its spread.
+pub fn robustness_full_table(report: &RobustnessReport) -> Table {
     let mut columns = vec![
         Column::new("Scenario"),
         Column::new("Task"),
@@ -260,6 +260,7 @@ pub fn robustness_sections(report: &RobustnessReport) -> Vec<Section> {
         .map(Block::Table)
         .collect();
     scores.insert(0, Block::Figure(dots(report)));
+    scores.push(Block::Table(robustness_full_table(report)));
     let mut sections = vec![
         Section {
             id: "robustness-scenarios-section".to_owned(),

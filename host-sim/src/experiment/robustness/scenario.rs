@@ -62,10 +62,10 @@ const HOLD: Task = Task::Hold(4.0, 0.0);
 const ENGAGED_S: (f64, f64) = (1.0, 3.0);
 const ALWAYS_S: (f64, f64) = (0.0, 1e3);
 
-/// The slot of [`Milling::slot`], its force across the feed along the axis.
-fn cut(engaged_s: (f64, f64)) -> Load {
+/// A cut whose force across the feed acts along the axis.
+fn milling(cut: Milling, engaged_s: (f64, f64)) -> Load {
     Load::Milling {
-        cut: Milling::slot(),
+        cut,
         component: Component::Normal,
         engaged_s,
         newtons_per_volt: NEWTONS_PER_VOLT,
@@ -80,10 +80,13 @@ pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
     let mut all = vec![sine("nominal", "as commissioned", nominal())];
     all.extend(changed_axes(&nominal(), sine));
     all.extend([
-        sine("cutting", "slot milled all along", nominal()).loaded(cut(ALWAYS_S)),
+        sine("cutting", "slot milled all along", nominal())
+            .loaded(milling(Milling::slot(), ALWAYS_S)),
+        sine("light cutting", "finishing cut all along", nominal())
+            .loaded(milling(Milling::finishing(), ALWAYS_S)),
         Scenario::new(HOLD, "hold", "position held", nominal()),
         Scenario::new(HOLD, "hold, cutting", "slot milled for 2 s", nominal())
-            .loaded(cut(ENGAGED_S)),
+            .loaded(milling(Milling::slot(), ENGAGED_S)),
         Scenario::new(Task::SlowFeed, "slow feed", "10 mm at 2 mm/s", nominal()),
         Scenario::new(
             Task::SlowFeed,
@@ -91,7 +94,7 @@ pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
             "slot milled for 2 s",
             nominal(),
         )
-        .loaded(cut(ENGAGED_S)),
+        .loaded(milling(Milling::slot(), ENGAGED_S)),
     ]);
     if let Some(force) = recorded {
         let load = Load::Recorded {
