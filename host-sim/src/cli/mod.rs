@@ -10,6 +10,7 @@ mod numerics;
 mod output;
 mod replay;
 mod report;
+mod robustness;
 
 use clap::{Parser, Subcommand};
 
@@ -48,6 +49,9 @@ enum Command {
     /// Every table and figure of the thesis' chapters 3 to 5 on the simulated stage, in one page: about three minutes on two
     /// cores. An interrupted report goes on where it stopped.
     Report(report::Arguments),
+    /// Say what becomes of tracking when mass, friction, delay, amplifier, encoder or drive change, or a tool cuts: named
+    /// scenarios on the simulated stage.
+    Robustness(robustness::Arguments),
 }
 
 /// Does what the command line asks for.
@@ -63,5 +67,6 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Numerics(arguments)) => numerics::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
         Some(Command::Report(arguments)) => report::run(&arguments),
+        Some(Command::Robustness(arguments)) => robustness::run(&arguments),
     }
 }

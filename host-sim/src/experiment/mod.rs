@@ -10,6 +10,7 @@ pub mod laws;
 pub mod metrics;
 pub mod numerics;
 pub mod recorded;
+pub mod robustness;
 mod run;
 pub mod thesis;
 mod trial;

@@ -23,7 +23,7 @@ use super::run::{RunError, run};
 use crate::design::{Form, Process, ShapingError, shape_to_margins};
 use crate::identify::single_state::with_all_models;
 use crate::machine::Machine;
-use crate::plant::{AxisTruth, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
+use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
 use crate::record::{AxisLimits, Record};
 
 /// An axis that can follow a record.
@@ -180,6 +180,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
             offset_v: -emps::OFFSET_N * per_newton,
             ..Imperfections::default()
         },
+        drive: Drive::BallScrew,
     };
     Ok(Axis { settings, truth })
 }

@@ -17,7 +17,7 @@ use rayon::prelude::*;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};
 use super::response::FrequencyResponse;
-use crate::plant::{AxisTruth, FrictionTruth, Imperfections};
+use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 use crate::rig::{Experiment, Recording, Rig, RigError, SimulatedRig};
 
 /// Which friction models stand beside the linear model, as in the thesis.
@@ -187,6 +187,7 @@ pub fn candidate(
         resolution_mm: settings.encoder.resolution_mm,
         full_scale_v: settings.amplifier.full_scale_v,
         imperfections: Imperfections::default(),
+        drive: Drive::BallScrew,
     }
 }
 

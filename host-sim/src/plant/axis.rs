@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{AxisTruth, Presliding};
+use super::{AxisTruth, Backlash, Body, Drive, EncoderSide, Forcing, Presliding};
 
 /// Steps of the integration in a control period.
 const SUBSTEPS: usize = 4;
@@ -29,6 +29,8 @@ pub struct SimulatedAxis {
     load_v: f64,
     position_mm: f64,
     velocity_mm_s: f64,
+    /// The motor, where a gap lies between it and the table.
+    motor: Body,
     noise: Xoshiro256PlusPlus,
 }
 
@@ -47,6 +49,7 @@ impl SimulatedAxis {
             load_v: 0.0,
             position_mm: 0.0,
             velocity_mm_s: 0.0,
+            motor: Body::default(),
             noise: Xoshiro256PlusPlus::seed_from_u64(seed),
             truth,
         }
@@ -60,6 +63,14 @@ impl SimulatedAxis {
     /// The true velocity, mm/s.
     pub fn velocity_mm_s(&self) -> f64 {
         self.velocity_mm_s
+    }
+
+    /// The motor's position as far as it has one of its own, mm.
+    pub fn motor_position_mm(&self) -> f64 {
+        match self.truth.drive {
+            Drive::RackAndPinion(_) => self.motor.position_mm,
+            Drive::BallScrew | Drive::Direct(_) => self.position_mm,
+        }
     }
 
     /// The friction at this moment, V at the amplifier input.
@@ -82,7 +93,14 @@ impl SimulatedAxis {
         } else {
             0.0
         };
-        ((self.position_mm + noise) / self.truth.resolution_mm).floor() as i64 as u32
+        let seen_mm = match self.truth.drive {
+            Drive::RackAndPinion(gap) if gap.encoder == EncoderSide::Motor => {
+                self.motor.position_mm
+            }
+            _ => self.position_mm,
+        };
+        let error_mm = self.truth.imperfections.interpolation_error_mm(seen_mm);
+        ((seen_mm + error_mm + noise) / self.truth.resolution_mm).floor() as i64 as u32
     }
 
     /// One control period with the converter at `code` (or the amplifier disabled).
@@ -91,7 +109,8 @@ impl SimulatedAxis {
         let imperfections = &truth.imperfections;
         let limit = truth.full_scale_v;
         let driven = if enabled {
-            (f64::from(code.0) * self.volts_per_code + imperfections.offset_v).clamp(-limit, limit)
+            let asked = f64::from(code.0) * self.volts_per_code + imperfections.offset_v;
+            (asked * (1.0 + imperfections.amplifier_gain_error)).clamp(-limit, limit)
         } else {
             0.0
         };
@@ -101,17 +120,15 @@ impl SimulatedAxis {
         } else {
             0.0
         };
-        let external = self.load_v - ripple;
+        let external = self.load_v - ripple + truth.drive.force_v(self.position_mm);
         for _ in 0..SUBSTEPS {
             self.pipeline.push_back(driven);
             let arriving = self.pipeline.pop_front().unwrap_or(driven);
-            self.substep(arriving + external);
+            self.substep(arriving, external);
         }
     }
 
-    fn substep(&mut self, force_v: f64) {
-        let truth = &self.truth;
-        let gain = truth.gain_mm_per_v_s2;
+    fn substep(&mut self, driven_v: f64, external_v: f64) {
         let along = |velocity: f64| {
             if velocity < 0.0 {
                 Direction::Negative
@@ -119,10 +136,25 @@ impl SimulatedAxis {
                 Direction::Positive
             }
         };
+        let truth = &self.truth;
         let viscous = truth
             .friction
             .of(along(self.velocity_mm_s))
             .viscous_v_s_per_mm;
+        let displacement = match truth.drive {
+            Drive::RackAndPinion(gap) => self.move_geared(&gap, driven_v, external_v, viscous),
+            Drive::BallScrew | Drive::Direct(_) => self.move_rigid(driven_v + external_v, viscous),
+        };
+        let factor = self.truth.imperfections.friction_factor(self.position_mm);
+        let after = self.velocity_mm_s;
+        self.presliding_v = factor * self.presliding.step(displacement, after.abs(), self.step_s);
+        self.friction_v = self.presliding_v + viscous * after;
+    }
+
+    /// Moves motor and table as one; the displacement, mm.
+    fn move_rigid(&mut self, force_v: f64, viscous: f64) -> f64 {
+        let truth = &self.truth;
+        let gain = truth.gain_mm_per_v_s2;
         // The trapezoidal rule on the linear part: a held force moves the mass as it would in continuous time.
         let drag = 0.5 * self.step_s * (truth.damping_per_s + gain * viscous);
         let push = gain * (force_v - self.presliding_v) - truth.stiffness_per_s2 * self.position_mm;
@@ -131,7 +163,36 @@ impl SimulatedAxis {
         let displacement = 0.5 * (before + after) * self.step_s;
         self.velocity_mm_s = after;
         self.position_mm += displacement;
-        self.presliding_v = self.presliding.step(displacement, after.abs(), self.step_s);
-        self.friction_v = self.presliding_v + viscous * after;
+        displacement
+    }
+
+    /// Moves motor and table with the gap between them; the table's displacement, mm.
+    fn move_geared(&mut self, gap: &Backlash, driven_v: f64, external_v: f64, viscous: f64) -> f64 {
+        let truth = &self.truth;
+        let table = Body {
+            position_mm: self.position_mm,
+            velocity_mm_s: self.velocity_mm_s,
+        };
+        let motor_gain = truth.gain_mm_per_v_s2 / gap.motor_share;
+        let table_gain = truth.gain_mm_per_v_s2 / (1.0 - gap.motor_share);
+        let forcings = [
+            Forcing {
+                gain_mm_per_v_s2: motor_gain,
+                acceleration_mm_s2: motor_gain * driven_v,
+                damping_per_s: truth.damping_per_s,
+            },
+            Forcing {
+                gain_mm_per_v_s2: table_gain,
+                acceleration_mm_s2: table_gain * (external_v - self.presliding_v)
+                    - truth.stiffness_per_s2 / (1.0 - gap.motor_share) * self.position_mm,
+                damping_per_s: truth.damping_per_s + table_gain * viscous,
+            },
+        ];
+        let [motor, table] = gap.step([self.motor, table], &forcings, self.step_s);
+        let displacement = table.position_mm - self.position_mm;
+        self.motor = motor;
+        self.position_mm = table.position_mm;
+        self.velocity_mm_s = table.velocity_mm_s;
+        displacement
     }
 }

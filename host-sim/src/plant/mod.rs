@@ -4,12 +4,20 @@
 //! with more elements and other parameters than the control law has.
 
 mod axis;
+pub mod cutting;
+mod drive;
 mod friction;
+pub mod load;
 mod stage;
+mod transmission;
 mod truth;
+mod variation;
 
 pub use axis::SimulatedAxis;
+pub use drive::{Backlash, Cogging, Drive, EncoderSide};
 pub use friction::FrictionTruth;
 pub(crate) use friction::Presliding;
 pub use stage::SimulatedStage;
+pub use transmission::{Body, Forcing};
 pub use truth::{AxisTruth, Imperfections, StageTruth, TRUTH_ELEMENTS, virgin_curve_elements};
+pub use variation::NEWTONS_PER_VOLT;

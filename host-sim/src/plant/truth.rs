@@ -1,10 +1,13 @@
 //! What the simulated axes really are. Every number here is chosen, none measured.
 
+use std::f64::consts::TAU;
+
 use heapless::Vec;
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 
+use super::Drive;
 use super::FrictionTruth;
 
 /// GMS elements of the simulated axes' friction.
@@ -33,6 +36,8 @@ pub struct AxisTruth {
     pub full_scale_v: f64,
     /// What a real axis has and its model leaves out.
     pub imperfections: Imperfections,
+    /// What lies between motor and table.
+    pub drive: Drive,
 }
 
 /// What a real axis has and its model leaves out; all zero for an ideal one.
@@ -46,6 +51,36 @@ pub struct Imperfections {
     pub ripple_v: f64,
     /// Lead of the screw, mm.
     pub lead_mm: f64,
+    /// Relative error of the amplifier's gain, above -1.
+    pub amplifier_gain_error: f64,
+    /// Amplitude of the error that the encoder's interpolation repeats in every period of its grating, mm.
+    pub interpolation_mm: f64,
+    /// Period of the grating, mm; above zero where the amplitude is.
+    pub grating_mm: f64,
+    /// Amplitude, relative, with which friction changes along the travel, 0 to below 1.
+    pub friction_variation: f64,
+    /// Length over which that repeats, mm; above zero where the amplitude is.
+    pub friction_period_mm: f64,
+}
+
+impl Imperfections {
+    /// What the encoder's interpolation adds to a position, mm.
+    pub fn interpolation_error_mm(&self, position_mm: f64) -> f64 {
+        if self.interpolation_mm > 0.0 {
+            self.interpolation_mm * (TAU * position_mm / self.grating_mm).sin()
+        } else {
+            0.0
+        }
+    }
+
+    /// Friction at a position over its mean.
+    pub fn friction_factor(&self, position_mm: f64) -> f64 {
+        if self.friction_variation > 0.0 {
+            1.0 + self.friction_variation * (TAU * position_mm / self.friction_period_mm).sin()
+        } else {
+            1.0
+        }
+    }
 }
 
 /// The three axes of the simulated stage.
@@ -132,6 +167,7 @@ fn axis(character: &Character) -> AxisTruth {
         resolution_mm: 5e-4,
         full_scale_v: 10.0,
         imperfections: character.imperfections,
+        drive: Drive::BallScrew,
     }
 }
 
@@ -153,6 +189,7 @@ impl StageTruth {
             offset_v,
             ripple_v,
             lead_mm: 10.0,
+            ..Imperfections::default()
         };
         Self {
             axes: [

@@ -21,6 +21,7 @@ mod numbering;
 mod numerics;
 mod recorded;
 mod revise;
+mod robustness;
 mod validation;
 mod wrong_model;
 
@@ -41,6 +42,9 @@ pub use motor_constant::motor_constant_section;
 pub use numerics::numerics_table;
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
+pub use robustness::{
+    RobustnessReport, robustness_full_table, robustness_sections, robustness_tables,
+};
 pub use validation::validation_table;
 pub use wrong_model::wrong_model_section;
 

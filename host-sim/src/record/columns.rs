@@ -1,7 +1,8 @@
 //! From bytes to columns of finite numbers.
 
 use super::{MIN_ROWS, RecordError};
-use csv::{ByteRecord, ReaderBuilder};
+use csv::{ByteRecord, Reader, ReaderBuilder};
+use std::fs::File;
 use std::path::Path;
 
 /// The columns of a record, as labelled.
@@ -64,6 +65,11 @@ const REFERENCE: &[Name] = &[("reference_m", 1e3), ("reference_mm", 1.0)];
 const POSITION: &[Name] = &[("position_m", 1e3), ("position_mm", 1.0)];
 const VOLTAGE: &[Name] = &[("voltage_v", 1.0)];
 const INJECTION: &[Name] = &[("injection_v", 1.0)];
+const FORCES: [&[Name]; 3] = [
+    &[("force_x_n", 1.0)],
+    &[("force_y_n", 1.0)],
+    &[("force_z_n", 1.0)],
+];
 
 /// What a file must hold besides the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -95,22 +101,7 @@ fn read_at_most(
     most_rows: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Columns, RecordError> {
-    let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
-    let mut reader = ReaderBuilder::new()
-        .from_path(path)
-        .map_err(|error| refuse(path, error))?;
-    let header = reader
-        .byte_headers()
-        .map_err(|error| refuse(path, error))?
-        .clone();
-    let header = Header {
-        path,
-        names: header
-            .iter()
-            .map(|name| String::from_utf8_lossy(name).trim().to_owned())
-            .collect(),
-    };
-
+    let (mut reader, header) = open(path)?;
     let mut time = header.required("t_s", TIME)?;
     let mut reference = header.optional("reference", REFERENCE)?;
     let mut position = header.optional("position", POSITION)?;
@@ -127,6 +118,71 @@ fn read_at_most(
         return Err(header.missing(missing));
     }
 
+    let columns = [
+        Some(&mut time),
+        reference.as_mut(),
+        position.as_mut(),
+        voltage.as_mut(),
+        injection.as_mut(),
+    ];
+    fill(
+        &mut reader,
+        path,
+        &mut columns.into_iter().flatten().collect::<Vec<_>>(),
+        most_rows,
+        progress,
+    )?;
+    Ok(Columns {
+        time: time.0,
+        reference: reference.map(|c| c.0),
+        position: position.map(|c| c.0),
+        voltage: voltage.map(|c| c.0),
+        injection: injection.map(|c| c.0),
+    })
+}
+
+/// The time, and the forces of x, y and z where they are recorded, of a file with one of them at least.
+pub(super) fn read_forces(path: &Path) -> Result<(Column, [Option<Column>; 3]), RecordError> {
+    let (mut reader, header) = open(path)?;
+    let mut time = header.required("t_s", TIME)?;
+    let mut forces = [None, None, None];
+    for (force, names) in forces.iter_mut().zip(FORCES) {
+        *force = header.optional(names[0].0, names)?;
+    }
+    if forces.iter().all(Option::is_none) {
+        return Err(header.missing("force_x_n (or force_y_n, force_z_n)"));
+    }
+    let mut columns: Vec<&mut Place> = forces.iter_mut().flatten().collect();
+    columns.push(&mut time);
+    fill(&mut reader, path, &mut columns, MOST_ROWS, &mut |_| {})?;
+    Ok((time.0, forces.map(|force| force.map(|(column, _)| column))))
+}
+
+/// A file, and its header read.
+fn open(path: &Path) -> Result<(Reader<File>, Header<'_>), RecordError> {
+    let mut reader = ReaderBuilder::new()
+        .from_path(path)
+        .map_err(|error| refuse(path, error))?;
+    let header = reader
+        .byte_headers()
+        .map_err(|error| refuse(path, error))?
+        .clone();
+    let names = header
+        .iter()
+        .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+        .collect();
+    Ok((reader, Header { path, names }))
+}
+
+/// Reads all rows into the columns, of which there is at least one.
+fn fill(
+    reader: &mut Reader<File>,
+    path: &Path,
+    columns: &mut [&mut Place],
+    most_rows: usize,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(), RecordError> {
+    let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
     let mut row = ByteRecord::new();
     let mut rows: usize = 0;
     while reader
@@ -145,16 +201,7 @@ fn read_at_most(
                 most_rows,
             });
         }
-        for (column, index) in [
-            Some(&mut time),
-            reference.as_mut(),
-            position.as_mut(),
-            voltage.as_mut(),
-            injection.as_mut(),
-        ]
-        .into_iter()
-        .flatten()
-        {
+        for (column, index) in columns.iter_mut() {
             let value = number(path, column.name, line, &row[*index])?;
             column.push(value, line);
         }
@@ -165,13 +212,7 @@ fn read_at_most(
             rows,
         });
     }
-    Ok(Columns {
-        time: time.0,
-        reference: reference.map(|c| c.0),
-        position: position.map(|c| c.0),
-        voltage: voltage.map(|c| c.0),
-        injection: injection.map(|c| c.0),
-    })
+    Ok(())
 }
 
 fn number(path: &Path, column: &str, line: u64, cell: &[u8]) -> Result<f64, RecordError> {

@@ -151,6 +151,13 @@ pub enum UselessFault {
         /// Its largest magnitude.
         largest: f64,
     },
+    /// It is no force in newtons.
+    NotForce {
+        /// Its largest magnitude.
+        largest: f64,
+        /// The largest that is believed, N.
+        most_n: f64,
+    },
 }
 
 impl fmt::Display for UselessFault {
@@ -176,6 +183,12 @@ impl fmt::Display for UselessFault {
                 f,
                 "it reaches {}, and an amplifier's input takes at most 20 V; is it swapped with the position?",
                 Brief(*largest)
+            ),
+            Self::NotForce { largest, most_n } => write!(
+                f,
+                "it reaches {} N, and no force above {} N is believed; is the column in newtons?",
+                Brief(*largest),
+                Brief(*most_n)
             ),
         }
     }

@@ -12,16 +12,19 @@
 //! | `voltage_v` | V | optional: the controller's output |
 //! | `injection_v` | V | optional, of an experiment: the part of the voltage that was injected |
 //!
-//! Other columns are passed over, and the order is free.
+//! Other columns are passed over, and the order is free. A recorded force ([`ForceRecord`]) has `t_s` and at least one of
+//! `force_x_n`, `force_y_n`, `force_z_n`, in N.
 
 mod columns;
 mod error;
 mod experiment;
+mod force;
 mod plausible;
 mod time;
 mod trace;
 
 pub use error::{Doubt, RecordError, TimeFault, UnitFault, UselessFault};
+pub use force::ForceRecord;
 pub use trace::{TraceError, write_trace};
 
 use std::path::Path;

@@ -18,7 +18,7 @@ use quadrant::settings::{AxisSettings, FrictionSettings};
 use rayon::prelude::*;
 
 use crate::identify::single_state::{presliding_range_mm, with_all_models};
-use crate::plant::{AxisTruth, FrictionTruth, Imperfections};
+use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 use drift::{Drift, drift};
 use driven::Driven;
 
@@ -126,6 +126,7 @@ impl Parameters {
             friction: self.friction.sliding,
             gms: self.friction.gms.clone(),
             model,
+            drive: Drive::BallScrew,
             resolution_mm: 1e-6,
             full_scale_v: 10.0,
             imperfections: Imperfections::default(),

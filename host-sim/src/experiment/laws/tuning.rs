@@ -18,7 +18,7 @@ use crate::design::{
 use crate::experiment::run::RunError;
 use crate::experiment::trial::{Trial, try_three};
 use crate::identify::characteristic::Characteristic;
-use crate::plant::{AxisTruth, FrictionTruth, Imperfections};
+use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 
 /// Bounds that every law keeps at small errors.
 pub const SENSITIVITY_PEAK: f64 = 1.7;
@@ -107,6 +107,7 @@ pub fn twin(axis: &AxisSettings) -> Option<AxisTruth> {
         friction: axis.friction.sliding,
         gms: axis.friction.gms.clone(),
         model: FrictionTruth::default(),
+        drive: Drive::BallScrew,
         resolution_mm: axis.encoder.resolution_mm,
         full_scale_v: axis.amplifier.full_scale_v,
         imperfections: Imperfections::default(),

@@ -8,7 +8,7 @@ use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::FrictionSettings;
 
 use crate::identify::single_state::with_all_models;
-use crate::plant::{AxisTruth, FrictionTruth, Imperfections};
+use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 
 /// What a model holds beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -197,6 +197,7 @@ impl MotionModel {
                 offset_v: -self.offset_v,
                 ..Imperfections::default()
             },
+            drive: Drive::BallScrew,
         }
     }
 }
