@@ -15,6 +15,7 @@ mod numerics;
 mod recorded;
 mod revise;
 mod robustness;
+mod robustness_figures;
 mod validation;
 
 pub use commission::{commission_page, gains_table, verdict_table};
