@@ -12,10 +12,11 @@ use quadrant_sim::experiment::robustness::{
     RobustnessOutcome, RobustnessRequest, Task, baseline, find, run_robustness, scenarios,
     usual_competitors,
 };
-use quadrant_sim::plant::StageTruth;
 use quadrant_sim::plant::cutting::{Component, Milling};
-use quadrant_sim::plant::load::Load;
+use quadrant_sim::plant::load::{Force, Load};
+use quadrant_sim::plant::{NEWTONS_PER_VOLT, StageTruth};
 use quadrant_sim::record::ForceRecord;
+use std::sync::Arc;
 
 fn stage() -> StageSettings {
     identified().unwrap().stage
@@ -117,6 +118,37 @@ fn compensation_that_was_identified_before_friction_grew_still_helps() {
     let full = largest_um(&outcomes, "friction +50 %", "N-PID + static + GMS");
     assert!(full < 0.5 * pid, "{full} um, PID {pid} um");
     assert!(full > 3.0 * largest_um(&outcomes, "nominal", "N-PID + static + GMS"));
+}
+
+/// The scenario "cutting" with a force in place of its own, N, repeated every 20 ms.
+fn under(force_n: Vec<f64>) -> Vec<RobustnessOutcome> {
+    let mut request = request(&["nominal", "cutting"], 1, 1);
+    request.scenarios[1].load = Load::Recorded {
+        force: Arc::new(Force {
+            sample_time_s: 0.020 / force_n.len() as f64,
+            force_n,
+        }),
+        newtons_per_volt: NEWTONS_PER_VOLT,
+    };
+    run(&request)
+}
+
+#[test]
+fn a_cut_s_vibration_and_not_its_mean_spoils_the_compensation() {
+    const FULL: &str = "N-PID + static + GMS";
+    let cut = Milling::slot();
+    let mean = cut.mean_force_n(Component::Normal);
+    let steady = under(vec![mean; 200]);
+    let nominal = largest_um(&steady, "nominal", FULL);
+    assert!(largest_um(&steady, "cutting", FULL) < 1.5 * nominal);
+    let vibration = (0..200)
+        .map(|k| cut.force_n(Component::Normal, f64::from(k) * 1e-4) - mean)
+        .collect();
+    let shaken = under(vibration);
+    // It shakes friction loose: there is less of it at a reversal than the compensation puts in.
+    let pid = largest_um(&shaken, "cutting", "PID");
+    assert!(pid < 0.6 * largest_um(&shaken, "nominal", "PID"));
+    assert!(largest_um(&shaken, "cutting", FULL) > 1.5 * pid);
 }
 
 #[test]

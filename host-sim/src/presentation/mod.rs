@@ -22,6 +22,7 @@ mod numerics;
 mod recorded;
 mod revise;
 mod robustness;
+mod robustness_figures;
 mod validation;
 mod wrong_model;
 

@@ -1,17 +1,12 @@
 //! The robustness experiment's tables and figures.
 
-use super::{UM_PER_MM, error_curve};
+use super::UM_PER_MM;
+use super::robustness_figures::{compliance_figure, dots, error_figure};
 use crate::experiment::metrics::{Score, change_percent};
 use crate::experiment::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
 use crate::experiment::robustness::drives::Refused;
 use crate::experiment::robustness::{RobustnessOutcome, Scenario, baseline, find};
-use crate::report::{
-    Block, Cell, Column, DotSeries, Dots, Figure, Lines, Plot, Scale, Section, Series, Spread,
-    Style, Table,
-};
-
-/// Control period of the outcomes' traces, s.
-const PERIOD_S: f64 = 1e-4;
+use crate::report::{Block, Cell, Column, Section, Table};
 
 /// What a run of the experiment left.
 #[derive(Debug)]
@@ -52,7 +47,7 @@ const READINGS: [Reading; 3] = [
 
 impl RobustnessReport {
     /// The competitors, in the order in which they ran.
-    fn competitors(&self) -> Vec<&str> {
+    pub(super) fn competitors(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
         for outcome in &self.outcomes {
             if !names.contains(&outcome.competitor.as_str()) {
@@ -314,118 +309,8 @@ fn scenario_prose() -> String {
 
 fn compliance_prose() -> String {
     "The linear model's compliance is P / (1 + L), with the identified plant and the sampled loop of its PID. Without \
-     friction the simulated axis must show the same; with it, friction takes part of the load, more of it the slower the \
-     load moves the axis."
+     friction the simulated axis must show the same. On the axis as it is, friction takes part of the load, and the error is \
+     not proportional to it: the points hold for this amplitude. At rest the feedforward is silent; laws that differ in \
+     nothing else are one."
         .to_owned()
-}
-
-/// The largest error of each law in each scenario.
-fn dots(report: &RobustnessReport) -> Figure {
-    let series = report
-        .competitors()
-        .into_iter()
-        .enumerate()
-        .map(|(index, competitor)| {
-            let errors = report.scenarios.iter().map(|scenario| {
-                find(&report.outcomes, &scenario.name, competitor)
-                    .and_then(|outcome| outcome.statistic(|score| score.largest_mm))
-                    .map_or(Spread::exact(f64::NAN), |statistic| {
-                        let mean = statistic.mean * UM_PER_MM;
-                        let half = statistic.deviation * UM_PER_MM;
-                        Spread {
-                            mean,
-                            low: mean - half,
-                            high: mean + half,
-                        }
-                    })
-            });
-            DotSeries {
-                name: competitor.to_owned(),
-                values: errors.collect(),
-                colour: Style::nth(index).colour,
-            }
-        })
-        .collect();
-    Figure {
-        id: "robustness-largest-dots".to_owned(),
-        caption: "Largest tracking error in each scenario, mean over the seeds; bars: one standard deviation".to_owned(),
-        plot: Plot::Dots(Dots {
-            value_label: "largest tracking error (um)".to_owned(),
-            categories: report.scenarios.iter().map(|it| it.name.clone()).collect(),
-            series,
-            scale: Scale::Logarithmic,
-        }),
-    }
-}
-
-/// The error of the first law and of the last, over time.
-fn error_figure(report: &RobustnessReport, scenario: &Scenario) -> Figure {
-    let competitors = report.competitors();
-    let ends = [competitors.first(), competitors.last()];
-    let series = ends
-        .into_iter()
-        .flatten()
-        .enumerate()
-        .filter_map(|(index, competitor)| {
-            let trace = find(&report.outcomes, &scenario.name, competitor)?
-                .trace
-                .as_ref()?;
-            let name = (*competitor).to_owned();
-            Some(error_curve(
-                name,
-                &trace.error_mm,
-                PERIOD_S,
-                Style::nth(index),
-            ))
-        })
-        .collect();
-    Figure {
-        id: format!(
-            "robustness-error-{}",
-            scenario.name.replace([' ', ','], "-")
-        ),
-        caption: format!("Tracking error, {}: {}", scenario.name, scenario.what),
-        plot: Plot::Lines(Lines {
-            x_label: "time (s)".to_owned(),
-            y_label: "tracking error (um)".to_owned(),
-            series,
-            ..Lines::default()
-        }),
-    }
-}
-
-fn compliance_figure(compliances: &[Compliance]) -> Figure {
-    let series = compliances
-        .iter()
-        .enumerate()
-        .map(|(index, compliance)| {
-            let style = Style::nth(index);
-            Series {
-                name: compliance.name.clone(),
-                x: FREQUENCIES_HZ.to_vec(),
-                y: compliance
-                    .mm_per_v
-                    .iter()
-                    .map(|value| value.map_or(f64::NAN, |mm| mm * UM_PER_MM))
-                    .collect(),
-                style: if index == 0 {
-                    style
-                } else {
-                    Style::points(style.colour)
-                },
-            }
-        })
-        .collect();
-    Figure {
-        id: "robustness-compliance-figure".to_owned(),
-        caption: format!("Largest error at rest over a sinusoidal load of {LOAD_V} V"),
-        plot: Plot::Lines(Lines {
-            x_label: "frequency (Hz)".to_owned(),
-            y_label: "error over load (um/V)".to_owned(),
-            series,
-            x_scale: Scale::Logarithmic,
-            y_scale: Scale::Logarithmic,
-            ..Lines::default()
-        }),
-    }
 }

@@ -97,7 +97,10 @@ pub fn simulated_compliance(
                 stage,
                 truth,
                 load: &load,
-                task: Task::Hold((CYCLES / frequency_hz).max(LEAST_S), 0.5),
+                task: Task::Hold {
+                    seconds: (CYCLES / frequency_hz).max(LEAST_S),
+                    scored_from: 0.5,
+                },
                 seed,
             };
             let ended = trial

@@ -20,7 +20,7 @@ pub struct DriveCase {
     pub truth: AxisTruth,
 }
 
-/// Cogging of the linear motor, V: a little more than a sixth of the friction that is left to a direct drive. Chosen.
+/// Cogging of the linear motor, V: a sixth of the friction that is left to a direct drive. Chosen.
 pub const COGGING_V: f64 = 0.004;
 
 /// The drives that the axis (0 to 2) is put on: a linear motor, and a rack with a gap of `backlash_mm` and the encoder on

@@ -57,7 +57,10 @@ impl Scenario {
 }
 
 /// A hold, s, all of it scored.
-const HOLD: Task = Task::Hold(4.0, 0.0);
+const HOLD: Task = Task::Hold {
+    seconds: 4.0,
+    scored_from: 0.0,
+};
 /// When the tool is in the material, s: during a hold and a slow move, and from start to end of a sine.
 const ENGAGED_S: (f64, f64) = (1.0, 3.0);
 const ALWAYS_S: (f64, f64) = (0.0, 1e3);

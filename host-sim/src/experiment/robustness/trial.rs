@@ -22,8 +22,13 @@ pub enum Task {
     Sine,
     /// A move of 10 mm at 2 mm/s, scored from its start to its end.
     SlowFeed,
-    /// Nothing: to stay for so many seconds, scored from the share of them that comes second.
-    Hold(f64, f64),
+    /// To stay.
+    Hold {
+        /// For how long, s.
+        seconds: f64,
+        /// Share of that time after which scoring begins, 0 to below 1.
+        scored_from: f64,
+    },
 }
 
 /// Largest velocity of the sine, mm/s.
@@ -45,7 +50,7 @@ impl Task {
         match self {
             Self::Sine => "sine",
             Self::SlowFeed => "slow feed",
-            Self::Hold(..) => "hold",
+            Self::Hold { .. } => "hold",
         }
     }
 
@@ -63,7 +68,7 @@ impl Task {
                 max_acceleration_mm_s2: 50.0,
                 max_jerk_mm_s3: 1000.0,
             }),
-            Self::Hold(..) => MotionSettings::Hold,
+            Self::Hold { .. } => MotionSettings::Hold,
         }
     }
 
@@ -72,7 +77,7 @@ impl Task {
         let task = match self {
             Self::Sine => CYCLES * TAU * AMPLITUDE_MM / SINE_MM_S + 2.0 * LEAD_S,
             Self::SlowFeed => FEED_MM / FEED_MM_S,
-            Self::Hold(seconds, _) => seconds,
+            Self::Hold { seconds, .. } => seconds,
         };
         task + 2.0
     }
@@ -91,8 +96,8 @@ impl Task {
                 )
             }
             Self::SlowFeed => (without_reversals(&trace.error_mm), trace.clone()),
-            Self::Hold(_, from) => {
-                let first = (from * trace.error_mm.len() as f64) as usize;
+            Self::Hold { scored_from, .. } => {
+                let first = (scored_from * trace.error_mm.len() as f64) as usize;
                 (without_reversals(&trace.error_mm[first..]), trace.clone())
             }
         }
@@ -183,7 +188,7 @@ impl Trial<'_> {
             enabled_ticks += if outputs.enabled { 1.0 } else { 0.0 };
             let under_way = match self.task {
                 Task::Sine | Task::SlowFeed => state.is_running(),
-                Task::Hold(seconds, _) => {
+                Task::Hold { seconds, .. } => {
                     (SETTLING_S..SETTLING_S + seconds).contains(&(enabled_ticks / rate_hz))
                 }
             };
