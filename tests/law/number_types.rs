@@ -1,5 +1,6 @@
 //! The law on `f32` and in fixed point differs from the law on `f64` by microvolts.
 
+use quadrant::feedforward::FeedforwardKind;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{PlanSettings, StageSettings};
 
@@ -9,8 +10,11 @@ use crate::common::{Noise, Rig, sine_on_x};
 type Shown = ([f64; 5], i16);
 
 /// All axes over a motion with noise on the counts: the same counts for every type.
-fn run<S: Scalar>(plan: &PlanSettings, ticks: usize) -> Vec<[Shown; 3]> {
-    let settings = StageSettings::default();
+fn run<S: Scalar>(kind: FeedforwardKind, plan: &PlanSettings, ticks: usize) -> Vec<[Shown; 3]> {
+    let mut settings = StageSettings::default();
+    for axis in &mut settings.axes {
+        axis.feedforward.kind = kind;
+    }
     let mut rig = Rig::<S>::new(&settings, plan);
     let mut noise = Noise::new(3);
     let mut lag = [0i64; 3];
@@ -40,11 +44,11 @@ fn run<S: Scalar>(plan: &PlanSettings, ticks: usize) -> Vec<[Shown; 3]> {
 }
 
 /// Largest deviations from `f64`, per term, and the share of codes that differ, none by more than one.
-fn deviation<S: Scalar>(name: &str) -> [f64; 5] {
+fn deviation<S: Scalar>(name: &str, kind: FeedforwardKind) -> [f64; 5] {
     const TICKS: usize = 250_000;
     let (exact, other) = (
-        run::<f64>(&three_sines(), TICKS),
-        run::<S>(&three_sines(), TICKS),
+        run::<f64>(kind, &three_sines(), TICKS),
+        run::<S>(kind, &three_sines(), TICKS),
     );
     let mut worst = [0.0f64; 5];
     let mut differ = 0u32;
@@ -59,7 +63,7 @@ fn deviation<S: Scalar>(name: &str) -> [f64; 5] {
     let share = 100.0 * f64::from(differ) / (3 * TICKS) as f64;
     let [p, i, d, feedforward, output] = worst.map(|volts| volts * 1e6);
     println!(
-        "{name} against f64 over 25 s, uV: P {p:.3}, I {i:.3}, D {d:.3}, feedforward {feedforward:.3}, \
+        "{name}, {kind:?}, against f64 over 25 s, uV: P {p:.3}, I {i:.3}, D {d:.3}, feedforward {feedforward:.3}, \
          output {output:.3}; {share:.2} % of the words differ, by one code"
     );
     worst
@@ -72,7 +76,7 @@ fn three_sines() -> PlanSettings {
 
 #[test]
 fn fixed_point_output_is_within_microvolts_of_double_precision() {
-    let [p, i, d, feedforward, output] = deviation::<Fixed>("fixed");
+    let [p, i, d, feedforward, output] = deviation::<Fixed>("fixed", FeedforwardKind::Combined);
     assert!(
         p < 1e-6 && i < 1e-6 && d < 25e-6 && feedforward < 10e-6,
         "{p} {i} {d} {feedforward}"
@@ -82,7 +86,7 @@ fn fixed_point_output_is_within_microvolts_of_double_precision() {
 
 #[test]
 fn single_precision_output_is_within_microvolts_of_double_precision() {
-    let [p, i, d, feedforward, output] = deviation::<f32>("f32");
+    let [p, i, d, feedforward, output] = deviation::<f32>("f32", FeedforwardKind::Combined);
     assert!(
         p < 1e-6 && i < 1e-6 && d < 25e-6 && feedforward < 10e-6,
         "{p} {i} {d} {feedforward}"
@@ -91,7 +95,28 @@ fn single_precision_output_is_within_microvolts_of_double_precision() {
 }
 
 #[test]
+fn the_other_friction_models_are_within_microvolts_of_double_precision_too() {
+    // The smoothed elements stop in slow motion where a step rounds to nothing: see docs/fixed-point.md.
+    for (kind, most_fixed) in [
+        (FeedforwardKind::Dahl, 10e-6),
+        (FeedforwardKind::Lugre, 10e-6),
+        (FeedforwardKind::SmoothedGms, 60e-6),
+    ] {
+        let [.., fixed, _] = deviation::<Fixed>("fixed", kind);
+        let [.., single, _] = deviation::<f32>("f32", kind);
+        assert!(
+            fixed < most_fixed && single < 10e-6,
+            "{kind:?}: {fixed} {single} V"
+        );
+    }
+}
+
+#[test]
 fn the_law_is_not_the_same_to_the_bit_in_every_type() {
     let plan = three_sines();
-    assert_ne!(run::<f64>(&plan, 2000), run::<Fixed>(&plan, 2000));
+    let kind = FeedforwardKind::Combined;
+    assert_ne!(
+        run::<f64>(kind, &plan, 2000),
+        run::<Fixed>(kind, &plan, 2000)
+    );
 }

@@ -3,10 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant::settings::StageSettings;
-use quadrant_sim::experiment::friction_models::{Model, Parameters, compare};
+use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::experiment::friction_models::{Model, Parameters, compare, tracking};
 use quadrant_sim::presentation::{
     friction_models_page, friction_models_table, friction_parameters_table, provenance,
+    tracking_table,
 };
 use quadrant_sim::settings_file::SettingsFile;
 
@@ -16,10 +17,11 @@ use super::output::{Output, command_line, progress};
 /// Options of `quadrant friction`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
-    /// The axis of the settings whose friction is modelled.
+    /// The axis of the settings and of the simulated stage.
     #[arg(long, value_enum, default_value = "x")]
     axis: Axis,
-    /// Settings with the friction of the axis, as `quadrant commission` leaves them; without them, the default settings.
+    /// Settings with the friction of the axis, as `quadrant commission` leaves them; without them, what commissioning the
+    /// simulated stage found.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Width of the smoothed GMS' transition over each element's breakaway level, 0.001 to 1, instead of the settings'.
@@ -46,22 +48,28 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let stage = match settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => StageSettings::default(),
+        None => identified()?.stage,
     };
     let mut axis_settings = stage.axes[axis.index()].clone();
     if let Some(width) = width {
         axis_settings.friction.smoothed_gms.width = *width;
     }
     let parameters = Parameters::of(&axis_settings)?;
+    axis_settings.friction = parameters.friction.clone();
     let bar = progress(Model::ALL.len() as u64, "moving the friction models");
     let behaviours = compare(&parameters, &bar);
+    bar.finish_and_clear();
+    let bar = progress(tracking::RUNS, "tracking with each feedforward");
+    let tracked = tracking::track(&axis_settings, axis.index(), output.seed, &bar)?;
     bar.finish_and_clear();
     println!("Simulated, not measured. {} axis\n", axis.name());
     output.table(&friction_parameters_table(&parameters))?;
     output.table(&friction_models_table(&behaviours))?;
+    output.table(&tracking_table(&tracked))?;
     let page = friction_models_page(
         &parameters,
         &behaviours,
+        &tracked,
         &format!("{} axis", axis.name()),
         provenance(&command_line(), output.seed),
     );

@@ -26,6 +26,10 @@ pub enum FrictionTruth {
 }
 
 /// A model with its memory.
+#[allow(
+    clippy::large_enum_variant,
+    reason = "tables of like size, one an axis, used in every substep"
+)]
 #[derive(Clone, Debug)]
 pub(crate) enum Presliding {
     Gms(

@@ -1,13 +1,16 @@
 //! The friction models side by side: table and page.
 
+use quadrant::feedforward::FeedforwardKind;
+
 use super::UM_PER_MM;
 use super::identify::{columns, lines, series};
 use crate::experiment::friction_models::drift::{AMPLITUDE, FREQUENCY_HZ, MEAN};
+use crate::experiment::friction_models::tracking::{TRUTHS, Tracked};
 use crate::experiment::friction_models::{Behaviour, Curve, LAG_FREQUENCIES_HZ, Model, Parameters};
-use crate::report::{Block, Cell, Figure, Page, Provenance, Section, Series, Style, Table};
+use crate::report::{Block, Cell, Column, Figure, Page, Provenance, Section, Series, Style, Table};
 
 /// Largest closing error of a small loop that counts as closed, of the breakaway level.
-const CLOSES: f64 = 0.005;
+const CLOSES: f64 = 0.01;
 
 /// What each model has and what it costs in truth (simulated).
 pub fn friction_models_table(behaviours: &[Behaviour]) -> Table {
@@ -131,10 +134,55 @@ pub fn friction_parameters_table(parameters: &Parameters) -> Table {
     }
 }
 
+/// What each kind of feedforward leaves on axes that follow one model or another: RMS error and glitch.
+pub fn tracking_table(tracked: &[Tracked]) -> Table {
+    let heads: Vec<String> = TRUTHS
+        .iter()
+        .flat_map(|truth| ["RMS", "glitch"].map(|what| format!("{what} on {}", truth.name())))
+        .collect();
+    let mut columns = columns(&[("Feedforward", "")]);
+    columns.extend(heads.iter().map(|head| Column::with_unit(head, "um")));
+    let rows = FeedforwardKind::ALL
+        .into_iter()
+        .map(|kind| {
+            let mut row = vec![Cell::text(kind_name(kind))];
+            for truth in TRUTHS {
+                let found = tracked.iter().find(|t| t.kind == kind && t.truth == truth);
+                row.extend(
+                    [found.map(|t| t.rms_mm), found.map(|t| t.glitch_mm)]
+                        .map(|mm| mm.map_or(Cell::Missing, |mm| Cell::number(UM_PER_MM * mm, 2))),
+                );
+            }
+            row
+        })
+        .collect();
+    Table {
+        id: "friction-models-tracking".to_owned(),
+        caption: "Tracking error with each feedforward under N-PID, on simulated axes whose friction follows the model at the head of \
+                  the column; mean over sines of 30 mm at 5, 10 and 15 mm/s"
+            .to_owned(),
+        columns,
+        rows,
+    }
+}
+
+const fn kind_name(kind: FeedforwardKind) -> &'static str {
+    match kind {
+        FeedforwardKind::None => "none",
+        FeedforwardKind::Static => "static",
+        FeedforwardKind::Gms => "GMS alone",
+        FeedforwardKind::Combined => "static + GMS",
+        FeedforwardKind::Dahl => "Dahl",
+        FeedforwardKind::Lugre => "LuGre",
+        FeedforwardKind::SmoothedGms => "S-GMS",
+    }
+}
+
 /// The page.
 pub fn friction_models_page(
     parameters: &Parameters,
     behaviours: &[Behaviour],
+    tracked: &[Tracked],
     axis: &str,
     provenance: Provenance,
 ) -> Page {
@@ -162,6 +210,15 @@ pub fn friction_models_page(
             memory(behaviours),
             drifting(behaviours),
             lagging(behaviours),
+            Section {
+                id: "tracking".to_owned(),
+                heading: "As feedforward".to_owned(),
+                prose: vec![
+                    "The same settings on axes that differ in their friction alone. A model does best on an axis that follows it."
+                        .to_owned(),
+                ],
+                blocks: vec![Block::Table(tracking_table(tracked))],
+            },
         ],
     }
 }

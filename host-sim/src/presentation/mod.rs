@@ -35,7 +35,9 @@ pub use comparison::{comparison_page, comparison_tables};
 pub use design_npid::NonlinearPage;
 pub use design_pid::{PidPage, margins_table, pid_table, step_table};
 pub use friction::{friction_section, friction_table, gms_table, presliding_section};
-pub use friction_models::{friction_models_page, friction_models_table, friction_parameters_table};
+pub use friction_models::{
+    friction_models_page, friction_models_table, friction_parameters_table, tracking_table,
+};
 pub use identify::{fitted_response_section, motor_constant_table, plant_tables, response_section};
 pub use laws::{laws_section, laws_table, tuning_table};
 pub use motion::{Reruns, candidates_table, motion_page, motion_table};

@@ -13,6 +13,10 @@ pub(super) struct Driven {
     position_mm: f64,
 }
 
+#[allow(
+    clippy::large_enum_variant,
+    reason = "a table in both, and a handful of them"
+)]
 enum Moved {
     /// The level in the sense of the last motion.
     Static(SlidingTable<f64>),

@@ -4,12 +4,14 @@
 //! - memory: a small loop within a large one, which closes if the model remembers more than one number;
 //! - drift of a free mass under a load below breakaway that vibrates ([`drift`]);
 //! - lag of friction behind a changing sliding velocity;
-//! - how abruptly the force and its slope change.
+//! - how abruptly the force and its slope change;
+//! - what is left of the tracking error with each as feedforward, on axes that follow one or the other ([`tracking`]).
 //!
 //! Simulated, with the library's own code in `f64`: the models are moved, or act as the truth of a simulated axis.
 
 pub mod drift;
 mod driven;
+pub mod tracking;
 
 use indicatif::ProgressBar;
 use quadrant::friction::dahl::DahlParameters;
@@ -62,7 +64,7 @@ impl Model {
 /// The parameters of all models of one axis.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Parameters {
-    /// As settings hold them.
+    /// As settings hold them, with every model.
     pub friction: FrictionSettings,
     /// Dahl's.
     pub dahl: DahlParameters,
@@ -95,7 +97,7 @@ impl Parameters {
     /// No linear model, or elements that nothing can be fitted to.
     pub fn of(settings: &AxisSettings) -> Result<Self, ParametersError> {
         let plant = settings.plant.ok_or(ParametersError::NoPlant)?;
-        let friction = settings.friction.clone();
+        let mut friction = settings.friction.clone();
         let fitted = with_all_models(friction.sliding, friction.gms.clone());
         let (Some(dahl), Some(lugre)) = (
             friction.dahl.or(fitted.dahl),
@@ -103,6 +105,7 @@ impl Parameters {
         ) else {
             return Err(ParametersError::NotFitted);
         };
+        (friction.dahl, friction.lugre) = (Some(dahl), Some(lugre));
         Ok(Self {
             friction,
             dahl,
