@@ -58,8 +58,8 @@ pub fn headline_section(comparison: &Comparison) -> Section {
         provenance: None,
         prose: vec![
             "The thesis measured its own stage; ours are simulated on ours, sine of 30 mm, mean over the three velocities. \
-             Matched: the law has the plant's own friction. Virtual machine: the law has what commissioning found; ± is \
-             one standard deviation over the seeds of the noise. Neither plant nor gains were tuned to meet the figures."
+             Matched: the feedforward has the plant's own friction. Virtual machine: it has what commissioning found; ± is \
+             one standard deviation over the seeds of the noise. The controllers are the same. Neither plant nor gains were tuned to meet the figures."
                 .to_owned(),
         ],
         blocks: vec![
@@ -263,9 +263,13 @@ fn conclusion(
     } else {
         "falls short of"
     };
+    let percent = |value: f64| Cell::number(value, 1).shown();
     Some(format!(
-        "{}: {as_it_is:.1} % {verdict} the thesis' {thesis_percent:.1} %; of the single changes \u{201c}{}\u{201d} helps most, to {helped:.1} %.",
+        "{}: {} % {verdict} the thesis' {} %; of the single changes \u{201c}{}\u{201d} helps most, to {} %.",
         measure.name,
+        percent(as_it_is),
+        percent(thesis_percent),
         helps.name(),
+        percent(helped),
     ))
 }
