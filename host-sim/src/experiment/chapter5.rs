@@ -16,7 +16,7 @@ use super::run::{AxisTrace, RunError};
 pub const AMPLITUDES_MM: [f64; 2] = [30.0, 15.0];
 
 /// Seconds that a run takes on two cores of a current machine, for each mm of amplitude.
-const SECONDS_PER_MM: f64 = 0.015;
+const SECONDS_PER_MM: f64 = 0.009;
 
 /// What repeated runs gave for one quantity, in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]

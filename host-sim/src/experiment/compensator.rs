@@ -59,7 +59,12 @@ pub struct Setup {
 impl Setup {
     /// The ideal stage, and the default settings with its own friction.
     pub fn matched() -> Self {
-        let mut stage = StageSettings::default();
+        Self::matched_under(StageSettings::default())
+    }
+
+    /// The ideal stage, and these settings with its own friction: the simulation beside an experiment with the same
+    /// controllers.
+    pub fn matched_under(mut stage: StageSettings) -> Self {
         for (axis, truth) in stage.axes.iter_mut().zip(&StageTruth::real().axes) {
             axis.friction = with_all_models(
                 truth.friction.map(|model| with_total_damping(model, truth)),

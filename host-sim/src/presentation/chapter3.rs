@@ -46,16 +46,17 @@ pub fn chapter3_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Sect
         .blocks
         .extend(plant_tables(&found.plant).map(Block::Table));
     let mut constant_velocity = friction_section(map, friction);
-    constant_velocity.blocks.extend(
-        nearest(runs, SHOWN_VELOCITY_MM_S).map(|run| Block::Figure(constant_velocity_figure(run))),
-    );
+    if let Some(run) = nearest(runs, SHOWN_VELOCITY_MM_S) {
+        let figure = Block::Figure(constant_velocity_figure(run));
+        constant_velocity.blocks.insert(0, figure);
+    }
     let mut presliding = presliding_section(gms, friction.mean_levels_v().1);
     presliding
         .blocks
         .insert(1, Block::Figure(hysteresis_figure(slow_sine)));
     let mut sections = vec![
-        motor_constant_section(&found.motor, None),
         response,
+        motor_constant_section(&found.motor, None),
         constant_velocity,
         presliding,
     ];

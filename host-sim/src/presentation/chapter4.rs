@@ -118,7 +118,12 @@ fn data_rows(rate_hz: f64, x: &AxisSettings, truth: &AxisTruth, seeds: u64) -> V
             1e3 * imperfections.ripple_v,
             1,
         ),
-        imperfect("lead of the screw", "mm", imperfections.lead_mm, 0),
+        vec![
+            Cell::text("lead of the screw"),
+            Cell::text("mm"),
+            Cell::Missing,
+            Cell::number(imperfections.lead_mm, 0),
+        ],
         vec![
             Cell::text("friction known to the law"),
             Cell::Missing,

@@ -50,6 +50,12 @@ fn switching_text(switching: Switching) -> String {
     }
 }
 
+/// The largest slope of `k(e) e`, at emax: `cosh x + x sinh x` with `x = ko emax`.
+fn steepest(gain: &NonlinearGain) -> f64 {
+    let reach = gain.rate_per_mm * gain.range_mm;
+    reach.cosh() + reach * reach.sinh()
+}
+
 impl NonlinearPage {
     /// The gain and its bounds.
     pub fn bounds_table(&self) -> Table {
@@ -70,6 +76,13 @@ impl NonlinearPage {
                 self.gain.largest(),
                 3,
                 "cosh(ko emax), from emax on",
+            ),
+            row(
+                "largest slope of k(e) e",
+                "",
+                steepest(&self.gain),
+                3,
+                "what small motions about a lasting error are amplified by; above the gain margin the loop hunts there",
             ),
             row(
                 "circle bound",
@@ -303,5 +316,21 @@ impl NonlinearPage {
                 ),
             ],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_steepest_slope_is_that_of_the_scaled_error_just_below_emax() {
+        let gain = NonlinearGain {
+            rate_per_mm: 15.0,
+            range_mm: 0.1,
+        };
+        let scaled = |error: f64| gain.at(error) * error;
+        let slope = (scaled(0.1) - scaled(0.1 - 1e-7)) / 1e-7;
+        assert!((slope - steepest(&gain)).abs() < 1e-4, "{slope}");
     }
 }

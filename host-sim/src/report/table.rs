@@ -108,7 +108,8 @@ impl Cell {
     }
 
     /// As shown to a reader.
-    pub(super) fn shown(&self) -> String {
+    #[must_use]
+    pub fn shown(&self) -> String {
         match self {
             Self::Text(text) => text.clone(),
             Self::Number { value, decimals } => shown_number(*value, *decimals),

@@ -43,11 +43,13 @@ impl Context {
         })
     }
 
-    /// Matched, and the virtual machine under the settings.
+    /// Matched, and the virtual machine; both with the controllers of the settings, as the thesis simulated and
+    /// measured with the same ones.
     pub fn setups(&self) -> [Setup; 2] {
+        let stage = &self.settings.stage;
         [
-            Setup::matched(),
-            Setup::virtual_machine(self.settings.stage.clone()),
+            Setup::matched_under(stage.clone()),
+            Setup::virtual_machine(stage.clone()),
         ]
     }
 

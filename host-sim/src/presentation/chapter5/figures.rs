@@ -160,6 +160,10 @@ impl Chapter<'_> {
                 reach,
             ));
         }
+        let measured = CONTROLLERS
+            .into_iter()
+            .flat_map(|c| alone(c, VirtualMachine));
+        let reach = reach_um(measured);
         for (velocity, part) in VELOCITIES_MM_S.into_iter().zip(["a", "b", "c"]) {
             let series = CONTROLLERS
                 .into_iter()

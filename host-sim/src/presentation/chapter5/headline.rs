@@ -58,8 +58,8 @@ pub fn headline_section(comparison: &Comparison) -> Section {
         provenance: None,
         prose: vec![
             "The thesis measured its own stage; ours are simulated on ours, sine of 30 mm, mean over the three velocities. \
-             Matched: the law has the plant's own friction. Virtual machine: the law has what commissioning found; ± is \
-             one standard deviation over the seeds of the noise. Neither plant nor gains were tuned to meet the figures."
+             Matched: the feedforward has the plant's own friction. Virtual machine: it has what commissioning found; ± is \
+             one standard deviation over the seeds of the noise. The controllers are the same. Neither plant nor gains were tuned to meet the figures."
                 .to_owned(),
         ],
         blocks: vec![
@@ -171,27 +171,18 @@ fn best_table(comparison: &Comparison) -> Table {
 
 /// What each imperfection of the virtual machine costs.
 pub fn study_section(findings: &[Finding]) -> Section {
-    let change = |finding: &Finding, measure, velocities: &[f64]| {
-        let knowledge = Knowledge::VirtualMachine;
-        changes_percent(
-            finding.outcome.as_ref().ok()?,
-            knowledge,
-            measure,
-            PID,
-            BEST,
-            velocities,
-        )
-    };
     let rows = findings
         .iter()
         .map(|finding| {
             let mut row = vec![Cell::text(finding.change.name())];
             for (measure, _) in BEST_MEASURES {
                 for velocity in VELOCITIES_MM_S {
-                    let [mean, _] = percent_cells(change(finding, measure, &[velocity]), 2);
+                    let [mean, _] =
+                        percent_cells(change_percent_of(finding, measure, &[velocity]), 2);
                     row.push(mean);
                 }
-                let [mean, _] = percent_cells(change(finding, measure, &VELOCITIES_MM_S), 2);
+                let [mean, _] =
+                    percent_cells(change_percent_of(finding, measure, &VELOCITIES_MM_S), 2);
                 row.push(mean);
             }
             row
@@ -216,9 +207,7 @@ pub fn study_section(findings: &[Finding]) -> Section {
     prose.extend(
         BEST_MEASURES
             .iter()
-            .filter_map(|&(measure, thesis_percent)| {
-                conclusion(findings, measure, thesis_percent, &change)
-            }),
+            .filter_map(|&(measure, thesis_percent)| conclusion(findings, measure, thesis_percent)),
     );
     prose.extend(findings.iter().filter_map(|finding| {
         let error = finding.outcome.as_ref().err()?;
@@ -239,15 +228,27 @@ pub fn study_section(findings: &[Finding]) -> Section {
     }
 }
 
-/// A sentence on one measure: whether the thesis' figure is met, and which single change helps most.
-fn conclusion(
-    findings: &[Finding],
+/// The change from PID to the best configuration on a changed virtual machine, %; nothing if it could not be run.
+fn change_percent_of(
+    finding: &Finding,
     measure: Measure,
-    thesis_percent: f64,
-    change: &dyn Fn(&Finding, Measure, &[f64]) -> Option<Spread>,
-) -> Option<String> {
+    velocities_mm_s: &[f64],
+) -> Option<Spread> {
+    changes_percent(
+        finding.outcome.as_ref().ok()?,
+        Knowledge::VirtualMachine,
+        measure,
+        PID,
+        BEST,
+        velocities_mm_s,
+    )
+}
+
+/// A sentence on one measure: whether the thesis' figure is met, and which single change helps most.
+fn conclusion(findings: &[Finding], measure: Measure, thesis_percent: f64) -> Option<String> {
     let mean = |finding: &Finding| {
-        change(finding, measure, &VELOCITIES_MM_S).map(|spread| (finding.change, spread.mean))
+        change_percent_of(finding, measure, &VELOCITIES_MM_S)
+            .map(|spread| (finding.change, spread.mean))
     };
     let (_, as_it_is) = findings
         .iter()
@@ -263,9 +264,13 @@ fn conclusion(
     } else {
         "falls short of"
     };
+    let percent = |value: f64| Cell::number(value, 1).shown();
     Some(format!(
-        "{}: {as_it_is:.1} % {verdict} the thesis' {thesis_percent:.1} %; of the single changes \u{201c}{}\u{201d} helps most, to {helped:.1} %.",
+        "{}: {} % {verdict} the thesis' {} %; of the single changes \u{201c}{}\u{201d} helps most, to {} %.",
         measure.name,
+        percent(as_it_is),
+        percent(thesis_percent),
         helps.name(),
+        percent(helped),
     ))
 }

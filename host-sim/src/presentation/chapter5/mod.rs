@@ -136,14 +136,26 @@ pub fn chapter5_sections(comparison: &Comparison) -> Vec<Section> {
 
 fn metrics_prose() -> String {
     format!(
-        "The x axis follows a sine of {:?} mm amplitude whose largest velocity is {:?} mm/s. Tracking error is the \
+        "The x axis follows a sine of {} mm amplitude whose largest velocity is {} mm/s. Tracking error is the \
          reference minus the true position over two cycles, as largest magnitude and as RMS. The glitch of a reversal \
          is the largest error magnitude within {} % of the cycle on either side of it, over the mean error magnitude \
          in the shoulders of the same width next to that window; the mean over the reversals is shown.",
-        AMPLITUDES_MM,
-        VELOCITIES_MM_S,
+        either(&AMPLITUDES_MM),
+        either(&VELOCITIES_MM_S),
         100.0 * GLITCH_WINDOW
     )
+}
+
+/// "5, 10 or 15".
+fn either(values: &[f64]) -> String {
+    match values {
+        [] => String::new(),
+        [only] => only.to_string(),
+        [first @ .., last] => {
+            let first: Vec<String> = first.iter().map(f64::to_string).collect();
+            format!("{} or {last}", first.join(", "))
+        }
+    }
 }
 
 fn runs_prose(comparison: &Comparison) -> String {
@@ -154,8 +166,8 @@ fn runs_prose(comparison: &Comparison) -> String {
         .max()
         .unwrap_or_default();
     format!(
-        "What the thesis simulated is matched here: the law has the plant's own friction, and nothing in the run is \
-         random, so it is run once and has no spread. What the thesis measured is the virtual machine here: the plant \
+        "Both use the same controllers. What the thesis simulated is matched here: the feedforward has the plant's own \
+         friction, and nothing in the run is random, so it is run once and has no spread. What the thesis measured is the virtual machine here: the plant \
          has noise, offset and ripple, and the law has what commissioning it found; means of {seeds} runs, ± is one \
          standard deviation of a run. Both are simulated; nothing here is measured on a machine."
     )
