@@ -5,6 +5,7 @@
 //! - [`experiment`]: runs of a machine on a stage, and what they score;
 //! - [`presentation`]: their tables and pages, made with [`report`];
 //! - [`record`]: recorded motions from CSV files, checked;
+//! - [`program`]: part programs in G-code, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
 //! - [`scenario`]: the motion that the firmware is emulated with;
 //! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
@@ -19,6 +20,7 @@ pub mod identify;
 pub mod machine;
 pub mod plant;
 pub mod presentation;
+pub mod program;
 pub mod record;
 pub mod report;
 pub mod rig;

@@ -2,6 +2,8 @@
 
 mod bode;
 mod circle;
+mod circle_figures;
+mod circle_tests;
 mod commission;
 mod comparison;
 mod design_npid;
@@ -12,10 +14,12 @@ mod loop_figures;
 mod motion;
 mod motor_constant;
 mod numerics;
+mod part_program;
 mod recorded;
 mod revise;
 mod validation;
 
+pub use circle_tests::{circle_page, circle_sections, circle_tables};
 pub use commission::{commission_page, gains_table, verdict_table};
 pub use comparison::{comparison_page, comparison_tables};
 pub use design_npid::NonlinearPage;
@@ -25,6 +29,7 @@ pub use identify::{fitted_response_section, motor_constant_table, plant_tables, 
 pub use motion::{Reruns, candidates_table, motion_page, motion_table};
 pub use motor_constant::motor_constant_section;
 pub use numerics::numerics_table;
+pub use part_program::{motion_summary_table, program_page, program_table};
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
 pub use validation::validation_table;
