@@ -59,7 +59,7 @@ fn what_is_reported_of_a_circle_hangs_together() {
         assert!(turn.spikes.largest_mm() <= about_nominal);
         let drawn = turn.path.iter().map(|&(_, deviation)| deviation);
         assert_eq!(drawn.fold(f64::MIN, f64::max), turn.radial_max_mm);
-        // Friction holds an axis back at its reversal: PID alone overshoots the circle outwards at all four.
+        // Friction holds an axis at its reversal: PID alone is thrown outwards at all four.
         assert!(
             turn.spikes.0.iter().all(|&spike| spike > 0.0),
             "{:?}",
@@ -141,7 +141,7 @@ fn the_command_writes_tables_and_a_page() {
         assert!(at.join("x").join(file).exists(), "{file}");
     }
     let page = std::fs::read_to_string(at.join("x/circle.html")).unwrap();
-    assert!(page.contains("circle-polar-zx") && page.contains("circle --plane zx"));
+    assert!(page.contains("circle-polar-zx") && !page.contains("circle-polar-xy"));
     let refused = command::fail(at, &["circle", "--radius-mm", "-5"]);
     assert!(refused.contains("--radius-mm -5"), "{refused}");
 }

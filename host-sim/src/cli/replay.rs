@@ -27,7 +27,7 @@ pub(super) struct Arguments {
     )]
     reference: Option<PathBuf>,
     /// The axis that follows the reference.
-    #[arg(long, value_enum, requires = "reference")]
+    #[arg(long, value_enum, conflicts_with = "gcode")]
     axis: Option<RecordedAxis>,
     #[command(flatten)]
     program: ProgramOptions,

@@ -137,7 +137,10 @@ fn case_cells(case: &CircleCase) -> Vec<Cell> {
     vec![
         Cell::text(plane_name(case.plane)),
         Cell::number(case.radius_mm, 1),
-        Cell::number(case.feed_mm_min, 0),
+        Cell::number(
+            case.feed_mm_min,
+            if case.feed_mm_min < 10.0 { 2 } else { 0 },
+        ),
         Cell::text(case.configuration.name()),
     ]
 }
@@ -360,7 +363,7 @@ fn definition_prose() -> String {
     "G is the radial range of the path about the centre of its least-squares circle; G(b) that of both senses about one \
      centre; H the largest radial distance between the senses at one angle; F the distance from the nominal centre less \
      the nominal radius; D the radius of the least-squares circle of both senses less the nominal one. A spike is the \
-     radial deviation about a reversal that is farthest from the line between the mean deviations on either side of it."
+     radial deviation about a reversal that is farthest from the mean deviation just before it."
         .to_owned()
 }
 

@@ -12,10 +12,11 @@ pub const AT_RAD: [f64; 4] = [
 
 /// The spikes of one turn, by [`AT_RAD`]; mm, outwards positive.
 ///
-/// A spike is the radial deviation within a window about the reversal that is farthest from the straight line between
-/// the mean deviations of the two shoulders, each half the window wide, on either side of it. So a deviation that is merely
-/// large, or drifts, is no spike. Half the window is a fiftieth of the turn (7.2 degrees), or 20 ms if that is more (at high
-/// feeds a glitch lasts as long as the control loop takes to answer it), at most 6 hundredths of the turn.
+/// A spike is the radial deviation within a window about the reversal that is farthest from the level before it: the mean
+/// deviation over half a window's width before the window. So it is how far the reversal throws the path, and a deviation
+/// that is merely large is none. A path that does not come back within the window (a slow integrator's) counts in full; one
+/// that drifts counts by what it drifts. Half the window is a fiftieth of the turn (7.2 degrees), or 20 ms if that is more (at
+/// high feeds a glitch lasts as long as the control loop takes to answer it), at most 6 hundredths of the turn.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Spikes(pub [f64; 4]);
 
@@ -58,17 +59,12 @@ impl Spikes {
     }
 }
 
-/// The spike about one sample, or nothing when its shoulders leave the turn.
+/// The spike about one sample, or nothing when its window or the level before it leave the turn.
 fn spike_at(deviations: &[f64], reversal: usize, half: usize) -> Option<f64> {
     let from = reversal.checked_sub(2 * half)?;
-    let surroundings = deviations.get(from..=reversal + 2 * half)?;
-    let (before, rest) = surroundings.split_at(half);
-    let (inside, after) = rest.split_at(2 * half + 1);
-    let mean = |part: &[f64]| part.iter().sum::<f64>() / part.len() as f64;
-    let (before, after) = (mean(before), mean(after));
-    // The shoulders' middles are three half windows apart, the window begins half a shoulder after the first.
-    let level = |k: usize| before + (after - before) * (k as f64 / half as f64 + 0.5) / 3.0;
-    let heights = inside.iter().enumerate().map(|(k, value)| value - level(k));
+    let (before, window) = deviations.get(from..=reversal + half)?.split_at(half);
+    let level = before.iter().sum::<f64>() / half as f64;
+    let heights = window.iter().map(|value| value - level);
     Some(heights.fold(0.0, |most: f64, height| {
         if height.abs() > most.abs() {
             height
@@ -100,10 +96,17 @@ mod tests {
     }
 
     #[test]
-    fn a_sloping_deviation_has_no_spike() {
-        let slope: Vec<f64> = (0..TURN).map(|k| 1e-6 * k as f64).collect();
-        let spikes = Spikes::find(&slope, Sense::Clockwise, 1e4);
-        assert!(spikes.largest_mm() < 2e-6, "{spikes:?}");
+    fn a_large_deviation_is_no_spike_and_a_step_is_one_in_full() {
+        let mut deviations = vec![0.02; TURN];
+        let level = Spikes::find(&deviations, Sense::Clockwise, 1e4);
+        assert!(level.largest_mm() < 1e-12, "{level:?}");
+        // Outwards at the first reversal, 180 degrees, and never back.
+        deviations[TURN / 8..].fill(0.05);
+        let step = Spikes::find(&deviations, Sense::Clockwise, 1e4);
+        assert!(
+            (step.0[2] - 0.03).abs() < 1e-12 && step.0[1].abs() < 1e-12,
+            "{step:?}"
+        );
     }
 
     #[test]

@@ -51,7 +51,10 @@ pub enum CircleRefusal {
         /// Its duration, s.
         turn_s: f64,
     },
-    /// An axis' limits do not allow it, or the stage switched off.
+    /// An axis' limits do not allow it.
+    #[error("{0}; choose a lower feed or a larger radius")]
+    Limits(quadrant::settings::SettingsError),
+    /// The settings are refused, or the stage switched off.
     #[error(transparent)]
     Run(#[from] RunError),
 }
@@ -106,6 +109,9 @@ pub fn run_path<S: Scalar>(
             ),
         },
     };
+    job.plan
+        .validate(&job.stage)
+        .map_err(CircleRefusal::Limits)?;
     let axes = &job.stage.axes;
     let resolution_mm = axes.each_ref().map(|axis| axis.encoder.resolution_mm);
     // The reference that the feedback sees is late by the preview.
