@@ -6,6 +6,7 @@
 //! - [`report_parts`]: what `quadrant report` computes, part by part, and keeps;
 //! - [`presentation`]: their tables and pages, made with [`report`];
 //! - [`record`]: recorded motions from CSV files, checked;
+//! - [`program`]: part programs in G-code, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
 //! - [`scenario`]: the motion that the firmware is emulated with;
 //! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
@@ -20,6 +21,7 @@ pub mod identify;
 pub mod machine;
 pub mod plant;
 pub mod presentation;
+pub mod program;
 pub mod record;
 pub mod report;
 pub mod report_parts;

@@ -1,8 +1,9 @@
 //! N-PID under a load that leaves a lasting error: Popov's criterion speaks of the origin, and about another point the loop
 //! has the slope of k(e) e for a gain.
 
+use quadrant::control::feedback::FeedbackState;
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
-use quadrant::control::pid::{Pid, PidState};
+use quadrant::control::pid::Pid;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::{PidGains, sector_bound};
 use quadrant_sim::design::held_plant::{HeldPlant, HeldPlantRun};
@@ -40,7 +41,7 @@ fn unrest_mm(error_mm: f64) -> f64 {
     let pid = Pid::<f64>::build(&GAINS, LIMIT_V, PERIOD_S);
     let table = NonlinearGainTable::<f64>::build(&GAIN);
     let mut axis = HeldPlantRun::at_rest(HeldPlant::new(&PLANT, PERIOD_S, 0.0), 0.0);
-    let mut state = PidState::default();
+    let mut state = FeedbackState::default();
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for tick in 0..20_000 {
         let share = (f64::from(tick) / 5_000.0).min(1.0);

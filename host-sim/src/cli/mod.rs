@@ -1,5 +1,6 @@
 //! The command line.
 
+mod circle;
 mod commission;
 mod compare;
 mod design;
@@ -9,6 +10,7 @@ mod laws;
 mod numerics;
 mod output;
 mod replay;
+mod replay_program;
 mod report;
 mod robustness;
 
@@ -26,6 +28,8 @@ struct Arguments {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    /// Run circle tests after ISO 230-4 on the simulated stage: every plane, several radii and feeds, both senses.
+    Circle(circle::Arguments),
     /// Commission an axis, unattended: from nothing known to settings that the firmware runs, with a report.
     Commission(commission::Arguments),
     /// Run the thesis' comparison on the simulated stage: PID and N-PID with every feedforward, three velocities, and a
@@ -44,7 +48,8 @@ enum Command {
     Laws(laws::Arguments),
     /// Say what the number type costs: f32 and fixed point against f64 over the whole comparison.
     Numerics(numerics::Arguments),
-    /// Run our controllers over a recorded reference, beside what the recorded machine did.
+    /// Run our controllers over a recorded reference, beside what the recorded machine did, or along a part program in
+    /// G-code.
     Replay(replay::Arguments),
     /// Every table and figure of the thesis' chapters 3 to 5 on the simulated stage, in one page: about three minutes on two
     /// cores. An interrupted report goes on where it stopped.
@@ -58,6 +63,7 @@ enum Command {
 pub(crate) fn run() -> anyhow::Result<()> {
     match Arguments::parse().command {
         None => compare::run(&compare::Arguments::default()),
+        Some(Command::Circle(arguments)) => circle::run(&arguments),
         Some(Command::Commission(arguments)) => commission::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),

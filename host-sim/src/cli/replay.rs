@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use anyhow::ensure;
+use anyhow::{bail, ensure};
 use clap::Args;
 use quadrant_sim::experiment::compensator::Setup;
 use quadrant_sim::experiment::recorded::{self, RecordedAxis};
@@ -11,17 +11,26 @@ use quadrant_sim::record::Record;
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::output::{Output, progress};
+use super::replay_program::{self, ProgramOptions};
 
 /// Options of `quadrant replay`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
     /// CSV file with the columns t_s and reference_m (or reference_mm); position_m (or position_mm), if present, is the
     /// recorded machine's own.
-    #[arg(long, value_name = "FILE")]
-    reference: PathBuf,
-    /// The axis that follows it.
-    #[arg(long, value_enum)]
-    axis: RecordedAxis,
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "axis",
+        required_unless_present = "gcode",
+        conflicts_with = "gcode"
+    )]
+    reference: Option<PathBuf>,
+    /// The axis that follows the reference.
+    #[arg(long, value_enum, conflicts_with = "gcode")]
+    axis: Option<RecordedAxis>,
+    #[command(flatten)]
+    program: ProgramOptions,
     /// Settings of the simulated stage's control law, as `quadrant commission` leaves them; the stage then has
     /// everything a real one has. Without them the law knows the stage's own parameters.
     #[arg(long, value_name = "FILE")]
@@ -34,16 +43,24 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         reference,
         axis,
+        program,
         settings,
         output,
     } = arguments;
     ensure!(
-        settings.is_none() || *axis != RecordedAxis::Emps,
+        settings.is_none() || *axis != Some(RecordedAxis::Emps),
         "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
     );
     let setup = match settings {
         Some(path) => Setup::virtual_machine(SettingsFile::read(path)?.stage),
         None => Setup::matched(),
+    };
+    if let Some(path) = &program.gcode {
+        return replay_program::run(path, program, &setup, output);
+    }
+    // The command line has either a program, or a reference and its axis.
+    let (Some(reference), Some(axis)) = (reference, axis) else {
+        bail!("nothing to follow; give --gcode, or --reference with --axis");
     };
     let record = Record::read(reference, &axis.limits())?;
     for doubt in &record.doubts {

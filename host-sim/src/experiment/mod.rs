@@ -9,6 +9,7 @@ pub mod imperfections;
 pub mod laws;
 pub mod metrics;
 pub mod numerics;
+pub mod part_program;
 pub mod recorded;
 pub mod robustness;
 mod run;
@@ -16,5 +17,5 @@ pub mod thesis;
 mod trial;
 pub mod validation;
 
-pub use run::{AxisTrace, run};
+pub use run::{AxisTrace, RunError, run};
 pub use trial::{Trial, TrialOutcome, try_three};

@@ -55,9 +55,9 @@ pub fn chapter4_sections(
 pub fn data_section(stage: &StageSettings, truth: &AxisTruth, seeds: u64) -> Section {
     let [x, ..] = &stage.axes;
     Section {
+        provenance: None,
         id: "data".to_owned(),
         heading: "Data properties".to_owned(),
-        provenance: None,
         prose: Vec::new(),
         blocks: vec![Block::Table(Table {
             id: "data-properties".to_owned(),

@@ -70,8 +70,8 @@ pub fn characteristic_section(
         },
     );
     Section {
-        id: "characteristic-trajectory".to_owned(),
         provenance: None,
+        id: "characteristic-trajectory".to_owned(),
         heading: "Nominal characteristic trajectory".to_owned(),
         prose: vec![
             format!(

@@ -1,9 +1,9 @@
-//! The circle test's table and figures.
+//! The table and figures of the comparison's circle.
 
-use super::{UM_PER_MM, error_curve};
+use super::UM_PER_MM;
 use crate::experiment::circle::{CircleOutcome, FEED_MM_S, RADIUS_MM};
 use crate::report::{
-    Cell, Column, DeviationTrace, Figure, Lines, Plot, PolarDeviation, Style, Table,
+    Cell, Column, DeviationTrace, Figure, Lines, Plot, PolarDeviation, Series, Style, Table,
 };
 
 /// Circular deviation and reversal spikes.
@@ -12,7 +12,7 @@ pub(super) fn circle_table(circles: &[CircleOutcome]) -> Table {
         id: "circle-test".to_owned(),
         caption: format!(
             "Circle of {RADIUS_MM} mm radius at {FEED_MM_S} mm/s in XY, counter-clockwise, virtual machine: circular \
-             deviation G (largest minus smallest radial deviation, as in ISO 230-4), and mean radial height of the \
+             deviation G (radial range about the least-squares centre, ISO 230-4), and mean radial height of the \
              spikes at the four reversals"
         ),
         columns: vec![
@@ -33,6 +33,17 @@ pub(super) fn circle_table(circles: &[CircleOutcome]) -> Table {
     }
 }
 
+/// A path's deviation, mm, over its angle, rad, as a curve in um over degrees from 0 to 360.
+fn over_angle(name: String, path: &[(f64, f64)], style: Style) -> Series {
+    let mut points: Vec<(f64, f64)> = path
+        .iter()
+        .map(|&(angle, deviation)| (angle.to_degrees().rem_euclid(360.0), deviation * UM_PER_MM))
+        .collect();
+    points.sort_by(|(one, _), (other, _)| one.total_cmp(other));
+    let (x, y) = points.into_iter().unzip();
+    Series { name, x, y, style }
+}
+
 /// The circle as a ball-bar draws it, and the same deviation over the angle.
 pub(super) fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
     let traces = circles
@@ -49,22 +60,12 @@ pub(super) fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
             style: Style::nth(index),
         })
         .collect();
-    let over_time = circles
+    let over_angle = circles
         .iter()
         .enumerate()
         .map(|(index, circle)| {
-            let deviations: Vec<f64> = circle
-                .path
-                .iter()
-                .map(|&(_, deviation)| deviation)
-                .collect();
-            let turn = 1.0 / deviations.len() as f64;
-            error_curve(
-                circle.configuration.name(),
-                &deviations,
-                turn,
-                Style::nth(index),
-            )
+            let name = circle.configuration.name();
+            over_angle(name, &circle.path, Style::nth(index))
         })
         .collect();
     vec![
@@ -80,11 +81,11 @@ pub(super) fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
         },
         Figure {
             id: "circle-deviation".to_owned(),
-            caption: "The same radial deviation over the turn, from 45 degrees".to_owned(),
+            caption: "The same radial deviation over the angle".to_owned(),
             plot: Plot::Lines(Lines {
-                x_label: "turn (1)".to_owned(),
+                x_label: "angle (deg)".to_owned(),
                 y_label: "radial deviation (um)".to_owned(),
-                series: over_time,
+                series: over_angle,
                 ..Lines::default()
             }),
         },

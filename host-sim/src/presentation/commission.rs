@@ -130,9 +130,9 @@ pub fn commission_page(
         .extend([parameters, bands].map(Block::Table));
     let mut sections = vec![
         Section {
+            provenance: None,
             id: "result".to_owned(),
             heading: "What it achieves".to_owned(),
-            provenance: None,
             prose: Vec::new(),
             blocks: vec![
                 Block::Table(verdict_table(&found.verdicts)),
@@ -180,9 +180,9 @@ fn check_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
             .inertia_agreement(&found.settings)
             .unwrap_or(f64::NAN);
         sections.push(Section {
+            provenance: None,
             id: "motion".to_owned(),
             heading: "An ordinary motion".to_owned(),
-            provenance: None,
             prose: vec![format!(
                 "Inertia and friction of an ordinary motion, by inverse dynamics, the dead time taken from the linear model: its A is {agreement:.3} \
                  times that of the frequency response. A motion record cannot tell much of the pre-sliding friction."

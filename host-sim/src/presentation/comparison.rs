@@ -177,37 +177,37 @@ pub fn comparison_page(
         provenance,
         sections: vec![
             Section {
+                provenance: None,
                 id: "summary".to_owned(),
                 heading: "The thesis' headlines".to_owned(),
-                provenance: None,
                 prose: vec![experiment_prose()],
                 blocks: headlines,
             },
             Section {
+                provenance: None,
                 id: "scores".to_owned(),
                 heading: "Tracking error and quadrant glitch".to_owned(),
-                provenance: None,
                 prose: vec![metric_prose(), knowledge_prose()],
                 blocks: scores,
             },
             Section {
+                provenance: None,
                 id: "matched".to_owned(),
                 heading: "Error over time, matched".to_owned(),
-                provenance: None,
                 prose: vec![],
                 blocks: errors(Knowledge::Matched),
             },
             Section {
+                provenance: None,
                 id: "virtual-machine".to_owned(),
                 heading: "Error over time, virtual machine".to_owned(),
-                provenance: None,
                 prose: vec![],
                 blocks: errors(Knowledge::VirtualMachine),
             },
             Section {
+                provenance: None,
                 id: "circle".to_owned(),
                 heading: "Circle in XY".to_owned(),
-                provenance: None,
                 prose: vec![],
                 blocks: circle_tables
                     .into_iter()

@@ -274,9 +274,9 @@ impl NonlinearPage {
             .map(|(index, (law, step))| (step_name(law, step), step, Style::nth(index)))
             .collect();
         let section = |id: &str, heading: &str, prose: &str, blocks: Vec<Block>| Section {
+            provenance: None,
             id: id.to_owned(),
             heading: heading.to_owned(),
-            provenance: None,
             prose: vec![prose.to_owned()],
             blocks,
         };

@@ -154,9 +154,9 @@ impl PidPage<'_> {
         let (gains, margins) = (tables.next(), tables.next());
         let mut sections = vec![
             Section {
+                provenance: None,
                 id: "result".to_owned(),
                 heading: "Gains and margins".to_owned(),
-                provenance: None,
                 prose: vec![
                     "The sampled loop drives the axis through the converter's hold with the firmware's difference equations; its margins \
                      are those that the machine has."
@@ -165,9 +165,9 @@ impl PidPage<'_> {
                 blocks: gains.into_iter().chain(margins).collect(),
             },
             Section {
+                provenance: None,
                 id: "open-loop".to_owned(),
                 heading: "Open loop".to_owned(),
-                provenance: None,
                 prose: Vec::new(),
                 blocks: bode_blocks(&loops)
                     .into_iter()
@@ -175,18 +175,18 @@ impl PidPage<'_> {
                     .collect(),
             },
             Section {
+                provenance: None,
                 id: "sensitivities".to_owned(),
                 heading: "Closed loop".to_owned(),
-                provenance: None,
                 prose: Vec::new(),
                 blocks: sensitivity_blocks(&loops).into(),
             },
         ];
         if let Some(step) = &self.step {
             sections.push(Section {
+                provenance: None,
                 id: "step-response".to_owned(),
                 heading: "Step response".to_owned(),
-                provenance: None,
                 prose: Vec::new(),
                 blocks: tables
                     .chain(step_blocks(&[(

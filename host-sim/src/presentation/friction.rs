@@ -104,9 +104,9 @@ pub fn friction_section(map: &FrictionMap, found: &FrictionFit) -> Section {
         ));
     }
     Section {
+        provenance: None,
         id: "friction".to_owned(),
         heading: "Friction at constant velocity".to_owned(),
-        provenance: None,
         prose: vec![
             "At constant velocity the voltage is the friction. The slope at high velocity is sigma + B / A, which motion cannot tell \
              apart, and each direction's level contains the amplifier's offset."
@@ -194,9 +194,9 @@ pub fn presliding_section(found: &GmsFit, breakaway_v: f64) -> Section {
         .map(|mm| 1e3 * mm)
         .collect();
     Section {
+        provenance: None,
         id: "pre-sliding".to_owned(),
         heading: "Pre-sliding friction".to_owned(),
-        provenance: None,
         prose: vec![
             "Branches of the measured hysteresis, halved by the Masing rule, are the virgin curve; its knots are the slip-blocks, refined on \
              the whole record. The prediction is the library's own GMS model along the measured position."

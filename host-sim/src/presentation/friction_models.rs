@@ -211,6 +211,7 @@ pub fn friction_models_page(
             drifting(behaviours),
             lagging(behaviours),
             Section {
+                provenance: None,
                 id: "tracking".to_owned(),
                 heading: "As feedforward".to_owned(),
                 prose: vec![

@@ -105,9 +105,9 @@ pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>
         "The loop was open: the estimate is H1, of position over voltage"
     };
     Section {
+        provenance: None,
         id: "response".to_owned(),
         heading: "Frequency response".to_owned(),
-        provenance: None,
         prose: vec![format!(
             "{} blocks averaged, resolution {} Hz. {estimator}; the hold of the converter is divided out.",
             measurement.estimate.blocks, measurement.estimate.resolution_hz
@@ -135,9 +135,9 @@ pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantModel)
         bode_figures("response", "Response, position over voltage", &curves).into();
     blocks.push(Block::Figure(quality_figure(response)));
     Section {
+        provenance: None,
         id: "response".to_owned(),
         heading: "Frequency response".to_owned(),
-        provenance: None,
         prose: Vec::new(),
         blocks,
     }

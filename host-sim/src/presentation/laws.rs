@@ -180,8 +180,8 @@ fn laws_figure(outcomes: &[LawOutcome]) -> Figure {
 /// All that there is to say of the laws.
 pub fn laws_section(laws: &[TunedLaw], outcomes: &[LawOutcome]) -> Section {
     Section {
-        id: "laws-compared".to_owned(),
         provenance: None,
+        id: "laws-compared".to_owned(),
         heading: "Feedback laws, fairly tuned".to_owned(),
         prose: vec![
             "Every law keeps the same bounds on sensitivity at small errors, on the same identified model, and uses them up. What the \

@@ -139,9 +139,9 @@ pub fn motion_page(
         provenance,
         sections: vec![
             Section {
+                provenance: None,
                 id: "models".to_owned(),
                 heading: "Models and parameters".to_owned(),
-                provenance: None,
                 prose: vec![
                     "Each model has one part more than the one before. The one whose error is smallest where it was not fitted is \
                      shown below, among those whose friction does not rise with the velocity but for its viscous part."
@@ -150,9 +150,9 @@ pub fn motion_page(
                 blocks: tables.into_iter().map(Block::Table).collect(),
             },
             Section {
+                provenance: None,
                 id: "explained".to_owned(),
                 heading: "What the model explains".to_owned(),
-                provenance: None,
                 prose: Vec::new(),
                 blocks: vec![
                     Block::Figure(lines(

@@ -39,9 +39,9 @@ pub fn motor_constant_section(found: &MotorConstant, moving_mass_kg: Option<f64>
         velocity,
     );
     Section {
+        provenance: None,
         id: "open-loop-test".to_owned(),
         heading: "Open-loop test".to_owned(),
-        provenance: None,
         prose: vec![
             "The voltage steps between two levels of one sign: the axis slides on, its friction stays the same, and what changes \
              is the acceleration, by A for each volt."

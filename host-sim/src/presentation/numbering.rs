@@ -11,6 +11,7 @@ pub(super) fn number(sections: Vec<Section>, chapter: &str, numbers: &[Number]) 
     sections
         .into_iter()
         .map(|section| Section {
+            provenance: None,
             id: format!("{chapter}-{}", section.id),
             blocks: section
                 .blocks

@@ -113,9 +113,9 @@ pub fn recorded_page(
         subtitle: format!("{axis}, simulated; the recorded machine's own error, measured, beside it"),
         provenance,
         sections: vec![Section {
+            provenance: None,
             id: "result".to_owned(),
             heading: "Tracking error".to_owned(),
-            provenance: None,
             prose: vec![
                 "The axis' model is the compensator's own (matched), so these errors are what the method can reach on \
                  this reference, not what the machine would show. Errors are drawn from the end of the settling time."

@@ -142,9 +142,9 @@ pub(super) fn revise_sections(
         ));
     }
     let mut sections = vec![Section {
+        provenance: None,
         id: "revised".to_owned(),
         heading: "Linear model and friction together".to_owned(),
-        provenance: None,
         prose: vec![
             "An axis' frequency response already contains its friction. With friction explicit, A, B and C are revised until \
              both together show what was measured; every candidate is excited as the axis was. The friction carries the whole \
@@ -175,9 +175,9 @@ pub(super) fn revise_sections(
             })
             .collect();
         sections.push(Section {
+            provenance: None,
             id: "amplitude".to_owned(),
             heading: "The response depends on the amplitude".to_owned(),
-            provenance: None,
             prose: vec![
                 "The same axis at several amplitudes of the excitation. At small ones the pre-sliding friction is a spring and \
                  the response flattens; at large ones friction is a small part of the voltage, and the response nears the \

@@ -187,8 +187,8 @@ pub fn wrong_model_section(outcomes: &[WrongOutcome]) -> Section {
     );
     let [largest, rms] = READINGS;
     Section {
-        id: "wrong-model".to_owned(),
         provenance: None,
+        id: "wrong-model".to_owned(),
         heading: "\u{201c}A well-tuned PID is as good\u{201d}".to_owned(),
         prose: vec![
             "The usual objection to friction feedforward. All competitors keep the same bounds on sensitivity: the PID, whose share of \

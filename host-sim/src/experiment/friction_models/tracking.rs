@@ -2,12 +2,13 @@
 //! model or another.
 
 use indicatif::ProgressBar;
+use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::AxisSettings;
 use rayon::prelude::*;
 
 use super::Model;
-use crate::experiment::comparison::{Configuration, Controller, run_configuration};
+use crate::experiment::comparison::{Configuration, run_configuration};
 use crate::experiment::compensator::{Setup, identified};
 use crate::experiment::metrics::Score;
 use crate::experiment::run::RunError;
@@ -88,7 +89,7 @@ pub fn track(
             let mut setup = Setup::virtual_machine(stage.clone());
             setup.truth.axes[0] = with_model(axis, truth).ok_or(TrackingError::NotFitted)?;
             let configuration = Configuration {
-                controller: Controller::NPid,
+                controller: LawKind::NPid,
                 feedforward: kind,
             };
             let outcomes = run_configuration::<f32>(configuration, &setup, seed)?;
