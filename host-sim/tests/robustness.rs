@@ -1,6 +1,5 @@
 //! The robustness experiment measures what it says.
 
-use indicatif::ProgressBar;
 use quadrant::safety::FaultCode;
 use quadrant::settings::StageSettings;
 use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
@@ -37,7 +36,7 @@ fn request(names: &[&str], seed: u64, seeds: u64) -> RobustnessRequest {
 }
 
 fn run(request: &RobustnessRequest) -> Vec<RobustnessOutcome> {
-    run_robustness(request, &ProgressBar::hidden()).unwrap()
+    run_robustness(request, &|| {}).unwrap()
 }
 
 fn largest_um(outcomes: &[RobustnessOutcome], scenario: &str, competitor: &str) -> f64 {

@@ -3,19 +3,14 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::experiment::compensator::identified;
-use quadrant_sim::experiment::laws::comparison::compare_laws;
-use quadrant_sim::experiment::laws::tuning::tune_all;
-use quadrant_sim::experiment::laws::wrong_model::{Competitor, cases, run_wrong_models};
-use quadrant_sim::identify::characteristic::{CharacteristicSettings, measure};
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::experiment::laws::study::run_study;
 use quadrant_sim::presentation::{laws_section, provenance, wrong_model_section};
 use quadrant_sim::report::{Block, Page};
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::identify::rig::Axis;
-use super::output::{Output, command_line, progress, share};
+use super::output::{Output, command_line, share};
 
 /// Options of `quadrant laws`.
 #[derive(Clone, Debug, Args)]
@@ -33,8 +28,8 @@ pub(super) struct Arguments {
     output: Output,
 }
 
-/// Feedforwards that each law is compared with.
-const FEEDFORWARDS: [FeedforwardKind; 2] = [FeedforwardKind::None, FeedforwardKind::Combined];
+/// Steps of the progress bar.
+const STEPS: u64 = 1_000_000;
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, axis, .. } = arguments;
@@ -42,54 +37,25 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(path) => SettingsFile::read(path)?.stage,
         None => identified()?.stage,
     };
-    let settings = &stage.axes[axis.index()];
-    let truth = &StageTruth::real().axes[axis.index()];
-    let characteristic = measure(
-        &mut axis.rig(output.seed),
-        &CharacteristicSettings::default(),
-        &mut |_| {},
-    )?;
-
-    let bar = share("tuning every law");
-    let laws = tune_all(
-        settings,
-        &characteristic,
-        stage.rate_hz,
+    let bar = share("tuning and running the laws");
+    bar.set_length(STEPS);
+    let study = run_study(
+        &stage,
+        axis.index(),
         output.seed,
-        &|done| {
-            bar.set_position((1000.0 * done) as u64);
-        },
+        arguments.seeds,
+        &|done| bar.inc((done * STEPS as f64) as u64),
     )?;
     bar.finish_and_clear();
-
-    let runs = (laws.len() * FEEDFORWARDS.len()) as u64 * arguments.seeds;
-    let studies = (Competitor::ALL.len() * cases().len()) as u64;
-    let bar = progress(runs + studies, "running the laws");
-    let outcomes = compare_laws(
-        &laws,
-        &FEEDFORWARDS,
-        (settings, truth),
-        stage.rate_hz,
-        output.seed..output.seed + arguments.seeds,
-        &|| bar.inc(1),
-    )?;
-    let wrong = run_wrong_models(
-        &laws,
-        (settings, truth),
-        stage.rate_hz,
-        output.seed,
-        &|| {
-            bar.inc(1);
-        },
-    )?;
-    bar.finish_and_clear();
-
     println!(
         "Simulated, not measured. {} axis, 10 kHz, f32; seeds from {}\n",
         axis.name(),
         output.seed
     );
-    let sections = vec![laws_section(&laws, &outcomes), wrong_model_section(&wrong)];
+    let sections = vec![
+        laws_section(&study.laws, &study.outcomes),
+        wrong_model_section(&study.wrong),
+    ];
     for block in sections.iter().flat_map(|section| &section.blocks) {
         if let Block::Table(table) = block {
             output.table(table)?;

@@ -4,19 +4,11 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant::settings::StageSettings;
 use quadrant_sim::experiment::compensator::identified;
-use quadrant_sim::experiment::robustness::compliance::{
-    Compliance, FREQUENCIES_HZ, frictionless, linear_compliance, pid_alone, simulated_compliance,
-};
-use quadrant_sim::experiment::robustness::drives::{commission_drives, drive_cases};
-use quadrant_sim::experiment::robustness::{
-    RobustnessRequest, run_robustness, scenarios, usual_competitors,
-};
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::experiment::robustness::study::{StudyRequest, run_study, runs};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::presentation::{
-    RobustnessReport, provenance, robustness_full_table, robustness_sections, robustness_tables,
+    provenance, robustness_full_table, robustness_sections, robustness_tables,
 };
 use quadrant_sim::record::{ForceRecord, write_trace};
 use quadrant_sim::report::Page;
@@ -68,51 +60,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(path) => SettingsFile::read(path)?.stage,
         None => identified()?.stage,
     };
-    let mut request = RobustnessRequest {
-        competitors: usual_competitors(&stage),
+    let request = StudyRequest {
+        stage,
         axis: axis.index(),
-        scenarios: scenarios(axis.index(), recorded_force(arguments)?),
+        backlash_mm: 1e-3 * arguments.backlash_um,
+        force: recorded_force(arguments)?,
+        only: arguments.only.clone(),
         seed: output.seed,
         seeds: arguments.seeds,
     };
-    let wanted = |name: &str| {
-        let only = arguments.only.as_deref();
-        only.is_none_or(|text| name.contains(text))
-    };
-    let mut cases = drive_cases(axis.index(), 1e-3 * arguments.backlash_um);
-    cases.retain(|case| wanted(&case.name));
-    let bar = progress(cases.len() as u64, "commissioning on other drives");
-    let (drives, refused) = commission_drives(axis.index(), cases, output.seed, &bar);
+    let bar = progress(runs(&request), "running the scenarios");
+    let report = run_study(&request, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    let references = ["nominal", "hold", "slow feed"];
-    request
-        .scenarios
-        .retain(|scenario| wanted(&scenario.name) || references.contains(&scenario.name.as_str()));
-    request.scenarios.extend(drives);
-    if !request
-        .scenarios
-        .iter()
-        .any(|scenario| wanted(&scenario.name))
-        && refused.is_empty()
-    {
-        bail!(
-            "--only is {:?}, and no scenario's name contains that; without it the first table lists them all",
-            arguments.only.as_deref().unwrap_or_default()
-        );
-    }
-    let bar = progress(request.runs(), "running the scenarios");
-    let outcomes = run_robustness(&request, &bar)?;
-    bar.finish_and_clear();
-    let compliances = match &arguments.only {
-        None => compliances(&stage, &request)?,
-        Some(_) => Vec::new(),
-    };
-    let report = RobustnessReport {
-        scenarios: request.scenarios,
-        outcomes,
-        refused,
-        compliances,
-    };
     println!(
         "Simulated, not measured: {} axis; runs of each: {}, seeds from {} on\n",
         axis.name(),
@@ -154,50 +113,6 @@ fn recorded_force(
         )
     })?;
     Ok(Some(force))
-}
-
-/// The linear model's compliance, the frictionless axis', and that of each law on the axis as it is.
-fn compliances(
-    stage: &StageSettings,
-    request: &RobustnessRequest,
-) -> anyhow::Result<Vec<Compliance>> {
-    let truth = StageTruth::real().axes[request.axis].clone();
-    let first = |stage: &StageSettings| {
-        let mut stage = stage.clone();
-        stage.axes[0] = stage.axes[request.axis].clone();
-        stage
-    };
-    let alone = first(&pid_alone(stage));
-    let own = &alone.axes[0];
-    let plant = own.plant.context(
-        "the settings hold no linear model of the axis: commission it, or give other --settings",
-    )?;
-    let linear = FREQUENCIES_HZ
-        .map(|hz| Some(linear_compliance(&plant, own, stage.rate_hz, hz).norm()))
-        .to_vec();
-    let mut all = vec![
-        Compliance {
-            name: "PID, linear model".to_owned(),
-            mm_per_v: linear,
-        },
-        simulated_compliance(
-            "PID, no friction",
-            &alone,
-            &frictionless(&truth),
-            request.seed,
-        )?,
-    ];
-    // At rest the feedforward is silent: laws that differ in nothing else are one.
-    let mut seen: Vec<StageSettings> = Vec::new();
-    for (name, settings) in &request.competitors {
-        let mut silent = first(settings);
-        silent.axes[0].feedforward = own.feedforward;
-        if !seen.contains(&silent) {
-            all.push(simulated_compliance(name, &silent, &truth, request.seed)?);
-            seen.push(silent);
-        }
-    }
-    Ok(all)
 }
 
 /// Writes the force that the cutting scenarios are made with: synthetic, and a template of a recorded one.

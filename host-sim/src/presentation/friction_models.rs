@@ -190,7 +190,17 @@ pub fn friction_models_page(
         title: "Friction models".to_owned(),
         subtitle: format!("{axis}; simulated, not measured"),
         provenance,
-        sections: vec![
+        sections: friction_models_sections(parameters, behaviours, tracked),
+    }
+}
+
+/// The sections of the page.
+pub fn friction_models_sections(
+    parameters: &Parameters,
+    behaviours: &[Behaviour],
+    tracked: &[Tracked],
+) -> Vec<Section> {
+    vec![
             Section {
                 provenance: None,
                 id: "summary".to_owned(),
@@ -220,8 +230,7 @@ pub fn friction_models_page(
                 ],
                 blocks: vec![Block::Table(tracking_table(tracked))],
             },
-        ],
-    }
+        ]
 }
 
 fn presliding(behaviours: &[Behaviour]) -> Section {

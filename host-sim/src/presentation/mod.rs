@@ -40,7 +40,8 @@ pub use design_npid::NonlinearPage;
 pub use design_pid::{PidPage, margins_table, pid_table, step_table};
 pub use friction::{friction_section, friction_table, gms_table, presliding_section};
 pub use friction_models::{
-    friction_models_page, friction_models_table, friction_parameters_table, tracking_table,
+    friction_models_page, friction_models_sections, friction_models_table,
+    friction_parameters_table, tracking_table,
 };
 pub use identify::{fitted_response_section, motor_constant_table, plant_tables, response_section};
 pub use laws::{laws_section, laws_table, tuning_table};
@@ -50,9 +51,7 @@ pub use numerics::numerics_table;
 pub use part_program::{motion_summary_table, program_page, program_table};
 pub use recorded::{recorded_page, recorded_table};
 pub use revise::{AmplitudeResponse, revise_page, revise_table};
-pub use robustness::{
-    RobustnessReport, robustness_full_table, robustness_sections, robustness_tables,
-};
+pub use robustness::{robustness_full_table, robustness_sections, robustness_tables};
 pub use validation::validation_table;
 pub use wrong_model::wrong_model_section;
 

@@ -4,22 +4,9 @@ use super::UM_PER_MM;
 use super::robustness_figures::{compliance_figure, dots, error_figure};
 use crate::experiment::metrics::{Score, change_percent};
 use crate::experiment::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
-use crate::experiment::robustness::drives::Refused;
-use crate::experiment::robustness::{RobustnessOutcome, Scenario, baseline, find};
+use crate::experiment::robustness::study::RobustnessReport;
+use crate::experiment::robustness::{RobustnessOutcome, baseline, find};
 use crate::report::{Block, Cell, Column, Section, Table};
-
-/// What a run of the experiment left.
-#[derive(Debug)]
-pub struct RobustnessReport {
-    /// The scenarios, in the order of the tables.
-    pub scenarios: Vec<Scenario>,
-    /// What the competitors did in them.
-    pub outcomes: Vec<RobustnessOutcome>,
-    /// Drives on which no controller could be commissioned, and why.
-    pub refused: Vec<Refused>,
-    /// Compliances, the linear model's first; none where they were not asked for.
-    pub compliances: Vec<Compliance>,
-}
 
 struct Reading {
     id: &'static str,

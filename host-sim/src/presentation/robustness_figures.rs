@@ -1,8 +1,8 @@
 //! The robustness experiment's figures.
 
-use super::robustness::RobustnessReport;
 use super::{UM_PER_MM, error_curve};
 use crate::experiment::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
+use crate::experiment::robustness::study::RobustnessReport;
 use crate::experiment::robustness::{Scenario, find};
 use crate::report::{DotSeries, Dots, Figure, Lines, Plot, Scale, Series, Spread, Style};
 

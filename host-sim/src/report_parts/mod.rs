@@ -6,6 +6,7 @@
 mod chapters;
 mod context;
 mod designs;
+mod neighbours;
 mod progress;
 mod store;
 
@@ -61,6 +62,34 @@ pub const PARTS: &[Part] = &[
         expected_s: |_| 2.0,
         needs_comparison: true,
         run: chapters::chapter5,
+    },
+    Part {
+        id: "laws",
+        title: "Every feedback law at equal robustness, and what feedforward is worth when its model is wrong",
+        expected_s: |_| 70.0,
+        needs_comparison: false,
+        run: neighbours::laws,
+    },
+    Part {
+        id: "friction-models",
+        title: "Dahl, LuGre, GMS and smoothed GMS: pre-sliding, memory, drift, lag, and each as feedforward",
+        expected_s: |_| 20.0,
+        needs_comparison: false,
+        run: neighbours::friction_models,
+    },
+    Part {
+        id: "robustness",
+        title: "Changed mass, friction, delay, amplifier, encoder; cutting; other drives",
+        expected_s: |_| 30.0,
+        needs_comparison: false,
+        run: neighbours::scenarios,
+    },
+    Part {
+        id: "circle",
+        title: "Circle tests after ISO 230-4 in three planes",
+        expected_s: |_| 20.0,
+        needs_comparison: false,
+        run: neighbours::circles,
     },
 ];
 

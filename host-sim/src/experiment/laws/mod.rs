@@ -12,5 +12,6 @@
 //! [`tuning`] tunes, [`comparison`] compares, [`wrong_model`] asks what remains when the feedforward's model is wrong.
 
 pub mod comparison;
+pub mod study;
 pub mod tuning;
 pub mod wrong_model;

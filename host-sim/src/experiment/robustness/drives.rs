@@ -1,6 +1,5 @@
 //! The axis on other drives, each with a controller that was designed for it in the same way: by commissioning it.
 
-use indicatif::ProgressBar;
 use quadrant::settings::{AxisSettings, StageSettings};
 use rayon::prelude::*;
 
@@ -66,18 +65,18 @@ pub fn commission_drive(
 pub type Refused = (DriveCase, CommissionError);
 
 /// Commissions the axis on every drive, in parallel: the scenarios with those that were found, and the drives on which the
-/// commissioning ended early. `progress` advances by one a drive.
+/// commissioning ended early. `progress` is called a drive.
 pub fn commission_drives(
     index: usize,
     cases: Vec<DriveCase>,
     seed: u64,
-    progress: &ProgressBar,
+    progress: &(dyn Fn() + Sync),
 ) -> (Vec<Scenario>, Vec<Refused>) {
     let found: Vec<_> = cases
         .into_par_iter()
         .map(|case| {
             let found = commission_drive(index, &case.truth, seed);
-            progress.inc(1);
+            progress();
             (case, found)
         })
         .collect();

@@ -8,9 +8,9 @@
 pub mod compliance;
 pub mod drives;
 pub mod scenario;
+pub mod study;
 mod trial;
 
-use indicatif::ProgressBar;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::safety::Fault;
@@ -143,13 +143,13 @@ fn transferred(competitor: &AxisSettings, found: &AxisSettings) -> AxisSettings 
 }
 
 /// Runs every competitor in every scenario with every seed, in parallel; the same request gives the same outcomes, scenario by
-/// scenario. A fault is a result. `progress` advances by one a run, of which there are [`RobustnessRequest::runs`].
+/// scenario. A fault is a result. `progress` is called a run, of which there are [`RobustnessRequest::runs`].
 ///
 /// # Errors
 /// Settings that are refused, or a motion that does not end.
 pub fn run_robustness(
     request: &RobustnessRequest,
-    progress: &ProgressBar,
+    progress: &(dyn Fn() + Sync),
 ) -> Result<Vec<RobustnessOutcome>, RobustnessError> {
     let pairs: Vec<_> = request
         .scenarios
@@ -178,7 +178,7 @@ pub fn run_robustness(
                     let ended = trial
                         .run()
                         .map_err(|stopped| stopped.named(competitor, &scenario.name));
-                    progress.inc(1);
+                    progress();
                     // Traces are long: all but those that are wanted go at once.
                     ended.map(|mut ended| {
                         if index > 0 || !scenario.keeps_trace {
