@@ -45,6 +45,8 @@ pub struct Axis<S: Scalar, const N: usize> {
     pub(crate) feedback: Feedback<S>,
     pub(crate) feedforward: Feedforward<S, N>,
     pub(crate) preview_ticks: usize,
+    /// How long a motion waits, so that the feedback's reference starts when that of every axis does.
+    pub(crate) wait_ticks: u32,
     pub(crate) amplifier: Amplifier<S>,
     pub(crate) following_error_limit: S,
     pub(crate) transfer_decay: S,
@@ -56,6 +58,8 @@ pub struct AxisState<S: Scalar, const N: usize> {
     encoder: EncoderState,
     motion: MotionState,
     running: bool,
+    /// Ticks until the motion begins.
+    waiting: u32,
     /// What speaks against the axis in this tick.
     pub(crate) suspect: Option<FaultCode>,
     /// The reference's step at the feedforward's tick.
@@ -78,6 +82,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             encoder: EncoderState::default(),
             motion: MotionState::default(),
             running: false,
+            waiting: 0,
             suspect: None,
             step: ReferenceStep::default(),
             ahead: Position::ZERO,
@@ -130,12 +135,15 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     pub(crate) fn run(&self, state: &mut AxisState<S, N>) {
         state.motion = MotionState::start(state.ahead);
         state.running = true;
+        state.waiting = self.wait_ticks;
     }
 
     /// Advances the reference and forms the error; says whether the axis follows. `tick` numbers the ticks.
     #[inline(never)]
     pub(crate) fn refer(&self, state: &mut AxisState<S, N>, motion: &Motion<S>, tick: u32) -> bool {
-        let ahead = if state.running {
+        let waits = state.waiting > 0;
+        state.waiting = state.waiting.saturating_sub(1);
+        let ahead = if state.running && !waits {
             let sample = motion.step(&mut state.motion);
             state.running = !motion.finished(&state.motion);
             sample

@@ -19,8 +19,13 @@ impl StageSettings {
         self.validate(N)?;
         let period_s = 1.0 / self.rate_hz;
         let [x, y, z] = &self.axes;
+        let previews = self
+            .axes
+            .each_ref()
+            .map(|axis| axis.preview_ticks(period_s));
+        let longest = previews.into_iter().fold(0, usize::max);
         Ok(Stage {
-            axes: [x.build(period_s), y.build(period_s), z.build(period_s)],
+            axes: [x, y, z].map(|axis| axis.build(period_s, longest)),
         })
     }
 
@@ -34,7 +39,18 @@ impl StageSettings {
 }
 
 impl AxisSettings {
-    fn build<S: Scalar, const N: usize>(&self, period_s: f64) -> Axis<S, N> {
+    /// The preview in whole ticks.
+    fn preview_ticks(&self, period_s: f64) -> usize {
+        libm::round(self.feedforward.preview_s / period_s) as usize
+    }
+
+    /// `longest_preview_ticks` is the stage's.
+    fn build<S: Scalar, const N: usize>(
+        &self,
+        period_s: f64,
+        longest_preview_ticks: usize,
+    ) -> Axis<S, N> {
+        let preview_ticks = self.preview_ticks(period_s);
         let (encoder, amplifier) = (&self.encoder, &self.amplifier);
         let (feedback, feedforward) = (&self.feedback, &self.feedforward);
         let largest_step = 2.0 * self.limits.max_velocity_mm_s * period_s / encoder.resolution_mm;
@@ -64,7 +80,8 @@ impl AxisSettings {
                 &self.friction,
                 period_s,
             ),
-            preview_ticks: libm::round(feedforward.preview_s / period_s) as usize,
+            preview_ticks,
+            wait_ticks: (longest_preview_ticks - preview_ticks) as u32,
             amplifier: Amplifier {
                 limit: S::quantise(amplifier.output_limit_v, Quantity::Voltage),
                 codes_per_volt: S::gain(

@@ -7,7 +7,7 @@ use quadrant::feedforward::{
 };
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{FrictionSettings, PlanSettings, StageSettings, x_axis};
-use quadrant::units::DacCode;
+use quadrant::units::{DacCode, Position};
 
 use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x};
 
@@ -258,4 +258,32 @@ fn a_stage_of_any_kind_is_small() {
     let state = size_of::<quadrant::stage::StageState<f32>>();
     println!("stage {stage} bytes, its state {state} bytes");
     assert!(stage + state < 30 << 10, "{stage} + {state} bytes");
+}
+
+/// A path in the plane keeps its shape: an axis whose plant is slower must not drag its reference behind.
+#[test]
+fn axes_with_different_previews_keep_one_time() {
+    let mut settings = StageSettings::default();
+    for (axis, preview_s) in settings.axes.iter_mut().zip([1.2e-3, 0.0, 1.3e-3]) {
+        *axis = quadrant::settings::x_axis();
+        axis.feedforward.preview_s = preview_s;
+    }
+    let sine = sine_on_x(1.0, 10.0).motions[0].clone();
+    let plan = PlanSettings {
+        motions: [sine.clone(), sine.clone(), sine],
+    };
+    let mut rig = Rig::<f32>::new(&settings, &plan);
+    rig.start();
+    let mut moved = false;
+    for tick in 0..400 {
+        rig.tick();
+        let [x, y, z] = rig
+            .state
+            .axes()
+            .each_ref()
+            .map(|axis| axis.telemetry().reference);
+        assert!(x == y && y == z, "tick {tick}: {x:?} {y:?} {z:?}");
+        moved |= x != Position::ZERO;
+    }
+    assert!(moved);
 }

@@ -26,6 +26,8 @@ mod reference_recorded;
 mod safety;
 mod settings;
 mod settings_cross_checks;
+mod settings_fields;
+mod settings_law_fields;
 mod settings_plan;
 mod settings_storage;
 mod supervisor;

@@ -6,7 +6,8 @@ use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::with_x;
-use crate::settings::{ROOM, check_message, nonlinear, refusal};
+use crate::settings::{ROOM, check_message, refusal};
+use crate::settings_fields::nonlinear;
 use quadrant::control::feedback::LawKind;
 use quadrant::control::nctf::CharacteristicPoint;
 
