@@ -1,7 +1,7 @@
 //! The force that milling exerts on the table.
 //!
 //! The mechanistic model of a cutter with straight teeth, Y. Altintas, *Manufacturing Automation*, Cambridge University
-//! Press, 2nd ed. 2012, section 2.8: a tooth at the immersion angle phi, counted from the normal of the feed towards it,
+//! Press, 2nd ed. 2012, chapter 2: a tooth at the immersion angle phi, counted from the normal of the feed towards it,
 //! takes a chip of thickness `h = c sin(phi)` and is pushed back by `Ft = (Ktc h + Kte) a` along its path and
 //! `Fr = (Krc h + Kre) a` towards the cutter's axis. Each spindle turn repeats the force with its teeth, every tooth its
 //! own chip where the cutter runs out.
@@ -101,7 +101,7 @@ impl Milling {
         }
     }
 
-    /// The mean force over a turn, N, in closed form (Altintas, eq. 2.90 ff.): the integral over the engagement.
+    /// The mean force over a turn, N, in closed form: the integral of the model over the engagement.
     pub fn mean_force_n(&self, component: Component) -> f64 {
         let (enters, leaves) = self.engagement_rad;
         let between = |primitive: fn(f64) -> f64| primitive(leaves) - primitive(enters);
