@@ -5,6 +5,7 @@ mod command;
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
+use proptest::test_runner::RngSeed;
 use quadrant::settings::StageSettings;
 use quadrant_sim::program::{Limits, Program, ProgramError, Trajectory, Vector};
 
@@ -253,7 +254,12 @@ fn text(steps: &[Step]) -> String {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(40))]
+    #![proptest_config(ProptestConfig {
+        cases: 300,
+        rng_seed: RngSeed::Fixed(0x4E47_4331),
+        failure_persistence: None,
+        ..ProptestConfig::default()
+    })]
 
     #[test]
     fn no_program_exceeds_the_limits(
