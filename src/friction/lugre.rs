@@ -3,8 +3,8 @@
 //! `dz/dt = v - sigma0 |v| z / s(v)`, `F = sigma0 z + sigma1 dz/dt + sigma2 v`; sigma2 is the viscous friction of the
 //! static model and is added there. Its memory is one number, and it drifts under a vibrating load.
 //! Source: Canudas de Wit, Olsson, Astrom and Lischinsky, *A new model for control of systems with friction*, IEEE
-//! Transactions on Automatic Control 40 (1995); passivity needs `sigma1 <= sigma2 Fc / (Fs - Fc)` (Barahona and Canudas de
-//! Wit, *Modeling and control of systems with dynamic friction*, IEEE CDC 2002).
+//! Transactions on Automatic Control 40 (1995); passivity needs `sigma1 <= sigma2 Fc / (Fs - Fc)` (Barabanov and Ortega,
+//! *Necessary and sufficient conditions for passivity of the LuGre friction model*, the same 45, 2000).
 //!
 //! Discretised by the exact step at the velocity of the tick: `sigma0 z` covers the share `1 - exp(-sigma0 |v| Ts / s(v))`
 //! of its distance to `s(v) sgn(v)`. The share depends on the velocity alone, so it stands beside s(v) in the table; the

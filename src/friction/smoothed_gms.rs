@@ -2,9 +2,10 @@
 //!
 //! An element's force depends on the gap to its share, `g = alpha_i s(v) - F_i sgn(v)`, through a switch that falls from
 //! one to zero over the width `W_i`, a share of the element's breakaway level: `S(g) = min(max(g / W_i, 0), 1)` and
-//! `dF_i/dt = S k_i v + (1 - S) sgn(v) C (alpha_i - |F_i| / s(v))`. Nothing but the forces is remembered, so the force
-//! is a continuously differentiable function of the displacement between two reversals, and of every parameter. Without
-//! GMS's memory of having slipped, an element whose share rises takes part of the spring's force again.
+//! `dF_i/dt = S k_i v + (1 - S) sgn(v) C (alpha_i - |F_i| / s(v))`, but never faster towards the share than its spring, `k_i v`:
+//! in slow motion attraction would else make the element stiffer than it is, and give back more than it took. Nothing but
+//! the forces is remembered, so the force is a continuously differentiable function of the displacement between two
+//! reversals. Without GMS's memory of having slipped, an element whose share rises takes part of the spring's force again.
 //! Source: the idea is Boegli, De Laet, De Schutter and Swevers', *A smoothed GMS friction model suited for gradient-based
 //! friction state and parameter estimation*, IEEE/ASME Transactions on Mechatronics 19 (2014). The switch is ours: theirs
 //! has no closed solution.
@@ -121,6 +122,7 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
             let gap = share - along(*force);
             let push = distance.scale(element.stiffness);
             let beyond = gap - element.width;
+            let least = gap - push;
             let free = if beyond > S::ZERO { beyond } else { S::ZERO };
             let used = if push < free { push } else { free };
             let mut gap = gap - used;
@@ -132,7 +134,9 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
             let slipped = gap
                 .times(self.one - sticking, Quantity::Fraction)
                 .times(fading, Quantity::Fraction);
-            *force = along(share - (gap - slipped));
+            let next = gap - slipped;
+            let next = if next < least { least } else { next };
+            *force = along(share - next);
         }
     }
 

@@ -10,7 +10,7 @@ use crate::experiment::friction_models::{Behaviour, Curve, LAG_FREQUENCIES_HZ, M
 use crate::report::{Block, Cell, Column, Figure, Page, Provenance, Section, Series, Style, Table};
 
 /// Largest closing error of a small loop that counts as closed, of the breakaway level.
-const CLOSES: f64 = 0.01;
+const CLOSES: f64 = 0.05;
 
 /// What each model has and what it costs in truth (simulated).
 pub fn friction_models_table(behaviours: &[Behaviour]) -> Table {
