@@ -141,18 +141,16 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Advances the reference and forms the error; says whether the axis follows. `tick` numbers the ticks.
     #[inline(never)]
     pub(crate) fn refer(&self, state: &mut AxisState<S, N>, motion: &Motion<S>, tick: u32) -> bool {
-        let waits = state.waiting > 0;
-        state.waiting = state.waiting.saturating_sub(1);
-        let ahead = if state.running && !waits {
-            let sample = motion.step(&mut state.motion);
-            state.running = !motion.finished(&state.motion);
-            sample
+        let ahead = if state.running && state.waiting == 0 {
+            motion.step(&mut state.motion)
         } else {
             ReferenceSample {
                 position: state.ahead,
                 ..ReferenceSample::default()
             }
         };
+        state.waiting = state.waiting.saturating_sub(1);
+        state.running = state.running && !motion.finished(&state.motion);
         let displacement = (ahead.position - state.ahead).clipped();
         state.ahead = ahead.position;
 

@@ -7,7 +7,7 @@ use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant::units::Position;
 
-use crate::common::{Rig, with_x};
+use crate::common::{Rig, x_alone};
 
 const RESOLUTION_MM: f64 = 5e-4;
 /// Ticks before the change: into the motion, out of the lead-in.
@@ -29,7 +29,7 @@ fn plan() -> PlanSettings {
 /// counts. Returns the volts of every tick and the transfer offset.
 fn volts<S: Scalar>(first: &StageSettings, second: Option<&StageSettings>) -> Vec<(f64, f64)> {
     let mut rig = Rig::<S>::new(first, &plan());
-    let mut follower = Rig::<f64>::new(&StageSettings::default(), &plan());
+    let mut follower = Rig::<f64>::new(&x_alone(|_| {}), &plan());
     rig.start();
     follower.start();
     (0..BEFORE + AFTER)
@@ -104,7 +104,7 @@ fn linear(axis: &mut AxisSettings) {
 
 #[test]
 fn gains_change_without_a_jump() {
-    let first = with_x(linear);
+    let first = x_alone(linear);
     let changes: [Change; 5] = [
         ("kp", |axis| axis.feedback.pid.kp_v_per_mm *= 0.4),
         ("ki", |axis| axis.feedback.pid.ki_v_per_mm_s *= 10.0),
@@ -115,7 +115,7 @@ fn gains_change_without_a_jump() {
         }),
     ];
     for (what, change) in changes {
-        let second = with_x(|axis| {
+        let second = x_alone(|axis| {
             linear(axis);
             change(axis);
         });
@@ -126,7 +126,7 @@ fn gains_change_without_a_jump() {
 
 #[test]
 fn any_two_laws_exchange_without_a_jump() {
-    let with = |law| with_x(|axis| axis.feedback.law = law);
+    let with = |law| x_alone(|axis| axis.feedback.law = law);
     for from in LawKind::ALL {
         for to in LawKind::ALL {
             let what = format!("{from:?} to {to:?}");
@@ -140,7 +140,7 @@ fn any_two_laws_exchange_without_a_jump() {
 fn feedforward_kinds_exchange_without_a_jump() {
     for from in FeedforwardKind::ALL {
         for to in FeedforwardKind::ALL {
-            let kind = |kind| with_x(|axis| axis.feedforward.kind = kind);
+            let kind = |kind| x_alone(|axis| axis.feedforward.kind = kind);
             check::<f32>(&format!("{from:?} to {to:?}"), &kind(from), &kind(to));
         }
     }
@@ -148,7 +148,7 @@ fn feedforward_kinds_exchange_without_a_jump() {
 
 #[test]
 fn feedforward_gains_and_preview_change_without_a_jump() {
-    let first = StageSettings::default();
+    let first = x_alone(|_| {});
     let changes: [Change; 4] = [
         ("gms", |axis| axis.feedforward.gains.gms = 0.0),
         ("viscous", |axis| axis.feedforward.gains.viscous = 2.0),
@@ -158,7 +158,7 @@ fn feedforward_gains_and_preview_change_without_a_jump() {
         ("preview", |axis| axis.feedforward.preview_s = 0.0),
     ];
     for (what, change) in changes {
-        let second = with_x(change);
+        let second = x_alone(change);
         all_scalars(what, &first, &second);
         all_scalars(what, &second, &first);
     }
@@ -166,8 +166,8 @@ fn feedforward_gains_and_preview_change_without_a_jump() {
 
 #[test]
 fn a_second_change_starts_from_the_first_ones_remainder() {
-    let (pid, npid) = (with_x(linear), StageSettings::default());
-    let weak = with_x(|axis| axis.feedback.pid.kp_v_per_mm *= 0.4);
+    let (pid, npid) = (x_alone(linear), x_alone(|_| {}));
+    let weak = x_alone(|axis| axis.feedback.pid.kp_v_per_mm *= 0.4);
     let mut rig = Rig::<f32>::new(&pid, &PlanSettings::default());
     rig.start();
     rig.inputs.counts = [100, 0, 0];
@@ -186,8 +186,8 @@ fn a_second_change_starts_from_the_first_ones_remainder() {
 
 #[test]
 fn settings_exchanged_while_disabled_leave_no_offset() {
-    let mut rig = Rig::<f32>::new(&StageSettings::default(), &PlanSettings::default());
-    rig.exchange(&with_x(linear));
+    let mut rig = Rig::<f32>::new(&x_alone(|_| {}), &PlanSettings::default());
+    rig.exchange(&x_alone(linear));
     rig.tick();
     rig.start();
     assert_eq!(rig.state.axes()[0].telemetry().transfer, 0.0);

@@ -66,6 +66,16 @@ pub(crate) fn with_x(change: impl FnOnce(&mut quadrant::settings::AxisSettings))
     settings
 }
 
+/// The same, the other axes with x's preview, so that x waits for none.
+pub(crate) fn x_alone(change: impl FnOnce(&mut quadrant::settings::AxisSettings)) -> StageSettings {
+    let mut settings = with_x(change);
+    let [x, y, z] = &mut settings.axes;
+    for axis in [y, z] {
+        axis.feedforward.preview_s = x.feedforward.preview_s;
+    }
+    settings
+}
+
 /// A sine on x alone.
 pub(crate) fn sine_on_x(amplitude_mm: f64, velocity_mm_s: f64) -> PlanSettings {
     let mut plan = PlanSettings::default();

@@ -9,7 +9,7 @@ use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{FrictionSettings, PlanSettings, StageSettings, x_axis};
 use quadrant::units::{DacCode, Position};
 
-use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x};
+use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x, x_alone};
 
 const PERIOD_S: f64 = 1e-4;
 const WHOLE: FeedforwardGains = FeedforwardGains {
@@ -206,7 +206,7 @@ fn zero_gains_are_bit_identical_to_off() {
 #[test]
 fn preview_shifts_the_feedbacks_reference_by_whole_ticks() {
     let run = |preview_s: f64| {
-        let settings = with_x(|axis| axis.feedforward.preview_s = preview_s);
+        let settings = x_alone(|axis| axis.feedforward.preview_s = preview_s);
         let mut rig = Rig::<f64>::new(&settings, &sine_on_x(1.0, 10.0));
         rig.tick();
         rig.command(quadrant::safety::Command::Enable);
