@@ -2,7 +2,9 @@
 
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant::friction::PerDirection;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 
 use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
@@ -18,7 +20,7 @@ use crate::identify::single_state::with_all_models;
 use crate::identify::static_friction::{
     self, Exponent, FrictionFit, FrictionMap, StaticFrictionSettings, fit_map,
 };
-use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveSettings};
+use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveError, VirginCurveSettings};
 use crate::rig::{Recording, Rig, approach};
 
 /// What a commissioning is asked for.
@@ -90,6 +92,8 @@ const STEPS: [(&str, f64); 6] = [
 const HOME_MM: f64 = 0.0;
 /// How often the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
+/// Fewest elements that a record is tried with when it does not determine more.
+const LEAST_ELEMENTS: usize = 4;
 /// Largest relative error of the predicted hysteresis.
 const MOST_HYSTERESIS_ERROR: f64 = 0.10;
 
@@ -153,8 +157,7 @@ pub fn commission(
     let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
     let recording = virgin_curve::measure(rig, &sine, &mut |share| report(step, share))?;
     let sliding = friction.models();
-    let knots = Knots::Automatic(FIRMWARE_ELEMENTS);
-    let gms = virgin_curve::identify(&recording, Some(&sliding), &knots)?;
+    let gms = identify_elements(&recording, &sliding)?;
     if gms.prediction.relative_error > MOST_HYSTERESIS_ERROR {
         return Err(CommissionError::Hysteresis {
             percent: 100.0 * gms.prediction.relative_error,
@@ -208,6 +211,23 @@ pub fn commission(
         settings,
         verdicts,
     })
+}
+
+/// The GMS model on as many elements as the firmware has room for, or as the record determines.
+fn identify_elements(
+    recording: &Recording,
+    sliding: &PerDirection<StaticFriction>,
+) -> Result<GmsFit, VirginCurveError> {
+    let identify =
+        |count| virgin_curve::identify(recording, Some(sliding), &Knots::Automatic(count));
+    let most = identify(FIRMWARE_ELEMENTS);
+    match most {
+        Err(VirginCurveError::Fit(_)) => (LEAST_ELEMENTS..FIRMWARE_ELEMENTS)
+            .rev()
+            .find_map(|count| identify(count).ok())
+            .map_or(most, Ok),
+        outcome => outcome,
+    }
 }
 
 /// The response of the sliding axis, with less excitation as long as it slows the axis too much.

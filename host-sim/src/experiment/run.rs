@@ -3,6 +3,7 @@
 use quadrant::link::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::Scalar;
+use quadrant::telemetry::AxisTelemetry;
 
 use crate::machine::{Machine, Operator};
 use crate::plant::SimulatedStage;
@@ -19,6 +20,19 @@ pub struct AxisTrace {
 }
 
 impl AxisTrace {
+    /// Adds a tick: what the law says of it, and where the axis truly was, mm. `resolution_mm` is the encoder's.
+    pub(super) fn push<S: Scalar>(
+        &mut self,
+        seen: &AxisTelemetry<S>,
+        resolution_mm: f64,
+        place_mm: f64,
+    ) {
+        let reference = seen.reference.to_mm(resolution_mm);
+        self.reference_mm.push(reference);
+        self.error_mm.push(reference - place_mm);
+        self.output_v.push(f64::from(seen.output_v()));
+    }
+
     /// The samples of a range, of every signal.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
         let part = |signal: &[f64]| signal[range.clone()].to_vec();
@@ -76,13 +90,9 @@ pub fn run<S: Scalar, const N: usize>(
         }
         if started {
             for (index, trace) in traces.iter_mut().enumerate() {
-                let telemetry = state.axes()[index].telemetry();
-                let reference = telemetry.reference.to_mm(resolution_mm[index]);
-                trace.reference_mm.push(reference);
-                trace
-                    .error_mm
-                    .push(reference - plant.axes()[index].position_mm());
-                trace.output_v.push(f64::from(telemetry.output_v()));
+                let seen = state.axes()[index].telemetry();
+                let place_mm = plant.axes()[index].position_mm();
+                trace.push(seen, resolution_mm[index], place_mm);
             }
         }
         plant.step(&outputs);

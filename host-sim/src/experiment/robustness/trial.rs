@@ -194,9 +194,8 @@ impl Trial<'_> {
             };
             if under_way {
                 plant.set_load_v(self.load.at_v(trace.error_mm.len() as f64 / rate_hz));
-                let reference = state.axes()[0].telemetry().reference.to_mm(resolution_mm);
-                trace.reference_mm.push(reference);
-                trace.error_mm.push(reference - plant.position_mm());
+                let seen = state.axes()[0].telemetry();
+                trace.push(seen, resolution_mm, plant.position_mm());
             } else if !trace.error_mm.is_empty() {
                 let (score, shown) = self.task.score(&trace, rate_hz);
                 return Ok(Ended {

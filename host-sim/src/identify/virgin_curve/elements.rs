@@ -9,7 +9,7 @@ use super::error::VirginCurveError;
 use super::plateau::{check_plateau, plateau};
 use super::predict::{Prediction, predict};
 use super::shape::{Shape, parameters};
-use crate::identify::fit::{Fit, Loss, Parameter, fit, fit_with_step};
+use crate::identify::fit::{Fit, Loss, Parameter, fit_with_step};
 use crate::rig::Recording;
 
 /// An identified GMS model.
@@ -37,6 +37,8 @@ pub const ASSUMED_ATTRACTION_V_S: f64 = 5.0;
 const FITTED: f64 = 0.97;
 /// Every so many samples of the hysteresis count in the refinement: neighbours are correlated by the smoothing.
 const THINNING: usize = 20;
+/// Step of the difference quotients: pieces of straight lines have corners.
+const ROUGH_STEP: f64 = 1e-3;
 /// Relative standard error of C beyond which it is not determined.
 const MOST_UNCERTAIN: f64 = 0.3;
 
@@ -140,7 +142,8 @@ fn fit_curve(
     if variables.is_empty() {
         return Ok(start);
     }
-    let found = fit(&variables, Loss::Squares, |values| {
+    // A start for the refinement: the nearest it gets will do.
+    let found = fit_with_step(&variables, Loss::Squares, ROUGH_STEP, |values| {
         let shape = Shape::from_variables(values, count, held);
         let points = fitted.iter();
         points
@@ -175,7 +178,7 @@ fn refine(
         let shape = Shape::from_variables(values, count, held);
         parameters(&shape, level_v, values[attraction].exp())
     };
-    let found = fit_with_step(&variables, Loss::Squares, 1e-3, |values| {
+    let found = fit_with_step(&variables, Loss::Squares, ROUGH_STEP, |values| {
         let predicted = predict(smooth, sliding, &model(values));
         scored
             .clone()
