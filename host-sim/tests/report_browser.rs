@@ -124,7 +124,7 @@ fn every_way_of_breaking_a_page_is_noticed() {
         ("--paper: #fff;", "--paper: #eee;", "wrong colours"),
         (
             "<section id=\"other\">",
-            "<section id=\"other\"><script>setTimeout(()=>document.querySelector('main').prepend(document.createElement('hr')),100)</script>",
+            "<section id=\"other\"><script>addEventListener('scroll',()=>document.querySelector('main').prepend(document.createElement('hr')),{once:true})</script>",
             "moved under the reader",
         ),
     ];

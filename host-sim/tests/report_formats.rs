@@ -208,7 +208,7 @@ fn images_are_well_formed_and_say_everything_in_text() {
                 "Time (s)",
                 "Error (µm)",
                 "law 7 &lt;/script&gt;&lt;b&gt;",
-                "0.2",
+                "0.20",
                 "\u{2212}10",
             ],
             "circle" => &[

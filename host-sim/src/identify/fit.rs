@@ -141,6 +141,28 @@ pub fn fit_with_step(
     step: f64,
     residuals: impl Fn(&[f64]) -> Vec<f64>,
 ) -> Result<Fit, FitError> {
+    search(parameters, loss, (step, step > STEP), residuals)
+}
+
+/// As [`fit`], but where the search stands when its patience is out will do: for the start of another.
+///
+/// # Errors
+/// As [`fit`], but for the last.
+pub fn fit_nearest(
+    parameters: &[Parameter],
+    loss: Loss,
+    residuals: impl Fn(&[f64]) -> Vec<f64>,
+) -> Result<Fit, FitError> {
+    search(parameters, loss, (STEP, true), residuals)
+}
+
+/// The search; its step, and whether it may end without having converged.
+fn search(
+    parameters: &[Parameter],
+    loss: Loss,
+    (step, nearest): (f64, bool),
+    residuals: impl Fn(&[f64]) -> Vec<f64>,
+) -> Result<Fit, FitError> {
     for parameter in parameters {
         let (low, high) = parameter.bounds;
         let within = low < high && (low..=high).contains(&parameter.start);
@@ -165,6 +187,7 @@ pub fn fit_with_step(
         parameters,
         residuals: &residuals,
         step,
+        nearest,
         angles: DVector::from_iterator(parameters.len(), parameters.iter().map(angle)),
         weights: vec![1.0; first.len()],
     };
@@ -202,6 +225,8 @@ struct Problem<'a, F> {
     parameters: &'a [Parameter],
     residuals: &'a F,
     step: f64,
+    /// Whether the search may end without having converged.
+    nearest: bool,
     angles: DVector<f64>,
     /// Square roots of the residuals' weights.
     weights: Vec<f64>,
@@ -222,8 +247,8 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
     }
 
     fn minimise(self) -> Result<Self, FitError> {
-        let rough = self.step > STEP;
-        let patience = if rough { 30 } else { 200 };
+        let nearest = self.nearest;
+        let patience = if self.step > STEP { 30 } else { 200 };
         let (problem, report) = LevenbergMarquardt::new()
             .with_patience(patience)
             .minimize(self);
@@ -231,7 +256,7 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
         // this gets.
         let done = match report.termination {
             TerminationReason::NoImprovementPossible(_) => true,
-            TerminationReason::LostPatience => rough,
+            TerminationReason::LostPatience => nearest,
             reason => reason.was_successful(),
         };
         done.then_some(problem).ok_or(FitError::NotConverged)

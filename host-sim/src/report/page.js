@@ -62,9 +62,11 @@
 
   // What a drawing was last drawn for: it is drawn again only when something changed.
   const drawn = new Map();
+  // While a sheet is made, nothing is drawn for the screen: its other width would ask for that.
+  let onSheet = false;
   const drawFor = (drawing, printing) => {
     const wanted = printing ? "print" : `${isDark()} ${drawing.clientWidth}`;
-    if (drawn.get(drawing) === wanted) return;
+    if (drawn.get(drawing) === wanted || (onSheet && !printing)) return;
     try {
       draw(drawing, printing);
       drawn.set(drawing, wanted);
@@ -101,8 +103,12 @@
   }
 
   // A sheet shows everything, in light colours, wherever the reader was.
-  addEventListener("beforeprint", () => drawings.forEach((drawing) => drawFor(drawing, true)));
+  addEventListener("beforeprint", () => {
+    onSheet = true;
+    drawings.forEach((drawing) => drawFor(drawing, true));
+  });
   addEventListener("afterprint", () => {
+    onSheet = false;
     for (const drawing of drawings) {
       if (near.has(drawing)) continue;
       Plotly.purge(drawing);

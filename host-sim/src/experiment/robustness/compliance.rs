@@ -1,5 +1,6 @@
 //! How far a sinusoidal load moves the axis at rest: what the loop's linear model says, and what the simulated axis does.
 
+use quadrant::control::feedback::LawKind;
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
@@ -70,7 +71,7 @@ pub fn frictionless(truth: &AxisTruth) -> AxisTruth {
 pub fn pid_alone(settings: &StageSettings) -> StageSettings {
     let mut settings = settings.clone();
     for axis in &mut settings.axes {
-        axis.feedback.nonlinear = None;
+        axis.feedback.law = LawKind::Pid;
         axis.feedforward.kind = FeedforwardKind::None;
     }
     settings

@@ -132,13 +132,11 @@ pub fn usual_competitors(stage: &StageSettings) -> Vec<(String, StageSettings)> 
 }
 
 /// The competitor's law on a machine that was commissioned as `found`: gains and models are the machine's; which feedforward
-/// acts, and whether the nonlinear gain does, are the competitor's.
+/// and which feedback law act, are the competitor's.
 fn transferred(competitor: &AxisSettings, found: &AxisSettings) -> AxisSettings {
     let mut settings = found.clone();
     settings.feedforward.kind = competitor.feedforward.kind;
-    if competitor.feedback.nonlinear.is_none() {
-        settings.feedback.nonlinear = None;
-    }
+    settings.feedback.law = competitor.feedback.law;
     settings
 }
 

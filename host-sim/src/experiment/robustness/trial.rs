@@ -155,8 +155,13 @@ impl Stopped {
 
 impl Trial<'_> {
     pub(super) fn run(&self) -> Result<Ended, Stopped> {
+        // The idle axes are like it, so that none waits for another.
+        let [axis, ..] = &self.stage.axes;
         let mut machine = Machine::<f32, ELEMENTS>::new(&Job {
-            stage: self.stage.clone(),
+            stage: StageSettings {
+                rate_hz: self.stage.rate_hz,
+                axes: [axis.clone(), axis.clone(), axis.clone()],
+            },
             plan: PlanSettings {
                 motions: [
                     self.task.motion(),

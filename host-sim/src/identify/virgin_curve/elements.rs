@@ -9,7 +9,7 @@ use super::error::VirginCurveError;
 use super::plateau::{check_plateau, plateau};
 use super::predict::{Prediction, predict};
 use super::shape::{Shape, parameters};
-use crate::identify::fit::{Fit, Loss, Parameter, fit_with_step};
+use crate::identify::fit::{Fit, Loss, Parameter, fit_nearest, fit_with_step};
 use crate::rig::Recording;
 
 /// An identified GMS model.
@@ -143,7 +143,7 @@ fn fit_curve(
         return Ok(start);
     }
     // A start for the refinement: the nearest it gets will do.
-    let found = fit_with_step(&variables, Loss::Squares, ROUGH_STEP, |values| {
+    let found = fit_nearest(&variables, Loss::Squares, |values| {
         let shape = Shape::from_variables(values, count, held);
         let points = fitted.iter();
         points

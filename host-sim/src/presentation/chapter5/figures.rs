@@ -199,7 +199,7 @@ impl Chapter<'_> {
             .into_iter()
             .flat_map(|knowledge| VELOCITIES_MM_S.map(|velocity| (knowledge, velocity)));
         for ((knowledge, velocity), number) in panels.zip(first..) {
-            let series = FeedforwardKind::ALL
+            let series = FeedforwardKind::THESIS
                 .into_iter()
                 .enumerate()
                 .filter_map(|(index, feedforward)| {

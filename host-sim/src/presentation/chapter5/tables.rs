@@ -222,7 +222,7 @@ impl Chapter<'_> {
         let mut rows = Vec::new();
         for &velocity in velocities_mm_s {
             let alone = self.entry(controller, Without, knowledge, velocity);
-            for feedforward in FeedforwardKind::ALL {
+            for feedforward in FeedforwardKind::THESIS {
                 let entry = self.entry(controller, feedforward, knowledge, velocity);
                 let mut cells = vec![velocity_cell(velocity), Cell::text(feedforward.name())];
                 for measure in measures {
@@ -251,7 +251,7 @@ impl Chapter<'_> {
                 vec![Column::new("Feedforward")],
                 ["PID", "N-PID"].map(|name| Side::new(name, VirtualMachine)),
                 measures,
-                FeedforwardKind::ALL
+                FeedforwardKind::THESIS
                     .into_iter()
                     .map(|feedforward| Pair {
                         labels: vec![Cell::text(feedforward.name())],
