@@ -35,7 +35,7 @@ fn the_trajectory_is_how_the_axis_comes_to_rest() {
             let exact = stopping_distance(&truth, speed);
             // Friction gives way over tens of micrometres before the axis stands, and the screw ripples.
             assert!(
-                (distance - exact).abs() < 0.05 * exact + 0.01,
+                (distance - exact).abs() < 0.05 * exact + 0.02,
                 "axis {index}: {distance} mm at {speed} mm/s, {exact} expected"
             );
         }

@@ -235,6 +235,10 @@ fn all_of_the_page_is_printed_in_light_colours_wherever_the_reader_was() {
     opened
         .browser
         .call("Emulation.setDeviceMetricsOverride", metrics);
+    // A sheet has no scroll bars.
+    opened
+        .browser
+        .call("Emulation.setScrollbarsHidden", json!({"hidden": true}));
     opened.browser.emulate("print", true);
     let printed = opened.browser.evaluate(PRINTED);
     let figures = full().sections.iter().flat_map(|s| &s.blocks).count() - 2;

@@ -92,8 +92,13 @@ const STEPS: [(&str, f64); 6] = [
 const HOME_MM: f64 = 0.0;
 /// How often the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
-/// Fewest elements that a record is tried with when it does not determine more.
-const LEAST_ELEMENTS: usize = 4;
+/// Elements that find their own knots.
+const FEW_ELEMENTS: usize = 4;
+/// Share of the largest force at which the pre-sliding range ends, the last knot over that range, and the exponent with which
+/// knots are denser near zero.
+const RISEN: f64 = 0.95;
+const SPREAD: f64 = 1.2;
+const DENSITY: f64 = 1.6;
 /// Largest relative error of the predicted hysteresis.
 const MOST_HYSTERESIS_ERROR: f64 = 0.10;
 
@@ -213,21 +218,37 @@ pub fn commission(
     })
 }
 
-/// The GMS model on as many elements as the firmware has room for, or as the record determines.
+/// The GMS model on as many elements as the firmware has room for, if that predicts the record better than few do.
+///
+/// Few elements find their own knots. For many the record is too noisy: knots wander off beyond it, and the search may not
+/// end. Theirs are spread over the pre-sliding range, denser near zero, where the curve bends most; only shares are searched.
 fn identify_elements(
     recording: &Recording,
     sliding: &PerDirection<StaticFriction>,
 ) -> Result<GmsFit, VirginCurveError> {
-    let identify =
-        |count| virgin_curve::identify(recording, Some(sliding), &Knots::Automatic(count));
-    let most = identify(FIRMWARE_ELEMENTS);
-    match most {
-        Err(VirginCurveError::Fit(_)) => (LEAST_ELEMENTS..FIRMWARE_ELEMENTS)
-            .rev()
-            .find_map(|count| identify(count).ok())
-            .map_or(most, Ok),
-        outcome => outcome,
-    }
+    let identify = |knots| virgin_curve::identify(recording, Some(sliding), &knots);
+    let few = identify(Knots::Automatic(FEW_ELEMENTS))?;
+    let top_v = few
+        .curve
+        .points
+        .iter()
+        .map(|point| point.force_v)
+        .fold(0.0, f64::max);
+    let rising = few
+        .curve
+        .points
+        .iter()
+        .find(|point| point.force_v >= RISEN * top_v);
+    let range_mm = rising.map_or(0.0, |point| point.displacement_mm);
+    let knot = |index: usize| {
+        let place = index as f64 / FIRMWARE_ELEMENTS as f64;
+        SPREAD * range_mm * place.powf(DENSITY)
+    };
+    let many = identify(Knots::At((1..=FIRMWARE_ELEMENTS).map(knot).collect()));
+    Ok(match many {
+        Ok(many) if many.prediction.relative_error < few.prediction.relative_error => many,
+        _ => few,
+    })
 }
 
 /// The response of the sliding axis, with less excitation as long as it slows the axis too much.
