@@ -97,7 +97,7 @@ const FEW_ELEMENTS: usize = 4;
 /// Share of the largest force at which the pre-sliding range ends, the last knot over that range, and the exponent with which
 /// knots are denser near zero.
 const RISEN: f64 = 0.95;
-const SPREAD: f64 = 1.2;
+const SPREAD: f64 = 1.7;
 const DENSITY: f64 = 1.6;
 /// Largest relative error of the predicted hysteresis.
 const MOST_HYSTERESIS_ERROR: f64 = 0.10;
