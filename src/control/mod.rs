@@ -1,8 +1,9 @@
 //! Feedback: the laws, the model they are designed on, and the bound that keeps the nonlinear one stable.
 //!
 //! An axis runs one law of [`feedback::LawKind`], chosen in its settings and exchanged without a jolt. All of them close
-//! in the same way ([`integrator`]) and keep the same memory ([`feedback::FeedbackState`]), and at small errors each is
-//! a PID ([`crate::settings::FeedbackSettings::linear_gains`]): that is what their stability is judged by.
+//! in the same way (one integrator, held back by what the output limit leaves) and keep the same memory
+//! ([`feedback::FeedbackState`]), and at small errors each is a PID
+//! ([`crate::settings::FeedbackSettings::linear_gains`]): that is what their stability is judged by.
 //!
 //! | law | module | acts on |
 //! |-----|--------|---------|

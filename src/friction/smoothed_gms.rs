@@ -31,7 +31,7 @@ pub struct SmoothedGmsParameters {
 }
 
 impl Default for SmoothedGmsParameters {
-    /// The last quarter of each element's level [chosen].
+    /// The last quarter of each element's level (our choice).
     fn default() -> Self {
         Self { width: 0.25 }
     }

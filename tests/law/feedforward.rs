@@ -268,9 +268,9 @@ fn axes_with_different_previews_keep_one_time() {
         *axis = quadrant::settings::x_axis();
         axis.feedforward.preview_s = preview_s;
     }
-    let sine = sine_on_x(1.0, 10.0).motions[0].clone();
+    let sine = sine_on_x(1.0, 10.0).motions[0];
     let plan = PlanSettings {
-        motions: [sine.clone(), sine.clone(), sine],
+        motions: [sine, sine, sine],
     };
     let mut rig = Rig::<f32>::new(&settings, &plan);
     rig.start();
