@@ -73,7 +73,7 @@ fn every_law_is_tuned_at_equal_robustness_and_runs() {
     let outcomes = run();
     assert_eq!(outcomes.len(), 4);
     for pair in outcomes.chunks(2) {
-        let rms = |index: usize| pair[index].spread(|o| o.score.rms_mm).mean;
+        let rms = |index: usize| pair[index].statistic(|o| o.score.rms_mm).mean;
         assert!(
             rms(1) < 0.3 * rms(0),
             "feedforward pays: {} {}",

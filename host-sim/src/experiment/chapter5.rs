@@ -11,34 +11,13 @@ use super::comparison::{Configuration, Outcome, run_at_amplitude};
 use super::compensator::{Knowledge, Setup};
 use super::metrics::Score;
 use super::run::{AxisTrace, RunError};
+use super::statistic::Statistic;
 
 /// Amplitudes of the sine, mm: that of most of the chapter, and that of Tables 5.21 and 5.22.
 pub const AMPLITUDES_MM: [f64; 2] = [30.0, 15.0];
 
 /// Seconds that a run takes on two cores of a current machine, for each mm of amplitude.
 const SECONDS_PER_MM: f64 = 0.009;
-
-/// What repeated runs gave for one quantity, in its unit.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Spread {
-    /// Mean over the runs.
-    pub mean: f64,
-    /// Standard deviation of one run; nothing of a single one.
-    pub deviation: Option<f64>,
-}
-
-impl Spread {
-    /// Of these values, of which there is one at least.
-    pub fn of(values: &[f64]) -> Self {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let square: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        Self {
-            mean,
-            deviation: (values.len() > 1).then(|| (square / (count - 1.0)).sqrt()),
-        }
-    }
-}
 
 /// What one configuration did on one sine.
 #[derive(Clone, Debug)]
@@ -59,8 +38,8 @@ pub struct Entry {
 
 impl Entry {
     /// Mean and deviation of one metric.
-    pub fn spread(&self, read: fn(&Score) -> f64) -> Spread {
-        Spread::of(&self.scores.iter().map(read).collect::<Vec<_>>())
+    pub fn statistic(&self, read: fn(&Score) -> f64) -> Statistic {
+        Statistic::of(&self.scores.iter().map(read).collect::<Vec<_>>())
     }
 }
 
@@ -233,14 +212,6 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn the_spread_is_the_deviation_of_one_run() {
-        let spread = Spread::of(&[1.0, 2.0, 3.0, 4.0]);
-        assert!((spread.mean - 2.5).abs() < 1e-12);
-        assert!((spread.deviation.unwrap() - (5.0_f64 / 3.0).sqrt()).abs() < 1e-12);
-        assert_eq!(Spread::of(&[7.0]).deviation, None);
-    }
 
     #[test]
     fn a_matched_run_is_not_repeated_and_every_entry_has_its_seeds() {

@@ -13,6 +13,7 @@ pub mod part_program;
 pub mod recorded;
 pub mod robustness;
 mod run;
+pub mod statistic;
 pub mod thesis;
 mod trial;
 pub mod validation;

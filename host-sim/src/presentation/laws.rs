@@ -3,10 +3,10 @@
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 
-use super::UM_PER_MM;
 use super::identify::{columns, lines, series};
+use super::{UM_PER_MM, dot, statistic_cells};
 use crate::experiment::TrialOutcome;
-use crate::experiment::laws::comparison::{LawOutcome, Spread};
+use crate::experiment::laws::comparison::LawOutcome;
 use crate::experiment::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw};
 use crate::report::{
     self, Block, Cell, Colour, DotSeries, Dots, Figure, Plot, Scale, Section, Style, Table,
@@ -70,13 +70,6 @@ pub fn tuning_table(laws: &[TunedLaw]) -> Table {
     }
 }
 
-fn spread(spread: Spread, scale: f64, decimals: usize) -> [Cell; 2] {
-    [
-        Cell::number(scale * spread.mean, decimals),
-        Cell::number(scale * spread.deviation, decimals),
-    ]
-}
-
 /// What each law did.
 pub fn laws_table(outcomes: &[LawOutcome]) -> Table {
     let um = UM_PER_MM;
@@ -85,10 +78,26 @@ pub fn laws_table(outcomes: &[LawOutcome]) -> Table {
             Cell::text(outcome.law.name()),
             Cell::text(outcome.feedforward.name()),
         ];
-        row.extend(spread(outcome.spread(|o| o.score.largest_mm), um, 2));
-        row.extend(spread(outcome.spread(|o| o.score.rms_mm), um, 3));
-        row.extend(spread(outcome.spread(|o| o.score.glitch_mm), um, 2));
-        row.extend(spread(outcome.spread(|o| o.chatter_v), 1e3, 2));
+        row.extend(statistic_cells(
+            Some(outcome.statistic(|o| o.score.largest_mm)),
+            um,
+            2,
+        ));
+        row.extend(statistic_cells(
+            Some(outcome.statistic(|o| o.score.rms_mm)),
+            um,
+            3,
+        ));
+        row.extend(statistic_cells(
+            Some(outcome.statistic(|o| o.score.glitch_mm)),
+            um,
+            2,
+        ));
+        row.extend(statistic_cells(
+            Some(outcome.statistic(|o| o.chatter_v)),
+            1e3,
+            2,
+        ));
         row
     });
     Table {
@@ -143,14 +152,9 @@ fn laws_figure(outcomes: &[LawOutcome]) -> Figure {
         let of = outcomes
             .iter()
             .find(|outcome| outcome.law.name() == law && outcome.feedforward == kind);
-        let errors = of.map(|outcome| outcome.spread(|o| o.score.rms_mm));
+        let errors = of.map(|outcome| outcome.statistic(|o| o.score.rms_mm));
         errors.map_or(report::Spread::exact(f64::NAN), |errors| {
-            let (mean, half) = (errors.mean * UM_PER_MM, errors.deviation * UM_PER_MM);
-            report::Spread {
-                mean,
-                low: mean - half,
-                high: mean + half,
-            }
+            dot(errors, UM_PER_MM)
         })
     };
     let series = [
@@ -205,7 +209,7 @@ fn closeness(outcomes: &[LawOutcome]) -> String {
         let of = outcomes
             .iter()
             .filter(|outcome| outcome.feedforward == kind);
-        of.map(|outcome| outcome.spread(|o: &TrialOutcome| o.score.rms_mm).mean * UM_PER_MM)
+        of.map(|outcome| outcome.statistic(|o: &TrialOutcome| o.score.rms_mm).mean * UM_PER_MM)
             .fold((f64::INFINITY, 0.0f64), |(low, high), rms| {
                 (low.min(rms), high.max(rms))
             })

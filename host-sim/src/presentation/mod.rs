@@ -55,7 +55,8 @@ pub use robustness::{robustness_full_table, robustness_sections, robustness_tabl
 pub use validation::validation_table;
 pub use wrong_model::wrong_model_section;
 
-use crate::report::{Provenance, Series, Style};
+use crate::experiment::statistic::Statistic;
+use crate::report::{Cell, Provenance, Series, Spread, Style};
 
 /// mm to um.
 const UM_PER_MM: f64 = 1e3;
@@ -66,6 +67,27 @@ pub fn provenance(command: &str, seed: u64) -> Provenance {
         command: command.to_owned(),
         seed: Some(seed),
         version: env!("CARGO_PKG_VERSION").to_owned(),
+    }
+}
+
+/// Mean and deviation as cells, in the unit that `scale` makes; missing where there is none.
+fn statistic_cells(statistic: Option<Statistic>, scale: f64, decimals: usize) -> [Cell; 2] {
+    let cell = |value: Option<f64>| {
+        value.map_or(Cell::Missing, |value| Cell::number(scale * value, decimals))
+    };
+    [
+        cell(statistic.map(|found| found.mean)),
+        cell(statistic.and_then(|found| found.deviation)),
+    ]
+}
+
+/// A dot at the mean with a bar over one deviation to each side, in the unit that `scale` makes.
+fn dot(statistic: Statistic, scale: f64) -> Spread {
+    let (low, high) = statistic.range();
+    Spread {
+        mean: scale * statistic.mean,
+        low: scale * low,
+        high: scale * high,
     }
 }
 

@@ -1,7 +1,7 @@
 //! The robustness experiment's tables and figures.
 
-use super::UM_PER_MM;
 use super::robustness_figures::{compliance_figure, dots, error_figure};
+use super::{UM_PER_MM, statistic_cells};
 use crate::experiment::metrics::{Score, change_percent};
 use crate::experiment::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
 use crate::experiment::robustness::study::RobustnessReport;
@@ -142,12 +142,7 @@ pub fn robustness_full_table(report: &RobustnessReport) -> Table {
             ];
             for reading in &READINGS {
                 let statistic = outcome.statistic(reading.read);
-                row.extend(statistic.map_or([Cell::Missing, Cell::Missing], |found| {
-                    [
-                        Cell::number(found.mean * UM_PER_MM, 2),
-                        Cell::number(found.deviation * UM_PER_MM, 2),
-                    ]
-                }));
+                row.extend(statistic_cells(statistic, UM_PER_MM, 2));
             }
             row.push(Cell::number(outcome.runs.len() as f64, 0));
             let faults = outcome.faults();

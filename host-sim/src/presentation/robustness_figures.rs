@@ -1,6 +1,6 @@
 //! The robustness experiment's figures.
 
-use super::{UM_PER_MM, error_curve};
+use super::{UM_PER_MM, dot, error_curve};
 use crate::experiment::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
 use crate::experiment::robustness::study::RobustnessReport;
 use crate::experiment::robustness::{Scenario, find};
@@ -20,13 +20,7 @@ pub(super) fn dots(report: &RobustnessReport) -> Figure {
                 find(&report.outcomes, &scenario.name, competitor)
                     .and_then(|outcome| outcome.statistic(|score| score.largest_mm))
                     .map_or(Spread::exact(f64::NAN), |statistic| {
-                        let mean = statistic.mean * UM_PER_MM;
-                        let half = statistic.deviation * UM_PER_MM;
-                        Spread {
-                            mean,
-                            low: mean - half,
-                            high: mean + half,
-                        }
+                        dot(statistic, UM_PER_MM)
                     })
             });
             DotSeries {

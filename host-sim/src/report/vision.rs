@@ -98,10 +98,11 @@ fn all_eyes_can_tell_the_series_apart_on_light_and_dark_pages() {
         ("protanopia", PROTANOPIA),
         ("deuteranopia", DEUTERANOPIA),
     ];
-    let pages: [(&str, fn(Colour) -> &'static str); 2] =
-        [("light", Colour::light), ("dark", Colour::dark)];
+    type Shade = fn(Colour) -> &'static str;
+    let light: Shade = Colour::light;
+    let dark: Shade = Colour::dark;
     for (name, eyes) in eyes {
-        for (page, shade) in pages {
+        for (page, shade) in [("light", light), ("dark", dark)] {
             let (least, a, b) = closest(&eyes, shade);
             println!("{name}, {page}: {least:.1} between {a:?} and {b:?}");
             assert!(

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 
 use super::tuning::TunedLaw;
 use crate::experiment::run::RunError;
+use crate::experiment::statistic::Statistic;
 use crate::experiment::trial::{Trial, TrialOutcome, try_three};
 use crate::plant::AxisTruth;
 
@@ -37,37 +38,15 @@ pub struct LawOutcome {
     pub outcomes: Vec<[TrialOutcome; 3]>,
 }
 
-/// Mean and standard deviation.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Spread {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation; zero of a single value.
-    pub deviation: f64,
-}
-
-impl Spread {
-    /// Of some values.
-    pub fn of(values: &[f64]) -> Self {
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        Self {
-            mean,
-            deviation: (squares / (count - 1.0).max(1.0)).sqrt(),
-        }
-    }
-}
-
 impl LawOutcome {
     /// A reading of every seed, mean over the trials, spread over the seeds.
-    pub fn spread(&self, read: impl Fn(&TrialOutcome) -> f64) -> Spread {
+    pub fn statistic(&self, read: impl Fn(&TrialOutcome) -> f64) -> Statistic {
         let seeds: Vec<f64> = self
             .outcomes
             .iter()
             .map(|trials| trials.iter().map(&read).sum::<f64>() / trials.len() as f64)
             .collect();
-        Spread::of(&seeds)
+        Statistic::of(&seeds)
     }
 }
 

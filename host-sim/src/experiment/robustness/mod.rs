@@ -20,6 +20,7 @@ use rayon::prelude::*;
 use super::comparison::Configuration;
 use super::metrics::Score;
 use super::run::AxisTrace;
+use super::statistic::Statistic;
 pub use scenario::{Scenario, scenarios};
 pub use trial::Task;
 use trial::{Ended, Trial};
@@ -54,27 +55,14 @@ pub struct RobustnessOutcome {
     pub trace: Option<AxisTrace>,
 }
 
-/// Mean and spread over seeds.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Statistic {
-    /// Mean.
-    pub mean: f64,
-    /// Standard deviation of a run; zero for a single one.
-    pub deviation: f64,
-}
-
 impl RobustnessOutcome {
     /// Mean and spread of what `read` finds in the scores of the runs that ended; nothing when none did, or where the task
     /// has no such score.
     pub fn statistic(&self, read: fn(&Score) -> f64) -> Option<Statistic> {
         let values: Vec<f64> = self.runs.iter().flatten().map(read).collect();
-        let count = values.len() as f64;
-        let mean = values.iter().sum::<f64>() / count;
-        let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
-        mean.is_finite().then(|| Statistic {
-            mean,
-            deviation: (squares / (count - 1.0).max(1.0)).sqrt(),
-        })
+        (!values.is_empty())
+            .then(|| Statistic::of(&values))
+            .filter(|statistic| statistic.mean.is_finite())
     }
 
     /// The faults of the runs that did not end.

@@ -1,13 +1,14 @@
 //! The thesis' headline figures beside ours, and what in the virtual machine costs how much of them.
 
 use super::{GLITCH, LARGEST, Measure, RMS};
-use crate::experiment::chapter5::{AMPLITUDES_MM, Comparison, Spread};
+use crate::experiment::chapter5::{AMPLITUDES_MM, Comparison};
 use crate::experiment::comparison::{Configuration, VELOCITIES_MM_S};
 use crate::experiment::compensator::Knowledge;
 use crate::experiment::imperfections::{BEST, Change, Finding, PID};
 use crate::experiment::metrics::change_percent;
+use crate::experiment::statistic::Statistic;
 use crate::experiment::thesis::{HEADLINES, Metric};
-use crate::presentation::UM_PER_MM;
+use crate::presentation::{UM_PER_MM, statistic_cells};
 use crate::report::{Block, Cell, Column, Section, Table};
 
 /// The measures of the best configuration, with the thesis' figure for each, %. It does not say whether its tracking error is a
@@ -23,7 +24,7 @@ fn changes_percent(
     from: Configuration,
     to: Configuration,
     velocities_mm_s: &[f64],
-) -> Option<Spread> {
+) -> Option<Statistic> {
     let mut of_seeds: Vec<f64> = Vec::new();
     for &velocity in velocities_mm_s {
         let find =
@@ -37,17 +38,7 @@ fn changes_percent(
     for sum in &mut of_seeds {
         *sum /= velocities_mm_s.len() as f64;
     }
-    (!of_seeds.is_empty()).then(|| Spread::of(&of_seeds))
-}
-
-/// A change and its deviation, %.
-fn percent_cells(spread: Option<Spread>, decimals: usize) -> [Cell; 2] {
-    let cell =
-        |value: Option<f64>| value.map_or(Cell::Missing, |value| Cell::number(value, decimals));
-    [
-        cell(spread.map(|spread| spread.mean)),
-        cell(spread.and_then(|spread| spread.deviation)),
-    ]
+    (!of_seeds.is_empty()).then(|| Statistic::of(&of_seeds))
 }
 
 /// The headlines, and the best configuration by velocity.
@@ -75,8 +66,9 @@ fn headline_table(comparison: &Comparison) -> Table {
         .map(|headline| {
             let cells = |knowledge, measure| {
                 let (from, to) = (headline.from, headline.to);
-                percent_cells(
+                statistic_cells(
                     changes_percent(comparison, knowledge, measure, from, to, &VELOCITIES_MM_S),
+                    1.0,
                     1,
                 )
             };
@@ -135,12 +127,12 @@ fn best_table(comparison: &Comparison) -> Table {
                     let entry =
                         comparison.find(configuration, knowledge, AMPLITUDES_MM[0], velocity);
                     row.push(entry.map_or(Cell::Missing, |entry| {
-                        Cell::number(UM_PER_MM * entry.spread(measure.read).mean, 2)
+                        Cell::number(UM_PER_MM * entry.statistic(measure.read).mean, 2)
                     }));
                 }
                 let changes =
                     changes_percent(comparison, knowledge, measure, PID, BEST, &[velocity]);
-                let [change, deviation] = percent_cells(changes, 2);
+                let [change, deviation] = statistic_cells(changes, 1.0, 2);
                 row.push(change);
                 if knowledge == Knowledge::VirtualMachine {
                     row.push(deviation);
@@ -178,11 +170,14 @@ pub fn study_section(findings: &[Finding]) -> Section {
             for (measure, _) in BEST_MEASURES {
                 for velocity in VELOCITIES_MM_S {
                     let [mean, _] =
-                        percent_cells(change_percent_of(finding, measure, &[velocity]), 2);
+                        statistic_cells(change_percent_of(finding, measure, &[velocity]), 1.0, 2);
                     row.push(mean);
                 }
-                let [mean, _] =
-                    percent_cells(change_percent_of(finding, measure, &VELOCITIES_MM_S), 2);
+                let [mean, _] = statistic_cells(
+                    change_percent_of(finding, measure, &VELOCITIES_MM_S),
+                    1.0,
+                    2,
+                );
                 row.push(mean);
             }
             row
@@ -233,7 +228,7 @@ fn change_percent_of(
     finding: &Finding,
     measure: Measure,
     velocities_mm_s: &[f64],
-) -> Option<Spread> {
+) -> Option<Statistic> {
     changes_percent(
         finding.outcome.as_ref().ok()?,
         Knowledge::VirtualMachine,

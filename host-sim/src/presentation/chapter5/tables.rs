@@ -8,7 +8,7 @@ use crate::experiment::chapter5::{AMPLITUDES_MM, Entry};
 use crate::experiment::comparison::VELOCITIES_MM_S;
 use crate::experiment::compensator::Knowledge;
 use crate::experiment::metrics::change_percent;
-use crate::presentation::UM_PER_MM;
+use crate::presentation::{UM_PER_MM, statistic_cells};
 use crate::report::{Block, Cell, Column, Table};
 
 use FeedforwardKind::{Combined, None as Without};
@@ -38,19 +38,19 @@ impl Side {
     }
 
     fn cells(&self, entry: Option<&Entry>, measure: &Measure) -> Vec<Cell> {
-        let spread = entry.map(|entry| entry.spread(measure.read));
-        let um = |mm: Option<f64>| mm.map_or(Cell::Missing, |mm| Cell::number(UM_PER_MM * mm, 2));
-        let mut cells = vec![um(spread.map(|spread| spread.mean))];
+        let statistic = entry.map(|entry| entry.statistic(measure.read));
+        let [mean, deviation] = statistic_cells(statistic, UM_PER_MM, 2);
         if self.repeated {
-            cells.push(um(spread.and_then(|spread| spread.deviation)));
+            vec![mean, deviation]
+        } else {
+            vec![mean]
         }
-        cells
     }
 }
 
 /// The change between two entries' means, %.
 fn change(from: Option<&Entry>, to: Option<&Entry>, measure: &Measure) -> Cell {
-    let mean = |entry: &Entry| entry.spread(measure.read).mean;
+    let mean = |entry: &Entry| entry.statistic(measure.read).mean;
     match (from, to) {
         (Some(from), Some(to)) => Cell::number(change_percent(mean(from), mean(to)), 1),
         _ => Cell::Missing,
