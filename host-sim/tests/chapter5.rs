@@ -6,7 +6,7 @@ use quadrant_sim::experiment::AxisTrace;
 use quadrant_sim::experiment::chapter5::{AMPLITUDES_MM, Comparison, Entry, Request};
 use quadrant_sim::experiment::comparison::{Configuration, VELOCITIES_MM_S};
 use quadrant_sim::experiment::compensator::{Knowledge, Setup};
-use quadrant_sim::experiment::imperfections::{BEST, Change, PID, study};
+use quadrant_sim::experiment::imperfections::{Change, study};
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::presentation::{chapter5_sections, headline_section, provenance, study_section};
 use quadrant_sim::report::{Block, Cell, Page, Section, Table};
@@ -162,7 +162,7 @@ fn the_same_runs_on_one_thread_and_on_three_give_the_same_scores() {
     let setups = Setup::both().unwrap();
     let request = Request {
         setups: &setups,
-        configurations: &[PID, BEST],
+        configurations: &Configuration::EXTREMES,
         amplitudes_mm: &[1.0],
         seed: 5,
         seeds: 3,

@@ -3,8 +3,6 @@
 mod command;
 
 use indicatif::ProgressBar;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::Plane;
 use quadrant_sim::experiment::circle::{
     CircleRefusal, CircleRequest, CircleResult, run_circle_tests,
@@ -12,15 +10,6 @@ use quadrant_sim::experiment::circle::{
 use quadrant_sim::experiment::comparison::Configuration;
 use quadrant_sim::experiment::compensator::{Setup, identified};
 use quadrant_sim::presentation::circle_tables;
-
-const PID: Configuration = Configuration {
-    controller: LawKind::Pid,
-    feedforward: FeedforwardKind::None,
-};
-const BEST: Configuration = Configuration {
-    controller: LawKind::NPid,
-    feedforward: FeedforwardKind::Combined,
-};
 
 fn request(configurations: &[Configuration]) -> CircleRequest {
     CircleRequest {
@@ -39,7 +28,7 @@ fn results(request: &CircleRequest) -> Vec<CircleResult> {
 
 #[test]
 fn compensation_makes_the_circle_rounder_in_both_senses() {
-    let results = results(&request(&[PID, BEST]));
+    let results = results(&request(&Configuration::EXTREMES));
     let [pid, best] = [0, 1].map(|index| results[index].outcome.as_ref().unwrap());
     for (pid, best) in pid.turns().iter().zip(best.turns()) {
         assert!(best.1.circular_deviation_mm < 0.3 * pid.1.circular_deviation_mm);
@@ -50,7 +39,7 @@ fn compensation_makes_the_circle_rounder_in_both_senses() {
 
 #[test]
 fn what_is_reported_of_a_circle_hangs_together() {
-    let results = results(&request(&[PID]));
+    let results = results(&request(&[Configuration::PID]));
     let test = results[0].outcome.as_ref().unwrap();
     for (_, turn) in test.turns() {
         // The least-squares centre can only narrow the range; both senses can only widen it.
@@ -74,7 +63,7 @@ fn a_circle_beyond_the_limits_is_reported_with_its_reason_beside_the_others() {
     let request = CircleRequest {
         radii_mm: vec![1.0, 10.0],
         feeds_mm_min: vec![4000.0, 0.001],
-        ..request(&[BEST])
+        ..request(&[Configuration::BEST])
     };
     let results = results(&request);
     // v^2 / r = 4444 mm/s^2 at 1 mm, of 2000 allowed; 444 at 10 mm.
@@ -100,7 +89,7 @@ fn a_circle_beyond_the_limits_is_reported_with_its_reason_beside_the_others() {
 fn the_same_request_gives_the_same_results_and_seeds_differ() {
     let request = CircleRequest {
         seeds: vec![1, 2],
-        ..request(&[BEST])
+        ..request(&[Configuration::BEST])
     };
     let deviations = |results: Vec<CircleResult>| {
         results

@@ -1,8 +1,6 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
 use indicatif::ProgressBar;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{Command, FaultCode, SafetyState};
@@ -16,20 +14,11 @@ use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::record::Record;
 
-const PID: Configuration = Configuration {
-    controller: LawKind::Pid,
-    feedforward: FeedforwardKind::None,
-};
-const BEST: Configuration = Configuration {
-    controller: LawKind::NPid,
-    feedforward: FeedforwardKind::Combined,
-};
-
 #[test]
 fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_an_identified_model() {
     for setup in Setup::both().unwrap() {
-        let pid = run_configuration::<f32>(PID, &setup, 1).unwrap();
-        let best = run_configuration::<f32>(BEST, &setup, 1).unwrap();
+        let pid = run_configuration::<f32>(Configuration::PID, &setup, 1).unwrap();
+        let best = run_configuration::<f32>(Configuration::BEST, &setup, 1).unwrap();
         for (pid, best) in pid.iter().zip(&best) {
             assert!(best.score.largest_mm < 0.12 * pid.score.largest_mm);
             assert!(best.score.glitch_mm < 0.2 * pid.score.glitch_mm);
@@ -42,7 +31,7 @@ fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_an_id
 fn the_same_seed_gives_the_same_outcome() {
     let [_, setup] = Setup::both().unwrap();
     let run = |seed| {
-        run_configuration::<f32>(BEST, &setup, seed)
+        run_configuration::<f32>(Configuration::BEST, &setup, seed)
             .unwrap()
             .map(|o| o.last_cycle.error_mm)
     };
@@ -53,7 +42,7 @@ fn the_same_seed_gives_the_same_outcome() {
 #[test]
 fn combined_feedforward_makes_the_circle_rounder() {
     let [_, setup] = Setup::both().unwrap();
-    let circles = run_circles::<f32>(&[PID, BEST], &setup, 1).unwrap();
+    let circles = run_circles::<f32>(&Configuration::EXTREMES, &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
 }
@@ -128,6 +117,6 @@ fn our_controllers_follow_the_recorded_emps_reference() {
     };
     // The recorded machine's own error, computed from the file alone, is 0.58 mm.
     assert!((rms(None) - 0.58).abs() < 0.01);
-    assert!(rms(Some(BEST)) < 0.1 * rms(Some(PID)));
-    assert!(rms(Some(PID)) < rms(None));
+    assert!(rms(Some(Configuration::BEST)) < 0.1 * rms(Some(Configuration::PID)));
+    assert!(rms(Some(Configuration::PID)) < rms(None));
 }

@@ -1,11 +1,9 @@
 //! `quadrant circle`.
 
-use quadrant::control::feedback::LawKind;
 use std::path::PathBuf;
 
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
-use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::Plane;
 use quadrant_sim::experiment::circle::{CircleRequest, run_circle_tests};
 use quadrant_sim::experiment::comparison::Configuration;
@@ -14,18 +12,6 @@ use quadrant_sim::presentation::{circle_page, circle_tables, provenance};
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::output::{Output, command_line, progress};
-
-/// PID alone, and everything.
-pub(super) const EXTREMES: [Configuration; 2] = [
-    Configuration {
-        controller: LawKind::Pid,
-        feedforward: FeedforwardKind::None,
-    },
-    Configuration {
-        controller: LawKind::NPid,
-        feedforward: FeedforwardKind::Combined,
-    },
-];
 
 /// A plane, as G17 to G19 select it.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -102,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         configurations: if arguments.all {
             Configuration::all()
         } else {
-            EXTREMES.to_vec()
+            Configuration::EXTREMES.to_vec()
         },
         seeds: (output.seed..=last_seed).collect(),
     };

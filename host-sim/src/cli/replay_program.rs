@@ -10,7 +10,6 @@ use quadrant_sim::presentation::{motion_summary_table, program_page, program_tab
 use quadrant_sim::program::{Limits, Program, Trajectory};
 use quadrant_sim::record::write_trace;
 
-use super::circle::EXTREMES;
 use super::output::{Output, command_line, progress};
 
 /// Options of `quadrant replay --gcode`.
@@ -64,7 +63,7 @@ pub(super) fn run(
     let configurations = if options.all {
         Configuration::all()
     } else {
-        EXTREMES.to_vec()
+        Configuration::EXTREMES.to_vec()
     };
     let bar = progress(configurations.len() as u64, "following the program");
     let outcomes = run_program::<f32>(

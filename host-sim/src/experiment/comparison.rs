@@ -40,6 +40,19 @@ pub struct Configuration {
 }
 
 impl Configuration {
+    /// PID alone.
+    pub const PID: Self = Self {
+        controller: LawKind::Pid,
+        feedforward: FeedforwardKind::None,
+    };
+    /// Everything: N-PID with static and GMS feedforward.
+    pub const BEST: Self = Self {
+        controller: LawKind::NPid,
+        feedforward: FeedforwardKind::Combined,
+    };
+    /// What most studies compare.
+    pub const EXTREMES: [Self; 2] = [Self::PID, Self::BEST];
+
     /// All eight, in the order of the thesis' tables.
     pub fn all() -> Vec<Self> {
         [LawKind::Pid, LawKind::NPid]

@@ -1,8 +1,6 @@
 //! Which imperfection of the virtual machine costs how much: each is switched off by itself, and the comparison of the
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
@@ -16,17 +14,6 @@ use crate::commission::bootstrap::quiet_settings;
 use crate::identify::virgin_curve::{self, Knots, VirginCurveError, VirginCurveSettings};
 use crate::plant::Imperfections;
 use crate::rig::{Rig, RigError, SimulatedRig, approach};
-
-/// PID without feedforward.
-pub const PID: Configuration = Configuration {
-    controller: LawKind::Pid,
-    feedforward: FeedforwardKind::None,
-};
-/// N-PID with static and GMS feedforward.
-pub const BEST: Configuration = Configuration {
-    controller: LawKind::NPid,
-    feedforward: FeedforwardKind::Combined,
-};
 
 /// Elements of the GMS models that are identified: up to the firmware's room. From nine on the search for the
 /// parameters takes minutes or ends without an answer: the record does not determine so many.
@@ -243,7 +230,7 @@ pub fn study<S: Scalar>(
             let outcome = match changed {
                 Ok(setup) => Ok(Request {
                     setups: &[setup],
-                    configurations: &[PID, BEST],
+                    configurations: &Configuration::EXTREMES,
                     amplitudes_mm: &[AMPLITUDE_MM],
                     seed,
                     seeds,

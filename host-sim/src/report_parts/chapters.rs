@@ -2,8 +2,8 @@
 
 use super::{Context, Progress};
 use crate::experiment::chapter5::Request;
-use crate::experiment::comparison::AMPLITUDE_MM;
-use crate::experiment::imperfections::{BEST, Change, PID, study};
+use crate::experiment::comparison::{AMPLITUDE_MM, Configuration};
+use crate::experiment::imperfections::{Change, study};
 use crate::presentation::{chapter5_sections, headline_section, study_section};
 use crate::report::Section;
 
@@ -17,7 +17,7 @@ pub(super) fn headline_s(context: &Context) -> f64 {
     let [_, virtual_machine] = context.setups();
     let one = Request {
         setups: &[virtual_machine],
-        configurations: &[PID, BEST],
+        configurations: &Configuration::EXTREMES,
         amplitudes_mm: &[AMPLITUDE_MM],
         seed: context.seed,
         seeds: context.seeds.min(STUDY_SEEDS),

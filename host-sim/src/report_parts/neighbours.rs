@@ -2,8 +2,6 @@
 //! circle as machine builders know it.
 
 use indicatif::ProgressBar;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
 
 use super::{Context, Progress};
 use crate::experiment::circle::{CircleRequest, run_circle_tests};
@@ -22,17 +20,6 @@ use crate::report::Section;
 const MOST_SEEDS: u64 = 2;
 /// Backlash of the rack, mm: as `quadrant robustness` has it.
 const BACKLASH_MM: f64 = 0.02;
-/// PID alone, and everything.
-const EXTREMES: [Configuration; 2] = [
-    Configuration {
-        controller: LawKind::Pid,
-        feedforward: FeedforwardKind::None,
-    },
-    Configuration {
-        controller: LawKind::NPid,
-        feedforward: FeedforwardKind::Combined,
-    },
-];
 
 /// The feedback laws at equal robustness, and what a wrong model costs.
 pub(super) fn laws(context: &Context, progress: &Progress) -> anyhow::Result<Vec<Section>> {
@@ -80,7 +67,7 @@ pub(super) fn scenarios(context: &Context, progress: &Progress) -> anyhow::Resul
 /// The circle tests.
 pub(super) fn circles(context: &Context, _: &Progress) -> anyhow::Result<Vec<Section>> {
     let request = CircleRequest {
-        configurations: EXTREMES.to_vec(),
+        configurations: Configuration::EXTREMES.to_vec(),
         seeds: vec![context.seed],
         ..CircleRequest::default()
     };

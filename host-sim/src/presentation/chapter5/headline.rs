@@ -4,7 +4,7 @@ use super::{GLITCH, LARGEST, Measure, RMS};
 use crate::experiment::chapter5::{AMPLITUDES_MM, Comparison};
 use crate::experiment::comparison::{Configuration, VELOCITIES_MM_S};
 use crate::experiment::compensator::Knowledge;
-use crate::experiment::imperfections::{BEST, Change, Finding, PID};
+use crate::experiment::imperfections::{Change, Finding};
 use crate::experiment::metrics::change_percent;
 use crate::experiment::statistic::Statistic;
 use crate::experiment::thesis::{HEADLINES, Metric};
@@ -123,15 +123,21 @@ fn best_table(comparison: &Comparison) -> Table {
                 Cell::number(thesis_percent, 1),
             ];
             for knowledge in Knowledge::ALL {
-                for configuration in [PID, BEST] {
+                for configuration in Configuration::EXTREMES {
                     let entry =
                         comparison.find(configuration, knowledge, AMPLITUDES_MM[0], velocity);
                     row.push(entry.map_or(Cell::Missing, |entry| {
                         Cell::number(UM_PER_MM * entry.statistic(measure.read).mean, 2)
                     }));
                 }
-                let changes =
-                    changes_percent(comparison, knowledge, measure, PID, BEST, &[velocity]);
+                let changes = changes_percent(
+                    comparison,
+                    knowledge,
+                    measure,
+                    Configuration::PID,
+                    Configuration::BEST,
+                    &[velocity],
+                );
                 let [change, deviation] = statistic_cells(changes, 1.0, 2);
                 row.push(change);
                 if knowledge == Knowledge::VirtualMachine {
@@ -233,8 +239,8 @@ fn change_percent_of(
         finding.outcome.as_ref().ok()?,
         Knowledge::VirtualMachine,
         measure,
-        PID,
-        BEST,
+        Configuration::PID,
+        Configuration::BEST,
         velocities_mm_s,
     )
 }
