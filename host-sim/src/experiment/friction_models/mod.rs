@@ -2,7 +2,7 @@
 //!
 //! - virgin curve and hysteresis, slowly, over the pre-sliding range and a third of it;
 //! - memory: a small loop within a large one, which closes if the model remembers more than one number;
-//! - drift of a free mass under a load below breakaway that vibrates ([`drift`]);
+//! - drift of a free mass under a load below breakaway that vibrates ([`mod@drift`]);
 //! - lag of friction behind a changing sliding velocity;
 //! - how abruptly the force and its slope change;
 //! - what is left of the tracking error with each as feedforward, on axes that follow one or the other ([`tracking`]).
