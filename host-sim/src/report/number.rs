@@ -1,48 +1,30 @@
 //! Numbers in files: JSON has none that are not finite, yet gaps in curves and unbounded results are such.
 
+use serde::de::Error;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use serde_json::Value;
 
 /// A number, or the name of one that JSON cannot hold.
-#[derive(Serialize, Deserialize)]
-#[serde(untagged)]
-enum Readable {
-    Finite(f64),
-    Named(String),
-}
-
-impl Readable {
-    fn new(value: f64) -> Self {
-        if value.is_finite() {
-            Self::Finite(value)
-        } else {
-            Self::Named(value.to_string())
-        }
-    }
-
-    fn value<E: serde::de::Error>(self) -> Result<f64, E> {
-        match self {
-            Self::Finite(value) => Ok(value),
-            Self::Named(name) => name
-                .parse()
-                .map_err(|_| E::custom(format!("{name:?} is no number; \"NaN\" and \"inf\" are"))),
-        }
-    }
-}
-
 pub(super) fn serialize<S: Serializer>(value: &f64, to: S) -> Result<S::Ok, S::Error> {
-    if to.is_human_readable() {
-        Readable::new(*value).serialize(to)
+    if to.is_human_readable() && !value.is_finite() {
+        to.collect_str(value)
     } else {
         value.serialize(to)
     }
 }
 
 pub(super) fn deserialize<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
-    if from.is_human_readable() {
-        Readable::deserialize(from)?.value()
-    } else {
-        f64::deserialize(from)
+    if !from.is_human_readable() {
+        return f64::deserialize(from);
     }
+    // Not an untagged enum: none takes a number where another crate has asked serde_json for arbitrary precision.
+    let value = Value::deserialize(from)?;
+    let found = match &value {
+        Value::Number(number) => number.as_f64(),
+        Value::String(name) => name.parse().ok(),
+        _ => None,
+    };
+    found.ok_or_else(|| Error::custom(format!("{value} is no number; \"NaN\" and \"inf\" are")))
 }
 
 /// The same for many: a sample that is not finite is `null`, a gap.
