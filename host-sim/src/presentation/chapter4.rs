@@ -126,19 +126,19 @@ fn data_rows(rate_hz: f64, x: &AxisSettings, truth: &AxisTruth, seeds: u64) -> V
         ],
         vec![
             Cell::text("friction known to the law"),
-            Cell::Missing,
+            Cell::text(""),
             Cell::text("the plant's"),
             Cell::text("as identified"),
         ],
         vec![
             Cell::text("GMS elements of the law"),
-            Cell::Missing,
+            Cell::text(""),
             Cell::number(truth.gms.elements.len() as f64, 0),
             Cell::number(x.friction.gms.elements.len() as f64, 0),
         ],
         vec![
             Cell::text("runs of a configuration"),
-            Cell::Missing,
+            Cell::text(""),
             Cell::number(1.0, 0),
             Cell::number(seeds as f64, 0),
         ],

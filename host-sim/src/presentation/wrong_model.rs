@@ -124,10 +124,11 @@ fn figure(
             Style::dashed(style.colour),
         ));
     }
+    let quantity = name.replacen('L', "l", 1);
     lines(
         &format!("wrong-{kind}-{id}"),
         &format!("{name} over {what}; dashed, without feedforward"),
-        (label, &format!("{} (um)", name.to_lowercase())),
+        (label, &format!("{quantity} (um)")),
         curves,
     )
 }

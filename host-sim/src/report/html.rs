@@ -40,7 +40,7 @@ impl Page {
                     header {
                         (theme_switch())
                         h1 { (self.title) }
-                        p.subtitle { (self.subtitle) }
+                        p.subtitle { (typeset(&self.subtitle)) }
                         (provenance(&self.provenance))
                     }
                     (contents(&parts))
@@ -49,7 +49,7 @@ impl Page {
                         @for (i, part) in parts.iter().enumerate() {
                             section id=(part.section.id) {
                                 h2 { span.number { (i + 1) } " " (part.section.heading) }
-                                @for paragraph in &part.section.prose { p { (paragraph) } }
+                                @for paragraph in &part.section.prose { p { (typeset(paragraph)) } }
                                 @for numbered in &part.blocks { (numbered.markup(points, part.provenance)) }
                             }
                         }
@@ -146,9 +146,9 @@ impl Numbered<'_> {
     fn markup(&self, points_per_series: usize, made: &Provenance) -> Markup {
         let caption = |note: Option<String>| {
             html! {
-                b { (self.label) "." } " " (self.block.caption())
+                b { (self.label) "." } " " (typeset(self.block.caption()))
                 @if !self.block.caption().ends_with(['.', '?', '!']) { "." }
-                @if let Some(note) = note { " " span.note { (note) } }
+                @if let Some(note) = note { " " span.note { (typeset(&note)) } }
             }
         };
         match self.block.content() {
@@ -196,7 +196,7 @@ fn legend_markup(figure: &Figure) -> Markup {
                         style={ "color:" (light) ";color:light-dark(" (light) "," (dark) ")" } {
                         (entry.sample.markup("currentColor"))
                     }
-                    span { (whole_words(entry.name)) }
+                    span { (whole_words(&typeset(entry.name))) }
                 }
             }
         }
@@ -221,7 +221,7 @@ fn table_markup(table: &Table) -> Markup {
                 tr {
                     @for (i, column) in table.columns.iter().enumerate() {
                         th scope="col" class=[class(i)] {
-                            (whole_words(&column.heading))
+                            (whole_words(&typeset(&column.heading)))
                             @if let Some(unit) = &column.unit { span.unit { (typeset(unit)) } }
                         }
                     }
@@ -229,7 +229,7 @@ fn table_markup(table: &Table) -> Markup {
             }
             tbody {
                 @for row in &table.rows {
-                    tr { @for (i, cell) in row.iter().enumerate() { td class=[class(i)] { (cell.shown()) } } }
+                    tr { @for (i, cell) in row.iter().enumerate() { td class=[class(i)] { (typeset(&cell.shown())) } } }
                 }
             }
         }

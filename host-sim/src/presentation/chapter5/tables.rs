@@ -305,7 +305,7 @@ impl Chapter<'_> {
                     knowledge_name(VirtualMachine)
                 ),
                 vec![
-                    Column::new("LawKind"),
+                    Column::new("Controller"),
                     Column::with_unit("Amplitude", "mm"),
                     velocity_column(),
                 ],
