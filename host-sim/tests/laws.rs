@@ -43,6 +43,13 @@ fn every_law_is_tuned_at_equal_robustness_and_runs() {
             // Kept, and used up but for the two digits that Ki is rounded down to.
             assert!(used <= 1.0 + 1e-6 && used > 0.95, "{:?}: {used}", tuned.law);
         }
+        // A loop whose slope is beyond its gain margin hunts about lasting errors.
+        if tuned.law == LawKind::NPid {
+            let margins = process.margins(&tuned.feedback.pid, form).unwrap();
+            let bearable = 10.0_f64.powf(margins.gain_margin_db / 20.0);
+            let slope = tuned.feedback.nonlinear.unwrap().largest_slope();
+            assert!(1.5 < slope && slope < bearable, "{slope} of {bearable}");
+        }
         // The best of what was tried is what stayed.
         let cost = |value: f64| {
             let of = tuned.tried.iter().filter(|(tried, _)| *tried == value);

@@ -51,7 +51,7 @@ enum Command {
     /// Run our controllers over a recorded reference, beside what the recorded machine did, or along a part program in
     /// G-code.
     Replay(replay::Arguments),
-    /// Every table and figure of the thesis' chapters 3 to 5 on the simulated stage, in one page: about three minutes on two
+    /// Every table and figure of the thesis' chapters 3 to 5 on the simulated stage, in one page: under five minutes on two
     /// cores. An interrupted report goes on where it stopped.
     Report(report::Arguments),
     /// Say what becomes of tracking when mass, friction, delay, amplifier, encoder or drive change, or a tool cuts: named

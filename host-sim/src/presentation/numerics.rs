@@ -30,7 +30,7 @@ pub fn numerics_table(numerics: &[Numerics]) -> Table {
     });
     Table {
         id: "numerics".to_owned(),
-        caption: "f32 and fixed point against f64 over the whole comparison, worst values. Output and differing words: \
+        caption: "Simulated, x axis. f32 and fixed point against f64 over the whole comparison, worst values. Output and differing words: \
                   on the same counts. Tracking error: each in closed loop on its own stage, at the same time, and as \
                   scores"
             .to_owned(),
