@@ -10,7 +10,6 @@
 //! so that it cannot wind up on a large error.
 //! Source: Slotine and Li, *Applied Nonlinear Control*, Prentice Hall, 1991, chapter 7.
 
-use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::feedback::{FeedbackState, FeedbackTerms};
@@ -18,7 +17,7 @@ use super::surface::{SurfaceGains, SurfaceLoop};
 use crate::scalar::{Quantity, Scalar};
 
 /// Sliding mode as a person writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SlidingModeGains {
     /// lambda, the slope of the sliding line, 1/s: on it the error falls as exp(-lambda t). Above zero, to 1e4.

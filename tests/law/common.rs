@@ -2,7 +2,6 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
-use quadrant::encoder::EncoderReading;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::Command;
 use quadrant::scalar::Scalar;
@@ -105,14 +104,11 @@ impl<S: Scalar> Rig<S> {
         }
     }
 
-    /// One tick; commands and flags act once, counts and switches stay.
+    /// One tick; commands and flags act once, counts stay.
     pub(crate) fn tick(&mut self) -> Outputs {
         let inputs = self.inputs;
         self.inputs = Inputs {
-            readings: inputs
-                .readings
-                .map(|reading| EncoderReading::of(reading.count)),
-            switches: inputs.switches,
+            counts: inputs.counts,
             ..Inputs::default()
         };
         self.stage.tick(&self.plan, &mut self.state, &inputs)
@@ -133,6 +129,6 @@ impl<S: Scalar> Rig<S> {
     /// Goes over to other settings at the next tick.
     pub(crate) fn exchange(&mut self, settings: &StageSettings) {
         self.stage = settings.build().expect("valid settings");
-        self.inputs.settings_changed = [true; 3];
+        self.inputs.settings_changed = true;
     }
 }

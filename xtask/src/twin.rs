@@ -121,7 +121,10 @@ impl Twin {
         if self.blocked {
             counts[0] = 0;
         }
-        InputRecord::of_counts(counts, self.operator.request(self.tick))
+        InputRecord {
+            counts,
+            request: self.operator.request(self.tick),
+        }
     }
 
     /// The twin's own answer.
