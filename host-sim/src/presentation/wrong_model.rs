@@ -193,8 +193,8 @@ pub fn wrong_model_section(outcomes: &[WrongOutcome]) -> Section {
         heading: "\u{201c}A well-tuned PID is as good\u{201d}".to_owned(),
         prose: vec![
             "The usual objection to friction feedforward. All competitors keep the same bounds on sensitivity: the PID, whose share of \
-             integral action was tuned; the N-PID on it, which keeps the bounds at small errors and is held to three quarters of the \
-             Popov bound beyond; and a cautious N-PID, half as stiff at small errors, that keeps the bounds at every gain of its sector. \
+             integral action was tuned; the N-PID on it, which keeps the bounds at small errors and the slope of k(e) e within three \
+             quarters of the Popov bound beyond; and a cautious N-PID, half as stiff at small errors, that keeps the bounds at every gain of its sector. \
              Then the feedforward's model is made wrong on purpose."
                 .to_owned(),
         ],

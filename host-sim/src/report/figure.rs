@@ -168,7 +168,7 @@ pub(super) fn same_length(
     })
 }
 
-/// A label of an axis or a unit as it is printed: with the micro sign, which plain text does without.
+/// A text as it is printed: with the micro sign, which plain text does without. The word "us" is taken for a unit.
 pub(super) fn typeset(label: &str) -> String {
     label
         .split_inclusive(|c: char| !c.is_alphanumeric())

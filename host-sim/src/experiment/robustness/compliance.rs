@@ -1,9 +1,9 @@
 //! How far a sinusoidal load moves the axis at rest: what the loop's linear model says, and what the simulated axis does.
 
-use quadrant::control::feedback::LawKind;
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use quadrant::control::feedback::LawKind;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
