@@ -1,10 +1,19 @@
 //! One axis, one tick: counts in, a converter's word out.
 
+mod state;
+
+pub use state::AxisState;
+
 use crate::control::feedback::{Feedback, FeedbackInput, FeedbackState, FeedbackTerms};
-use crate::encoder::{Encoder, EncoderState};
-use crate::feedforward::{Feedforward, FeedforwardState, ReferenceStep};
-use crate::reference::{Motion, MotionState, ReferenceSample};
-use crate::safety::FaultCode;
+pub use crate::course::CourseMode;
+use crate::course::{Course, CourseEvent};
+use crate::encoder::{Encoder, EncoderReading};
+use crate::feedforward::{Feedforward, ReferenceStep};
+use crate::homing::HomingInput;
+use crate::reference::Motion;
+use crate::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
+use crate::safety::travel::{Travel, TravelState};
+use crate::safety::{AxisSwitches, Command, FaultCode};
 use crate::scalar::{Quantity, Scalar};
 use crate::telemetry::{AxisTelemetry, LimitedBy};
 use crate::units::{DacCode, Position};
@@ -45,77 +54,56 @@ pub struct Axis<S: Scalar, const N: usize> {
     pub(crate) feedback: Feedback<S>,
     pub(crate) feedforward: Feedforward<S, N>,
     pub(crate) preview_ticks: usize,
-    /// How long a motion waits, so that the feedback's reference starts when that of every axis does.
-    pub(crate) wait_ticks: u32,
     pub(crate) amplifier: Amplifier<S>,
-    pub(crate) following_error_limit: S,
     pub(crate) transfer_decay: S,
-}
-
-/// The memory of an axis.
-#[derive(Clone, Debug, PartialEq)]
-pub struct AxisState<S: Scalar, const N: usize> {
-    encoder: EncoderState,
-    motion: MotionState,
-    running: bool,
-    /// Ticks until the motion begins.
-    waiting: u32,
-    /// What speaks against the axis in this tick.
-    pub(crate) suspect: Option<FaultCode>,
-    /// The reference's step at the feedforward's tick.
-    step: ReferenceStep<S>,
-    /// The reference at the feedforward's tick, ahead of the feedback's.
-    ahead: Position,
-    preview: [Position; PREVIEW_ROOM],
-    /// Velocity of the feedback's reference, for a law that needs it.
-    velocity: S,
-    feedback: FeedbackState<S>,
-    springs: FeedforwardState<S, N>,
-    transfer: S,
-    last_output: S,
-    telemetry: AxisTelemetry<S>,
-}
-
-impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
-    fn default() -> Self {
-        Self {
-            encoder: EncoderState::default(),
-            motion: MotionState::default(),
-            running: false,
-            waiting: 0,
-            suspect: None,
-            step: ReferenceStep::default(),
-            ahead: Position::ZERO,
-            preview: [Position::ZERO; PREVIEW_ROOM],
-            velocity: S::ZERO,
-            feedback: FeedbackState::default(),
-            springs: FeedforwardState::default(),
-            transfer: S::ZERO,
-            last_output: S::ZERO,
-            telemetry: AxisTelemetry::default(),
-        }
-    }
-}
-
-impl<S: Scalar, const N: usize> AxisState<S, N> {
-    /// What the last tick computed.
-    pub fn telemetry(&self) -> &AxisTelemetry<S> {
-        &self.telemetry
-    }
-
-    /// Whether a motion is under way.
-    pub fn is_running(&self) -> bool {
-        self.running
-    }
+    pub(crate) overspeed: Overspeed,
+    pub(crate) silence: Silence<S>,
+    pub(crate) index: IndexSpacing,
+    pub(crate) following: Following<S>,
+    pub(crate) travel: Travel,
+    pub(crate) course: Course<S>,
 }
 
 impl<S: Scalar, const N: usize> Axis<S, N> {
-    /// Takes the encoder's raw count; says whether it is plausible.
+    /// Takes the encoder's reading; says whether there is nothing to suspect. What there is stays in `state.suspect`.
     #[inline(always)]
-    pub(crate) fn measure(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
-        let plausible = self.encoder.update(&mut state.encoder, raw);
+    pub(crate) fn measure(&self, state: &mut AxisState<S, N>, reading: &EncoderReading) -> bool {
+        let step = self.encoder.update(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
-        plausible
+        let slow = self.overspeed.step(&mut state.overspeed, step.counts);
+        let audible = self
+            .silence
+            .step(&mut state.silence, step.counts, state.last_output);
+        let indexed = match reading.index {
+            Some(raw) => {
+                let at = self.encoder.count_at(&state.encoder, raw);
+                state.pulse = Some(at.position());
+                self.index.step(&mut state.index, at.0 as u32)
+            }
+            None => true,
+        };
+        let sound = reading.fresh & reading.valid & step.plausible & slow & audible & indexed;
+        if !sound {
+            // Where counts may be lost, so is the origin.
+            if !reading.valid | !step.plausible | !indexed {
+                state.homed = false;
+            }
+            // The first that explains the others.
+            state.suspect = Some(if !reading.fresh {
+                FaultCode::StaleSample
+            } else if !reading.valid {
+                FaultCode::EncoderInvalid
+            } else if !step.plausible {
+                FaultCode::EncoderJump
+            } else if !indexed {
+                FaultCode::IndexMismatch
+            } else if !slow {
+                FaultCode::Overspeed
+            } else {
+                FaultCode::EncoderSilent
+            });
+        }
+        sound
     }
 
     /// Prepares to hold the measured position.
@@ -123,6 +111,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let here = state.encoder.position();
         *state = AxisState {
             encoder: state.encoder.clone(),
+            homed: state.homed,
+            index: state.index,
+            following: self.following.start(),
             ahead: here,
             preview: [here; PREVIEW_ROOM],
             telemetry: state.telemetry,
@@ -130,29 +121,111 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         };
     }
 
-    /// Starts a motion from where the reference stands.
-    #[inline(always)]
-    pub(crate) fn run(&self, state: &mut AxisState<S, N>) {
-        state.motion = MotionState::start(state.ahead);
-        state.running = true;
-        state.waiting = self.wait_ticks;
+    /// Starts or ends a motion, from where the reference stands. What the axis cannot follow now is ignored.
+    pub(crate) fn obey(&self, state: &mut AxisState<S, N>, command: Command) {
+        let (course, here) = (&mut state.course, state.ahead);
+        match command {
+            Command::Run | Command::StartMove(_) => self.course.run(course, here),
+            Command::Jog(_, velocity) => self.course.jog(course, here, velocity),
+            Command::StartStream => self.course.run_stream(course),
+            Command::Stop => self.stop(state),
+            Command::Home(_) => {
+                if self.course.home(course, here) {
+                    state.homed = false;
+                    state.pulse = None;
+                }
+            }
+            Command::Enable | Command::Disable | Command::ResetFault => {}
+        }
     }
 
-    /// Advances the reference and forms the error; says whether the axis follows. `tick` numbers the ticks.
+    /// Brakes what is under way, unless it brakes already.
+    pub(crate) fn stop(&self, state: &mut AxisState<S, N>) {
+        let from = state.standing();
+        self.course.stop(&mut state.course, from);
+    }
+
+    /// Shifts every position of the axis: nothing moves by it.
+    #[cold]
     #[inline(never)]
-    pub(crate) fn refer(&self, state: &mut AxisState<S, N>, motion: &Motion<S>, tick: u32) -> bool {
-        let ahead = if state.running && state.waiting == 0 {
-            motion.step(&mut state.motion)
-        } else {
-            ReferenceSample {
-                position: state.ahead,
-                ..ReferenceSample::default()
+    fn shift(state: &mut AxisState<S, N>, offset: Position) {
+        state.encoder.shift(offset);
+        state.telemetry.measured = state.encoder.count();
+        state.ahead = state.ahead + offset;
+        for position in &mut state.preview {
+            *position = *position + offset;
+        }
+        // Distances to pulses before the shift would be off by it.
+        IndexSpacing::forget(&mut state.index);
+        state.travel = TravelState::default();
+        state.homed = true;
+    }
+
+    /// Whether the reference goes where it may.
+    #[inline(always)]
+    fn confine(&self, state: &mut AxisState<S, N>, switches: AxisSwitches) -> bool {
+        let found = if switches.at_limit() && !self.course.expects(&state.course, switches) {
+            // Away from a pressed switch the axis may go.
+            let forward = state.displacement > Position::ZERO;
+            let backward = state.displacement < Position::ZERO;
+            if forward && switches.has(AxisSwitches::POSITIVE_LIMIT) {
+                Some(FaultCode::PositiveLimitSwitch)
+            } else if backward && switches.has(AxisSwitches::NEGATIVE_LIMIT) {
+                Some(FaultCode::NegativeLimitSwitch)
+            } else {
+                None
             }
+        } else {
+            None
         };
-        state.waiting = state.waiting.saturating_sub(1);
-        state.running = state.running && !motion.finished(&state.motion);
-        let displacement = (ahead.position - state.ahead).clipped();
+        let found = match found {
+            None if state.homed => self.travel.step(
+                &mut state.travel,
+                &self.course.braking,
+                state.ahead,
+                state.displacement,
+                state.encoder.position(),
+            ),
+            found => found,
+        };
+        if found.is_some() {
+            state.suspect = found;
+        }
+        found.is_none()
+    }
+
+    /// Advances the reference and forms the error; says whether the axis follows and stays where it may. What there is to
+    /// suspect stays in `state.suspect`. `tick` numbers the ticks.
+    #[inline(never)]
+    pub(crate) fn refer(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        switches: AxisSwitches,
+        tick: u32,
+    ) -> bool {
+        let input = HomingInput {
+            switches,
+            index: state.pulse.take(),
+            measured: state.encoder.position(),
+        };
+        let from = state.standing();
+        let (ahead, event) =
+            self.course
+                .advance(&mut state.course, motion, from, state.homed, input);
+        if let CourseEvent::Origin(offset) = event {
+            Self::shift(state, offset);
+        }
+        state.displacement_before = state.displacement;
+        state.displacement = ahead.position - state.ahead;
+        let displacement = state.displacement.clipped();
         state.ahead = ahead.position;
+        let mut confined =
+            state.course.mode() == CourseMode::Stopping || self.confine(state, switches);
+        if let CourseEvent::Fault(code) = event {
+            state.suspect = Some(code);
+            confined = false;
+        }
 
         // The feedback's reference is what the feedforward's was `preview_ticks` ago.
         let slot = tick as usize % PREVIEW_ROOM;
@@ -169,12 +242,20 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let error = S::scale_wide((reference - measured).0, self.unit_mm);
         state.telemetry.reference = reference;
         state.telemetry.error = error;
+        state.telemetry.velocity = ahead.velocity;
         state.step = ReferenceStep {
             displacement: S::scale_integer(displacement, self.unit_mm),
             velocity: ahead.velocity,
             acceleration: ahead.acceleration,
         };
-        error.magnitude() <= self.following_error_limit
+        let follows = self
+            .following
+            .step(&mut state.following, error, ahead.velocity.magnitude());
+        if !follows {
+            // It cannot be braked under control, so it goes before what could.
+            state.suspect = Some(FaultCode::FollowingError);
+        }
+        follows & confined
     }
 
     /// Computes the output. `changed` says that the settings are new in this tick: the output then starts from where
@@ -241,7 +322,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(always)]
     pub(crate) fn rest(&self, state: &mut AxisState<S, N>) {
         let measured = state.encoder.count();
-        state.running = false;
+        state.course.hold();
         state.last_output = S::ZERO;
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),

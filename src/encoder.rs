@@ -2,6 +2,47 @@
 
 use crate::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
 
+/// What a board reads of one encoder in one tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct EncoderReading {
+    /// The raw counter. One narrower than 32 bits fills the low bits.
+    pub count: u32,
+    /// The raw counter latched at the index pulse, if one passed since the last tick.
+    pub index: Option<u32>,
+    /// The reading was taken in this tick.
+    pub fresh: bool,
+    /// No change of both lines at once was seen since the last tick.
+    pub valid: bool,
+}
+
+impl EncoderReading {
+    /// A fresh and valid reading without an index pulse.
+    #[inline(always)]
+    pub const fn of(count: u32) -> Self {
+        Self {
+            count,
+            index: None,
+            fresh: true,
+            valid: true,
+        }
+    }
+}
+
+impl Default for EncoderReading {
+    fn default() -> Self {
+        Self::of(0)
+    }
+}
+
+/// What a reading says of the motion since the last one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Step {
+    /// Counts towards larger positions.
+    pub counts: i32,
+    /// Whether the axis can have moved that far.
+    pub plausible: bool,
+}
+
 /// An incremental encoder's counter.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Encoder {
@@ -32,6 +73,11 @@ impl EncoderState {
     pub const fn position(&self) -> Position {
         self.position
     }
+
+    /// Shifts the accumulated count: what was zero becomes `offset`.
+    pub(crate) fn shift(&mut self, offset: Position) {
+        self.position = self.position.saturating_add(offset);
+    }
 }
 
 impl Encoder {
@@ -45,22 +91,41 @@ impl Encoder {
         }
     }
 
-    /// Takes a raw reading: differences it, wrap-safe, and accumulates. Says whether the step is plausible; an
-    /// implausible one is accumulated too, so that position is not lost when the limit was wrong.
+    /// The signed counts from one raw reading to another, towards larger positions.
     #[inline(always)]
-    pub fn update(&self, state: &mut EncoderState, raw: u32) -> bool {
-        let step = (raw.wrapping_sub(state.raw) << self.shift) as i32 >> self.shift;
-        state.raw = raw;
-        if !state.started {
-            state.started = true;
-            return true;
-        }
-        let directed = if self.reversed {
+    const fn between(&self, from: u32, to: u32) -> i32 {
+        let step = (to.wrapping_sub(from) << self.shift) as i32 >> self.shift;
+        if self.reversed {
             step.wrapping_neg()
         } else {
             step
-        };
-        state.position = state.position.saturating_add(Position::from_step(directed));
-        step.unsigned_abs() <= self.largest_step as u32
+        }
+    }
+
+    /// Takes a raw count: differences it, wrap-safe, and accumulates. An implausible step is accumulated too, so that
+    /// position is not lost when the limit was wrong.
+    #[inline(always)]
+    pub fn update(&self, state: &mut EncoderState, raw: u32) -> Step {
+        let counts = self.between(state.raw, raw);
+        state.raw = raw;
+        if !state.started {
+            state.started = true;
+            return Step {
+                counts: 0,
+                plausible: true,
+            };
+        }
+        state.position = state.position.saturating_add(Position::from_step(counts));
+        Step {
+            counts,
+            plausible: counts.unsigned_abs() <= self.largest_step as u32,
+        }
+    }
+
+    /// The accumulated count at which the counter showed `raw`, within half its range of the last reading.
+    #[inline(always)]
+    pub const fn count_at(&self, state: &EncoderState, raw: u32) -> EncoderCount {
+        let back = self.between(raw, state.raw);
+        EncoderCount(state.count().0.wrapping_sub(back as i64))
     }
 }

@@ -19,7 +19,9 @@
 //! the elements' sum, the elements take their weights' shares of the bristle's force. What else the elements remember is
 //! right again once the reference has moved over the pre-sliding range in one sense.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
+use strum::{AsRefStr, EnumString, VariantNames};
 
 use crate::friction::bristle::Bristle;
 use crate::friction::dahl::Dahl;
@@ -32,8 +34,21 @@ use crate::scalar::{Quantity, Scalar};
 use crate::settings::FrictionSettings;
 
 /// Which friction models act.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    AsRefStr,
+    EnumString,
+    VariantNames,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum FeedforwardKind {
     /// No friction feedforward.
     #[default]
@@ -97,7 +112,7 @@ impl FeedforwardKind {
 }
 
 /// How much of each effect is fed forward.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedforwardGains {
     /// Share of `s(v) sgn(v)`, 0..=2; 1 is the identified value.

@@ -1,18 +1,92 @@
-//! The two traits that a board gives to the control law.
+//! What a board gives to the firmware.
 //!
-//! embedded-hal 1.0 has neither an encoder nor a converter trait; these are ours, and this is their only place. They
-//! speak in raw words: what a word means is [`settings`](crate::settings).
+//! embedded-hal 1.0 has no encoder, no converter, no watchdog and no port that is read and written without waiting; these
+//! traits are ours, and this is their only place. They speak in raw words: what a word means is
+//! [`settings`](crate::settings). Flash for stored settings is `embedded_storage::nor_flash::NorFlash`.
 
+use crate::encoder::EncoderReading;
+use crate::safety;
 use crate::units::DacCode;
 
-/// The three axes' encoder counters.
+/// The three axes' encoders.
 pub trait Encoders {
-    /// The raw counters, all read in this call. A counter narrower than 32 bits fills the low bits.
-    fn counts(&mut self) -> [u32; 3];
+    /// What all three say, read in this call; to be called once a tick. A counter narrower than 32 bits fills the low
+    /// bits, and an index pulse is reported once.
+    fn read(&mut self) -> [EncoderReading; 3];
 }
 
 /// The three axes' amplifiers: converters and their common enable line.
 pub trait Amplifiers {
     /// Sets all three converters together, and the enable line. When disabling, the line goes first.
     fn write(&mut self, codes: [DacCode; 3], enabled: bool);
+
+    /// Whose converters held something else than they were told when the last call of [`write`](Self::write) looked.
+    /// Where any did, that call has disabled the amplifiers.
+    fn mismatches(&self) -> [bool; 3] {
+        [false; 3]
+    }
+}
+
+/// The limit and home switches, the amplifiers' faults and the emergency stop.
+pub trait Switches {
+    /// All of them, read in this call. One is active when the switch is pressed, the amplifier at fault, or a wire broken.
+    fn read(&mut self) -> safety::Switches;
+}
+
+/// A serial port that never waits.
+pub trait Serial {
+    /// Takes what has arrived, as much as `into` holds; returns how many bytes that was.
+    fn read(&mut self, into: &mut [u8]) -> usize;
+
+    /// Sends the beginning of `bytes`; returns how many were taken, 0 while earlier ones are on their way.
+    fn write(&mut self, bytes: &[u8]) -> usize;
+}
+
+/// A watchdog that resets the processor unless it is fed.
+pub trait Watchdog {
+    /// Starts it, for good. The first [`feed`](Self::feed) must follow within its time.
+    fn start(&mut self);
+
+    /// Feeds it. `driving`: the amplifiers are enabled. While they are not, a board may let a debugger stop the
+    /// processor without being reset; while they are, a stopped processor must be.
+    fn feed(&mut self, driving: bool);
+}
+
+/// What started the processor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ResetCause {
+    /// The supply came up.
+    PowerOn,
+    /// The supply sagged below the processor's threshold.
+    BrownOut,
+    /// The reset pin: the button, or a debugger.
+    Pin,
+    /// The firmware itself.
+    Software,
+    /// The watchdog: nobody fed it.
+    Watchdog,
+    /// The processor's security against entering a low-power mode.
+    LowPower,
+    /// The hardware does not say.
+    Unknown,
+}
+
+impl ResetCause {
+    /// The cause in words.
+    pub const fn as_str(self) -> &'static str {
+        match self {
+            Self::PowerOn => "power-on",
+            Self::BrownOut => "brown-out",
+            Self::Pin => "reset pin",
+            Self::Software => "software",
+            Self::Watchdog => "watchdog",
+            Self::LowPower => "illegal low-power mode",
+            Self::Unknown => "unknown",
+        }
+    }
+
+    /// Whether the firmware before this one did not end of its own accord or at somebody's wish.
+    pub const fn is_alarming(self) -> bool {
+        matches!(self, Self::BrownOut | Self::Watchdog | Self::LowPower)
+    }
 }

@@ -27,7 +27,7 @@
 //! 5. The converter's word, and [`telemetry`] with every term of the law.
 //!
 //! [`safety`] decides whether any of this reaches the amplifiers: the stage starts disabled, and a fault switches it off
-//! in the tick that finds it. [`supervisor`] stands between a person's requests and the tick.
+//! in the tick that finds it, or brakes it under control where that is safer. [`supervisor`] stands between a person's requests and the tick.
 //!
 //! # One law, three number types
 //!
@@ -49,7 +49,7 @@
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
 //! assert!(stage.tick(&plan, &mut state, &enable).enabled);
 //! // One count (0.5 um) away from where it was enabled, the stage pushes back.
-//! let moved = Inputs { counts: [1, 0, 0], ..Inputs::default() };
+//! let moved = Inputs::of_counts([1, 0, 0]);
 //! assert!(stage.tick(&plan, &mut state, &moved).codes[0].0 < 0);
 //! # Ok::<(), quadrant::settings::SettingsError>(())
 //! ```
@@ -57,17 +57,24 @@
 #![forbid(unsafe_code)]
 
 pub mod axis;
+pub mod capture;
 pub mod control;
+mod course;
+pub mod driver;
 pub mod encoder;
 pub mod feedforward;
 pub mod friction;
 pub mod hal;
+pub mod homing;
+pub mod last_words;
 pub mod link;
+pub mod machine;
 pub mod reference;
 pub mod safety;
 pub mod scalar;
 pub mod settings;
 pub mod stage;
+pub mod store;
 pub mod supervisor;
 pub mod table;
 pub mod telemetry;

@@ -7,6 +7,7 @@
 //! |-----------|----------|-------------------------------|------|
 //! | control   | highest  | every control tick            | encoders in, law, amplifiers out, deadline check |
 //! | supervise | middle   | every tenth control tick      | lets requests through or refuses them |
+//! | serve     | low      | after supervise               | answers a host's requests |
 //! | log       | low      | when supervise has something  | prints through defmt |
 //! | idle      | none     | the rest of the time          | what the board asks for |
 #![cfg_attr(target_os = "none", no_std, no_main)]
@@ -23,7 +24,7 @@ mod board;
     target_os = "none",
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
-mod job;
+mod boot;
 
 #[cfg(all(
     target_os = "none",
@@ -41,18 +42,28 @@ compile_error!("choose a board: `board-mps2` or `board-nucleo-f446re` (`cargo xt
     dispatchers = [DISPATCHER_0, DISPATCHER_1, DISPATCHER_2]
 )]
 mod app {
-    use core::sync::atomic::{AtomicU32, Ordering};
+    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
+    use quadrant::capture::CAPTURE_WORDS;
     use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-    use quadrant::hal::{Amplifiers as _, Encoders as _};
-    use quadrant::safety::{AxisName, Command};
+    use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
+    use quadrant::link::message::NumberType;
+    use quadrant::machine::{
+        After, Axis, Control, ControlInputs, Liveness, Meters, Queues, Server, ServerParts,
+        Snapshot, Supervision,
+    };
+    use quadrant::safety::{AxisName, AxisSwitches, Command, Fault};
     use quadrant::scalar::{Quantity, Scalar};
-    use quadrant::stage::{Inputs, Plan, Stage, StageState};
-    use quadrant::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
+    use quadrant::stage::StageState;
+    use quadrant::store::BUFFER_BYTES;
+    use quadrant::supervisor::Event;
 
-    use crate::board::{self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Tick};
-    use crate::job;
+    use crate::board::{
+        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
+        Switches, Tick, Watchdog,
+    };
+    use crate::boot;
 
     /// What the control law computes with.
     #[cfg(not(feature = "scalar-fixed"))]
@@ -60,25 +71,25 @@ mod app {
     /// What the control law computes with.
     #[cfg(feature = "scalar-fixed")]
     type Number = quadrant::scalar::Fixed;
-
-    /// Runs of the supervising task per status line of the log: one a second at 10 kHz.
-    const STATUS_DIVIDER: u32 = 1_000;
+    /// What that is called.
+    #[cfg(not(feature = "scalar-fixed"))]
+    const NUMBER: NumberType = NumberType::F32;
+    /// What that is called.
+    #[cfg(feature = "scalar-fixed")]
+    const NUMBER: NumberType = NumberType::Fixed;
 
     /// Control ticks begun: the time of everything else.
-    static TICK: AtomicU32 = AtomicU32::new(0);
+    pub(crate) static TICK: AtomicU32 = AtomicU32::new(0);
     /// Control ticks that ended after the next one was due.
     static OVERRUNS: AtomicU32 = AtomicU32::new(0);
     /// The longest a control tick took, in cycles of its timer.
     static LONGEST: AtomicU32 = AtomicU32::new(0);
+    /// Polls of the server.
+    static POLLS: AtomicU32 = AtomicU32::new(0);
+    /// The host whose set points the axes follow has fallen silent.
+    static LINK_LOST: AtomicBool = AtomicBool::new(false);
 
     defmt::timestamp!("{=u32:010}", TICK.load(Ordering::Relaxed));
-
-    /// What control tells the supervising task.
-    #[derive(Clone, Copy)]
-    pub(crate) struct Sample {
-        view: StageView,
-        errors: [Number; 3],
-    }
 
     /// What the supervising task has to say to a person.
     #[derive(Clone, Copy)]
@@ -90,73 +101,119 @@ mod app {
     }
 
     #[shared]
-    struct Shared {}
+    struct Shared {
+        /// What the supervising task saw last, for the server.
+        seen: Snapshot<Number>,
+    }
 
     #[local]
     struct Local {
-        stage: Stage<Number>,
-        plan: Plan<Number>,
-        state: StageState<Number>,
+        control: Control<'static, 'static, Number>,
+        server: Server<'static, 'static, Number, SettingsFlash>,
         amplifiers: Amplifiers,
         encoders: Encoders,
+        switches: Switches,
         operator: Operator,
+        serial: Serial,
+        watchdog: Watchdog,
         tick: Tick,
         idle: Idle,
+        supervision: Supervision,
+        liveness: Liveness,
         requests_in: Producer<'static, Command>,
         requests_out: Consumer<'static, Command>,
         commands_in: Producer<'static, Command>,
         commands_out: Consumer<'static, Command>,
-        samples_in: Producer<'static, Sample>,
-        samples_out: Consumer<'static, Sample>,
+        snapshots_in: Producer<'static, Snapshot<Number>>,
+        snapshots_out: Consumer<'static, Snapshot<Number>>,
+        events_in: Producer<'static, (u32, Event)>,
+        events_out: Consumer<'static, (u32, Event)>,
         lines_in: Producer<'static, Line>,
         lines_out: Consumer<'static, Line>,
-        supervisor: Supervisor,
     }
 
     #[init(local = [
+        axes: [Option<Axis<Number>>; 4] = [const { None }; 4],
+        queues: Queues<'static, Number> = Queues::new(),
+        buffer: [u8; BUFFER_BYTES] = [0; BUFFER_BYTES],
+        capture: [u32; CAPTURE_WORDS] = [0; CAPTURE_WORDS],
         requests: Queue<Command, 4> = Queue::new(),
         commands: Queue<Command, 4> = Queue::new(),
-        samples: Queue<Sample, 4> = Queue::new(),
+        snapshots: Queue<Snapshot<Number>, 4> = Queue::new(),
+        events: Queue<(u32, Event), 16> = Queue::new(),
         lines: Queue<Line, 16> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
+        let mut board = Board::init(cx.core);
+        let remains = boot::remains(board.reset_cause);
         // Tables are filled and bounds are searched before the first tick is due.
-        let job = job::take(board::job());
-        let stage = job::built(job.stage.build::<Number, FIRMWARE_ELEMENTS>());
-        let plan = job::built(job.plan.build::<Number>(&job.stage));
-        let rate_hz = job.stage.rate_hz as u32;
+        let boot::Loaded {
+            settings,
+            plan,
+            provenance,
+            store,
+            fault,
+        } = boot::load(board.flash, cx.local.buffer);
+        let [x, y, z, spare] = cx.local.axes;
+        let axes = [
+            x.insert(settings.build_axis(AxisName::X)),
+            y.insert(settings.build_axis(AxisName::Y)),
+            z.insert(settings.build_axis(AxisName::Z)),
+        ];
+        let spare = spare.insert(axes[0].clone());
+        let state = match remains.or(fault) {
+            Some(code) => StageState::<Number, FIRMWARE_ELEMENTS>::with_fault(code),
+            None => StageState::default(),
+        };
+        let rate_hz = settings.rate_hz as u32;
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
-        let Board {
-            encoders,
-            operator,
-            amplifiers,
-            tick,
-            idle,
-        } = Board::init(cx.core, rate_hz);
+        let (control_ends, ends) = cx.local.queues.split();
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
-        let (samples_in, samples_out) = cx.local.samples.split();
+        let (snapshots_in, snapshots_out) = cx.local.snapshots.split();
+        let (events_in, events_out) = cx.local.events.split();
         let (lines_in, lines_out) = cx.local.lines.split();
+        let streaming = settings.streaming.build();
+        let server = Server::new(ServerParts {
+            ends,
+            spare,
+            settings,
+            provenance,
+            store,
+            buffer: cx.local.buffer,
+            capture: cx.local.capture,
+            board: board::NAME,
+            cycle_hz: board.tick.cycle_hz(),
+            number: NUMBER,
+        });
+        board.tick.start(rate_hz);
+        board.watchdog.start();
         let local = Local {
-            stage,
-            plan,
-            state: StageState::default(),
-            amplifiers,
-            encoders,
-            operator,
-            tick,
-            idle,
+            control: Control::new(axes, streaming, plan, state, control_ends),
+            server,
+            amplifiers: board.amplifiers,
+            encoders: board.encoders,
+            switches: board.switches,
+            operator: board.operator,
+            serial: board.serial,
+            watchdog: board.watchdog,
+            tick: board.tick,
+            idle: board.idle,
+            supervision: Supervision::default(),
+            liveness: Liveness::default(),
             requests_in,
             requests_out,
             commands_in,
             commands_out,
-            samples_in,
-            samples_out,
+            snapshots_in,
+            snapshots_out,
+            events_in,
+            events_out,
             lines_in,
             lines_out,
-            supervisor: Supervisor::default(),
         };
-        (Shared {}, local)
+        let seen = Snapshot::default();
+        (Shared { seen }, local)
     }
 
     /// Reads the encoders, computes, writes the amplifiers.
@@ -164,35 +221,38 @@ mod app {
     /// The contract: done before the next tick is due. It is checked at the end of every tick, and nothing that could
     /// panic, divide by a helper or compute in f64 can be reached from here (`cargo xtask prove-no-panic`).
     #[task(binds = CONTROL_TICK, priority = 4, local = [
-        stage, plan, state, encoders, operator, amplifiers, tick, requests_in, commands_out, samples_in,
+        control, encoders, switches, operator, amplifiers, tick, requests_in, commands_out, snapshots_in,
         deadline_missed: bool = false,
     ])]
     fn control(cx: control::Context) {
         cx.local.tick.acknowledge();
-        let inputs = Inputs {
-            counts: cx.local.encoders.counts(),
+        let mut switches = cx.local.switches.read();
+        for (axis, differs) in AxisName::ALL
+            .into_iter()
+            .zip(cx.local.amplifiers.mismatches())
+        {
+            if differs {
+                switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
+            }
+        }
+        let outputs = cx.local.control.tick(&ControlInputs {
+            readings: cx.local.encoders.read(),
+            switches,
             command: cx.local.commands_out.dequeue(),
-            settings_changed: false,
             deadline_missed: *cx.local.deadline_missed,
-        };
-        let state = cx.local.state;
-        let outputs = cx.local.stage.tick(cx.local.plan, state, &inputs);
+            link_lost: LINK_LOST.load(Ordering::Relaxed),
+        });
         cx.local.amplifiers.write(outputs.codes, outputs.enabled);
 
-        TICK.store(state.tick(), Ordering::Relaxed);
+        TICK.store(cx.local.control.state().tick(), Ordering::Relaxed);
         if let Some(request) = cx.local.operator.request() {
             // A full queue drops the newest request: whoever asks too fast asks again.
             let _ = cx.local.requests_in.enqueue(request);
         }
-        if state.tick().is_multiple_of(PERIOD_TICKS) {
-            // A supervising task that is late finds the oldest samples and misses the newest.
-            let _ = cx.local.samples_in.enqueue(Sample {
-                view: StageView {
-                    safety: state.safety(),
-                    running: state.is_running(),
-                },
-                errors: state.axes().each_ref().map(|axis| axis.telemetry().error),
-            });
+        let elapsed = cx.local.tick.elapsed_cycles();
+        if let Some(snapshot) = cx.local.control.observe(elapsed) {
+            // A supervising task that is late finds the oldest snapshots and misses the newest.
+            let _ = cx.local.snapshots_in.enqueue(snapshot);
             let _ = supervise::spawn();
         }
 
@@ -209,33 +269,59 @@ mod app {
         }
     }
 
-    /// Lets requests through to the control law, or refuses them, and tells the log what happened.
-    #[task(priority = 2, local = [samples_out, requests_out, commands_in, lines_in, supervisor, runs: u32 = 0])]
-    async fn supervise(cx: supervise::Context) {
-        while let Some(sample) = cx.local.samples_out.dequeue() {
+    /// Lets the operator's requests through to the control law, or refuses them, tells log and server what happened, and
+    /// feeds the watchdog while everything makes progress.
+    #[task(priority = 2, shared = [seen], local = [
+        snapshots_out, requests_out, commands_in, events_in, lines_in, watchdog, supervision, liveness,
+    ])]
+    async fn supervise(mut cx: supervise::Context) {
+        while let Some(snapshot) = cx.local.snapshots_out.dequeue() {
             let request = cx.local.requests_out.dequeue();
-            let decision = cx.local.supervisor.step(sample.view, request);
-            if let Some(command) = decision.command {
+            let supervised = cx.local.supervision.run(&snapshot, request);
+            if let Some(command) = supervised.command {
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
             }
-            *cx.local.runs = cx.local.runs.wrapping_add(1);
-            let status = cx
-                .local
-                .runs
-                .is_multiple_of(STATUS_DIVIDER)
-                .then_some(Line::Status(sample.errors));
-            for line in decision
-                .events
-                .into_iter()
-                .flatten()
-                .map(Line::Event)
-                .chain(status)
-            {
-                // A log that is late loses its newest lines; nothing waits for it.
-                let _ = cx.local.lines_in.enqueue(line);
+            for event in supervised.events.into_iter().flatten() {
+                // A server or a log that is late loses its newest; nothing waits for them.
+                let _ = cx.local.events_in.enqueue((snapshot.tick, event));
+                let _ = cx.local.lines_in.enqueue(Line::Event(event));
                 let _ = log::spawn();
             }
+            if supervised.status_due {
+                let errors = snapshot.axes.map(|axis| axis.error);
+                let _ = cx.local.lines_in.enqueue(Line::Status(errors));
+                let _ = log::spawn();
+            }
+            let polls = POLLS.load(Ordering::Relaxed);
+            if cx.local.liveness.check(snapshot.tick, polls) {
+                cx.local.watchdog.feed(snapshot.view.safety.drives());
+            }
+            cx.shared.seen.lock(|seen| *seen = snapshot);
+        }
+        let _ = serve::spawn();
+    }
+
+    /// Answers a host's requests.
+    #[task(priority = 1, shared = [seen], local = [server, serial, events_out])]
+    async fn serve(mut cx: serve::Context) {
+        POLLS.store(
+            POLLS.load(Ordering::Relaxed).wrapping_add(1),
+            Ordering::Relaxed,
+        );
+        while let Some((tick, event)) = cx.local.events_out.dequeue() {
+            cx.local.server.tell_of(tick, event);
+        }
+        let seen = cx.shared.seen.lock(|seen| *seen);
+        let meters = Meters {
+            overruns: OVERRUNS.load(Ordering::Relaxed),
+            longest_tick_cycles: LONGEST.load(Ordering::Relaxed),
+        };
+        let after = cx.local.server.poll(cx.local.serial, &seen, meters);
+        LINK_LOST.store(cx.local.server.link_lost(), Ordering::Relaxed);
+        if after == After::Reboot {
+            defmt::info!("restart, as a host has asked");
+            board::restart();
         }
     }
 
@@ -265,15 +351,22 @@ mod app {
             Event::MotionStarted => defmt::info!("motion started"),
             Event::MotionFinished => defmt::info!("motion finished"),
             Event::Refused(_, refusal) => defmt::warn!("request refused: {=str}", refusal.as_str()),
-            Event::Faulted(fault) => defmt::error!(
-                "fault {=u8} on {=str} at tick {=u32}, outputs are off: {=str}; {=str}",
-                fault.code.number(),
-                fault.axis.map_or("the stage", AxisName::as_str),
-                fault.tick,
-                fault.code.cause(),
-                fault.code.remedy()
-            ),
+            Event::Faulted(fault) => log_fault(fault, "outputs are off"),
+            Event::Stopping(fault) => log_fault(fault, "the axes brake"),
+            Event::Held(fault) => log_fault(fault, "the axes brake and hold"),
         }
+    }
+
+    fn log_fault(fault: Fault, reaction: &str) {
+        defmt::error!(
+            "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}; {=str}",
+            fault.code.number(),
+            fault.axis.map_or("the stage", AxisName::as_str),
+            fault.tick,
+            reaction,
+            fault.code.cause(),
+            fault.code.remedy()
+        );
     }
 
     #[idle(local = [idle])]
@@ -286,6 +379,11 @@ mod app {
                     OVERRUNS.load(Ordering::Relaxed),
                     LONGEST.load(Ordering::Relaxed),
                     finished.microseconds
+                );
+                defmt::info!(
+                    "stack: at most {=usize} of {=usize} bytes were used",
+                    board::stack::high_water(),
+                    board::stack::size()
                 );
                 board::halt(Outcome::Done);
             }

@@ -3,7 +3,12 @@
 //! Runs every [`PERIOD_TICKS`] control ticks, below the control interrupt. Pure, so that the firmware and the host's
 //! run of the same job decide alike.
 
-use crate::safety::{Command, Fault, SafetyState};
+use core::fmt;
+
+use crate::axis::{AxisState, CourseMode};
+use crate::safety::{AxisName, Command, Fault, FaultCode, Obstacle, SafetyState};
+use crate::scalar::Scalar;
+use crate::stage::StageState;
 
 /// Control ticks between two runs of the supervisor: 1 kHz at a control rate of 10 kHz.
 pub const PERIOD_TICKS: u32 = 10;
@@ -15,6 +20,31 @@ pub struct StageView {
     pub safety: SafetyState,
     /// Whether a motion is under way.
     pub running: bool,
+    /// Why the outputs cannot be enabled.
+    pub obstacle: Option<Obstacle>,
+    /// A fault that only held the axes.
+    pub held: Option<Fault>,
+    /// What each axis follows.
+    pub modes: [CourseMode; 3],
+    /// Which axes know where they are.
+    pub homed: [bool; 3],
+    /// The first segments of a stream are there, and start where the axes rest.
+    pub stream_ready: bool,
+}
+
+impl StageView {
+    /// What there is to see.
+    pub fn of<S: Scalar, const N: usize>(state: &StageState<S, N>) -> Self {
+        Self {
+            safety: state.safety(),
+            running: state.is_running(),
+            obstacle: state.obstacle(),
+            held: state.held(),
+            modes: state.axes().each_ref().map(AxisState::mode),
+            homed: state.axes().each_ref().map(AxisState::is_homed),
+            stream_ready: state.axes().iter().all(AxisState::is_stream_ready),
+        }
+    }
 }
 
 /// Why a request did not reach the control law.
@@ -28,6 +58,16 @@ pub enum Refusal {
     AlreadyRunning,
     /// There is no fault to reset.
     NoFault,
+    /// An input is bad.
+    BadInput(Obstacle),
+    /// The axes brake after a fault.
+    Stopping,
+    /// No good inputs have been seen yet.
+    Starting,
+    /// The axis moves already.
+    AxisBusy(AxisName),
+    /// The axes have no first segment of a stream that starts where they rest.
+    NoStream,
 }
 
 impl Refusal {
@@ -38,7 +78,45 @@ impl Refusal {
             Self::NotEnabled => "the outputs are off; enable them first",
             Self::AlreadyRunning => "a motion is under way",
             Self::NoFault => "there is no fault to reset",
+            Self::Stopping => "the axes brake after a fault; wait until they stand",
+            Self::AxisBusy(_) => "the axis moves already; stop it or wait until it stands",
+            Self::NoStream => {
+                "there is no stream that starts where the axes rest; open it again and send its first set points"
+            }
+            Self::Starting => "the stage has just started; ask again",
+            Self::BadInput(obstacle) => match obstacle.code {
+                FaultCode::EmergencyStop => "the emergency stop is pressed; release it",
+                FaultCode::AmplifierFault => "the amplifier reports a fault; clear it there",
+                FaultCode::OutputMismatch => {
+                    "the converter holds another word than was written; check its bus and supply"
+                }
+                FaultCode::StaleSample => {
+                    "the encoder's reading is stale; check the encoder's interface"
+                }
+                FaultCode::EncoderInvalid => {
+                    "both lines of the encoder change at once; check its cable and supply"
+                }
+                other => other.cause(),
+            },
         }
+    }
+
+    /// The axis that it is about, if it is about one.
+    pub const fn axis(&self) -> Option<AxisName> {
+        match self {
+            Self::BadInput(obstacle) => obstacle.axis,
+            Self::AxisBusy(axis) => Some(*axis),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Refusal {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(axis) = self.axis() {
+            write!(f, "{axis}: ")?;
+        }
+        f.write_str(self.as_str())
     }
 }
 
@@ -49,8 +127,12 @@ pub enum Event {
     Enabled,
     /// The outputs were switched off.
     Disabled,
+    /// A fault was found, and the axes brake under control.
+    Stopping(Fault),
     /// A fault switched the outputs off.
     Faulted(Fault),
+    /// A fault was found, and the axes brake and hold.
+    Held(Fault),
     /// The plan's motions began.
     MotionStarted,
     /// The plan's motions came to their end.
@@ -71,18 +153,27 @@ pub struct Decision {
     /// For the control law's next tick.
     pub command: Option<Command>,
     /// For the log: a change of state, a change of motion, a refusal.
-    pub events: [Option<Event>; 3],
+    pub events: [Option<Event>; 4],
 }
 
 impl Supervisor {
     /// Looks at the stage and at a request, if there is one.
     pub fn step(&mut self, view: StageView, request: Option<Command>) -> Decision {
         let seen = core::mem::replace(&mut self.seen, view);
-        let state = (seen.safety != view.safety).then_some(match view.safety {
-            SafetyState::Disabled => Event::Disabled,
-            SafetyState::Enabled => Event::Enabled,
-            SafetyState::Faulted(fault) => Event::Faulted(fault),
-        });
+        let state = match view.safety {
+            _ if seen.safety == view.safety => None,
+            SafetyState::Start => None,
+            // That a start is over is no news: nothing has changed for the outputs.
+            SafetyState::Disabled if seen.safety == SafetyState::Start => None,
+            SafetyState::Disabled => Some(Event::Disabled),
+            SafetyState::Enabled => Some(Event::Enabled),
+            SafetyState::Stopping(fault) => Some(Event::Stopping(fault)),
+            SafetyState::Faulted(fault) => Some(Event::Faulted(fault)),
+        };
+        let held = match view.held {
+            Some(fault) if seen.held != view.held => Some(Event::Held(fault)),
+            _ => None,
+        };
         let motion = match (seen.running, view.running) {
             (false, true) => Some(Event::MotionStarted),
             (true, false) if view.safety.is_enabled() => Some(Event::MotionFinished),
@@ -93,18 +184,49 @@ impl Supervisor {
         });
         Decision {
             command: if refusal.is_none() { request } else { None },
-            events: [state, motion, refusal],
+            events: [state, held, motion, refusal],
         }
     }
 }
 
-fn refusal(view: StageView, command: Command) -> Option<Refusal> {
+/// Why the control law would not act on a command now, as far as `view` tells.
+pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
     let faulted = matches!(view.safety, SafetyState::Faulted(_));
+    let stopping = matches!(view.safety, SafetyState::Stopping(_));
     match command {
-        Command::Enable | Command::Run if faulted => Some(Refusal::FaultLatched),
-        Command::Run if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
-        Command::Run if view.running => Some(Refusal::AlreadyRunning),
+        Command::Disable | Command::Stop => None,
+        Command::ResetFault if stopping => Some(Refusal::Stopping),
         Command::ResetFault if !faulted => Some(Refusal::NoFault),
-        _ => None,
+        Command::ResetFault => None,
+        _ if faulted => Some(Refusal::FaultLatched),
+        _ if stopping => Some(Refusal::Stopping),
+        Command::Enable if view.safety != SafetyState::Enabled && view.obstacle.is_some() => {
+            view.obstacle.map(Refusal::BadInput)
+        }
+        Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
+        Command::Enable => None,
+        _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
+        Command::Run | Command::StartStream if view.running => Some(Refusal::AlreadyRunning),
+        Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),
+        Command::Run | Command::StartStream => None,
+        Command::Home(axis) | Command::StartMove(axis) if mode(view, axis) != CourseMode::Hold => {
+            Some(Refusal::AxisBusy(axis))
+        }
+        Command::Jog(axis, _)
+            if !matches!(mode(view, axis), CourseMode::Hold | CourseMode::Jog) =>
+        {
+            Some(Refusal::AxisBusy(axis))
+        }
+        Command::Home(_) | Command::StartMove(_) | Command::Jog(..) => None,
+    }
+}
+
+/// What an axis follows.
+fn mode(view: StageView, axis: AxisName) -> CourseMode {
+    let [x, y, z] = view.modes;
+    match axis {
+        AxisName::X => x,
+        AxisName::Y => y,
+        AxisName::Z => z,
     }
 }

@@ -84,6 +84,14 @@ impl Neg for Position {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct EncoderCount(pub i64);
 
+impl EncoderCount {
+    /// The count as a position; saturates beyond what a [`Position`] holds.
+    #[inline(always)]
+    pub const fn position(self) -> Position {
+        Position(self.0.saturating_mul(1 << POSITION_FRACTION_BITS))
+    }
+}
+
 /// The word of a 16-bit two's-complement converter, -32768..=32767 over minus to plus full scale.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct DacCode(pub i16);

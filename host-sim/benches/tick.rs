@@ -39,10 +39,8 @@ impl<S: Scalar> Rig<S> {
     }
 
     fn step(&mut self) {
-        let input = InputRecord {
-            counts: self.plant.read_counters(),
-            request: self.operator.request(self.tick),
-        };
+        let input =
+            InputRecord::of_counts(self.plant.read_counters(), self.operator.request(self.tick));
         let outputs = self.machine.tick(&input);
         self.plant.step(&outputs);
         self.tick += 1;
@@ -52,10 +50,7 @@ impl<S: Scalar> Rig<S> {
 fn law<S: Scalar>(criterion: &mut Criterion, name: &str) {
     let mut rig = Rig::<S>::moving();
     let counts = rig.plant.read_counters();
-    let still = InputRecord {
-        counts,
-        request: None,
-    };
+    let still = InputRecord::of_counts(counts, None);
     let mut group = criterion.benchmark_group("law");
     group.throughput(Throughput::Elements(100));
     // The counts stand while the reference moves on, so the error is large; no branch of the law is cheaper for it,

@@ -8,13 +8,16 @@
 //! - [`record`]: recorded motions from CSV files, checked;
 //! - [`program`]: part programs in G-code, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
+//! - [`settings_reference`]: what every setting means, as a page;
 //! - [`scenario`]: the motion that the firmware is emulated with;
+//! - [`console`]: a machine with the firmware on it, or a simulated one, over the link;
 //! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
 //! - [`identify`]: from recordings to the parameters of an axis;
 //! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
 
 pub mod commission;
+pub mod console;
 pub mod design;
 pub mod experiment;
 pub mod identify;
@@ -28,3 +31,5 @@ pub mod report_parts;
 pub mod rig;
 pub mod scenario;
 pub mod settings_file;
+pub mod settings_reference;
+pub mod simulated_machine;

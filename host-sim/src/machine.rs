@@ -3,7 +3,8 @@
 use std::collections::VecDeque;
 
 use quadrant::link::lockstep::{InputRecord, Job};
-use quadrant::safety::Command;
+use quadrant::reference::{Motion, Segment};
+use quadrant::safety::{AxisName, Command};
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
@@ -17,6 +18,8 @@ pub struct Machine<S: Scalar, const N: usize> {
     state: StageState<S, N>,
     supervisor: Supervisor,
     requests: VecDeque<Command>,
+    /// Segments of a stream on their way to the axes.
+    segments: [VecDeque<Segment>; 3],
     command: Option<Command>,
     events: Vec<(u32, Event)>,
 }
@@ -41,6 +44,7 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
             state: StageState::default(),
             supervisor: Supervisor::default(),
             requests: VecDeque::new(),
+            segments: Default::default(),
             command: None,
             events: Vec::new(),
         }
@@ -56,16 +60,42 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
         &self.events
     }
 
+    /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.
+    pub fn set_motion(&mut self, axis: AxisName, motion: Motion<S>) {
+        self.plan[axis as usize] = motion;
+    }
+
+    /// Appends a segment of each axis to the stream's queues.
+    pub fn stream(&mut self, segments: [Segment; 3]) {
+        for (queue, segment) in self.segments.iter_mut().zip(segments) {
+            queue.push_back(segment);
+        }
+    }
+
+    /// Segments of the stream that the slowest axis has not taken yet.
+    pub fn queued_segments(&self) -> usize {
+        self.segments.iter().map(VecDeque::len).max().unwrap_or(0)
+    }
+
+    fn feed_stream(&mut self) {
+        for (name, queue) in AxisName::ALL.into_iter().zip(&mut self.segments) {
+            if self.state.axes()[name as usize].wants_segment()
+                && let Some(segment) = queue.pop_front()
+            {
+                self.state.offer_segment(name, segment);
+            }
+        }
+    }
+
     /// One control period.
     pub fn tick(&mut self, input: &InputRecord) -> Outputs {
+        self.feed_stream();
         let outputs = self.stage.tick(
             &self.plan,
             &mut self.state,
             &Inputs {
-                counts: input.counts,
                 command: self.command.take(),
-                settings_changed: false,
-                deadline_missed: false,
+                ..input.inputs()
             },
         );
         self.requests.extend(input.request);
@@ -76,10 +106,7 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
     }
 
     fn supervise(&mut self) {
-        let view = StageView {
-            safety: self.state.safety(),
-            running: self.state.is_running(),
-        };
+        let view = StageView::of(&self.state);
         let decision = self.supervisor.step(view, self.requests.pop_front());
         self.command = decision.command;
         let tick = self.state.tick();

@@ -63,10 +63,8 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         // The encoder of x stands still, as if the axis were clamped.
         let mut counts = plant.read_counters();
         counts[0] = 0;
-        let input = quadrant::link::lockstep::InputRecord {
-            counts,
-            request: operator.request(tick),
-        };
+        let input =
+            quadrant::link::lockstep::InputRecord::of_counts(counts, operator.request(tick));
         let outputs = machine.tick(&input);
         plant.step(&outputs);
         if let SafetyState::Faulted(fault) = machine.state().safety() {
@@ -77,10 +75,10 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         }
     }
     for _ in 0..20 {
-        machine.tick(&quadrant::link::lockstep::InputRecord {
-            counts: [0; 3],
-            request: Some(Command::Run),
-        });
+        machine.tick(&quadrant::link::lockstep::InputRecord::of_counts(
+            [0; 3],
+            Some(Command::Run),
+        ));
     }
     let events: Vec<_> = machine.events().iter().map(|(_, event)| *event).collect();
     assert!(matches!(

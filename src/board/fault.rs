@@ -1,41 +1,75 @@
 //! The last resort: panics, hard faults and interrupts nobody asked for.
 //!
-//! All three do the same, in this order: outputs to zero and amplifiers disabled; then the text; then the end.
+//! All three do the same, in this order: outputs to zero and amplifiers disabled; last words for the firmware that comes
+//! after; the same for the log; then the end.
 
+use core::arch::naked_asm;
+use core::fmt;
 use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
-use cortex_m_rt::{ExceptionFrame, exception};
+use cortex_m_rt::exception;
+use quadrant::last_words::{Death, LastWords};
 
-use super::{Outcome, halt, outputs_off};
+use super::{Outcome, halt, outputs_off, remains, stack};
+use crate::app::TICK;
 
 /// Makes the machine safe, then says why, then ends.
-fn fail(explain: impl FnOnce()) -> ! {
+fn fail(death: Death, text: fmt::Arguments) -> ! {
     // A second fault comes from the explanation itself: by then the outputs are off, so stay silent.
     static EXPLAINING: AtomicBool = AtomicBool::new(false);
 
     cortex_m::interrupt::disable();
     outputs_off();
     if !EXPLAINING.swap(true, Ordering::Relaxed) {
-        explain();
+        let words = LastWords::new(death, TICK.load(Ordering::Relaxed), text);
+        remains::leave(&words);
+        defmt::error!(
+            "{=str}, outputs are off: {=str}",
+            death.as_str(),
+            words.text()
+        );
     }
     halt(Outcome::Failed)
 }
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
-    fail(|| defmt::error!("panic, outputs are off: {}", defmt::Display2Format(info)))
+    fail(Death::Panic, format_args!("{info}"))
 }
 
-// SAFETY: `cortex-m-rt` calls this with the frame the processor stacked; nothing is assumed of the interrupted code,
-// and it is never returned to.
-#[exception]
-unsafe fn HardFault(frame: &ExceptionFrame) -> ! {
-    fail(|| defmt::error!("hard fault at {=u32:#010x}, outputs are off", frame.pc()))
+/// The hard fault's vector. It begins with a fresh stack, as the old one may be what failed: whoever was interrupted is
+/// not coming back.
+// SAFETY: the vector table's name and calling convention; it moves the stack pointer, hence naked, and never returns.
+#[unsafe(naked)]
+#[unsafe(export_name = "HardFault")]
+#[unsafe(link_section = ".HardFault.user")]
+unsafe extern "C" fn hard_fault_vector() -> ! {
+    naked_asm!(
+        "mov r0, sp",
+        "ldr r1, =_stack_start",
+        "mov sp, r1",
+        "b {handler}",
+        handler = sym hard_fault,
+    )
 }
 
-// SAFETY: as for `HardFault`.
+/// `frame` is where the processor put the registers: the program counter is the seventh word.
+extern "C" fn hard_fault(frame: usize) -> ! {
+    if stack::holds(frame) {
+        // SAFETY: inside the stack, and written by the processor a moment ago.
+        let counter = unsafe { (frame as *const u32).add(6).read_volatile() };
+        fail(Death::HardFault, format_args!("at {counter:#010x}"))
+    } else {
+        fail(
+            Death::HardFault,
+            format_args!("the stack is full: its pointer was {frame:#010x}"),
+        )
+    }
+}
+
+// SAFETY: `cortex-m-rt` calls this; nothing is assumed of the interrupted code, and it is never returned to.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
-    fail(|| defmt::error!("interrupt {=i16} has no handler, outputs are off", number))
+    fail(Death::StrayInterrupt, format_args!("number {number}"))
 }

@@ -4,23 +4,30 @@
 //!
 //! - `device`: what RTIC needs to know of the chip, with interrupts named by their *role*
 //!   (`CONTROL_TICK`, `DISPATCHER_0`..`DISPATCHER_2`) instead of by the peripheral behind them;
-//! - `Board::init`, which starts the chip and hands out `encoders`, `operator`, `amplifiers`, `tick` and `idle`;
+//! - `Board::init`, which starts the chip and hands out `encoders`, `operator`, `amplifiers`, `tick` and `idle`, and on
+//!   the reference board `switches`, `serial`, `watchdog`, `supply`, `flash` and `reset_cause`: the traits are in
+//!   `quadrant::hal`;
 //! - `job`, what a host has left to run, if there is one;
 //! - `outputs_off`, which makes the machine safe from any context without owning anything;
-//! - `halt`, which never returns.
+//! - `halt`, which never returns;
+//! - `board_memory.x`, the linker's map, with the stack at the bottom of RAM (`stack`).
+//!
+//! `remains` keeps what a panic or a fault has to say until the next start, on any board.
+//!
+//! How to add a board: `docs/porting.md`.
 
 #[cfg(all(feature = "board-mps2", feature = "board-nucleo-f446re"))]
 compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not both");
 
 mod fault;
+pub(crate) mod remains;
+pub(crate) mod stack;
 
 #[cfg(feature = "board-mps2")]
 mod mps2;
 #[cfg(feature = "board-mps2")]
 pub(crate) use mps2::*;
 
-#[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
-mod ad5754r;
 #[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
 mod nucleo_f446re;
 #[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]

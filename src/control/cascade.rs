@@ -11,6 +11,7 @@
 //! a large error is driven back at that speed, whatever the gains.
 //! Source: Gross, Hamann and Wiegärtner, *Electrical Feed Drives in Automation*, Publicis, 2001.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::feedback::{FeedbackInput, FeedbackState, FeedbackTerms};
@@ -18,7 +19,7 @@ use super::surface::{SurfaceGains, SurfaceLoop};
 use crate::scalar::{Quantity, Scalar};
 
 /// The cascade as a person writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct CascadeGains {
     /// Kv, the gain of the position loop, 1/s; above zero, to 1e4.

@@ -1,6 +1,7 @@
 //! The feedback law of an axis: which one it is, and what they all share.
 
 use serde::{Deserialize, Serialize};
+use strum::{AsRefStr, EnumString, VariantNames};
 
 use super::cascade::Cascade;
 use super::nctf::Nctf;
@@ -11,8 +12,11 @@ use super::sliding_mode::SlidingMode;
 use crate::scalar::Scalar;
 
 /// The feedback laws.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
+)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum LawKind {
     /// PID without an integral.
     Pd,

@@ -14,6 +14,7 @@
 //! systems*, Precision Engineering 27 (2003).
 
 use heapless::Vec;
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::feedback::{FeedbackState, FeedbackTerms};
@@ -34,12 +35,15 @@ pub struct CharacteristicPoint {
     pub velocity_mm_s: f64,
 }
 
+/// The points of a characteristic, one to [`MAX_POINTS`].
+pub type Characteristic = Vec<CharacteristicPoint, MAX_POINTS>;
+
 /// NCTF as a person writes it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct NctfGains {
     /// The NCT, joined by straight lines, from the origin on and constant beyond the last point; one to [`MAX_POINTS`].
-    pub characteristic: Vec<CharacteristicPoint, MAX_POINTS>,
+    pub characteristic: Characteristic,
     /// G, V s/mm; above zero, to 100.
     pub gain_v_s_per_mm: f64,
     /// r, the integral's share, 1/s; 0 to 1e4.

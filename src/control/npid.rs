@@ -3,13 +3,14 @@
 //! The PID acts on the scaled error `f(e) = k(e) e`, so the loop is stiff where the error is large and keeps its linear
 //! margins where it is small: `1 <= k(e) <= cosh(ko emax)`.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use crate::scalar::{Quantity, Scalar};
 use crate::table::OctaveTable;
 
 /// The nonlinear gain as a person writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct NonlinearGain {
     /// ko, the rate of variation, 1/mm.

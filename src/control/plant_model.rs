@@ -3,11 +3,12 @@
 //! `Y(s)/U(s) = A exp(-s Td) / (s^2 + B s + C)`, the form an FRF measurement at working amplitude is fitted with
 //! (thesis, Table 3.1). Friction is inside B and C here; a simulated stage with explicit friction needs other values.
 
+use miniconf::{TreeAny, TreeSchema};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 /// Second order plus delay. Settings time and host only: double precision.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct PlantModel {
     /// A, acceleration per volt at the amplifier input, mm/(V s^2). Above zero.

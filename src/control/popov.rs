@@ -26,13 +26,14 @@
 
 use core::f64::consts::{FRAC_PI_2, PI};
 
+use miniconf::{TreeAny, TreeSchema};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use crate::control::plant_model::PlantModel;
 
 /// The gains of a PID with filtered derivative, `Kp + Ki/s + Kd s / (1 + tau s)`, as its design yields them.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct PidGains {
     /// Kp, V/mm. Above zero.

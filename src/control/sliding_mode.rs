@@ -10,6 +10,7 @@
 //! so that it cannot wind up on a large error.
 //! Source: Slotine and Li, *Applied Nonlinear Control*, Prentice Hall, 1991, chapter 7.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::feedback::{FeedbackState, FeedbackTerms};
@@ -17,7 +18,7 @@ use super::surface::{SurfaceGains, SurfaceLoop};
 use crate::scalar::{Quantity, Scalar};
 
 /// Sliding mode as a person writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct SlidingModeGains {
     /// lambda, the slope of the sliding line, 1/s: on it the error falls as exp(-lambda t). Above zero, to 1e4.

@@ -10,6 +10,7 @@
 //! `z = sigma0 |dx| / Fc * w^(delta - 1)`. One table turns `w` into the rate `w^(delta - 1)`, another turns `z` into the
 //! share of the distance that is covered, which never exceeds one. Steps beyond `z = 16` count as 16.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::bristle::Bristle;
@@ -18,7 +19,7 @@ use crate::scalar::{Quantity, Scalar};
 use crate::table::OctaveTable;
 
 /// Dahl's model as a person writes it. Its level is the Coulomb level of the static model.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct DahlParameters {
     /// sigma0, the stiffness at zero force, V/mm; positive.

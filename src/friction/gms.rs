@@ -10,6 +10,7 @@
 //! explicit step of the slip equation overshoots when `C Ts / s` is not small.
 
 use heapless::Vec;
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::Direction;
@@ -32,12 +33,15 @@ pub struct GmsElement {
     pub weight: f64,
 }
 
+/// The blocks of a model, one to [`MAX_ELEMENTS`].
+pub type GmsElements = Vec<GmsElement, MAX_ELEMENTS>;
+
 /// The GMS model as a person writes it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct GmsParameters {
     /// The blocks, one to [`MAX_ELEMENTS`].
-    pub elements: Vec<GmsElement, MAX_ELEMENTS>,
+    pub elements: GmsElements,
     /// C, the rate at which sliding friction follows the Stribeck effect, V/s.
     pub attraction_v_s: f64,
 }

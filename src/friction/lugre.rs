@@ -12,6 +12,7 @@
 //! where little is left to cover, unless the Stribeck curve needs its nodes near zero; beyond its end both stay as they
 //! are there.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::bristle::Bristle;
@@ -21,7 +22,7 @@ use crate::scalar::{Quantity, Scalar};
 use crate::table::{OctaveTable, interpolation_error};
 
 /// The LuGre model as a person writes it. Its surface is the static model's Stribeck curve.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct LugreParameters {
     /// sigma0, the stiffness of the bristles, V/mm; positive.

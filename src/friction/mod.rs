@@ -11,10 +11,16 @@ pub mod lugre;
 pub mod smoothed_gms;
 pub mod stribeck;
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
+use strum::{AsRefStr, EnumString, VariantNames};
 
 /// A sense of motion.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 pub enum Direction {
     /// Towards larger positions.
     Positive,
@@ -23,7 +29,7 @@ pub enum Direction {
 }
 
 /// A pair of things, one for each sense of motion: friction is rarely the same both ways.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct PerDirection<T> {
     /// For motion towards larger positions.

@@ -15,6 +15,7 @@
 //! only as `1 / x`. The exponential is `((1 + (1 - h)^2) / 2)^8` with `h` an eighth of its argument, at most one: 0.005 off at
 //! most, and never negative.
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::Direction;
@@ -23,7 +24,7 @@ use super::stribeck::Sliding;
 use crate::scalar::{Quantity, Scalar};
 
 /// What the S-GMS has beyond the GMS, as a person writes it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct SmoothedGmsParameters {
     /// Width of the transition over each element's breakaway level, 0.001 to 1. The GMS is the limit of zero.

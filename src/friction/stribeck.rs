@@ -4,6 +4,7 @@
 //! Source: Armstrong-Helouvry, Dupont and Canudas de Wit, *A survey of models, analysis tools and compensation
 //! methods for the control of machines with friction*, Automatica 30 (1994).
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::{Direction, PerDirection};
@@ -11,7 +12,7 @@ use crate::scalar::{Quantity, Scalar};
 use crate::table::{OctaveTable, interpolation_error};
 
 /// The Stribeck curve of one sense of motion.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StribeckCurve {
     /// Fc, the level at high velocity, V.
@@ -47,7 +48,7 @@ impl StribeckCurve {
 }
 
 /// The static friction model of one sense of motion.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StaticFriction {
     /// s(v).

@@ -7,9 +7,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::safety::Command;
+use crate::encoder::EncoderReading;
+use crate::safety::{Command, Switches};
 use crate::settings::{PlanSettings, StageSettings};
-use crate::stage::Outputs;
+use crate::stage::{Inputs, Outputs};
 use crate::units::DacCode;
 
 /// Size of the memory.
@@ -29,15 +30,34 @@ pub const BOOT: usize = 0x100;
 pub const JOB: usize = 0x200;
 /// Largest encoded job.
 pub const JOB_BYTES: usize = 0x7E00;
+/// Bytes that the host has written to the link's port since the start, a word.
+pub const LINK_IN_WRITTEN: usize = 0x8000;
+/// Bytes of these that the target had read when it took the last inputs, a word.
+pub const LINK_IN_TAKEN: usize = 0x8004;
+/// Bytes that the target had written to its port when it took the last inputs, a word.
+pub const LINK_OUT_SHOWN: usize = 0x8008;
+/// Bytes of these that the host has read, a word.
+pub const LINK_OUT_TAKEN: usize = 0x800C;
+/// Size of each of the port's rings.
+pub const LINK_BYTES: usize = 0x400;
+/// The ring of bytes to the target.
+pub const LINK_IN: usize = 0x8400;
+/// The ring of bytes to the host.
+pub const LINK_OUT: usize = 0x8800;
+/// Size of the flash for settings: two sectors.
+pub const FLASH_BYTES: usize = 0x8000;
+/// The flash for settings, every byte inverted.
+pub const FLASH: usize = 0x9000;
 /// The recorded inputs, an [`InputRecord`] a tick.
-pub const RECORDED_INPUTS: usize = 0x1_0000;
+pub const RECORDED_INPUTS: usize = 0x1_1000;
 /// The collected outputs, an [`OutputRecord`] a tick.
-pub const RECORDED_OUTPUTS: usize = 0xAC_0000;
+pub const RECORDED_OUTPUTS: usize = 0xCD_1000;
 /// The sequence number that ends a run.
 pub const END_OF_RUN: u32 = u32::MAX;
 /// Most ticks that a recorded run can hold.
 pub const RECORDED_TICKS: usize = (MEMORY_BYTES - RECORDED_OUTPUTS) / OutputRecord::BYTES;
 
+const _: () = assert!(LINK_OUT + LINK_BYTES <= FLASH && FLASH + FLASH_BYTES <= RECORDED_INPUTS);
 const _: () = assert!(RECORDED_INPUTS + RECORDED_TICKS * InputRecord::BYTES <= RECORDED_OUTPUTS);
 
 /// What paces the control interrupt.
@@ -103,28 +123,90 @@ pub struct Job {
 /// What the host tells the target for one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InputRecord {
-    /// The encoders' raw counters.
-    pub counts: [u32; 3],
+    /// What the encoders say.
+    pub readings: [EncoderReading; 3],
+    /// What the digital inputs say.
+    pub switches: Switches,
+    /// The host whose set points the axes follow has fallen silent.
+    pub link_lost: bool,
     /// A request to the supervising task.
     pub request: Option<Command>,
 }
 
 impl InputRecord {
     /// Encoded size.
-    pub const BYTES: usize = 16;
+    pub const BYTES: usize = 32;
+    /// The word of the request.
+    pub const REQUEST_WORD: usize = 3;
 
-    /// The record as words.
+    /// The word of the flags; its low half are the switches.
+    pub const FLAGS_WORD: usize = 4;
+
+    /// Bits of the flags' word above the switches': the lowest of three, x first.
+    const INDEX_SEEN: u32 = 16;
+    const STALE: u32 = 19;
+    const INVALID: u32 = 22;
+    const LINK_LOST: u32 = 25;
+
+    /// Fresh and valid raw counts and a request: a stage without switches and index pulses.
+    pub fn of_counts(counts: [u32; 3], request: Option<Command>) -> Self {
+        Self {
+            readings: counts.map(EncoderReading::of),
+            request,
+            ..Self::default()
+        }
+    }
+
+    /// What the tick reads; the request goes to the supervising task.
+    #[inline(always)]
+    pub fn inputs(&self) -> Inputs {
+        Inputs {
+            readings: self.readings,
+            switches: self.switches,
+            link_lost: self.link_lost,
+            ..Inputs::default()
+        }
+    }
+
+    /// The record as words: three counts, the request, the flags, three latched counts.
     pub fn encode(&self) -> [u8; Self::BYTES] {
-        let [x, y, z] = self.counts;
-        words([x, y, z, self.request.map_or(0, Command::number)])
+        let mut flags = u32::from(self.switches.bits());
+        for (bit, reading) in self.readings.iter().enumerate() {
+            flags |= u32::from(reading.index.is_some()) << (Self::INDEX_SEEN as usize + bit);
+            flags |= u32::from(!reading.fresh) << (Self::STALE as usize + bit);
+            flags |= u32::from(!reading.valid) << (Self::INVALID as usize + bit);
+        }
+        flags |= u32::from(self.link_lost) << Self::LINK_LOST;
+        let [x, y, z] = self.readings.map(|reading| reading.count);
+        let [at_x, at_y, at_z] = self.readings.map(|reading| reading.index.unwrap_or(0));
+        let request = self.request.and_then(Command::number).unwrap_or(0);
+        words([x, y, z, request, flags, at_x, at_y, at_z])
     }
 
     /// The record of words.
-    #[inline(always)]
     pub fn decode(bytes: &[u8; Self::BYTES]) -> Self {
-        let [x, y, z, request] = unwords(bytes);
+        Self::from_words(unwords(bytes))
+    }
+
+    /// The record of words as the memory holds them.
+    #[inline(always)]
+    pub fn from_words(words: [u32; Self::BYTES / 4]) -> Self {
+        let [x, y, z, request, flags, at_x, at_y, at_z] = words;
+        let is_set = |lowest: u32, bit: u32| flags >> (lowest + bit) & 1 == 1;
+        let reading = |count, latched, bit| EncoderReading {
+            count,
+            index: is_set(Self::INDEX_SEEN, bit).then_some(latched),
+            fresh: !is_set(Self::STALE, bit),
+            valid: !is_set(Self::INVALID, bit),
+        };
         Self {
-            counts: [x, y, z],
+            readings: [
+                reading(x, at_x, 0),
+                reading(y, at_y, 1),
+                reading(z, at_z, 2),
+            ],
+            switches: Switches::from_bits(flags as u16),
+            link_lost: is_set(Self::LINK_LOST, 0),
             request: Command::from_number(request),
         }
     }

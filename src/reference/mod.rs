@@ -4,14 +4,29 @@
 //! and ends at rest. Positions are integers ([`Position`]) from end to end; velocity and
 //! acceleration, which only the feedforward reads, are [`Scalar`]s.
 
+mod approach;
 mod harmonic;
+mod jog;
 mod point_to_point;
+mod ramp;
 mod recorded;
 mod sine;
+mod stream;
+mod stream_error;
+mod stream_planner;
 
+pub use approach::Approach;
 pub use harmonic::{Harmonic, HarmonicSettings, Plane, Sense, circle};
+pub use jog::JogState;
 pub use point_to_point::{PointToPoint, PointToPointSettings};
+pub use ramp::{Ramp, RampState, Velocity};
 pub use recorded::RecordedTable;
+pub use stream::{Segment, Stream, StreamState, StreamStep};
+pub use stream_error::{StreamError, StreamFlaw};
+pub use stream_planner::{
+    AxisPoint, LEAST_PERIOD_TICKS, MOST_MISSING, MOST_SEGMENT_TICKS, SetPoint, StreamLimits,
+    StreamPlanner,
+};
 
 use serde::{Deserialize, Serialize};
 

@@ -52,7 +52,7 @@ impl PointToPointSettings {
 }
 
 /// Fraction bits of the sums beyond those of a [`Position`].
-const FRACTION_BITS: u32 = 64;
+pub(super) const FRACTION_BITS: u32 = 64;
 /// Bits dropped from the sums before they become a velocity and an acceleration.
 const VELOCITY_SHIFT: u32 = 52;
 const ACCELERATION_SHIFT: u32 = 48;
@@ -71,9 +71,9 @@ pub(super) struct Chain {
 #[derive(Clone, Debug, PartialEq)]
 pub struct PointToPoint<S: Scalar> {
     /// Ticks at which the jerk steps up (`true`) or down.
-    impulses: [(u32, bool); 8],
-    step: i128,
-    target: Position,
+    pub(super) impulses: [(u32, bool); 8],
+    pub(super) step: i128,
+    pub(super) target: Position,
     velocity: S::Gain,
     acceleration: S::Gain,
 }

@@ -40,18 +40,18 @@ fn sines<const COUNT: usize>(phases: [u32; COUNT]) -> [i32; COUNT] {
     });
     let t = z.map(|z| upper(z, z) - HALF);
     let [first, second, third, fourth, fifth] = COEFFICIENTS;
-    let step = |sums: [i32; COUNT], coefficient: i32| {
-        core::array::from_fn(|lane| coefficient + upper(sums[lane], t[lane]))
-    };
-    let sums = step([fifth; COUNT], fourth);
-    let sums = step(sums, third);
-    let sums = step(sums, second);
-    let sums: [i32; COUNT] = step(sums, first);
-    core::array::from_fn(|lane| {
-        let product = i64::from(sums[lane]) * i64::from(t[lane]);
-        let slope = ((CONSTANT + product) >> 31) as i32;
-        ((i64::from(z[lane]) * i64::from(slope)) >> 31) as i32
-    })
+    // Loops, because the compiler does not inline `array::from_fn` into every caller.
+    let mut sums = [fifth; COUNT];
+    for coefficient in [fourth, third, second, first] {
+        for (sum, &t) in sums.iter_mut().zip(&t) {
+            *sum = coefficient + upper(*sum, t);
+        }
+    }
+    for ((sum, &t), &z) in sums.iter_mut().zip(&t).zip(&z) {
+        let slope = ((CONSTANT + i64::from(*sum) * i64::from(t)) >> 31) as i32;
+        *sum = ((i64::from(z) * i64::from(slope)) >> 31) as i32;
+    }
+    sums
 }
 
 /// The sine of a phase.

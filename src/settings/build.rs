@@ -1,13 +1,17 @@
 //! From checked settings to what the tick reads.
 
-use super::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+use super::{AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings};
 use crate::axis::{Amplifier, Axis};
+use crate::course::Course;
 use crate::encoder::Encoder;
 use crate::feedforward::Feedforward;
-use crate::reference::{Motion, MotionScale};
+use crate::reference::{Motion, MotionScale, Ramp, Stream, Velocity};
+use crate::safety::AxisName;
+use crate::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
+use crate::safety::travel::Travel;
 use crate::scalar::{Quantity, Scalar};
 use crate::stage::{Plan, Stage};
-use crate::units::{DacCode, POSITION_UNITS_PER_COUNT};
+use crate::units::{DacCode, POSITION_UNITS_PER_COUNT, Position};
 
 impl StageSettings {
     /// Checks the settings and builds the stage, with room for `N` GMS elements. Slow: tables are filled and the
@@ -18,15 +22,28 @@ impl StageSettings {
     pub fn build<S: Scalar, const N: usize>(&self) -> Result<Stage<S, N>, SettingsError> {
         self.validate(N)?;
         let period_s = 1.0 / self.rate_hz;
-        let [x, y, z] = &self.axes;
-        let previews = self
-            .axes
-            .each_ref()
-            .map(|axis| axis.preview_ticks(period_s));
-        let longest = previews.into_iter().fold(0, usize::max);
+        let longest = self.longest_preview_ticks();
         Ok(Stage {
-            axes: [x, y, z].map(|axis| axis.build(period_s, longest)),
+            axes: self
+                .axes
+                .each_ref()
+                .map(|axis| axis.build(period_s, longest)),
+            streaming: self.streaming.build(),
         })
+    }
+
+    /// Builds one axis of settings that [`validate`](Self::validate) has accepted, to be put in the place of another in a
+    /// [`StageRef`](crate::stage::StageRef). How long an axis waits at the start of a motion depends on the longest preview
+    /// of all: a change of that concerns every axis. Slow, as the build of the stage.
+    pub fn build_axis<S: Scalar, const N: usize>(&self, axis: AxisName) -> Axis<S, N> {
+        self.axis(axis)
+            .build(1.0 / self.rate_hz, self.longest_preview_ticks())
+    }
+
+    /// The longest preview of any axis: the others wait for it.
+    pub(super) fn longest_preview_ticks(&self) -> usize {
+        let ticks = |axis: &AxisSettings| axis.preview_ticks(1.0 / self.rate_hz);
+        self.axes.iter().map(ticks).fold(0, usize::max)
     }
 
     /// The scale of the motions of axis `index` (0 to 2).
@@ -56,6 +73,12 @@ impl AxisSettings {
         let largest_step = 2.0 * self.limits.max_velocity_mm_s * period_s / encoder.resolution_mm;
         let sign = if amplifier.reversed { -1.0 } else { 1.0 };
         let codes_per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
+        let scale = MotionScale {
+            resolution_mm: encoder.resolution_mm,
+            rate_hz: 1.0 / period_s,
+        };
+        let limits = &self.limits;
+        let braking = Ramp::new(limits.braking_mm_s2, limits.braking_jerk_mm_s3, scale);
         Axis {
             encoder: Encoder::new(
                 encoder.counter_bits.into(),
@@ -81,7 +104,6 @@ impl AxisSettings {
                 period_s,
             ),
             preview_ticks,
-            wait_ticks: (longest_preview_ticks - preview_ticks) as u32,
             amplifier: Amplifier {
                 limit: S::quantise(amplifier.output_limit_v, Quantity::Voltage),
                 codes_per_volt: S::gain(
@@ -91,12 +113,66 @@ impl AxisSettings {
                 ),
                 offset_code: libm::round(amplifier.offset_v * codes_per_volt) as i32,
             },
-            following_error_limit: S::quantise(self.limits.following_error_mm, Quantity::Length),
+            following: self.limits.build_following(),
+            overspeed: Overspeed::new(self.limits.overspeed_ratio * 0.5 * largest_step),
+            silence: Silence {
+                level: S::quantise(
+                    self.limits.silent_share * amplifier.output_limit_v,
+                    Quantity::Voltage,
+                ),
+                ticks: libm::round(self.limits.silent_s / period_s) as u32,
+            },
+            index: IndexSpacing::new(encoder.counts_per_index, encoder.index_tolerance_counts),
+            travel: self.limits.build_travel(scale, &braking),
+            course: Course {
+                braking,
+                moving: Ramp::new(limits.max_acceleration_mm_s2, limits.max_jerk_mm_s3, scale),
+                fastest: Velocity::from_mm_s(limits.max_velocity_mm_s, scale),
+                span: limits.travel_mm.as_ref().map(|travel| {
+                    let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
+                    (position(travel.negative), position(travel.positive))
+                }),
+                homing: self.build_homing(scale),
+                stream: Stream::new(scale),
+                wait_ticks: (longest_preview_ticks - preview_ticks) as u32,
+            },
             transfer_decay: S::quantise(
                 libm::exp(-period_s / feedback.transfer_s),
                 Quantity::Fraction,
             ),
         }
+    }
+}
+
+impl LimitSettings {
+    fn build_following<S: Scalar>(&self) -> Following<S> {
+        Following {
+            at_rest: S::quantise(self.following_error_mm, Quantity::Length),
+            per_speed: S::gain(
+                self.following_error_lag_s,
+                Quantity::Velocity,
+                Quantity::Length,
+            ),
+            largest: S::quantise(self.following_error_max_mm, Quantity::Length),
+        }
+    }
+
+    fn build_travel<S: Scalar>(&self, scale: MotionScale, braking: &Ramp<S>) -> Travel {
+        let Some(travel) = self.travel_mm else {
+            return Travel::UNLIMITED;
+        };
+        let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
+        let beyond = position(0.5 * self.following_error_mm);
+        // References are rounded to units of a position.
+        let rounding = Position(2);
+        let period_s = 1.0 / scale.rate_hz;
+        Travel::new(
+            position(travel.negative) - beyond,
+            position(travel.positive) + beyond,
+            position(self.max_velocity_mm_s * period_s) + rounding,
+            position(self.max_acceleration_mm_s2 * period_s * period_s) + rounding,
+            braking,
+        )
     }
 }
 

@@ -5,18 +5,19 @@ use heapless::Vec;
 
 use super::{
     AmplifierSettings, AxisSettings, EncoderSettings, FeedbackSettings, FeedforwardSettings,
-    FrictionSettings, LimitSettings, StageSettings,
+    FrictionSettings, HomeSwitch, HomingSettings, LimitSettings, StageSettings, StreamingSettings,
+    TravelSettings,
 };
 use crate::control::npid::NonlinearGain;
 use crate::control::plant_model::PlantModel;
 use crate::control::popov::PidGains;
 use crate::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::friction::PerDirection;
 use crate::friction::dahl::DahlParameters;
 use crate::friction::gms::{GmsElement, GmsParameters};
 use crate::friction::lugre::LugreParameters;
 use crate::friction::smoothed_gms::SmoothedGmsParameters;
 use crate::friction::stribeck::{StaticFriction, StribeckCurve};
+use crate::friction::{Direction, PerDirection};
 
 /// What tells one default axis from another.
 struct Character {
@@ -51,6 +52,9 @@ fn axis(character: &Character) -> AxisSettings {
             resolution_mm: 5e-4,
             counter_bits: 32,
             reversed: false,
+            // The screw's lead, 10 mm.
+            counts_per_index: Some(20_000),
+            index_tolerance_counts: 4,
         },
         amplifier: AmplifierSettings {
             full_scale_v: 10.0,
@@ -98,8 +102,31 @@ fn axis(character: &Character) -> AxisSettings {
         limits: LimitSettings {
             max_velocity_mm_s: MAX_VELOCITY_MM_S,
             max_acceleration_mm_s2: 2000.0,
+            max_jerk_mm_s3: 1e5,
             following_error_mm: 1.0,
+            following_error_lag_s: 2e-3,
+            following_error_max_mm: 1.4,
+            overspeed_ratio: 1.2,
+            braking_mm_s2: 4000.0,
+            braking_jerk_mm_s3: 1e6,
+            silent_s: 0.1,
+            silent_share: 0.9,
+            travel_mm: Some(TravelSettings {
+                negative: -200.0,
+                positive: 200.0,
+            }),
         },
+        homing: Some(HomingSettings {
+            direction: Direction::Negative,
+            switch: HomeSwitch::Home,
+            search_mm_s: 20.0,
+            latch_mm_s: 2.0,
+            debounce_s: 5e-4,
+            index: true,
+            mark_mm: -36.0,
+            park_mm: 0.0,
+            travel_mm: 410.0,
+        }),
         plant: Some(character.plant),
     }
 }
@@ -206,6 +233,7 @@ impl Default for StageSettings {
     fn default() -> Self {
         Self {
             rate_hz: 10e3,
+            streaming: StreamingSettings::default(),
             axes: [x_axis(), y_axis(), z_axis()],
         }
     }

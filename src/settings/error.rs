@@ -30,6 +30,8 @@ pub enum Reason {
     },
     /// It is not there, and what is chosen needs it.
     Missing,
+    /// Homing by the index pulse needs to know the counts between two of them.
+    IndexUnknown,
     /// The loop that the law closes at small errors is not shown to be stable on the plant.
     Unstable,
     /// It is not above the point before it.
@@ -72,6 +74,9 @@ impl fmt::Display for SettingsError {
         }
         match self.reason {
             Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
+            Reason::IndexUnknown => f.write_str(
+                ": homing by the index pulse needs encoder.counts_per_index; give it, or home without the index",
+            ),
             Reason::Unstable => f.write_str(
                 ": the loop that the law closes at small errors is not shown to be stable on the axis' plant; \
                  lower its gains",

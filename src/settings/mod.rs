@@ -5,13 +5,26 @@
 
 mod build;
 mod defaults;
+mod destination;
+pub mod draft;
 mod error;
 mod feedback;
+mod homing;
+pub mod leaves;
+mod limits;
+pub(crate) mod parts;
+pub mod tree;
 mod validate;
+pub(crate) mod value;
 
 pub use defaults::{x_axis, y_axis, z_axis};
+pub use destination::{MoveError, MoveFlaw};
 pub use error::{Reason, SettingsError};
+pub use homing::{HomeSwitch, HomingSettings};
+pub use limits::{LimitSettings, LossReaction, StreamingSettings, TravelSettings};
+pub use value::MAX_VALUE_BYTES;
 
+use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use crate::control::cascade::CascadeGains;
@@ -32,17 +45,20 @@ use crate::friction::stribeck::StaticFriction;
 use crate::reference::MotionSettings;
 
 /// Everything the stage's control law is made from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StageSettings {
     /// Control rate, Hz; 1000 to 100 000.
     pub rate_hz: f64,
+    /// What happens when set points of a stream no longer come.
+    #[serde(default)]
+    pub streaming: StreamingSettings,
     /// The axes.
     pub axes: [AxisSettings; 3],
 }
 
 /// Everything one axis' control law is made from.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct AxisSettings {
     /// The encoder.
@@ -57,12 +73,15 @@ pub struct AxisSettings {
     pub feedforward: FeedforwardSettings,
     /// What the axis may do.
     pub limits: LimitSettings,
+    /// How the axis finds out where it is; none: it cannot be homed.
+    #[serde(default)]
+    pub homing: Option<HomingSettings>,
     /// The linear model of the axis, if known: with it, the nonlinear gain is held to the Popov bound.
     pub plant: Option<PlantModel>,
 }
 
 /// An incremental encoder.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct EncoderSettings {
     /// Length of one count, mm; 1e-6 to 1.
@@ -71,10 +90,20 @@ pub struct EncoderSettings {
     pub counter_bits: u8,
     /// The counter runs backwards when the axis moves to larger positions.
     pub reversed: bool,
+    /// Counts between neighbouring index pulses, 16 to 1e9; none: the encoder has no index, or its spacing is not known.
+    #[serde(default)]
+    pub counts_per_index: Option<u32>,
+    /// By how many counts an index pulse may be off; at most a quarter of their spacing.
+    #[serde(default = "index_tolerance_counts")]
+    pub index_tolerance_counts: u32,
+}
+
+fn index_tolerance_counts() -> u32 {
+    4
 }
 
 /// An amplifier input driven by a 16-bit converter.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct AmplifierSettings {
     /// Voltage of the converter's largest code, V; 0.1 to 20.
@@ -89,10 +118,11 @@ pub struct AmplifierSettings {
 
 /// The feedback law, and the parameters of every law that the axis has some for: the law can be changed without losing
 /// them, but only to one that has its own.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedbackSettings {
     /// The law that acts.
+    #[tree(with = miniconf::leaf)]
     pub law: LawKind,
     /// The integral of any law stays within plus and minus this, V; above zero, at most the output limit.
     pub integral_limit_v: f64,
@@ -113,7 +143,7 @@ pub struct FeedbackSettings {
 }
 
 /// The friction of an axis, as identified.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FrictionSettings {
     /// The static model, for each sense of motion.
@@ -140,27 +170,16 @@ impl FrictionSettings {
 }
 
 /// The feedforward.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedforwardSettings {
     /// Which friction models act.
+    #[tree(with = miniconf::leaf)]
     pub kind: FeedforwardKind,
     /// How much of each.
     pub gains: FeedforwardGains,
     /// How far ahead of the feedback's reference the feedforward looks, s: the plant's delay. 0 to 31 control periods.
     pub preview_s: f64,
-}
-
-/// What an axis may do.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct LimitSettings {
-    /// Largest velocity of any reference, mm/s; the encoder may move at twice this before it counts as faulty.
-    pub max_velocity_mm_s: f64,
-    /// Largest acceleration of any reference, mm/s^2.
-    pub max_acceleration_mm_s2: f64,
-    /// Largest tracking error, mm; beyond it the stage is switched off.
-    pub following_error_mm: f64,
 }
 
 /// The motions of the three axes, started together.

@@ -41,9 +41,9 @@ fn volts<S: Scalar>(first: &StageSettings, second: Option<&StageSettings>) -> Ve
             let ideal = follower.state.axes()[0].telemetry().reference;
             let place = ideal - Position::from_mm(lag, RESOLUTION_MM);
             let count = (place.0 >> 16) as u32;
-            follower.inputs.counts = [count, 0, 0];
+            follower.inputs.set_counts([count, 0, 0]);
             follower.tick();
-            rig.inputs.counts = [count, 0, 0];
+            rig.inputs.set_counts([count, 0, 0]);
             assert!(rig.tick().enabled);
             let seen = rig.state.axes()[0].telemetry();
             (
@@ -170,7 +170,7 @@ fn a_second_change_starts_from_the_first_ones_remainder() {
     let weak = x_alone(|axis| axis.feedback.pid.kp_v_per_mm *= 0.4);
     let mut rig = Rig::<f32>::new(&pid, &PlanSettings::default());
     rig.start();
-    rig.inputs.counts = [100, 0, 0];
+    rig.inputs.set_counts([100, 0, 0]);
     for _ in 0..50 {
         rig.tick();
     }

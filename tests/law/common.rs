@@ -2,6 +2,7 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
+use quadrant::encoder::EncoderReading;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::Command;
 use quadrant::scalar::Scalar;
@@ -104,11 +105,14 @@ impl<S: Scalar> Rig<S> {
         }
     }
 
-    /// One tick; commands and flags act once, counts stay.
+    /// One tick; commands and flags act once, counts and switches stay.
     pub(crate) fn tick(&mut self) -> Outputs {
         let inputs = self.inputs;
         self.inputs = Inputs {
-            counts: inputs.counts,
+            readings: inputs
+                .readings
+                .map(|reading| EncoderReading::of(reading.count)),
+            switches: inputs.switches,
             ..Inputs::default()
         };
         self.stage.tick(&self.plan, &mut self.state, &inputs)
@@ -129,6 +133,6 @@ impl<S: Scalar> Rig<S> {
     /// Goes over to other settings at the next tick.
     pub(crate) fn exchange(&mut self, settings: &StageSettings) {
         self.stage = settings.build().expect("valid settings");
-        self.inputs.settings_changed = true;
+        self.inputs.settings_changed = [true; 3];
     }
 }

@@ -7,16 +7,17 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Quantity, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant::settings::{HomingSettings, PlanSettings, StageSettings, TravelSettings};
 use serde_json::Value;
 
 use crate::common::{Noise, Rig};
+use crate::provocations::provoke;
 
 /// Outputs of every tick, in volts as bits and in codes, and the state at the end.
-type Trace = (Vec<([u64; 3], [i16; 3])>, SafetyState);
+pub(crate) type Trace = (Vec<([u64; 3], [i16; 3])>, SafetyState);
 
 /// The plan's peak acceleration is just within the default limit.
-fn plan() -> PlanSettings {
+pub(crate) fn plan() -> PlanSettings {
     let sine = HarmonicSettings::with_velocity(0.5, 31.4, 2.0, 0.2);
     PlanSettings {
         motions: [MotionSettings::Harmonic(sine); 3],
@@ -53,19 +54,19 @@ fn run<S: Scalar>(settings: &StageSettings, jumping: usize) -> Option<Trace> {
         for index in 0..3 {
             let reference = rig.state.axes()[index].telemetry().reference;
             let count = (reference.0 >> 16) - (lag / 5e-4) as i64 + noise.counts(2);
-            rig.inputs.counts[index] = count as u32;
+            rig.inputs.readings[index].count = count as u32;
         }
         trace.push(tick_of(&mut rig));
     }
     // At rest: as far as one tick can plausibly go, then half the counter, then too far.
     for jump in [100, 1 << 31, 103] {
-        rig.inputs.counts[jumping] = rig.inputs.counts[jumping].wrapping_add(jump);
+        rig.inputs.readings[jumping].count = rig.inputs.readings[jumping].count.wrapping_add(jump);
         trace.push(tick_of(&mut rig));
     }
     Some((trace, rig.state.safety()))
 }
 
-fn tick_of<S: Scalar>(rig: &mut Rig<S>) -> ([u64; 3], [i16; 3]) {
+pub(crate) fn tick_of<S: Scalar>(rig: &mut Rig<S>) -> ([u64; 3], [i16; 3]) {
     let outputs = rig.tick();
     let volts = |index: usize| {
         let volts = rig.state.axes()[index].telemetry().output;
@@ -100,6 +101,9 @@ fn perturbed(path: &str, value: &Value) -> Value {
     match value {
         Value::Bool(flag) => Value::Bool(!flag),
         Value::String(_) if field == "law" => Value::from("pid"),
+        Value::String(direction) if direction == "negative" => Value::from("positive"),
+        Value::String(switch) if switch == "home" => Value::from("limit"),
+        Value::String(reaction) if reaction == "stop" => Value::from("hold"),
         Value::String(kind) => Value::from(if kind == "static" { "gms" } else { "static" }),
         Value::Null => panic!("{path} is not set by default"),
         Value::Number(number) if number.is_u64() => Value::from(number.as_u64().expect("u64") - 1),
@@ -111,7 +115,7 @@ fn perturbed(path: &str, value: &Value) -> Value {
                 "damping_per_s" => 0.0,
                 "stiffness_per_s2" => 1e6,
                 // Whole ticks count.
-                "preview_s" => number * 0.9,
+                "preview_s" | "debounce_s" => number * 0.9,
                 _ if number == 0.0 => 1e-3,
                 _ => number * 0.97,
             })
@@ -127,6 +131,7 @@ fn inert(base: &StageSettings, of_interest: impl Fn(&str) -> bool) -> Vec<String
     leaves(&tree, "", &mut paths);
     assert!(paths.len() > 100, "{} leaves", paths.len());
     let unchanged = [0, 1, 2].map(|axis| run::<f32>(base, axis).expect("valid"));
+    let provoked = [0, 1, 2].map(|axis| provoke(base, axis));
     paths
         .into_iter()
         .filter(|path| of_interest(path))
@@ -141,6 +146,7 @@ fn inert(base: &StageSettings, of_interest: impl Fn(&str) -> bool) -> Vec<String
                 .and_then(|rest| rest[..1].parse().ok());
             let axis = axis.unwrap_or(0);
             run::<f32>(&settings, axis).is_some_and(|trace| trace == unchanged[axis])
+                && provoke(&settings, axis) == provoked[axis]
         })
         .collect()
 }
@@ -152,6 +158,23 @@ fn with_kind(kind: FeedforwardKind) -> StageSettings {
         // Low enough for the stretch with a large error to saturate, and the integral to reach its limit.
         axis.amplifier.output_limit_v = 1.5;
         axis.feedback.integral_limit_v = 0.05;
+        // Within reach of the provocations.
+        axis.limits.following_error_lag_s = 5e-3;
+        axis.limits.following_error_max_mm = 1.1;
+        axis.limits.travel_mm = Some(TravelSettings {
+            negative: -0.3,
+            positive: 0.3,
+        });
+        axis.encoder.counts_per_index = Some(20);
+        axis.homing = Some(HomingSettings {
+            search_mm_s: 2.0,
+            latch_mm_s: 0.5,
+            debounce_s: 1e-3,
+            mark_mm: -0.1,
+            park_mm: 0.05,
+            travel_mm: 0.2,
+            ..axis.homing.expect("by default")
+        });
         // As much nonlinear gain as the plant bears, so that less damping bears less.
         let plant = axis.plant.expect("a plant by default");
         let bound = sector_bound(&plant, &axis.feedback.pid, 1.0 / settings.rate_hz);

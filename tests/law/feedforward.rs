@@ -166,7 +166,7 @@ fn record<S: Scalar>(settings: &StageSettings) -> Vec<(u64, DacCode)> {
         .map(|_| {
             let reference = rig.state.axes()[0].telemetry().reference;
             let count = (reference.0 >> 16) + noise.counts(3);
-            rig.inputs.counts = [count as u32, 0, 0];
+            rig.inputs.set_counts([count as u32, 0, 0]);
             let outputs = rig.tick();
             assert!(outputs.enabled);
             let volts = rig.state.axes()[0].telemetry().output;

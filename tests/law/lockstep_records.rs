@@ -1,8 +1,10 @@
 //! The records of the lockstep channel survive the way there and back.
 
 use proptest::prelude::*;
+use quadrant::encoder::EncoderReading;
 use quadrant::link::lockstep::{BootBlock, InputRecord, JOB_BYTES, Job, Mode, OutputRecord};
-use quadrant::safety::Command;
+use quadrant::reference::Velocity;
+use quadrant::safety::{AxisName, AxisSwitches, Command, Switches};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
@@ -13,8 +15,27 @@ proptest! {
     #![proptest_config(repeatable(500))]
 
     #[test]
-    fn input_records_round_trip(counts in any::<[u32; 3]>(), number in 0u32..=5) {
-        let record = InputRecord { counts, request: Command::from_number(number) };
+    fn input_records_round_trip(
+        counts in any::<[u32; 3]>(),
+        index in any::<[Option<u32>; 3]>(),
+        fresh in any::<[bool; 3]>(),
+        valid in any::<[bool; 3]>(),
+        switches in any::<u16>(),
+        link_lost in any::<bool>(),
+        number in 0u32..=5,
+    ) {
+        let reading = |axis: usize| EncoderReading {
+            count: counts[axis],
+            index: index[axis],
+            fresh: fresh[axis],
+            valid: valid[axis],
+        };
+        let record = InputRecord {
+            readings: [0, 1, 2].map(reading),
+            switches: Switches::from_bits(switches),
+            link_lost,
+            request: Command::from_number(number),
+        };
         prop_assert_eq!(InputRecord::decode(&record.encode()), record);
     }
 
@@ -41,11 +62,16 @@ proptest! {
 
 #[test]
 fn records_are_little_endian_words() {
-    let record = InputRecord {
-        counts: [1, 0x0203, 0x0405_0607],
-        request: Some(Command::Run),
-    };
-    let bytes = [1, 0, 0, 0, 3, 2, 0, 0, 7, 6, 5, 4, 4, 0, 0, 0];
+    let mut record = InputRecord::of_counts([1, 0x0203, 0x0405_0607], Some(Command::Run));
+    let mut bytes = [0; 32];
+    bytes[..16].copy_from_slice(&[1, 0, 0, 0, 3, 2, 0, 0, 7, 6, 5, 4, 4, 0, 0, 0]);
+    assert_eq!(record.encode(), bytes);
+    record.switches = Switches::EMERGENCY_STOP.with_axis(AxisName::Y, AxisSwitches::HOME);
+    record.readings[0].index = Some(0x0807);
+    record.readings[1].fresh = false;
+    record.readings[2].valid = false;
+    record.link_lost = true;
+    bytes[16..22].copy_from_slice(&[0x80, 0x80, 0x11, 0x03, 7, 8]);
     assert_eq!(record.encode(), bytes);
     let record = OutputRecord {
         outputs: Outputs {
@@ -71,18 +97,25 @@ fn boot_blocks_with_wrong_magic_mode_or_size_are_refused() {
 }
 
 #[test]
-fn every_command_has_its_number_and_no_other_number_a_command() {
-    for command in [
-        Command::Enable,
-        Command::Disable,
-        Command::ResetFault,
-        Command::Run,
-    ] {
-        assert_eq!(Command::from_number(command.number()), Some(command));
+fn every_command_without_a_value_has_its_number_and_no_other_number_a_command() {
+    let found: Vec<(u32, Command)> = (0..1000)
+        .chain([u32::MAX])
+        .filter_map(|number| Some((number, Command::from_number(number)?)))
+        .collect();
+    assert_eq!(found.len(), 6 + 3 + 3);
+    for &(number, command) in &found {
+        assert_eq!(command.number(), Some(number), "{command:?}");
     }
-    assert_eq!(Command::from_number(0), None);
-    assert_eq!(Command::from_number(5), None);
-    assert_eq!(Command::from_number(u32::MAX), None);
+    assert_eq!(
+        &found[..4],
+        &[
+            (1, Command::Enable),
+            (2, Command::Disable),
+            (3, Command::ResetFault),
+            (4, Command::Run),
+        ]
+    );
+    assert_eq!(Command::Jog(AxisName::X, Velocity::ZERO).number(), None);
 }
 
 #[test]

@@ -25,7 +25,7 @@ fn run<S: Scalar>(kind: FeedforwardKind, plan: &PlanSettings, ticks: usize) -> V
                 // A machine that wanders about its reference by up to 0.15 mm, past the knee of k(e).
                 *lag = (*lag + noise.counts(2)).clamp(-300, 300);
                 let reference = rig.state.axes()[index].telemetry().reference;
-                rig.inputs.counts[index] = ((reference.0 >> 16) + *lag) as u32;
+                rig.inputs.readings[index].count = ((reference.0 >> 16) + *lag) as u32;
             }
             assert!(rig.tick().enabled);
             core::array::from_fn(|index| {

@@ -23,7 +23,7 @@ fn working() -> Rig<f32> {
     let mut rig = rig();
     rig.tick();
     rig.command(Command::Enable);
-    rig.inputs.counts = [50, 50, 50];
+    rig.inputs.set_counts([50, 50, 50]);
     let outputs = rig.tick();
     assert!(outputs.enabled);
     assert!(outputs.codes.iter().all(|code| code.0 != 0), "{outputs:?}");
@@ -41,7 +41,8 @@ fn fault(rig: &Rig<f32>) -> Fault {
 fn the_stage_starts_disabled_and_stays_so_unasked() {
     let mut rig = rig();
     for tick in 0..1000u32 {
-        rig.inputs.counts = [tick * 90, tick, 0u32.wrapping_sub(tick)];
+        rig.inputs
+            .set_counts([tick * 90, tick, 0u32.wrapping_sub(tick)]);
         assert_eq!(rig.tick(), off());
     }
     assert_eq!(rig.state.safety(), SafetyState::Disabled);
@@ -50,9 +51,9 @@ fn the_stage_starts_disabled_and_stays_so_unasked() {
 #[test]
 fn enabling_holds_the_present_position_with_no_output() {
     let mut rig = rig();
-    rig.inputs.counts = [1_000_000, 5, 0xFFFF_0000];
+    rig.inputs.set_counts([1_000_000, 5, 0xFFFF_0000]);
     rig.tick();
-    rig.inputs.counts = [1_000_100, 95, 0xFFFF_0010];
+    rig.inputs.set_counts([1_000_100, 95, 0xFFFF_0010]);
     let outputs = rig.command(Command::Enable);
     assert!(outputs.enabled);
     assert_eq!(outputs.codes, [DacCode::ZERO; 3]);
@@ -86,7 +87,7 @@ fn disabling_switches_off_in_the_same_tick() {
 fn an_encoder_jump_switches_off_in_the_same_tick_and_names_its_axis() {
     for (index, name) in AxisName::ALL.into_iter().enumerate() {
         let mut rig = working();
-        rig.inputs.counts[index] += 103;
+        rig.inputs.readings[index].count += 103;
         let tick = rig.state.tick();
         assert_eq!(rig.tick(), off());
         let expected = Fault {
@@ -103,12 +104,12 @@ fn a_following_error_switches_off_in_the_same_tick_and_names_its_axis() {
     for (index, name) in AxisName::ALL.into_iter().enumerate() {
         for direction in [1u32, u32::MAX] {
             let mut rig = working();
-            rig.inputs.counts = [0; 3];
+            rig.inputs.set_counts([0; 3]);
             rig.tick();
             let mut last = off();
             let mut moved = 0;
             while rig.state.safety().is_enabled() {
-                let counts = &mut rig.inputs.counts[index];
+                let counts = &mut rig.inputs.readings[index].count;
                 *counts = counts.wrapping_add(direction.wrapping_mul(50));
                 moved += 50;
                 last = rig.tick();
@@ -140,7 +141,7 @@ fn faults_need_driven_outputs() {
     let mut rig = rig();
     rig.tick();
     rig.inputs.deadline_missed = true;
-    rig.inputs.counts = [1 << 30; 3];
+    rig.inputs.set_counts([1 << 30; 3]);
     assert_eq!(rig.tick(), off());
     assert_eq!(rig.state.safety(), SafetyState::Disabled);
 }
@@ -148,13 +149,13 @@ fn faults_need_driven_outputs() {
 #[test]
 fn the_first_fault_stays() {
     let mut rig = working();
-    rig.inputs.counts[2] += 500;
+    rig.inputs.readings[2].count += 500;
     rig.inputs.deadline_missed = true;
     rig.tick();
     let first = fault(&rig);
     assert_eq!(first.code, FaultCode::EncoderJump);
     for _ in 0..10 {
-        rig.inputs.counts[0] += 1 << 20;
+        rig.inputs.readings[0].count += 1 << 20;
         rig.inputs.deadline_missed = true;
         assert_eq!(rig.tick(), off());
         assert_eq!(fault(&rig), first);

@@ -79,10 +79,10 @@ fn the_list_of_fields_is_complete() {
     let elements = axis.friction.gms.elements.len();
     let stored = numbers(&serde_json::to_value(&axis).expect("plain data"));
     let points = axis.feedback.schedule.expect("by default").len();
-    // One element and one point stand for all; the counter's width is no f64.
+    // One element and one point stand for all; the encoder has three whole numbers.
     assert_eq!(
         stored,
-        fields().count() + 2 * (elements - 1) + 4 * (points - 1) + 1
+        fields().count() + 2 * (elements - 1) + 4 * (points - 1) + 3
     );
 }
 
@@ -101,6 +101,25 @@ fn the_control_rate_and_the_counter_width_have_ranges() {
         let error = refusal(&with_x(|axis| axis.encoder.counter_bits = bits));
         check_message(&error, AxisName::X, "encoder.counter_bits");
     }
+}
+
+#[test]
+fn the_spacing_of_the_index_and_its_tolerance_have_ranges() {
+    for counts in [0, 15, 1_000_000_001] {
+        let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = Some(counts)));
+        check_message(&error, AxisName::X, "encoder.counts_per_index");
+    }
+    let error = refusal(&with_x(|axis| axis.encoder.index_tolerance_counts = 5001));
+    check_message(&error, AxisName::X, "encoder.index_tolerance_counts");
+    let without = with_x(|axis| {
+        axis.encoder.counts_per_index = None;
+        axis.encoder.index_tolerance_counts = 5001;
+        axis.homing.as_mut().expect("by default").index = false;
+    });
+    assert_eq!(without.validate(ROOM), Ok(()));
+    let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = None));
+    check_message(&error, AxisName::X, "homing.index");
+    assert!(error.to_string().contains("encoder.counts_per_index"));
 }
 
 #[test]

@@ -50,6 +50,97 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
         20.1,
     ),
     (
+        "limits.following_error_lag_s",
+        |a| &mut a.limits.following_error_lag_s,
+        -1e-9,
+        1.1,
+    ),
+    (
+        "limits.following_error_max_mm",
+        |a| &mut a.limits.following_error_max_mm,
+        0.99,
+        20.1,
+    ),
+    (
+        "limits.overspeed_ratio",
+        |a| &mut a.limits.overspeed_ratio,
+        1.04,
+        2.1,
+    ),
+    (
+        "limits.braking_mm_s2",
+        |a| &mut a.limits.braking_mm_s2,
+        0.0,
+        3.1e4,
+    ),
+    (
+        "limits.max_jerk_mm_s3",
+        |a| &mut a.limits.max_jerk_mm_s3,
+        0.9,
+        1.1e9,
+    ),
+    (
+        "homing.search_mm_s",
+        |a| &mut homing(a).search_mm_s,
+        0.9e-3,
+        1001.0,
+    ),
+    (
+        "homing.latch_mm_s",
+        |a| &mut homing(a).latch_mm_s,
+        0.9e-3,
+        20.1,
+    ),
+    (
+        "homing.debounce_s",
+        |a| &mut homing(a).debounce_s,
+        -1e-6,
+        0.101,
+    ),
+    (
+        "homing.mark_mm",
+        |a| &mut homing(a).mark_mm,
+        -1.01e4,
+        1.01e4,
+    ),
+    (
+        "homing.park_mm",
+        |a| &mut homing(a).park_mm,
+        -1.01e4,
+        1.01e4,
+    ),
+    (
+        "homing.travel_mm",
+        |a| &mut homing(a).travel_mm,
+        4e-4,
+        2.01e4,
+    ),
+    (
+        "limits.braking_jerk_mm_s3",
+        |a| &mut a.limits.braking_jerk_mm_s3,
+        0.9,
+        1.1e9,
+    ),
+    ("limits.silent_s", |a| &mut a.limits.silent_s, 0.9e-4, 10.1),
+    (
+        "limits.silent_share",
+        |a| &mut a.limits.silent_share,
+        0.009,
+        1.01,
+    ),
+    (
+        "limits.travel_mm.negative",
+        |a| &mut travel(a).negative,
+        -1.01e4,
+        1.01e4,
+    ),
+    (
+        "limits.travel_mm.positive",
+        |a| &mut travel(a).positive,
+        -200.0,
+        1.01e4,
+    ),
+    (
         "plant.gain_mm_per_v_s2",
         |a| &mut plant(a).gain_mm_per_v_s2,
         0.0,
@@ -162,7 +253,7 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
         "friction.sliding.positive.curve.stribeck_velocity_mm_s",
         |a| &mut a.friction.sliding.positive.curve.stribeck_velocity_mm_s,
         0.9e-3,
-        101.0,
+        1001.0,
     ),
     (
         "friction.sliding.positive.curve.exponent",
@@ -192,7 +283,7 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
         "friction.sliding.negative.curve.stribeck_velocity_mm_s",
         |a| &mut a.friction.sliding.negative.curve.stribeck_velocity_mm_s,
         0.9e-3,
-        101.0,
+        1001.0,
     ),
     (
         "friction.sliding.negative.curve.exponent",
@@ -262,6 +353,14 @@ fn dahl(axis: &mut AxisSettings) -> &mut quadrant::friction::dahl::DahlParameter
 
 fn lugre(axis: &mut AxisSettings) -> &mut quadrant::friction::lugre::LugreParameters {
     axis.friction.lugre.as_mut().expect("a model by default")
+}
+
+fn travel(axis: &mut AxisSettings) -> &mut quadrant::settings::TravelSettings {
+    axis.limits.travel_mm.as_mut().expect("by default")
+}
+
+fn homing(axis: &mut AxisSettings) -> &mut quadrant::settings::HomingSettings {
+    axis.homing.as_mut().expect("by default")
 }
 
 fn plant(axis: &mut AxisSettings) -> &mut PlantModel {

@@ -1,6 +1,7 @@
 //! What the supervising task lets through, and what it tells.
 
-use quadrant::safety::{Command, Fault, FaultCode, SafetyState};
+use quadrant::axis::CourseMode;
+use quadrant::safety::{AxisName, Command, Fault, FaultCode, Obstacle, SafetyState};
 use quadrant::supervisor::{Decision, Event, Refusal, StageView, Supervisor};
 
 const FAULT: Fault = Fault {
@@ -12,18 +13,29 @@ const FAULT: Fault = Fault {
 const DISABLED: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
+    obstacle: None,
+    held: None,
+    modes: [CourseMode::Hold; 3],
+    homed: [false; 3],
+    stream_ready: false,
 };
 const ENABLED: StageView = StageView {
     safety: SafetyState::Enabled,
-    running: false,
+    ..DISABLED
 };
 const MOVING: StageView = StageView {
     safety: SafetyState::Enabled,
     running: true,
+    ..DISABLED
 };
 const FAULTED: StageView = StageView {
     safety: SafetyState::Faulted(FAULT),
-    running: false,
+    ..DISABLED
+};
+const STOPPING: StageView = StageView {
+    safety: SafetyState::Stopping(FAULT),
+    running: true,
+    ..DISABLED
 };
 
 /// What a supervisor that has seen `before` decides on `view`.
@@ -45,12 +57,13 @@ fn requests_pass_where_they_make_sense() {
         (DISABLED, Command::Enable),
         (ENABLED, Command::Disable),
         (MOVING, Command::Disable),
+        (STOPPING, Command::Disable),
         (FAULTED, Command::ResetFault),
         (ENABLED, Command::Run),
     ] {
         let decision = decide(view, view, Some(command));
         assert_eq!(decision.command, Some(command), "{view:?}");
-        assert_eq!(decision.events, [None; 3]);
+        assert_eq!(decision.events, [None; 4]);
     }
 }
 
@@ -63,11 +76,15 @@ fn requests_are_refused_with_a_reason_where_they_do_not() {
         (MOVING, Command::Run, Refusal::AlreadyRunning),
         (DISABLED, Command::ResetFault, Refusal::NoFault),
         (ENABLED, Command::ResetFault, Refusal::NoFault),
+        (STOPPING, Command::Enable, Refusal::Stopping),
+        (STOPPING, Command::Run, Refusal::Stopping),
+        (STOPPING, Command::ResetFault, Refusal::Stopping),
+        (StageView::default(), Command::Enable, Refusal::Starting),
     ] {
         let decision = decide(view, view, Some(command));
         assert_eq!(decision.command, None, "{view:?} {command:?}");
         let told = Event::Refused(command, reason);
-        assert_eq!(decision.events, [None, None, Some(told)]);
+        assert_eq!(decision.events, [None, None, None, Some(told)]);
         assert!(!reason.as_str().is_empty());
     }
 }
@@ -78,7 +95,10 @@ fn changes_of_state_are_told_once() {
     assert_eq!(events(ENABLED, DISABLED), [Event::Disabled]);
     assert_eq!(events(FAULTED, DISABLED), [Event::Disabled]);
     assert_eq!(events(ENABLED, FAULTED), [Event::Faulted(FAULT)]);
-    for view in [DISABLED, ENABLED, MOVING, FAULTED] {
+    assert_eq!(events(MOVING, STOPPING), [Event::Stopping(FAULT)]);
+    assert_eq!(events(STOPPING, FAULTED), [Event::Faulted(FAULT)]);
+    assert_eq!(events(StageView::default(), DISABLED), []);
+    for view in [DISABLED, ENABLED, MOVING, FAULTED, STOPPING] {
         assert_eq!(events(view, view), []);
     }
 }
@@ -99,4 +119,70 @@ fn another_fault_is_another_event() {
         ..FAULTED
     };
     assert_eq!(events(FAULTED, later).len(), 1);
+}
+
+#[test]
+fn enabling_with_a_bad_input_is_refused_and_names_it() {
+    for (code, axis, words) in [
+        (
+            FaultCode::EmergencyStop,
+            None,
+            "the emergency stop is pressed; release it",
+        ),
+        (
+            FaultCode::AmplifierFault,
+            Some(AxisName::Y),
+            "y: the amplifier reports a fault",
+        ),
+        (
+            FaultCode::OutputMismatch,
+            Some(AxisName::Z),
+            "z: the converter holds another word",
+        ),
+        (
+            FaultCode::StaleSample,
+            Some(AxisName::X),
+            "x: the encoder's reading is stale",
+        ),
+        (
+            FaultCode::EncoderInvalid,
+            Some(AxisName::Z),
+            "z: both lines of the encoder change",
+        ),
+    ] {
+        let obstacle = Obstacle { code, axis };
+        for safety in [SafetyState::Start, SafetyState::Disabled] {
+            let view = StageView {
+                safety,
+                obstacle: Some(obstacle),
+                ..DISABLED
+            };
+            let decision = decide(view, view, Some(Command::Enable));
+            assert_eq!(decision.command, None);
+            let Some(Event::Refused(Command::Enable, refusal)) = decision.events[3] else {
+                panic!("{decision:?}");
+            };
+            assert_eq!(refusal, Refusal::BadInput(obstacle));
+            assert!(refusal.to_string().starts_with(words), "{refusal}");
+        }
+        // A latched fault is what a person is to hear of first.
+        let faulted = StageView {
+            obstacle: Some(obstacle),
+            ..FAULTED
+        };
+        let decision = decide(faulted, faulted, Some(Command::Enable));
+        let told = Event::Refused(Command::Enable, Refusal::FaultLatched);
+        assert_eq!(decision.events[3], Some(told));
+    }
+}
+
+#[test]
+fn a_fault_that_only_held_the_axes_is_told_once() {
+    let held = StageView {
+        held: Some(FAULT),
+        ..MOVING
+    };
+    assert_eq!(events(MOVING, held), [Event::Held(FAULT)]);
+    assert_eq!(events(held, held), []);
+    assert_eq!(events(held, MOVING), []);
 }

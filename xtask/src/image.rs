@@ -161,10 +161,15 @@ pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
 impl Image {
     /// The address of a function, without the bit that says Thumb.
     pub(crate) fn function(&self, name: &str) -> Result<u32> {
+        Ok(u32::try_from(self.symbol(name)?)? & !1)
+    }
+
+    /// The address of a symbol.
+    pub(crate) fn symbol(&self, name: &str) -> Result<u64> {
         let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
         let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
         let symbol = symbol.with_context(|| format!("the image has no symbol `{name}`"))?;
-        Ok(u32::try_from(symbol.address())? & !1)
+        Ok(symbol.address())
     }
 
     /// How much of the machine's memories the image takes.
@@ -212,20 +217,26 @@ pub(crate) struct Footprint {
     zeroed: u64,
 }
 
+impl Footprint {
+    /// Flash: initialised variables are in both memories, as flash holds their first values.
+    pub(crate) fn flash_bytes(&self) -> u64 {
+        self.flash + self.data
+    }
+
+    /// RAM without the stack.
+    pub(crate) fn ram_bytes(&self) -> u64 {
+        self.data + self.zeroed
+    }
+}
+
 impl fmt::Display for Footprint {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            target,
-            flash,
-            data,
-            zeroed,
-        } = self;
-        // Initialised variables are in both: flash holds their first values.
         write!(
             f,
-            "{target}: flash {} bytes, RAM {} bytes without the stack",
-            flash + data,
-            data + zeroed
+            "{}: flash {} bytes, RAM {} bytes without the stack",
+            self.target,
+            self.flash_bytes(),
+            self.ram_bytes()
         )
     }
 }

@@ -1,4 +1,4 @@
-//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `count`, `prove-no-panic`, `test`.
+//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `count`, `prove-no-panic`, `sizes`, `test`.
 #![forbid(unsafe_code)]
 
 mod attribution;
@@ -10,6 +10,7 @@ mod emulate;
 mod emulator;
 mod fault_paths;
 mod image;
+mod layout;
 mod listing;
 mod prove;
 mod setup;
@@ -60,6 +61,8 @@ enum Verb {
     Combinations(CombinationArgs),
     /// Prove from the linked image that the control tick cannot panic
     ProveNoPanic(TargetArgs),
+    /// Check where an image lies in the memories, and its sizes against the committed ones
+    Sizes(SizeArgs),
     /// Set up, then run every check there is
     Test,
 }
@@ -82,6 +85,16 @@ impl From<TargetArgs> for Target {
             scalar: args.scalar,
         }
     }
+}
+
+/// Whose sizes.
+#[derive(Args)]
+struct SizeArgs {
+    #[command(flatten)]
+    target: TargetArgs,
+    /// Write the sizes to the file that later runs are held against
+    #[arg(long)]
+    overwrite_expected: bool,
 }
 
 /// How to emulate.
@@ -179,6 +192,10 @@ fn run(cli: Cli) -> Result<bool> {
             }
         }
         Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
+        Verb::Sizes(args) => {
+            let image = image::build(toolchain()?, args.target.into())?;
+            layout::check(&image, args.overwrite_expected)?;
+        }
         Verb::Test => return test::run(cli.toolchain.unwrap_or(Choice::Auto)),
     }
     Ok(true)

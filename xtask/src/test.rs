@@ -7,7 +7,7 @@ use anyhow::Result;
 
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
-use crate::{combinations, command, count, emulate, fault_paths, prove, setup, twin};
+use crate::{combinations, command, count, emulate, fault_paths, layout, prove, setup, twin};
 
 /// Ticks of the counting run.
 const COUNTED_TICKS: u32 = 250;
@@ -122,8 +122,7 @@ fn firmware(report: &mut Report, toolchain: Toolchain) {
     }
     for target in Target::ALL {
         report.step(format!("firmware image, {target}"), || {
-            println!("{}", image::build(toolchain, target)?.footprint()?);
-            Ok(())
+            layout::check(&image::build(toolchain, target)?, false)
         });
         report.step(format!("no panic in the control tick, {target}"), || {
             prove::run(toolchain, target)

@@ -121,10 +121,7 @@ impl Twin {
         if self.blocked {
             counts[0] = 0;
         }
-        InputRecord {
-            counts,
-            request: self.operator.request(self.tick),
-        }
+        InputRecord::of_counts(counts, self.operator.request(self.tick))
     }
 
     /// The twin's own answer.

@@ -42,6 +42,7 @@ pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     settings.feedback.law = LawKind::Pid;
     settings.feedforward.kind = FeedforwardKind::None;
     settings.limits.following_error_mm = FOLLOWING_ERROR_MM;
+    settings.limits.following_error_max_mm = FOLLOWING_ERROR_MM;
     settings
 }
 

@@ -190,7 +190,17 @@ pub fn run_at_amplitude<S: Scalar>(
     amplitude_mm: f64,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
-    let mut bench = Bench::new(configuration, setup, amplitude_mm, seed);
+    let bench = Bench::new(configuration, setup, amplitude_mm, seed);
+    run_bench::<S>(bench, configuration, setup, amplitude_mm)
+}
+
+/// The same on a bench that is there: its plant may have been changed.
+pub(super) fn run_bench<S: Scalar>(
+    mut bench: Bench,
+    configuration: Configuration,
+    setup: &Setup,
+    amplitude_mm: f64,
+) -> Result<[Outcome; 3], RunError> {
     let rate_hz = bench.job.stage.rate_hz;
     let resolution_mm = bench
         .job

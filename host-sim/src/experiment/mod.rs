@@ -9,6 +9,7 @@ pub mod imperfections;
 pub mod laws;
 pub mod metrics;
 pub mod numerics;
+pub mod outputs;
 pub mod part_program;
 pub mod recorded;
 pub mod robustness;

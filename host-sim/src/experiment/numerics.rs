@@ -98,10 +98,7 @@ fn shadow(numerics: &mut Numerics, setup: &Setup, seed: u64) -> Result<(), RunEr
     let mut single = Machine::<f32, ELEMENTS>::new(&job)?;
     let mut fixed = Machine::<Fixed, ELEMENTS>::new(&job)?;
     for tick in 0..most_ticks {
-        let input = InputRecord {
-            counts: plant.read_counters(),
-            request: operator.request(tick as u32),
-        };
+        let input = InputRecord::of_counts(plant.read_counters(), operator.request(tick as u32));
         let outputs = exact.tick(&input);
         single.tick(&input);
         fixed.tick(&input);

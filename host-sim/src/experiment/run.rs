@@ -75,10 +75,10 @@ pub fn run<S: Scalar, const N: usize>(
     let mut traces: [AxisTrace; 3] = Default::default();
     let mut started = false;
     for tick in 0..most_ticks {
-        let outputs = machine.tick(&InputRecord {
-            counts: plant.read_counters(),
-            request: operator.request(tick as u32),
-        });
+        let outputs = machine.tick(&InputRecord::of_counts(
+            plant.read_counters(),
+            operator.request(tick as u32),
+        ));
         let state = machine.state();
         if let SafetyState::Faulted(fault) = state.safety() {
             return Err(RunError::Fault(fault));

@@ -2,7 +2,7 @@
 
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant::settings::{AxisSettings, PlanSettings, StageSettings, StreamingSettings};
 
 use super::comparison::ELEMENTS;
 use super::metrics::{Score, score};
@@ -64,6 +64,7 @@ pub fn try_three(
     let job = Job {
         stage: StageSettings {
             rate_hz,
+            streaming: StreamingSettings::default(),
             axes: settings,
         },
         plan: PlanSettings {

@@ -1,13 +1,20 @@
 //! The simulated stage: three axes that share nothing but the clock.
 
+use quadrant::driver::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant::link::lockstep::InputRecord;
+use quadrant::safety::{AxisName, Command, Switches};
 use quadrant::stage::Outputs;
+use quadrant::units::DacCode;
 
-use super::{SimulatedAxis, StageTruth};
+use super::{MarkTruth, Marks, SimulatedAxis, StageTruth};
 
 /// The simulated stage in motion.
 #[derive(Clone, Debug)]
 pub struct SimulatedStage {
     axes: [SimulatedAxis; 3],
+    marks: [Marks; 3],
+    /// What makes 12-bit words of codes, and what it remembers of each axis; nothing, where the converters have 16 bits.
+    converters: Option<(NoiseShaper, [NoiseShaperState; 3])>,
 }
 
 impl SimulatedStage {
@@ -22,7 +29,16 @@ impl SimulatedStage {
         };
         Self {
             axes: [axis(0), axis(1), axis(2)],
+            marks: [Marks::new(MarkTruth::default()); 3],
+            converters: None,
         }
+    }
+
+    /// The same stage behind 12-bit converters, which get their words from `shaper`.
+    #[must_use]
+    pub fn behind_12_bits(mut self, shaper: NoiseShaper) -> Self {
+        self.converters = Some((shaper, Default::default()));
+        self
     }
 
     /// The axes.
@@ -40,9 +56,34 @@ impl SimulatedStage {
         self.axes.each_mut().map(SimulatedAxis::read_counter)
     }
 
+    /// Puts switches and index pulses elsewhere. The axes must stand where they started.
+    pub fn set_marks(&mut self, truths: [MarkTruth; 3]) {
+        self.marks = truths.map(Marks::new);
+    }
+
+    /// What the board reads: counters with their index pulses, and switches; with a request that comes at the same time.
+    pub fn read_inputs(&mut self, request: Option<Command>) -> InputRecord {
+        let mut inputs = InputRecord::of_counts(self.read_counters(), request);
+        let mut switches = Switches::NONE;
+        for (index, axis) in self.axes.iter().enumerate() {
+            let counter = inputs.readings[index].count;
+            let (reading, pressed) = self.marks[index].read(counter, axis.position_mm());
+            inputs.readings[index] = reading;
+            switches = switches.with_axis(AxisName::ALL[index], pressed);
+        }
+        inputs.switches = switches;
+        inputs
+    }
+
     /// One control period.
     pub fn step(&mut self, outputs: &Outputs) {
-        for (axis, code) in self.axes.iter_mut().zip(outputs.codes) {
+        let mut codes = outputs.codes;
+        if let Some((shaper, states)) = &mut self.converters {
+            for (code, state) in codes.iter_mut().zip(states) {
+                *code = DacCode(shaper.step(state, *code) << 4);
+            }
+        }
+        for (axis, code) in self.axes.iter_mut().zip(codes) {
             axis.step(code, outputs.enabled);
         }
     }

@@ -104,6 +104,14 @@ pub enum RigError {
         /// The fault.
         fault: Fault,
     },
+    /// The axis cannot do this.
+    #[error("{experiment}: {reason}")]
+    Impossible {
+        /// The experiment.
+        experiment: String,
+        /// What is missing, or what failed.
+        reason: String,
+    },
     /// The axis left its travel.
     #[error(
         "{experiment}: the axis left its travel of +-{travel_mm} mm after {time_s:.3} s; \

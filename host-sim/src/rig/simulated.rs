@@ -178,10 +178,10 @@ impl Law {
                 motion_ended: true,
             }));
         };
-        let outputs = machine.tick(&InputRecord {
-            counts: [raw, 0, 0],
-            request: operator.request(*tick),
-        });
+        let outputs = machine.tick(&InputRecord::of_counts(
+            [raw, 0, 0],
+            operator.request(*tick),
+        ));
         *tick += 1;
         let state = machine.state();
         if let SafetyState::Faulted(fault) = state.safety() {

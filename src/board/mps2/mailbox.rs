@@ -35,6 +35,20 @@ pub(super) fn write(offset: usize, word: u32) {
     unsafe { core::ptr::write_volatile((BASE + offset) as *mut u32, word) }
 }
 
+/// Reads a byte.
+pub(super) fn byte(offset: usize) -> u8 {
+    debug_assert!(offset < MEMORY_BYTES);
+    // SAFETY: as in `read`; a byte is always aligned.
+    unsafe { core::ptr::read_volatile((BASE + offset) as *const u8) }
+}
+
+/// Writes a byte.
+pub(super) fn set_byte(offset: usize, byte: u8) {
+    debug_assert!(offset < MEMORY_BYTES);
+    // SAFETY: as in `byte`.
+    unsafe { core::ptr::write_volatile((BASE + offset) as *mut u8, byte) }
+}
+
 /// Reads a sequence number; what it announces can be read after it.
 #[inline(always)]
 pub(super) fn read_sequence(offset: usize) -> u32 {

@@ -4,7 +4,9 @@
 //! host. See `quadrant::link::lockstep` for its map and the ways to run.
 
 pub(crate) mod device;
+mod flash;
 mod mailbox;
+mod serial;
 mod timer;
 
 use core::sync::atomic::{AtomicU32, Ordering};
@@ -13,11 +15,14 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
-use quadrant::hal;
-use quadrant::safety::Command;
+use quadrant::encoder::EncoderReading;
+use quadrant::hal::{self, ResetCause};
+use quadrant::safety::{self, Command};
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 
+pub(crate) use self::flash::SettingsFlash;
+pub(crate) use self::serial::Serial;
 use super::{Finished, Outcome};
 use quadrant::link::lockstep::{
     self, END_OF_RUN, InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS,
@@ -30,10 +35,15 @@ static TICKS: AtomicU32 = AtomicU32::new(0);
 /// Cycles from the start of the control timer to the last tick of a paced run.
 static PACED_CYCLES: AtomicU32 = AtomicU32::new(0);
 
+/// Cycles between two control ticks.
+static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
+
 /// The machine, started, in pieces.
 pub(crate) struct Board {
     /// Three position encoders.
     pub(crate) encoders: Encoders,
+    /// Limits, homes, amplifier faults, emergency stop.
+    pub(crate) switches: Switches,
     /// What the operator asks for.
     pub(crate) operator: Operator,
     /// Three amplifiers.
@@ -42,29 +52,48 @@ pub(crate) struct Board {
     pub(crate) tick: Tick,
     /// What the idle loop does.
     pub(crate) idle: Idle,
+    /// The link's port, in the shared memory.
+    pub(crate) serial: Serial,
+    /// A watchdog that never bites: the emulator's user is watching.
+    pub(crate) watchdog: Watchdog,
+    /// Where settings are stored: in the shared memory.
+    pub(crate) flash: SettingsFlash,
+    /// Why the processor started.
+    pub(crate) reset_cause: ResetCause,
+}
+
+/// What the board calls itself.
+pub(crate) const NAME: &str = "mps2";
+
+/// Ends the emulator; the host starts it afresh.
+pub(crate) fn restart() -> ! {
+    halt(Outcome::Done)
 }
 
 impl Board {
-    /// Prepares the machine for `rate_hz` control ticks per second; the idle loop starts them.
-    pub(crate) fn init(_core: cortex_m::Peripherals, rate_hz: u32) -> Self {
+    /// Prepares the machine; the idle loop starts the control ticks.
+    pub(crate) fn init(_core: cortex_m::Peripherals) -> Self {
         let boot = mailbox::boot();
-        let period = timer::CLOCK_HZ / rate_hz;
         Self {
             encoders: Encoders { mode: boot.mode },
+            switches: Switches { mode: boot.mode },
             operator: Operator { mode: boot.mode },
             amplifiers: Amplifiers { mode: boot.mode },
             tick: Tick {
                 mode: boot.mode,
-                period,
+                period: u32::MAX,
                 last: boot.ticks,
             },
             idle: Idle {
                 mode: boot.mode,
-                period,
                 last: boot.ticks,
                 sequence: 0,
                 started: false,
             },
+            serial: Serial::new(boot.mode),
+            watchdog: Watchdog,
+            flash: SettingsFlash,
+            reset_cause: ResetCause::PowerOn,
         }
     }
 }
@@ -93,6 +122,13 @@ fn record() -> usize {
         .min(RECORDED_TICKS as u32 - 1) as usize
 }
 
+/// This tick's inputs as the host wrote them.
+#[inline(always)]
+fn inputs(mode: Mode) -> InputRecord {
+    let at = input(mode);
+    InputRecord::from_words(core::array::from_fn(|word| mailbox::read(at + 4 * word)))
+}
+
 /// Three position encoders.
 pub(crate) struct Encoders {
     mode: Mode,
@@ -100,13 +136,21 @@ pub(crate) struct Encoders {
 
 impl hal::Encoders for Encoders {
     #[inline(always)]
-    fn counts(&mut self) -> [u32; 3] {
-        let at = input(self.mode);
-        [
-            mailbox::read(at),
-            mailbox::read(at + 4),
-            mailbox::read(at + 8),
-        ]
+    fn read(&mut self) -> [EncoderReading; 3] {
+        inputs(self.mode).readings
+    }
+}
+
+/// The digital inputs of the stage.
+pub(crate) struct Switches {
+    mode: Mode,
+}
+
+impl hal::Switches for Switches {
+    #[inline(always)]
+    fn read(&mut self) -> safety::Switches {
+        let at = input(self.mode) + 4 * InputRecord::FLAGS_WORD;
+        safety::Switches::from_bits(mailbox::read(at) as u16)
     }
 }
 
@@ -119,7 +163,9 @@ impl Operator {
     /// What is asked for in this tick.
     #[inline(always)]
     pub(crate) fn request(&mut self) -> Option<Command> {
-        Command::from_number(mailbox::read(input(self.mode) + 12))
+        Command::from_number(mailbox::read(
+            input(self.mode) + 4 * InputRecord::REQUEST_WORD,
+        ))
     }
 }
 
@@ -154,6 +200,15 @@ impl hal::Amplifiers for Amplifiers {
     }
 }
 
+/// A watchdog that never bites.
+pub(crate) struct Watchdog;
+
+impl hal::Watchdog for Watchdog {
+    fn start(&mut self) {}
+
+    fn feed(&mut self, _driving: bool) {}
+}
+
 /// The control tick.
 pub(crate) struct Tick {
     mode: Mode,
@@ -162,6 +217,17 @@ pub(crate) struct Tick {
 }
 
 impl Tick {
+    /// Sets `rate_hz` ticks per second.
+    pub(crate) fn start(&mut self, rate_hz: u32) {
+        self.period = timer::CLOCK_HZ / rate_hz;
+        PERIOD.store(self.period, Ordering::Relaxed);
+    }
+
+    /// Rate of the timer, Hz.
+    pub(crate) fn cycle_hz(&self) -> u32 {
+        timer::CLOCK_HZ
+    }
+
     /// Begins a tick: clears its interrupt and counts it.
     #[inline(always)]
     pub(crate) fn acknowledge(&mut self) {
@@ -204,7 +270,6 @@ impl Tick {
 /// What the idle loop does.
 pub(crate) struct Idle {
     mode: Mode,
-    period: u32,
     last: u32,
     sequence: u32,
     started: bool,
@@ -220,6 +285,7 @@ impl Idle {
                 let sequence = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
                 if sequence != self.sequence && sequence != END_OF_RUN {
                     self.sequence = sequence;
+                    serial::exchange();
                     pend_tick();
                 }
                 sequence == END_OF_RUN
@@ -229,7 +295,7 @@ impl Idle {
                 if !self.started {
                     self.started = true;
                     timer::CLOCK.start(u32::MAX, false);
-                    timer::CONTROL.start(self.period - 1, true);
+                    timer::CONTROL.start(PERIOD.load(Ordering::Relaxed) - 1, true);
                 }
                 TICKS.load(Ordering::Relaxed) == self.last
             }

@@ -1,40 +1,48 @@
-//! Three amplifiers: their command voltages through the converter, their enable line through a pin.
+//! Three amplifiers: their command voltages through the external converter, their enable line through a pin.
 
 use embedded_hal::delay::DelayNs;
-use stm32f4xx_hal::gpio::{Output, PB12, PB13, PB14, PB15, PC8, Speed};
-use stm32f4xx_hal::pac::{self, SPI2};
-use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::Rcc;
-use stm32f4xx_hal::spi::{Mode, Phase, Polarity, Spi};
-
+use quadrant::driver::ad5754r::{self, ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
 use quadrant::units::DacCode;
+use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB12, PB13, PB14, PB15, PC9, Speed};
+use stm32f4xx_hal::pac::{self, SPI2};
+use stm32f4xx_hal::rcc::Rcc;
 
-use super::super::ad5754r::{ALL_ZERO, Ad5754r};
 use super::CORE_HZ;
+use super::converter_bus::{ConverterBus, READING_HZ, WRITING_HZ};
 
-/// Number of the /SYNC pin in port B.
+/// Numbers of /SYNC, /LDAC and /CLR in port B.
 const SYNC: u8 = 12;
-/// Number of the /LDAC pin in port B.
-const LOAD: u8 = 14;
+const LOAD: u8 = 1;
+const CLEAR: u8 = 2;
 /// Number of the enable pin in port C.
-const ENABLE: u8 = 8;
+const ENABLE: u8 = 9;
 /// How often to look for the bus before giving up, in the emergency path: far more than one byte takes.
 const PATIENCE: u32 = 10_000;
+
+// A tenth of a control period at 10 kHz is what the outputs may take.
+const _: () = assert!(ad5754r::write_ns(WRITING_HZ, READING_HZ) < 10_000);
 
 /// The pins of the amplifiers, as they are after reset.
 pub(super) struct Pins {
     pub(super) clock: PB13,
+    pub(super) answer: PB14,
     pub(super) data: PB15,
     pub(super) sync: PB12,
-    pub(super) load: PB14,
-    pub(super) enable: PC8,
+    pub(super) load: PB1,
+    pub(super) clear: PB2,
+    pub(super) enable: PC9,
 }
+
+type Converter = Ad5754r<ConverterBus, PB12<Output>, PB1<Output>, PB2<Output>, CoreDelay>;
 
 /// Three amplifiers.
 pub(crate) struct Amplifiers {
-    converter: Ad5754r<Spi<SPI2>, PB12<Output>, PB14<Output>, CoreDelay>,
-    enable: PC8<Output>,
+    converter: Converter,
+    enable: PC9<Output>,
+    /// The converter answered when it was started. One that did not is left alone, and nothing is ever enabled.
+    is_present: bool,
+    mismatches: [bool; 3],
 }
 
 impl Amplifiers {
@@ -42,21 +50,37 @@ impl Amplifiers {
     pub(super) fn new(spi: SPI2, pins: Pins, rcc: &mut Rcc) -> Self {
         let mut enable = pins.enable.into_push_pull_output();
         enable.set_low();
-        let sync = pins.sync.into_push_pull_output().speed(Speed::VeryHigh);
-        let load = pins.load.into_push_pull_output().speed(Speed::VeryHigh);
-        // The converter takes 30 MHz; the fastest this bus has below that is half its clock, 22.5 MHz.
-        let mode = Mode {
-            polarity: Polarity::IdleLow,
-            phase: Phase::CaptureOnSecondTransition,
+        let outputs = ad5754r::Pins {
+            sync: pins.sync.into_push_pull_output().speed(Speed::VeryHigh),
+            load: pins.load.into_push_pull_output().speed(Speed::VeryHigh),
+            clear: pins.clear.into_push_pull_output(),
         };
-        let clock = pins.clock.into_alternate().speed(Speed::VeryHigh);
-        let data = pins.data.into_alternate().speed(Speed::VeryHigh);
-        let pins = (Some(clock), SPI2::NoMiso, Some(data));
-        let bus = Spi::new(spi, pins, mode, 22_500.kHz(), rcc);
-        let Ok(converter) = Ad5754r::new(bus, sync, load, CoreDelay) else {
-            panic!("the converter's bus does not work");
+        let bus = ConverterBus::new(spi, pins.clock, pins.answer, pins.data, rcc);
+        let mut converter = Ad5754r::new(bus, outputs, CoreDelay);
+        let is_present = match converter.start() {
+            Ok(()) => true,
+            Err(Error::Bus(_)) => {
+                defmt::error!("the converter's bus is stuck: outputs stay off");
+                false
+            }
+            Err(Error::Mismatch {
+                expected, answered, ..
+            }) => {
+                defmt::error!(
+                    "the converter answers {=u16:#06x} instead of {=u16:#06x}: outputs stay off; \
+                     check its supply and the wires of SCLK, SDIN, SDO and /SYNC",
+                    answered,
+                    expected
+                );
+                false
+            }
         };
-        Self { converter, enable }
+        Self {
+            converter,
+            enable,
+            is_present,
+            mismatches: [!is_present; 3],
+        }
     }
 }
 
@@ -67,18 +91,33 @@ impl hal::Amplifiers for Amplifiers {
         if !enabled {
             self.enable.set_low();
         }
-        let written = self.converter.write(codes.map(|code| code.0)).is_ok();
-        if enabled && written {
+        if self.is_present {
+            let written = self.converter.write(codes.map(|code| code.0));
+            self.mismatches = match written {
+                Ok(()) => [false; 3],
+                Err(Error::Mismatch {
+                    item: Item::Code(channel),
+                    ..
+                }) => [channel == 0, channel == 1, channel == 2],
+                Err(_) => [true; 3],
+            };
+        }
+        if enabled && self.mismatches == [false; 3] {
             self.enable.set_high();
         } else {
             // Codes that did not get through must not keep driving the machine.
             self.enable.set_low();
         }
     }
+
+    #[inline(always)]
+    fn mismatches(&self) -> [bool; 3] {
+        self.mismatches
+    }
 }
 
 /// Short waits by counting instructions.
-struct CoreDelay;
+pub(super) struct CoreDelay;
 
 impl DelayNs for CoreDelay {
     #[inline(always)]
@@ -92,7 +131,7 @@ impl DelayNs for CoreDelay {
     }
 }
 
-/// Zero codes, amplifiers disabled, from any context: also from a panic before or in the middle of anything.
+/// Zero volts, amplifiers disabled, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
     // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
     // `halt`. Only single register writes are made, each valid in any state the owner left.
@@ -100,8 +139,10 @@ pub(crate) fn outputs_off() {
         unsafe { (pac::GPIOB::steal(), pac::GPIOC::steal(), pac::SPI2::steal()) };
     // First of all, and independent of the bus.
     port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
+    port_b.bsrr().write(|w| w.br(CLEAR).set_bit());
 
-    // End the frame that may be under way; the chip ignores it unless it is complete.
+    // /CLR holds the outputs at zero; should that wire be broken, the zero codes do. End the frame that may be under way;
+    // the chip ignores it unless it is complete.
     wait_for(|| !bus.sr().read().bsy().bit_is_set());
     port_b.bsrr().write(|w| w.bs(SYNC).set_bit());
     CoreDelay.delay_us(1);

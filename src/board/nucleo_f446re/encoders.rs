@@ -1,49 +1,133 @@
-//! Three quadrature encoders, each counted by a timer in all four edges.
+//! Three quadrature encoders with index, each on a timer of its own.
+//!
+//! The timer counts all four edges of A and B (RM0390, 17.3.12 "Encoder interface mode") and captures the count at the
+//! rising edge of the index on its third channel: "the capture, compare, prescaler, trigger output features continue to
+//! work as normal" in that mode. All nine inputs have the same digital filter, so that all edges are late by the same
+//! time and the index keeps its place among the counts.
+//!
+//! These timers do not tell when both lines change at once: a count that is lost or gained that way shows as a distance
+//! between index pulses that is wrong.
 
+use quadrant::driver::counter::ExtendedCounter;
+use quadrant::encoder::EncoderReading;
 use quadrant::hal;
-use stm32f4xx_hal::gpio::{PA0, PA1, PB8, PB9, PC6, PC7};
-use stm32f4xx_hal::hal_02::Qei as _;
-use stm32f4xx_hal::pac::{TIM2, TIM3, TIM5};
-use stm32f4xx_hal::qei::Qei;
-use stm32f4xx_hal::rcc::Rcc;
+use stm32f4xx_hal::gpio::{PA6, PA7, PB0, PB8, PB9, PB10, PC6, PC7, PC8, Pull};
+use stm32f4xx_hal::pac::{TIM2, TIM3, TIM8};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+use super::wiring::ENCODER_FILTER;
+
+/// TIMx_CCMR1: channels 1 and 2 are inputs from their own pins (CC1S = CC2S = 01), filtered (IC1F, IC2F).
+const CAPTURE_A_B: u32 = (0b01 | (ENCODER_FILTER.icf as u32) << 4) * 0x0101;
+/// TIMx_CCMR2: so is channel 3 (CC3S = 01, IC3F).
+const CAPTURE_INDEX: u32 = 0b01 | (ENCODER_FILTER.icf as u32) << 4;
+/// TIMx_CCER: capture on channel 3 enabled (CC3E), at rising edges; A and B are not inverted.
+const ENABLE_INDEX: u32 = 1 << 8;
+/// TIMx_SMCR: encoder mode 3 (SMS = 011), counting at the edges of both lines.
+const COUNT_BOTH: u32 = 0b011;
+/// TIMx_CR1: counter enabled (CEN).
+const ENABLE: u32 = 1;
+/// TIMx_CR1: the filter clock is half the timer's (CKD = 01).
+const HALVE_FILTER_CLOCK: u32 = 0b01 << 8;
+
+/// The pins of the encoders, as they are after reset: A, B and index of each.
+pub(super) struct Pins {
+    pub(super) x: (PB8, PB9, PB10),
+    pub(super) y: (PA6, PA7, PB0),
+    pub(super) z: (PC6, PC7, PC8),
+}
 
 /// Three position encoders.
 pub(crate) struct Encoders {
-    x: Qei<TIM2>,
-    y: Qei<TIM5>,
-    z: Qei<TIM3>,
-    /// The 16-bit counter of z, extended.
-    z_count: u32,
+    x: TIM2,
+    y: TIM3,
+    z: TIM8,
+    /// The 16-bit counters of y and z, extended.
+    y_count: ExtendedCounter,
+    z_count: ExtendedCounter,
+}
+
+/// Starts a timer as an encoder's counter. The timers' types differ, their registers do not.
+macro_rules! start {
+    ($type:ty, $timer:expr, $control:expr, $rcc:expr) => {{
+        <$type>::enable($rcc);
+        <$type>::reset($rcc);
+        // SAFETY: the values are the manual's for these registers, as the constants say.
+        unsafe {
+            $timer.ccmr1_input().write(|w| w.bits(CAPTURE_A_B as _));
+            $timer.ccmr2_input().write(|w| w.bits(CAPTURE_INDEX as _));
+            $timer.ccer().write(|w| w.bits(ENABLE_INDEX as _));
+            $timer.smcr().write(|w| w.bits(COUNT_BOTH as _));
+            $timer.arr().write(|w| w.bits(u32::MAX as _));
+            $timer.cr1().write(|w| w.bits((ENABLE | $control) as _));
+            // Whatever the inputs did on their way here was no index.
+            $timer.sr().write(|w| w.bits(0));
+        }
+    }};
+}
+
+/// The captured count, if there is one: CC3IF, which reading CCR3 clears.
+macro_rules! captured {
+    ($timer:expr) => {
+        $timer
+            .sr()
+            .read()
+            .cc3if()
+            .bit_is_set()
+            .then(|| $timer.ccr3().read().ccr().bits())
+    };
 }
 
 impl Encoders {
     /// Starts counting from zero.
-    pub(super) fn new(
-        x: (TIM2, PB8, PB9),
-        y: (TIM5, PA0, PA1),
-        z: (TIM3, PC6, PC7),
-        rcc: &mut Rcc,
-    ) -> Self {
+    pub(super) fn new(x: TIM2, y: TIM3, z: TIM8, pins: Pins, rcc: &mut Rcc) -> Self {
+        // A line that is not driven rests high.
+        let Pins {
+            x: (xa, xb, xi),
+            y: (ya, yb, yi),
+            z: (za, zb, zi),
+        } = pins;
+        let _ = (
+            xa.into_alternate::<1>().internal_resistor(Pull::Up),
+            xb.into_alternate::<1>().internal_resistor(Pull::Up),
+            xi.into_alternate::<1>().internal_resistor(Pull::Up),
+            ya.into_alternate::<2>().internal_resistor(Pull::Up),
+            yb.into_alternate::<2>().internal_resistor(Pull::Up),
+            yi.into_alternate::<2>().internal_resistor(Pull::Up),
+            za.into_alternate::<3>().internal_resistor(Pull::Up),
+            zb.into_alternate::<3>().internal_resistor(Pull::Up),
+            zi.into_alternate::<3>().internal_resistor(Pull::Up),
+        );
+        start!(TIM2, x, 0, rcc);
+        start!(TIM3, y, 0, rcc);
+        start!(TIM8, z, HALVE_FILTER_CLOCK, rcc);
         Self {
-            x: Qei::new(x.0, (x.1, x.2), rcc),
-            y: Qei::new(y.0, (y.1, y.2), rcc),
-            z: Qei::new(z.0, (z.1, z.2), rcc),
-            z_count: 0,
+            x,
+            y,
+            z,
+            y_count: ExtendedCounter::default(),
+            z_count: ExtendedCounter::default(),
         }
     }
 }
 
 impl hal::Encoders for Encoders {
-    /// All three wrap at 32 bits.
+    /// All three wrap at 32 bits. The counts are read before the captures: a captured count is near the one read.
     #[inline(always)]
-    fn counts(&mut self) -> [u32; 3] {
-        // Right as long as z moves less than 32768 counts in a tick.
-        let moved = self
-            .z
-            .count()
-            .wrapping_sub(self.z_count as u16)
-            .cast_signed();
-        self.z_count = self.z_count.wrapping_add_signed(moved.into());
-        [self.x.count(), self.y.count(), self.z_count]
+    fn read(&mut self) -> [EncoderReading; 3] {
+        let [x, y, z] = [
+            self.x.cnt().read().cnt().bits(),
+            self.y_count.read(self.y.cnt().read().cnt().bits()),
+            self.z_count.read(self.z.cnt().read().cnt().bits()),
+        ];
+        let reading = |count, index| EncoderReading {
+            index,
+            ..EncoderReading::of(count)
+        };
+        [
+            reading(x, captured!(self.x)),
+            reading(y, captured!(self.y).map(|raw| self.y_count.captured(raw))),
+            reading(z, captured!(self.z).map(|raw| self.z_count.captured(raw))),
+        ]
     }
 }

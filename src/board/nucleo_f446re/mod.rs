@@ -1,35 +1,57 @@
 //! The reference board: ST Nucleo-F446RE (STM32F446RE, Cortex-M4F at 180 MHz).
 //!
-//! | signal            | pin (connector)          | peripheral |
-//! |-------------------|--------------------------|------------|
-//! | encoder x, A and B | PB8 (D15), PB9 (D14)    | TIM2, 32 bit |
-//! | encoder y, A and B | PA0 (A0), PA1 (A1)      | TIM5, 32 bit |
-//! | encoder z, A and B | PC6 (CN10-4), PC7 (D9)  | TIM3, 16 bit, extended in software |
-//! | DAC SCLK, SDIN     | PB13 (CN10-30), PB15 (CN10-26) | SPI2 |
-//! | DAC /SYNC, /LDAC   | PB12 (CN10-16), PB14 (CN10-28) | |
-//! | amplifier enable   | PC8 (CN10-2), high enables | |
-//! | enabling button    | PC13 (B1, blue), hold to enable | |
-//! | control tick       |                          | TIM7 |
+//! `docs/board-nucleo-f446re.md` has the pins by connector, the circuit around them, and the way to a first motion.
 //!
-//! Left alone: the debug probe's serial port (PA2, PA3), SWD and SWO (PA13, PA14, PB3), the LED (PA5) and PB4, which
-//! is JTAG's reset at power-up.
+//! | signal                          | pins                   | peripheral |
+//! |---------------------------------|------------------------|------------|
+//! | encoder x: A, B, index          | PB8, PB9, PB10         | TIM2, 32 bit |
+//! | encoder y: A, B, index          | PA6, PA7, PB0          | TIM3, 16 bit, extended |
+//! | encoder z: A, B, index          | PC6, PC7, PC8          | TIM8, 16 bit, extended |
+//! | DAC: SCLK, SDIN, SDO            | PB13, PB15, PB14       | SPI2 |
+//! | DAC: /SYNC, /LDAC, /CLR         | PB12, PB1, PB2         | |
+//! | amplifier enable                | PC9, high enables      | |
+//! | emergency stop, amplifiers ready | PA0, PA1              | low while all is well |
+//! | amplifier faults x, y, z        | PA8, PA9, PA10         | low while all is well |
+//! | limits x- x+ y- y+ z- z+        | PC0 to PC5             | low while all is well |
+//! | home switches x, y, z           | PC10, PC11, PC12       | low while released |
+//! | enabling button                 | PC13 (B1, blue), hold to enable | |
+//! | link: to host, from host        | PA2, PA3               | USART2, DMA1 |
+//! | on-chip converters (fallback)   | PA4, PA5               | DAC |
+//! | control tick                    |                        | TIM7 |
 //!
-//! The enable line needs a pull-down at the amplifiers: while the processor is in reset its pins float.
+//! Left alone: SWD and SWO (PA13, PA14, PB3), PA15 and PB4, which are JTAG's at power-up, the oscillators' (PC14, PC15,
+//! PH0, PH1), and the spare PA11, PA12, PB5, PB6, PB7, PD2.
 
+#[cfg(not(feature = "output-on-chip"))]
 mod amplifiers;
+#[cfg(feature = "output-on-chip")]
+#[path = "on_chip.rs"]
+mod amplifiers;
+#[cfg(not(feature = "output-on-chip"))]
+mod converter_bus;
 pub(crate) mod device;
 mod encoders;
+mod flash;
+mod serial;
+mod switches;
 mod tick;
+mod watchdog;
+mod wiring;
 
 use defmt_rtt as _;
 use stm32f4xx_hal::gpio::{Input, PC13};
-use stm32f4xx_hal::pac;
+use stm32f4xx_hal::pac::{self, PWR};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::Config;
+use stm32f4xx_hal::rcc::{Config, Enable as _};
 
 pub(crate) use self::amplifiers::{Amplifiers, outputs_off};
 pub(crate) use self::encoders::Encoders;
+pub(crate) use self::flash::SettingsFlash;
+pub(crate) use self::serial::Serial;
+pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
+pub(crate) use self::watchdog::{Supply, Watchdog};
+use quadrant::hal::ResetCause;
 use quadrant::safety::Command;
 
 use super::{Finished, Outcome};
@@ -38,6 +60,7 @@ use super::{Finished, Outcome};
 const CORE_HZ: u32 = 180_000_000;
 
 /// The machine, started, in pieces.
+#[allow(dead_code, reason = "which pieces are used is up to the application")]
 pub(crate) struct Board {
     /// Three position encoders.
     pub(crate) encoders: Encoders,
@@ -49,14 +72,27 @@ pub(crate) struct Board {
     pub(crate) tick: Tick,
     /// What the idle loop does.
     pub(crate) idle: Idle,
+    /// Limits, homes, amplifier faults, emergency stop.
+    pub(crate) switches: Switches,
+    /// The serial port of the link.
+    pub(crate) serial: Serial,
+    /// The watchdog, not started.
+    pub(crate) watchdog: Watchdog,
+    /// The supply's monitor.
+    pub(crate) supply: Supply,
+    /// Where settings are stored.
+    pub(crate) flash: SettingsFlash,
+    /// Why the processor started.
+    pub(crate) reset_cause: ResetCause,
 }
 
 impl Board {
-    /// Starts the board with `rate_hz` control ticks per second.
-    pub(crate) fn init(_core: cortex_m::Peripherals, rate_hz: u32) -> Self {
+    /// Starts the board, but for the control tick and the watchdog.
+    pub(crate) fn init(_core: cortex_m::Peripherals) -> Self {
         let Some(chip) = pac::Peripherals::take() else {
             panic!("the board is started twice");
         };
+        let reset_cause = watchdog::reset_cause(&chip.RCC);
         // The debug probe feeds its 8 MHz clock to the oscillator pin. Above 168 MHz the core's regulator must be
         // overdriven, which `freeze` does.
         let clocks = Config::hse(8.MHz())
@@ -67,34 +103,65 @@ impl Board {
         let port_b = chip.GPIOB.split(&mut rcc);
         let port_c = chip.GPIOC.split(&mut rcc);
 
-        let encoders = Encoders::new(
-            (chip.TIM2, port_b.pb8, port_b.pb9),
-            (chip.TIM5, port_a.pa0, port_a.pa1),
-            (chip.TIM3, port_c.pc6, port_c.pc7),
-            &mut rcc,
-        );
-        let pins = amplifiers::Pins {
-            clock: port_b.pb13,
-            data: port_b.pb15,
-            sync: port_b.pb12,
-            load: port_b.pb14,
-            enable: port_c.pc8,
+        // First of all pins, as the amplifiers float until then.
+        #[cfg(not(feature = "output-on-chip"))]
+        let amplifiers = {
+            let pins = amplifiers::Pins {
+                clock: port_b.pb13,
+                answer: port_b.pb14,
+                data: port_b.pb15,
+                sync: port_b.pb12,
+                load: port_b.pb1,
+                clear: port_b.pb2,
+                enable: port_c.pc9,
+            };
+            Amplifiers::new(chip.SPI2, pins, &mut rcc)
         };
-        let amplifiers = Amplifiers::new(chip.SPI2, pins, &mut rcc);
+        #[cfg(feature = "output-on-chip")]
+        let amplifiers = Amplifiers::new(chip.DAC, (port_a.pa4, port_a.pa5), port_c.pc9, &mut rcc);
+        let switches = Switches::new();
+        let encoder_pins = encoders::Pins {
+            x: (port_b.pb8, port_b.pb9, port_b.pb10),
+            y: (port_a.pa6, port_a.pa7, port_b.pb0),
+            z: (port_c.pc6, port_c.pc7, port_c.pc8),
+        };
+        let encoders = Encoders::new(chip.TIM2, chip.TIM3, chip.TIM8, encoder_pins, &mut rcc);
+        let serial = Serial::new(chip.USART2, chip.DMA1, (port_a.pa2, port_a.pa3), &mut rcc);
+        PWR::enable(&mut rcc);
+        let supply = Supply::new(chip.PWR);
+        defmt::info!(
+            "started by {=str}; brown-out reset: {=str}",
+            reset_cause.as_str(),
+            watchdog::brown_out_level(&chip.FLASH)
+        );
         let operator = Operator {
             button: port_c.pc13.into_input(),
             history: u32::MAX,
             held: false,
         };
-        let tick = Tick::start(chip.TIM7, rate_hz, &mut rcc);
+        let tick = Tick::new(chip.TIM7, &mut rcc);
         Self {
             encoders,
             operator,
             amplifiers,
             tick,
             idle: Idle,
+            switches,
+            serial,
+            watchdog: Watchdog::new(chip.IWDG, chip.DBGMCU),
+            supply,
+            flash: SettingsFlash::new(chip.FLASH),
+            reset_cause,
         }
     }
+}
+
+/// What the board calls itself.
+pub(crate) const NAME: &str = "nucleo-f446re";
+
+/// Starts the firmware afresh.
+pub(crate) fn restart() -> ! {
+    cortex_m::peripheral::SCB::sys_reset()
 }
 
 /// The job that a host has left: none, the board has no such host.

@@ -6,22 +6,36 @@ use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 /// The control tick.
 pub(crate) struct Tick {
     timer: TIM7,
+    clock_hz: u32,
     period: u32,
 }
 
 impl Tick {
-    /// Starts the timer with `rate_hz` ticks per second.
-    pub(super) fn start(timer: TIM7, rate_hz: u32, rcc: &mut Rcc) -> Self {
-        let period = rcc.clocks.timclk1().raw() / rate_hz;
-        let Ok(reload) = u16::try_from(period - 1) else {
-            panic!("{rate_hz} Hz is too slow for a 16-bit timer without a prescaler");
-        };
+    /// The timer, not counting.
+    pub(super) fn new(timer: TIM7, rcc: &mut Rcc) -> Self {
         TIM7::enable(rcc);
         TIM7::reset(rcc);
-        timer.arr().write(|w| w.arr().set(reload));
-        timer.dier().write(|w| w.uie().enabled());
-        timer.cr1().write(|w| w.cen().enabled());
-        Self { timer, period }
+        Self {
+            timer,
+            clock_hz: rcc.clocks.timclk1().raw(),
+            period: u32::MAX,
+        }
+    }
+
+    /// Starts `rate_hz` ticks per second.
+    pub(crate) fn start(&mut self, rate_hz: u32) {
+        self.period = self.clock_hz / rate_hz;
+        let Ok(reload) = u16::try_from(self.period - 1) else {
+            panic!("{rate_hz} Hz is too slow for a 16-bit timer without a prescaler");
+        };
+        self.timer.arr().write(|w| w.arr().set(reload));
+        self.timer.dier().write(|w| w.uie().enabled());
+        self.timer.cr1().write(|w| w.cen().enabled());
+    }
+
+    /// Rate of the timer, Hz.
+    pub(crate) fn cycle_hz(&self) -> u32 {
+        self.clock_hz
     }
 
     /// Begins a tick: clears its interrupt.

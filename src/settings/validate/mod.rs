@@ -2,6 +2,8 @@
 
 mod feedback;
 mod friction;
+mod homing;
+mod limits;
 mod motion;
 
 use super::{AxisSettings, Reason, SettingsError, StageSettings};
@@ -40,12 +42,9 @@ impl Place {
     }
 }
 
-/// The fastest reference, in counts per tick: what the formats of the moves' velocity and of the displacement hold.
-const MOST_COUNTS_PER_TICK: f64 = 4096.0;
-/// The largest acceleration of a reference, in counts per tick squared: what the format of the moves' holds.
-const MOST_COUNTS_PER_TICK_SQUARED: f64 = 256.0;
-/// The largest limit of the tracking error, in counts: half of where the error saturates.
-const MOST_ERROR_COUNTS: f64 = 8_388_608.0;
+/// The longest travel of an axis and of a motion, mm.
+const LONGEST_TRAVEL_MM: f64 = 1e4;
+
 impl StageSettings {
     /// Checks every field and what they must hold together. `elements` is the room for GMS elements.
     ///
@@ -64,6 +63,7 @@ impl AxisSettings {
     fn validate(&self, at: Place, period_s: f64, elements: usize) -> Result<(), SettingsError> {
         self.validate_edges(at)?;
         self.validate_limits(at, period_s)?;
+        self.validate_homing(at)?;
         self.validate_plant(at)?;
         self.validate_feedback(at, period_s)?;
         self.validate_feedforward(at, period_s)?;
@@ -79,6 +79,13 @@ impl AxisSettings {
             8.0,
             32.0,
         )?;
+        if let Some(counts) = encoder.counts_per_index {
+            let field = "encoder.counts_per_index";
+            at.within(field, counts.into(), 16.0, 1e9)?;
+            let field = "encoder.index_tolerance_counts";
+            let most = libm::floor(f64::from(counts) / 4.0);
+            at.within(field, encoder.index_tolerance_counts.into(), 0.0, most)?;
+        }
         let amplifier = &self.amplifier;
         let full = amplifier.full_scale_v;
         at.within("amplifier.full_scale_v", full, 0.1, 20.0)?;
@@ -93,33 +100,6 @@ impl AxisSettings {
             amplifier.offset_v,
             -0.1 * full,
             0.1 * full,
-        )
-    }
-
-    fn validate_limits(&self, at: Place, period_s: f64) -> Result<(), SettingsError> {
-        let limits = &self.limits;
-        let resolution = self.encoder.resolution_mm;
-        // The encoder may move twice as far, within half of its counter's range, or its direction is lost.
-        let half_range = libm::scalbn(0.5, self.encoder.counter_bits.into());
-        let fastest = (0.5 * half_range).min(MOST_COUNTS_PER_TICK) * resolution / period_s;
-        let most_acceleration = MOST_COUNTS_PER_TICK_SQUARED * resolution / (period_s * period_s);
-        at.within(
-            "limits.max_velocity_mm_s",
-            limits.max_velocity_mm_s,
-            1e-3,
-            fastest.min(1e3),
-        )?;
-        at.within(
-            "limits.max_acceleration_mm_s2",
-            limits.max_acceleration_mm_s2,
-            1e-3,
-            most_acceleration.min(3e4),
-        )?;
-        at.within(
-            "limits.following_error_mm",
-            limits.following_error_mm,
-            resolution,
-            (MOST_ERROR_COUNTS * resolution).min(20.0),
         )
     }
 

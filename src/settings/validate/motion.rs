@@ -1,6 +1,6 @@
 //! Checks of motions against their axes' limits.
 
-use super::Place;
+use super::{LONGEST_TRAVEL_MM, Place};
 use crate::reference::MotionSettings;
 use crate::safety::AxisName;
 use crate::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
@@ -27,9 +27,6 @@ impl PlanSettings {
         Ok(())
     }
 }
-
-/// The longest travel that a motion may ask for, mm.
-const LONGEST_TRAVEL_MM: f64 = 1e4;
 
 fn validate_motion(
     at: Place,

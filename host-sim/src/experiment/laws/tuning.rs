@@ -375,6 +375,7 @@ impl Bench<'_> {
         settings.feedback = feedback.clone();
         settings.feedforward.kind = FeedforwardKind::None;
         settings.limits.following_error_mm = FOLLOWING_ERROR_MM;
+        settings.limits.following_error_max_mm = FOLLOWING_ERROR_MM;
         settings
     }
 }

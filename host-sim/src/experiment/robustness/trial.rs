@@ -159,8 +159,8 @@ impl Trial<'_> {
         let [axis, ..] = &self.stage.axes;
         let mut machine = Machine::<f32, ELEMENTS>::new(&Job {
             stage: StageSettings {
-                rate_hz: self.stage.rate_hz,
                 axes: [axis.clone(), axis.clone(), axis.clone()],
+                ..self.stage.clone()
             },
             plan: PlanSettings {
                 motions: [
@@ -179,10 +179,10 @@ impl Trial<'_> {
         let mut trace = AxisTrace::default();
         let mut enabled_ticks = 0.0;
         for tick in 0..most_ticks {
-            let outputs = machine.tick(&InputRecord {
-                counts: [plant.read_counter(), 0, 0],
-                request: operator.request(tick as u32),
-            });
+            let outputs = machine.tick(&InputRecord::of_counts(
+                [plant.read_counter(), 0, 0],
+                operator.request(tick as u32),
+            ));
             let state = machine.state();
             if let SafetyState::Faulted(fault) = state.safety() {
                 return Ok(Ended {

@@ -1,0 +1,52 @@
+//! `quadrant connect flash`.
+
+use std::io::ErrorKind;
+use std::path::PathBuf;
+use std::process::Command;
+
+use anyhow::{Context, bail};
+use clap::Args;
+
+/// Options of `flash`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Arguments {
+    /// The firmware: the ELF file that `cargo build --release` leaves in target/thumbv7em-none-eabihf/release.
+    elf: PathBuf,
+    /// The chip, as probe-rs calls it.
+    #[arg(long, default_value = "STM32F446RETx")]
+    chip: String,
+    /// Stay, and show the firmware's log (defmt) until Ctrl-C.
+    #[arg(long)]
+    run: bool,
+}
+
+/// Flashes the firmware and lets it start.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if !arguments.elf.is_file() {
+        bail!(
+            "{}: no such file; build the firmware first (docs/board-nucleo-f446re.md)",
+            arguments.elf.display()
+        );
+    }
+    if arguments.run {
+        return probe_rs(&["run", "--chip", &arguments.chip], Some(&arguments.elf));
+    }
+    probe_rs(
+        &["download", "--chip", &arguments.chip],
+        Some(&arguments.elf),
+    )?;
+    probe_rs(&["reset", "--chip", &arguments.chip], None)
+}
+
+fn probe_rs(words: &[&str], file: Option<&PathBuf>) -> anyhow::Result<()> {
+    let mut command = Command::new("probe-rs");
+    command.args(words).args(file);
+    match command.status() {
+        Ok(status) if status.success() => Ok(()),
+        Ok(status) => bail!("probe-rs {}: ended with {status}", words.join(" ")),
+        Err(error) if error.kind() == ErrorKind::NotFound => bail!(
+            "probe-rs is not installed; `cargo install probe-rs-tools --locked`, or see https://probe.rs"
+        ),
+        Err(error) => Err(error).context("cannot run probe-rs"),
+    }
+}

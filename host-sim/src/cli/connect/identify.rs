@@ -1,0 +1,127 @@
+//! `identify`: measurements on the connected machine, and what they say.
+
+use std::path::PathBuf;
+
+use anyhow::Context;
+use clap::{Args, Subcommand};
+use quadrant::safety::AxisName;
+use quadrant::settings::AxisSettings;
+use quadrant_sim::commission::bootstrap::{measuring_settings, quiet_settings};
+use quadrant_sim::console::Client;
+use quadrant_sim::console::rig::ConnectedRig;
+use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended, shuttle};
+use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
+use quadrant_sim::identify::static_friction::{self, Exponent, StaticFrictionSettings, fit_map};
+use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
+use quadrant_sim::presentation::{friction_table, gms_table, motion_table};
+use quadrant_sim::report::Table;
+use quadrant_sim::rig::Rig;
+use serde_json::json;
+
+use super::command::axis_parser;
+use super::drive::Answer;
+use crate::cli::output::share;
+
+/// The measurements.
+#[derive(Clone, Debug, Subcommand)]
+pub(super) enum Command {
+    /// Move the axis to and fro by up to 60 mm, and find inertia and friction in that motion.
+    Motion(Options),
+    /// Move the axis at 16 velocities from 0.1 to 40 mm/s, both ways, and fit the static model; within +-100 mm.
+    StaticFriction(Options),
+    /// Move the axis in a slow sine of micrometres under a quiet controller, and identify the GMS model; needs a plant in the
+    /// settings.
+    VirginCurve(Options),
+    /// Measure the acceleration per volt in open loop: the first step of `quadrant commission`.
+    MotorConstant(Options),
+}
+
+/// Options of a measurement.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Options {
+    /// The axis: x, y or z.
+    #[arg(value_parser = axis_parser())]
+    axis: AxisName,
+    /// File for the recording, CSV, which `quadrant identify ... --record` reads.
+    #[arg(long, value_name = "FILE")]
+    out: PathBuf,
+}
+
+/// Moves to and fro.
+const ROUNDS: usize = 1;
+/// Slip-blocks.
+const BLOCKS: usize = 4;
+
+pub(super) fn run(client: &mut Client, command: &Command) -> anyhow::Result<Answer> {
+    let (Command::Motion(options)
+    | Command::StaticFriction(options)
+    | Command::VirginCurve(options)
+    | Command::MotorConstant(options)) = command;
+    let mut rig = ConnectedRig::new(client, options.axis)?;
+    let before = rig.settings().clone();
+    let outcome = measure(&mut rig, command, options, &before);
+    // Whatever came of it, the machine keeps the settings that it had.
+    rig.apply(&before)?;
+    let table = outcome?;
+    let text = format!(
+        "{}\n{}: the recording",
+        table.to_text(),
+        options.out.display()
+    );
+    Ok(Answer::new(
+        text,
+        json!({ "file": options.out, "table": table.to_csv()? }),
+    ))
+}
+
+fn measure(
+    rig: &mut ConnectedRig<'_>,
+    command: &Command,
+    options: &Options,
+    before: &AxisSettings,
+) -> anyhow::Result<Table> {
+    let bar = share("measuring");
+    let mut progress = |done: f64| bar.set_position((1000.0 * done) as u64);
+    match command {
+        Command::Motion(_) => {
+            let recording = shuttle(rig, ROUNDS, &mut progress)?;
+            recording.write_csv(&options.out)?;
+            let settings = MotionFitSettings::default();
+            let candidates = fit_motion(&recording, &settings, &|_| {})?;
+            let chosen =
+                recommended(&candidates).context("no model of the motion is one of friction")?;
+            Ok(motion_table(&chosen.model, None))
+        }
+        Command::StaticFriction(_) => {
+            rig.apply(&measuring_settings(before))?;
+            let settings = StaticFrictionSettings::default();
+            let (map, _) = static_friction::measure(rig, &settings, &mut progress)?;
+            map.write_csv(&options.out)?;
+            Ok(friction_table(&fit_map(&map, Exponent::Free)?))
+        }
+        Command::VirginCurve(_) => {
+            let plant = before.plant.context(
+                "the settings hold no linear model to make a quiet controller for; load commissioned settings first",
+            )?;
+            let quiet = quiet_settings(before, &plant, rig.axis().rate_hz);
+            rig.apply(&quiet)?;
+            let sine = VirginCurveSettings::outrunning(
+                quiet.feedback.pid.kp_v_per_mm,
+                before.friction.sliding.positive.curve.breakaway_v,
+            );
+            let recording = virgin_curve::measure(rig, &sine, &mut progress)?;
+            recording.write_csv(&options.out)?;
+            let known = Some(&before.friction.sliding);
+            let found = virgin_curve::identify(&recording, known, &Knots::Automatic(BLOCKS))?;
+            Ok(gms_table(&found))
+        }
+        Command::MotorConstant(_) => {
+            let found =
+                motor_constant::measure(rig, &MotorConstantSettings::default(), &mut progress)?;
+            found.recording.write_csv(&options.out)?;
+            Ok(quadrant_sim::presentation::motor_constant_table(
+                &found, None,
+            ))
+        }
+    }
+}

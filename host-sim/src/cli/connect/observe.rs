@@ -1,0 +1,262 @@
+//! Recordings, captures, events.
+
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use quadrant::capture::{Edge, Level, Trigger};
+use quadrant::link::message::{CaptureStatus, Event, Notice};
+use quadrant_sim::console::samples::{
+    Recording, Samples, arm, capture_state, disarm, least_decimation, read_capture,
+};
+use quadrant_sim::console::{Client, columns, settings};
+use serde_json::{Value, json};
+
+use super::command::{ArmOptions, CaptureCommand, RecordOptions};
+use super::drive::{Answer, Session, seconds};
+use super::machine::name;
+use super::script::{self, Said};
+
+/// Time from one look at what has come to the next.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time recorded after the axes have come to rest, and for the last block to come.
+const TAIL: Duration = Duration::from_millis(100);
+/// Longest recording without a duration, s.
+const MOST: Duration = Duration::from_secs(3600);
+
+pub(super) fn record(session: &mut Session, options: &RecordOptions) -> anyhow::Result<Answer> {
+    let then = match options.then.as_slice() {
+        [] => None,
+        words => {
+            let line = words.join(" ");
+            match script::parse(&line) {
+                Ok(Said::Ask(command)) => Some(command),
+                Ok(_) => bail!("record: `{line}` is no command of the machine"),
+                Err(error) => bail!("record: {error}"),
+            }
+        }
+    };
+    let due = match options.seconds {
+        Some(time_s) => Some(seconds("--seconds", time_s)?),
+        None => None,
+    };
+    let client = &mut session.client;
+    let resolutions_mm = settings::resolutions_mm(client)?;
+    let rate_hz = client.identity().rate_hz;
+    let every = options
+        .every
+        .unwrap_or_else(|| least_decimation(options.channels.len(), rate_hz));
+    let mut recording = Recording::start(client, &options.channels, every)?;
+    let began = client.now();
+    if let Some(command) = then
+        && !session.run(&command, "record")
+    {
+        recording.finish(&mut session.client)?;
+        bail!("record: nothing was written");
+    }
+    let client = &mut session.client;
+    loop {
+        let elapsed = client.now().saturating_sub(began);
+        let left = due.map_or(MOST, |due| due.saturating_sub(elapsed));
+        if left.is_zero() {
+            break;
+        }
+        recording.gather(client, left.min(LOOK))?;
+        if due.is_none() {
+            let status = client.status()?;
+            if !status.running {
+                break;
+            }
+        }
+    }
+    recording.gather(client, TAIL)?;
+    let mut samples = recording.finish(client)?;
+    if let Some(due) = due {
+        samples.truncate((due.as_secs_f64() / samples.sample_time_s).round() as usize);
+    }
+    let files = write(&samples, &options.out, &resolutions_mm, options.allow_gaps)?;
+    Ok(written(&samples, &files))
+}
+
+fn write(
+    samples: &Samples,
+    out: &Path,
+    resolutions_mm: &[f64; 3],
+    allow_gaps: bool,
+) -> anyhow::Result<Vec<PathBuf>> {
+    if samples.is_empty() {
+        bail!("no sample came; nothing was written");
+    }
+    if samples.lost() > 0 && !allow_gaps {
+        bail!(
+            "{} of {} samples were lost, so nothing was written; select fewer channels, sample less often (--every), or take \
+             them with gaps (--allow-gaps); for the full rate there is `capture`",
+            samples.lost(),
+            samples.lost() + samples.len() as u64
+        );
+    }
+    Ok(columns::write(samples, out, resolutions_mm)?)
+}
+
+fn written(samples: &Samples, files: &[PathBuf]) -> Answer {
+    let names: Vec<String> = files
+        .iter()
+        .map(|file| file.display().to_string())
+        .collect();
+    let text = format!(
+        "{}: {} samples of {} channels, one every {:.4} ms{}",
+        names.join(", "),
+        samples.len(),
+        samples.channels.len(),
+        1e3 * samples.sample_time_s,
+        match samples.lost() {
+            0 => String::new(),
+            lost => format!("; {lost} samples are missing"),
+        }
+    );
+    let data = json!({
+        "files": files,
+        "samples": samples.len(),
+        "lost": samples.lost(),
+        "sample_time_s": samples.sample_time_s,
+        "first_tick": samples.first_tick,
+    });
+    Answer::new(text, data)
+}
+
+pub(super) fn capture(client: &mut Client, command: &CaptureCommand) -> anyhow::Result<Answer> {
+    match command {
+        CaptureCommand::Arm(options) => {
+            let status = arm(
+                client,
+                &options.channels,
+                options.every,
+                options.pre_trigger,
+                trigger(options)?,
+            )?;
+            Ok(state(&status))
+        }
+        CaptureCommand::State => Ok(state(&capture_state(client)?)),
+        CaptureCommand::Stop => Ok(state(&disarm(client)?)),
+        CaptureCommand::Read { out, timeout } => {
+            let patience = seconds("--timeout", *timeout)?;
+            let (samples, record) = read_capture(client, patience)?;
+            let resolutions_mm = settings::resolutions_mm(client)?;
+            let files = write(&samples, out, &resolutions_mm, false).context("capture")?;
+            let mut answer = written(&samples, &files);
+            answer.text.push_str(&format!(
+                "; frozen by {} at tick {}, {:.4} ms from the first",
+                name(&record.cause),
+                record.trigger_tick,
+                1e3 * samples.sample_time_s * f64::from(record.trigger_sample)
+            ));
+            answer.data["record"] = json!(record);
+            Ok(answer)
+        }
+    }
+}
+
+fn trigger(options: &ArmOptions) -> anyhow::Result<Trigger> {
+    if let (Some(channel), Some(level)) = (options.channel, options.level) {
+        let edge = match options.edge.as_str() {
+            "rising" => Edge::Rising,
+            "falling" => Edge::Falling,
+            _ => Edge::Either,
+        };
+        return Ok(Trigger::Level(Level {
+            channel,
+            edge,
+            level,
+        }));
+    }
+    Ok(match options.on.as_str() {
+        "now" => Trigger::Now,
+        "command" => Trigger::Command,
+        "motion" => Trigger::MotionStart,
+        "fault" => Trigger::Fault,
+        other => bail!("--on {other}: give now, command, fault or motion"),
+    })
+}
+
+fn state(status: &CaptureStatus) -> Answer {
+    let channels: Vec<String> = status.channels.iter().map(ToString::to_string).collect();
+    let mut text = format!("capture {}: {}", status.number, name(&status.phase));
+    if !channels.is_empty() {
+        text.push_str(&format!(
+            ", {} every {} ticks",
+            channels.join(","),
+            status.decimation
+        ));
+    }
+    if let Some(record) = &status.record {
+        text.push_str(&format!(
+            "; {} samples, frozen by {} at tick {}",
+            record.samples,
+            name(&record.cause),
+            record.trigger_tick
+        ));
+    }
+    let mut data = json!(status);
+    data["channels"] = json!(channels);
+    Answer::new(text, data)
+}
+
+pub(super) fn log(session: &mut Session, time_s: f64) -> anyhow::Result<Answer> {
+    let due = session.client.now() + seconds("log", time_s)?;
+    let rate_hz = session.client.identity().rate_hz;
+    let mut shown = 0;
+    // What has come, and at least what is on its way.
+    session.client.wait(Duration::from_millis(5))?;
+    loop {
+        for notice in session.client.take_notices() {
+            if let Some((text, data)) = line(&notice, rate_hz) {
+                session.printer.result("log", &text, &data);
+                shown += 1;
+            }
+        }
+        let left = due.saturating_sub(session.client.now());
+        if left.is_zero() {
+            return Ok(Answer::new("", json!({ "events": shown })));
+        }
+        session.client.wait(left.min(LOOK))?;
+    }
+}
+
+/// A notice as a line of the log.
+fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
+    match notice {
+        Notice::Event {
+            sequence,
+            tick,
+            event,
+        } => Some((
+            format!("{:>12.4} s  {}", f64::from(*tick) / rate_hz, said(event)),
+            json!({ "sequence": sequence, "tick": tick, "event": event }),
+        )),
+        Notice::Log(text) => Some((text.as_str().to_owned(), json!({ "log": text }))),
+        Notice::Telemetry(_) => None,
+    }
+}
+
+/// An event in words.
+fn said(event: &Event) -> String {
+    let fault = |code: &u8, axis: &Option<quadrant::safety::AxisName>| {
+        let axis = axis.map(|axis| format!(" of {axis}")).unwrap_or_default();
+        format!("fault {code}{axis}")
+    };
+    match event {
+        Event::Started(text) => format!("started: {text}"),
+        Event::Enabled => "outputs on".to_owned(),
+        Event::Disabled => "outputs off".to_owned(),
+        Event::Fault { code, axis } => format!("{}; `fault` says more", fault(code, axis)),
+        Event::Stopping { code, axis } => format!("braking for {}", fault(code, axis)),
+        Event::Held { code, axis } => format!("braked and held for {}", fault(code, axis)),
+        Event::MotionStarted => "motion begins".to_owned(),
+        Event::MotionFinished => "motion ends".to_owned(),
+        Event::Refused(text) => format!("refused: {text}"),
+        Event::Homed(axis) => format!("{axis} is homed"),
+        Event::CaptureFrozen { number } => format!("capture {number} can be read"),
+        Event::SettingsApplied(_) => "settings act".to_owned(),
+        Event::SettingsStored => "settings are kept".to_owned(),
+    }
+}

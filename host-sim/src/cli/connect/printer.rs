@@ -1,0 +1,34 @@
+//! Results: for a person, or one JSON object a line.
+
+use serde_json::{Value, json};
+
+/// Where results go.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Printer {
+    pub(super) json: bool,
+}
+
+impl Printer {
+    /// What came of a command: for a person, or as data.
+    pub(super) fn result(&self, command: &str, text: &str, result: &Value) {
+        if self.json {
+            println!("{}", json!({ "command": command, "result": result }));
+        } else if !text.is_empty() {
+            println!("{}", text.trim_end());
+        }
+    }
+
+    /// That a command failed; `place` is where it stands, such as "line 3".
+    pub(super) fn error(&self, command: &str, place: &str, error: &str) {
+        if self.json {
+            println!("{}", json!({ "command": command, "error": error }));
+        } else {
+            let place = if place.is_empty() {
+                String::new()
+            } else {
+                format!("{place}: ")
+            };
+            eprintln!("error: {place}{error}");
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! `scope`: channels in the terminal while they are sampled.
+
+use std::io::{IsTerminal, Write, stdout};
+use std::time::Duration;
+
+use anyhow::{Context, bail};
+use quadrant::telemetry::Channel;
+use quadrant_sim::console::samples::{Recording, Samples, least_decimation};
+use quadrant_sim::console::{columns, plot, settings};
+use quadrant_sim::report::{Figure, Lines, Plot, Series, Style};
+use serde_json::json;
+
+use super::command::ScopeOptions;
+use super::drive::{Answer, Session, seconds};
+
+/// Time from one picture to the next.
+const PICTURE: Duration = Duration::from_millis(100);
+/// Clears the screen and goes to its upper left corner.
+const CLEAR: &str = "\x1b[2J\x1b[H";
+/// Most characters of a line and lines of a channel.
+const MOST_SIZE: usize = 1000;
+
+pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Result<Answer> {
+    let duration = seconds("--seconds", options.seconds)?;
+    let window = seconds("--window", options.window)?;
+    let [width, height] = options.size[..] else {
+        bail!("--size: give width and height");
+    };
+    if !(20..=MOST_SIZE).contains(&width) || !(1..=MOST_SIZE).contains(&height) {
+        bail!(
+            "--size {width} {height}: give 20 to {MOST_SIZE} characters and 1 to {MOST_SIZE} lines"
+        );
+    }
+    let unit = columns::unit(options.channels[0]);
+    if options.svg.is_some()
+        && let Some(other) = options
+            .channels
+            .iter()
+            .find(|channel| columns::unit(**channel) != unit)
+    {
+        bail!(
+            "--svg: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
+            options.channels[0],
+            columns::unit(*other)
+        );
+    }
+    let live = stdout().is_terminal() && !session.printer.json;
+    let client = &mut session.client;
+    let resolutions_mm = settings::resolutions_mm(client)?;
+    let every = least_decimation(options.channels.len(), client.identity().rate_hz);
+    let mut recording = Recording::start(client, &options.channels, every)?;
+    let due = client.now() + duration;
+    while client.now() < due {
+        let left = due.saturating_sub(client.now());
+        recording.gather(client, left.min(PICTURE))?;
+        if live {
+            let picture = draw(
+                recording.samples(),
+                window,
+                [width, height],
+                &resolutions_mm,
+            );
+            print!("{CLEAR}{picture}");
+            stdout().flush().context("cannot write to the terminal")?;
+        }
+    }
+    let samples = recording.finish(client)?;
+    if samples.is_empty() {
+        bail!("no sample came");
+    }
+    let picture = draw(&samples, window, [width, height], &resolutions_mm);
+    let mut files = Vec::new();
+    if let Some(path) = &options.csv {
+        files.extend(columns::write(&samples, path, &resolutions_mm)?);
+    }
+    if let Some(path) = &options.svg {
+        let svg = figure(&samples, &resolutions_mm).to_svg()?;
+        std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+        files.push(path.clone());
+    }
+    let data = json!({
+        "files": files,
+        "samples": samples.len(),
+        "lost": samples.lost(),
+        "sample_time_s": samples.sample_time_s,
+    });
+    // The last picture of a live scope is on the screen already.
+    Ok(Answer::new(
+        if live { String::new() } else { picture },
+        data,
+    ))
+}
+
+/// The end of the samples, as much as `window` shows, one channel below the other.
+fn draw(
+    samples: &Samples,
+    window: Duration,
+    [width, height]: [usize; 2],
+    resolutions_mm: &[f64; 3],
+) -> String {
+    let shown = ((window.as_secs_f64() / samples.sample_time_s) as usize).max(2);
+    let first = samples.len().saturating_sub(shown);
+    let mut text = String::new();
+    for (index, &channel) in samples.channels.iter().enumerate() {
+        let values = columns::values_mm(samples, index, resolutions_mm);
+        let part = &values[first.min(values.len())..];
+        text.push_str(&heading(channel, part));
+        for line in plot::curve(part, width, height) {
+            text.push_str(line.trim_end());
+            text.push('\n');
+        }
+    }
+    let time_s = samples.time_s();
+    if let (Some(from), Some(to)) = (time_s.get(first), time_s.last()) {
+        text.push_str(&format!(
+            "{from:.3} s to {to:.3} s, one sample every {:.4} ms, {} lost\n",
+            1e3 * samples.sample_time_s,
+            samples.lost()
+        ));
+    }
+    text
+}
+
+/// A channel's name, and what its values come to.
+fn heading(channel: Channel, values: &[f64]) -> String {
+    let count = values.len().max(1) as f64;
+    let rms = (values.iter().map(|value| value * value).sum::<f64>() / count).sqrt();
+    let last = values.last().copied().unwrap_or(f64::NAN);
+    format!(
+        "{channel}, {unit}: now {last:.5}, RMS {rms:.5}\n",
+        unit = columns::unit(channel)
+    )
+}
+
+fn figure(samples: &Samples, resolutions_mm: &[f64; 3]) -> Figure {
+    let time_s = samples.time_s();
+    let series = samples
+        .channels
+        .iter()
+        .enumerate()
+        .map(|(index, channel)| Series {
+            name: channel.to_string(),
+            x: time_s.clone(),
+            y: columns::values_mm(samples, index, resolutions_mm),
+            style: Style::nth(index),
+        });
+    Figure {
+        id: "scope".to_owned(),
+        caption: "Sampled by telemetry.".to_owned(),
+        plot: Plot::Lines(Lines {
+            x_label: "Time, s".to_owned(),
+            y_label: samples
+                .channels
+                .first()
+                .map(|&channel| columns::unit(channel))
+                .unwrap_or_default()
+                .to_owned(),
+            series: series.collect(),
+            ..Lines::default()
+        }),
+    }
+}

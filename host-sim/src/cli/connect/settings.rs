@@ -1,0 +1,136 @@
+//! The machine's settings.
+
+use std::path::Path;
+
+use anyhow::{Context, bail};
+use quadrant::link::message::{Applied, Body, SettingsRequest};
+use quadrant_sim::console::Client;
+use quadrant_sim::console::settings::{self, whole_path};
+use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use serde_json::{Map, Value, json};
+
+use super::command::Command;
+use super::drive::Answer;
+
+pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
+    let path = whole_path(path);
+    match settings::get(client, &path) {
+        Ok(value) => Ok(Answer::new(&value, value.clone())),
+        Err(error) => {
+            // Perhaps a path above leaves.
+            let paths = below(client, &path)?;
+            if paths.is_empty() {
+                return Err(error.into());
+            }
+            let mut values = Map::new();
+            for path in paths {
+                let value = settings::get(client, &path)?;
+                values.insert(path, value);
+            }
+            let lines: Vec<String> = values
+                .iter()
+                .map(|(path, value)| format!("{path} {value}"))
+                .collect();
+            Ok(Answer::new(lines.join("\n"), Value::Object(values)))
+        }
+    }
+}
+
+fn below(client: &mut Client, path: &str) -> anyhow::Result<Vec<String>> {
+    let mut paths = settings::list(client, path)?;
+    let stem = path.trim_end_matches('/');
+    paths.retain(|found| found.len() == stem.len() || found[stem.len()..].starts_with('/'));
+    Ok(paths)
+}
+
+pub(super) fn set(client: &mut Client, path: &str, value: &str) -> anyhow::Result<Answer> {
+    settings::set(client, &whole_path(path), value)?;
+    Ok(Answer::done())
+}
+
+pub(super) fn list(client: &mut Client, prefix: &str) -> anyhow::Result<Answer> {
+    let path = whole_path(prefix);
+    let paths = below(client, &path)?;
+    if paths.is_empty() {
+        bail!("list: no setting is at or below {path}; `list` shows all paths");
+    }
+    Ok(Answer::new(paths.join("\n"), json!(paths)))
+}
+
+pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
+    let stage = settings::dump(client)?;
+    let mut dumped = SettingsFile::new(stage);
+    let identity = client.identity();
+    dumped.provenance.push(Provenance {
+        command: format!("quadrant connect dump, from {}", client.place()),
+        version: identity.firmware.as_str().to_owned(),
+        axis: "all".to_owned(),
+        records: Vec::new(),
+        sets: Vec::new(),
+    });
+    dumped.write(file)?;
+    let text = format!("{}: the settings of all axes", file.display());
+    Ok(Answer::new(text, json!({ "file": file })))
+}
+
+pub(super) fn load(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
+    let read = SettingsFile::read(file)?;
+    let loaded = settings::load(client, &read.stage)
+        .with_context(|| format!("{} was not loaded", file.display()))?;
+    let mut text = format!(
+        "{} settings changed; {}",
+        loaded.changed.len(),
+        applied_text(&loaded.applied)
+    );
+    if !loaded.left.is_empty() {
+        text.push_str(&format!(
+            "\nnote: the machine has {} settings that the file does not know; they stay: {}",
+            loaded.left.len(),
+            loaded.left.join(", ")
+        ));
+    }
+    let data = json!({
+        "changed": loaded.changed,
+        "left": loaded.left,
+        "applied": loaded.applied,
+    });
+    Ok(Answer::new(text, data))
+}
+
+pub(super) fn apply(client: &mut Client) -> anyhow::Result<Answer> {
+    let applied = settings::apply(client)?;
+    Ok(Answer::new(applied_text(&applied), json!(applied)))
+}
+
+fn applied_text(applied: &Applied) -> String {
+    let axes: Vec<&str> = applied.changed.iter().map(|axis| axis.as_str()).collect();
+    match (applied.restart_needed, axes.is_empty()) {
+        (true, _) => "the control rate or an encoder changed: nothing acts yet; `disable`, `store` and `reboot`".to_owned(),
+        (false, true) => "no axis changed".to_owned(),
+        (false, false) => format!("acting now on {}", axes.join(", ")),
+    }
+}
+
+pub(super) fn draft(client: &mut Client, command: &Command) -> anyhow::Result<Answer> {
+    let request = match command {
+        Command::Defaults => SettingsRequest::Defaults,
+        _ => SettingsRequest::Revert,
+    };
+    client.order(Body::Settings(request))?;
+    Ok(Answer::done())
+}
+
+pub(super) fn store(client: &mut Client, provenance: Option<&str>) -> anyhow::Result<Answer> {
+    let own = format!("quadrant connect {}", env!("CARGO_PKG_VERSION"));
+    settings::store(client, provenance.unwrap_or(&own))?;
+    Ok(Answer::done())
+}
+
+pub(super) fn provenance(client: &mut Client) -> anyhow::Result<Answer> {
+    let provenance = settings::provenance(client)?;
+    let text = match provenance.as_str() {
+        "" => "nothing is kept: the machine starts with the defaults",
+        text => text,
+    };
+    Ok(Answer::new(text, json!(provenance)))
+}

@@ -1,0 +1,225 @@
+//! The reference of all settings, from the library's own table: what each means, its unit, range and default.
+
+use std::collections::BTreeSet;
+use std::fmt::Write;
+
+use quadrant::settings::StageSettings;
+use quadrant::settings::leaves::{Bound, LeafInfo, Range, all};
+use quadrant::settings::tree::is_part;
+use serde_json::Value;
+
+/// What a row of the reference says of a leaf, or of a number of a list's points.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Row {
+    /// Its path, with `*` for the axis and for the point of a list.
+    pub path: &'static str,
+    /// Its unit; empty for none.
+    pub unit: &'static str,
+    /// What it may be, in words.
+    pub range: String,
+    /// Its default: one for all axes, or those of x, y and z; of a list's points, of each point.
+    pub default: String,
+    /// What it means.
+    pub meaning: &'static str,
+}
+
+/// Every setting whose path contains `part`, in the order of the table.
+pub fn rows(part: &str) -> Vec<Row> {
+    let settings = StageSettings::default();
+    all()
+        .filter(|leaf| leaf.path.contains(part))
+        .map(|leaf| Row {
+            path: leaf.path,
+            unit: leaf.unit,
+            range: range(leaf),
+            default: default(&settings, leaf.path),
+            meaning: leaf.meaning,
+        })
+        .collect()
+}
+
+/// A number as briefly as it goes.
+fn number(value: f64) -> String {
+    if value == 0.0 || (1e-3..1e5).contains(&value.abs()) {
+        format!("{value}")
+    } else {
+        format!("{value:e}")
+    }
+}
+
+fn bound(bound: Bound) -> String {
+    match bound {
+        Bound::At(value) => number(value),
+        Bound::Of(words, _) => words.to_owned(),
+    }
+}
+
+fn range(leaf: &LeafInfo) -> String {
+    match leaf.range {
+        Range::Number(least, most) => format!("{} to {}", bound(least), bound(most)),
+        Range::Flag => "true, false".to_owned(),
+        Range::Name(names) => names.join(", "),
+        Range::List(most) => format!("1 to {most} points"),
+    }
+}
+
+/// The default of a leaf in words, for one axis after the other unless they agree.
+fn default(settings: &StageSettings, path: &str) -> String {
+    let (list, name) = match path
+        .split_once("/*/")
+        .filter(|_| path.matches('*').count() > 1)
+    {
+        // The first star is the axis.
+        Some((axes, below)) => match below.split_once("/*/") {
+            Some((list, name)) => (format!("{axes}/*/{list}"), Some(name)),
+            None => (path.to_owned(), None),
+        },
+        None => (path.to_owned(), None),
+    };
+    let mut defaults: Vec<String> = ["0", "1", "2"]
+        .iter()
+        .map(|axis| spoken(&json(settings, &list.replacen('*', axis, 1)), name))
+        .collect();
+    if defaults.iter().all(|default| *default == defaults[0]) {
+        defaults.truncate(1);
+    }
+    defaults.join(" / ")
+}
+
+fn json(settings: &StageSettings, path: &str) -> Value {
+    let mut buffer = [0; 1024];
+    let length = settings.get_json(path, &mut buffer);
+    length
+        .ok()
+        .and_then(|length| serde_json::from_slice(&buffer[..length]).ok())
+        .unwrap_or_default()
+}
+
+fn spoken(value: &Value, name: Option<&str>) -> String {
+    match (value, name) {
+        (Value::Array(points), Some(name)) => {
+            let each = points.iter().map(|point| spoken(&point[name], None));
+            each.collect::<Vec<_>>().join(", ")
+        }
+        (Value::Array(points), None) => match points.len() {
+            1 => "1 point".to_owned(),
+            count => format!("{count} points"),
+        },
+        (Value::Number(value), _) => value.as_f64().map_or_else(String::new, number),
+        (Value::String(name), _) => name.clone(),
+        (Value::Null, _) => "left out".to_owned(),
+        (other, _) => other.to_string(),
+    }
+}
+
+/// The parts of an axis that may be left out, with `*` for the axis.
+fn parts() -> BTreeSet<String> {
+    let mut parts = BTreeSet::new();
+    let listed = StageSettings::default().list("/axes/x", &mut |path| {
+        if is_part(path) {
+            parts.insert(path.replacen("/axes/0", "/axes/*", 1));
+        }
+    });
+    // Every axis has leaves.
+    debug_assert!(listed.is_ok());
+    parts
+}
+
+/// Heading of the settings whose paths begin so.
+const SECTIONS: [(&str, &str); 8] = [
+    ("/rate_hz", "The stage"),
+    ("/axes/*/encoder/", "Encoder"),
+    ("/axes/*/amplifier/", "Amplifier"),
+    ("/axes/*/limits/", "Limits"),
+    ("/axes/*/plant/", "Plant"),
+    ("/axes/*/feedback/", "Feedback"),
+    ("/axes/*/friction/", "Friction"),
+    ("/axes/*/feedforward/", "Feedforward"),
+];
+
+/// The page `docs/settings.md`.
+pub fn markdown() -> String {
+    let mut page = String::from(INTRODUCTION);
+    let parts: Vec<String> = parts().iter().map(|part| format!("`{part}`")).collect();
+    let _ = writeln!(page, "\nThese parts may be left out: {}.", parts.join(", "));
+    let mut rest = rows("");
+    for (prefix, heading) in SECTIONS {
+        let (section, others) = rest
+            .into_iter()
+            .partition(|row| row.path.starts_with(prefix));
+        rest = others;
+        table(&mut page, heading, &section);
+    }
+    if !rest.is_empty() {
+        table(&mut page, "Others", &rest);
+    }
+    page
+}
+
+fn table(page: &mut String, heading: &str, rows: &[Row]) {
+    let _ = write!(
+        page,
+        "\n## {heading}\n\n| path | unit | range | default (x / y / z) | meaning |\n|---|---|---|---|---|\n"
+    );
+    for row in rows {
+        let _ = writeln!(
+            page,
+            "| `{}` | {} | {} | {} | {} |",
+            row.path, row.unit, row.range, row.default, row.meaning
+        );
+    }
+}
+
+const INTRODUCTION: &str = "\
+# Settings
+
+Made by `quadrant settings --markdown` from the table in `src/settings/leaves`; a test says when this page is stale.
+
+Every setting has a path. `*` stands for the axis, `x`, `y` or `z` (or 0, 1, 2), and for a point of a list: a list is one
+value, and its points' numbers are below it here only to be explained. Values are JSON. The defaults are those of the
+simulated stage, chosen and not measured (see [parameters.md](parameters.md)).
+
+A set of settings is checked as a whole before it takes effect. Beyond the ranges below: the law that acts and the kind of
+feedforward have their parameters; with a plant, the loop is stable at small errors and the nonlinear gain stays within its
+Popov bound, and pre-sliding springs are resolved at the control rate; the weights of the GMS sum to 1 within 1e-6; the
+points of lists rise; the Stribeck curve is smooth enough for its table. `rate_hz` and the encoders change with a restart.
+How a set is stored is in [settings-storage.md](settings-storage.md).
+
+A part that may be left out reads `\"present\"` or `null` at its own path. `null` removes it; `\"present\"` makes it, with
+the default axis' values.
+";
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_page_is_up_to_date() {
+        let page = include_str!("../../docs/settings.md");
+        assert!(
+            page == markdown(),
+            "docs/settings.md is stale: `cargo run -- settings --markdown > docs/settings.md`"
+        );
+    }
+
+    #[test]
+    fn every_setting_has_its_row_with_a_default() {
+        let rows = rows("");
+        assert_eq!(rows.len(), all().count());
+        for row in &rows {
+            assert!(!row.default.is_empty() && !row.range.is_empty(), "{row:?}");
+            assert!(!row.default.contains("left out"), "{row:?}");
+        }
+    }
+
+    #[test]
+    fn a_row_says_what_the_table_and_the_defaults_say() {
+        let found = rows("kp_v_per_mm");
+        assert_eq!(found.len(), 1);
+        assert_eq!(found[0].range, "0 to 10000");
+        assert_eq!(found[0].default, "1.118 / 1.31 / 1.669");
+        assert_eq!(rows("elements/*/weight")[0].default, "0.3, 0.3, 0.25, 0.15");
+        assert_eq!(rows("/feedback/schedule")[0].default, "2 points");
+        assert_eq!(rows("resolution_mm")[0].range, "1e-6 to 1");
+    }
+}

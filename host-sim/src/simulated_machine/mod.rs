@@ -1,0 +1,226 @@
+//! The firmware's application in this process, on the simulated stage: what a host connects to without a board.
+//!
+//! Control interrupt, supervising task and server run one after the other, in the order in which the target runs them, so
+//! that a session is the same every time. A serial port that carries ten bytes a tick each way joins them to the host.
+
+mod flash;
+
+use std::collections::VecDeque;
+
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::hal::Serial;
+use quadrant::link::message::NumberType;
+use quadrant::machine::{
+    After, Axis, Control, ControlInputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
+};
+use quadrant::safety::{FaultCode, Switches};
+use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant::stage::{Outputs, StageState};
+use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
+
+pub use self::flash::MemoryFlash;
+use crate::plant::{SimulatedStage, StageTruth};
+
+/// What the simulated machine calls itself.
+const BOARD: &str = "simulated";
+/// Words of the capture, as on the reference board.
+const CAPTURE_WORDS: usize = quadrant::capture::CAPTURE_WORDS;
+/// Bytes that the port carries in a run of the server: what 921 600 baud do in a millisecond.
+const PORT_BYTES: usize = 92;
+
+/// The host's end of the port, and its wire.
+#[derive(Debug, Default)]
+struct Wire {
+    to_machine: VecDeque<u8>,
+    to_host: Vec<u8>,
+    /// Bytes that may still be sent in this run.
+    room: usize,
+}
+
+impl Serial for Wire {
+    fn read(&mut self, into: &mut [u8]) -> usize {
+        let count = into.len().min(self.to_machine.len());
+        for (place, byte) in into.iter_mut().zip(self.to_machine.drain(..count)) {
+            *place = byte;
+        }
+        count
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> usize {
+        let count = bytes.len().min(self.room);
+        self.to_host.extend(&bytes[..count]);
+        self.room -= count;
+        count
+    }
+}
+
+type SimulatedServer = Server<'static, 'static, f32, MemoryFlash>;
+
+/// The application, as it runs between two starts.
+struct Running {
+    control: Control<'static, 'static, f32>,
+    supervision: Supervision,
+    server: SimulatedServer,
+    seen: Snapshot<f32>,
+}
+
+/// The firmware's application on the simulated stage.
+pub struct SimulatedMachine {
+    running: Running,
+    plant: SimulatedStage,
+    defaults: StageSettings,
+    wire: Wire,
+    outputs: Outputs,
+    /// Inputs that somebody holds pressed, beside those of the stage.
+    pressed: Switches,
+}
+
+impl SimulatedMachine {
+    /// Starts a machine whose flash is empty, with `settings` as the defaults of its firmware.
+    ///
+    /// # Errors
+    /// The first of the settings that is refused.
+    pub fn new(
+        settings: &StageSettings,
+        truth: &StageTruth,
+        seed: u64,
+    ) -> Result<Self, SettingsError> {
+        Ok(Self {
+            running: Running::start(settings, MemoryFlash::default(), None)?,
+            plant: SimulatedStage::new(truth, settings.rate_hz, seed),
+            defaults: settings.clone(),
+            wire: Wire::default(),
+            outputs: Outputs::default(),
+            pressed: Switches::NONE,
+        })
+    }
+
+    /// Control ticks since the last start.
+    pub fn tick(&self) -> u32 {
+        self.running.control.state().tick()
+    }
+
+    /// The outputs of the last tick.
+    pub fn outputs(&self) -> Outputs {
+        self.outputs
+    }
+
+    /// The stage under it.
+    pub fn plant_mut(&mut self) -> &mut SimulatedStage {
+        &mut self.plant
+    }
+
+    /// Presses inputs, or lets go of them: emergency stop, switches, amplifier faults.
+    pub fn press(&mut self, switches: Switches) {
+        self.pressed = switches;
+    }
+
+    /// Sends bytes to the machine.
+    pub fn send(&mut self, bytes: &[u8]) {
+        self.wire.to_machine.extend(bytes);
+    }
+
+    /// Takes what the machine has sent.
+    pub fn receive(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.wire.to_host)
+    }
+
+    /// Runs control ticks.
+    pub fn run(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            self.step();
+        }
+    }
+
+    fn step(&mut self) {
+        let inputs = self.plant.read_inputs(None);
+        let running = &mut self.running;
+        self.outputs = running.control.tick(&ControlInputs {
+            readings: inputs.readings,
+            switches: inputs.switches.with(self.pressed),
+            command: None,
+            deadline_missed: false,
+            link_lost: running.server.link_lost(),
+        });
+        self.plant.step(&self.outputs);
+        let Some(seen) = running.control.observe(0) else {
+            return;
+        };
+        running.seen = seen;
+        let supervised = running.supervision.run(&seen, None);
+        for event in supervised.events.into_iter().flatten() {
+            running.server.tell_of(seen.tick, event);
+        }
+        self.wire.room = PORT_BYTES;
+        let after = running
+            .server
+            .poll(&mut self.wire, &running.seen, Meters::default());
+        if after == After::Reboot {
+            self.restart();
+        }
+    }
+
+    /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
+    pub fn restart(&mut self) {
+        let Running { server, .. } = &self.running;
+        let flash = server.flash().clone();
+        match Running::start(&self.defaults, flash, None) {
+            Ok(running) => self.running = running,
+            // The defaults were accepted when the machine was made.
+            Err(_) => unreachable!("the same settings were accepted before"),
+        }
+    }
+}
+
+impl Running {
+    /// As the firmware does after a reset.
+    fn start(
+        defaults: &StageSettings,
+        flash: MemoryFlash,
+        fault: Option<FaultCode>,
+    ) -> Result<Self, SettingsError> {
+        let mut store = Store::new(flash, 0);
+        // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
+        let buffer: &'static mut [u8; BUFFER_BYTES] = Box::leak(Box::new([0; BUFFER_BYTES]));
+        let mut settings = defaults.clone();
+        let mut fault = fault;
+        let loaded = store.load(&mut settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
+        let provenance = match loaded {
+            Ok(Some(Loaded { provenance, .. })) => provenance,
+            Ok(None) => {
+                settings = defaults.clone();
+                Default::default()
+            }
+            Err(LoadError::Decode(_) | LoadError::Log(_)) => {
+                settings = defaults.clone();
+                fault = Some(FaultCode::SettingsInvalid);
+                Default::default()
+            }
+        };
+        let stage = settings.build::<f32, FIRMWARE_ELEMENTS>()?;
+        let plan = PlanSettings::default().build(&settings)?;
+        let (axes, streaming) = stage.into_axes();
+        let spare: &'static mut Axis<f32> = Box::leak(Box::new(axes[0].clone()));
+        let axes = axes.map(|axis| -> &'static mut Axis<f32> { Box::leak(Box::new(axis)) });
+        let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
+        let (control_ends, ends) = queues.split();
+        let state = fault.map_or_else(StageState::default, StageState::with_fault);
+        Ok(Self {
+            control: Control::new(axes, streaming, plan, state, control_ends),
+            supervision: Supervision::default(),
+            server: Server::new(ServerParts {
+                ends,
+                spare,
+                settings,
+                provenance,
+                store,
+                buffer,
+                capture: Box::leak(vec![0; CAPTURE_WORDS].into_boxed_slice()),
+                board: BOARD,
+                cycle_hz: 0,
+                number: NumberType::F32,
+            }),
+            seen: Snapshot::default(),
+        })
+    }
+}

@@ -1,0 +1,234 @@
+//! Flash for stored settings: sectors 1 and 2, 16 KiB each, between the vectors and the code.
+//!
+//! The chip has one bank: while it erases or programs, nothing can be read from flash, and a processor that fetches from
+//! it stands still. Programming a word takes 16 us (100 us at most), erasing a sector 250 ms (500 ms at most): **only
+//! while the amplifiers are disabled**. An erase runs from RAM with interrupts off and feeds the watchdog meanwhile; what
+//! the serial port receives for longer than its ring lasts is lost.
+
+use core::ptr::{read_volatile, write_volatile};
+
+use embedded_storage::nor_flash::{
+    ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
+    check_erase, check_read, check_write,
+};
+use stm32f4xx_hal::pac::{FLASH, IWDG};
+
+use super::watchdog::KEY_RELOAD;
+
+/// Where the two sectors are; the linker's map leaves them out.
+const START: u32 = 0x0800_4000;
+/// Bytes of a sector, and the number of the first.
+const SECTOR: u32 = 16 * 1024;
+const FIRST_SECTOR: u32 = 1;
+const SECTORS: u32 = 2;
+
+/// FLASH_KEYR (RM0390, 3.8.3).
+const KEYS: [u32; 2] = [0x4567_0123, 0xCDEF_89AB];
+/// FLASH_CR: program, sector erase, sector number, words of 32 bits (at 2.7 V to 3.6 V), start, lock.
+const PROGRAM: u32 = 1;
+const ERASE: u32 = 1 << 1;
+const NUMBER: u32 = 3;
+const BY_WORDS: u32 = 0b10 << 8;
+const START_ERASE: u32 = 1 << 16;
+const LOCK: u32 = 1 << 31;
+/// FLASH_SR: busy, and the five errors (OPERR, WRPERR, PGAERR, PGPERR, PGSERR), which ones clear.
+const BUSY: u32 = 1 << 16;
+const ERRORS: u32 = 1 << 1 | 0b1111 << 4;
+/// FLASH_ACR: data cache enabled, and its reset.
+const DATA_CACHE: u32 = 1 << 10;
+const DATA_CACHE_RESET: u32 = 1 << 12;
+/// How often to look at the busy bit before the watchdog is no longer fed: a look takes at least 10 cycles, so this is at
+/// least one second at 180 MHz.
+const LOOKS: u32 = 18_000_000;
+
+/// The flash did not do what it was told.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FlashError {
+    /// Outside of the two sectors.
+    OutOfBounds,
+    /// Not at a word, or not at a sector.
+    NotAligned,
+    /// The controller's error flags (FLASH_SR).
+    Controller(u32),
+    /// It reads back differently: the cells are worn.
+    Verify,
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
+            Self::NotAligned => NorFlashErrorKind::NotAligned,
+            Self::Controller(_) | Self::Verify => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl From<NorFlashErrorKind> for FlashError {
+    fn from(kind: NorFlashErrorKind) -> Self {
+        match kind {
+            NorFlashErrorKind::NotAligned => Self::NotAligned,
+            _ => Self::OutOfBounds,
+        }
+    }
+}
+
+/// The two sectors.
+pub(crate) struct SettingsFlash {
+    flash: FLASH,
+}
+
+impl SettingsFlash {
+    /// The two sectors, locked.
+    pub(super) fn new(flash: FLASH) -> Self {
+        Self { flash }
+    }
+
+    /// Does something with an unlocked controller.
+    fn unlocked(
+        &mut self,
+        body: impl FnOnce(&mut Self) -> Result<(), FlashError>,
+    ) -> Result<(), FlashError> {
+        for key in KEYS {
+            // SAFETY: the keys are the manual's.
+            self.flash.keyr().write(|w| unsafe { w.bits(key) });
+        }
+        // SAFETY: ones clear the errors of earlier times.
+        self.flash.sr().write(|w| unsafe { w.bits(ERRORS) });
+        let result = body(self);
+        // SAFETY: nothing but the lock is set, so no program or erase is left selected.
+        self.flash.cr().write(|w| unsafe { w.bits(LOCK) });
+        // What the cache holds of these sectors is of yesterday.
+        // SAFETY: the cache may be reset while it is disabled (RM0390, 3.4.2), and is enabled again as it was.
+        unsafe {
+            self.flash
+                .acr()
+                .modify(|r, w| w.bits(r.bits() & !DATA_CACHE));
+            self.flash
+                .acr()
+                .modify(|r, w| w.bits(r.bits() | DATA_CACHE_RESET));
+            self.flash
+                .acr()
+                .modify(|r, w| w.bits(r.bits() & !DATA_CACHE_RESET | DATA_CACHE));
+        }
+        result
+    }
+
+    fn errors(&self) -> Result<(), FlashError> {
+        match self.flash.sr().read().bits() & ERRORS {
+            0 => Ok(()),
+            errors => Err(FlashError::Controller(errors)),
+        }
+    }
+
+    fn erase_sector(&mut self, sector: u32) -> Result<(), FlashError> {
+        self.unlocked(|this| {
+            let select = ERASE | BY_WORDS | (FIRST_SECTOR + sector) << NUMBER;
+            // SAFETY: the value is the manual's; the sector is one of the two. The second write starts the erase, so
+            // that nothing is fetched from flash until it is over.
+            unsafe {
+                this.flash.cr().write(|w| w.bits(select));
+                cortex_m::interrupt::free(|_| {
+                    erase_from_ram(
+                        this.flash.cr().as_ptr(),
+                        this.flash.sr().as_ptr(),
+                        select | START_ERASE,
+                    );
+                });
+            }
+            this.errors()
+        })
+    }
+
+    fn program(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        self.unlocked(|this| {
+            // SAFETY: the value is the manual's.
+            this.flash
+                .cr()
+                .write(|w| unsafe { w.bits(PROGRAM | BY_WORDS) });
+            let addresses = (START + offset..).step_by(4);
+            for (address, word) in addresses.zip(bytes.chunks_exact(4)) {
+                let mut value = [0; 4];
+                value.copy_from_slice(word);
+                // SAFETY: a word inside the sectors, as the caller has checked; no Rust object is there.
+                unsafe { write_volatile(address as *mut u32, u32::from_le_bytes(value)) };
+                // The processor waits by itself, as it fetches from the same flash: this ends at once.
+                while this.flash.sr().read().bits() & BUSY != 0 {}
+                this.errors()?;
+            }
+            Ok(())
+        })
+    }
+}
+
+/// Starts an erase and waits for its end, in RAM; calls nothing, as everything else is in flash.
+///
+/// # Safety
+/// `control` and `status` are FLASH_CR and FLASH_SR, unlocked; interrupts are disabled; `start` selects a sector that
+/// nothing lives in.
+#[inline(never)]
+#[unsafe(link_section = ".data.erase_from_ram")]
+unsafe fn erase_from_ram(control: *mut u32, status: *mut u32, start: u32) {
+    // SAFETY: the watchdog's key register always exists, and a reload of a watchdog that was not started does nothing.
+    unsafe {
+        let watchdog = (*IWDG::ptr()).kr().as_ptr();
+        write_volatile(control, start);
+        // Until the write has arrived, the busy bit says nothing.
+        cortex_m::asm::dsb();
+        for _ in 0..LOOKS {
+            if read_volatile(status) & BUSY == 0 {
+                break;
+            }
+            write_volatile(watchdog, KEY_RELOAD);
+        }
+    }
+}
+
+impl ErrorType for SettingsFlash {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for SettingsFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        check_read(self, offset, bytes.len())?;
+        for (address, byte) in (START + offset..).zip(bytes) {
+            // SAFETY: inside the sectors, which the controller may change: hence volatile.
+            *byte = unsafe { read_volatile(address as *const u8) };
+        }
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        (SECTORS * SECTOR) as usize
+    }
+}
+
+impl NorFlash for SettingsFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR as usize;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        check_erase(self, from, to)?;
+        for sector in from / SECTOR..to / SECTOR {
+            self.erase_sector(sector)?;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        check_write(self, offset, bytes.len())?;
+        self.program(offset, bytes)?;
+        for (address, byte) in (START + offset..).zip(bytes) {
+            // SAFETY: as in `read`.
+            if unsafe { read_volatile(address as *const u8) } != *byte {
+                return Err(FlashError::Verify);
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Bits can be cleared word by word as often as one likes.
+impl MultiwriteNorFlash for SettingsFlash {}

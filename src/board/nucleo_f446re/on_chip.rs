@@ -1,0 +1,86 @@
+//! The fallback without an external converter: x and y on the chip's own two 12-bit converters, made better by shaping
+//! their error. **There is no third converter: z is not driven**, and whatever its codes are, nothing moves it.
+//!
+//! `docs/outputs.md` says what this costs in tracking error, and the circuit that makes ±10 V of 0 to 3.3 V.
+
+use quadrant::driver::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant::hal;
+use quadrant::units::DacCode;
+use stm32f4xx_hal::gpio::{Output, PA4, PA5, PC9};
+use stm32f4xx_hal::pac::{self, DAC};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+/// Number of the enable pin in port C.
+const ENABLE: u8 = 9;
+/// The word in the middle: zero volts.
+const ZERO: u32 = 2048;
+/// DAC_CR (RM0390, 14.5.1): both channels on (EN1, EN2), buffered, without triggers.
+const BOTH_ON: u32 = 1 | 1 << 16;
+/// First order: docs/outputs.md has the comparison.
+const SHAPER: NoiseShaper = NoiseShaper::FirstOrder;
+
+/// Two amplifiers of three.
+pub(crate) struct Amplifiers {
+    converter: DAC,
+    enable: PC9<Output>,
+    states: [NoiseShaperState; 2],
+}
+
+impl Amplifiers {
+    /// Starts the converters with zero volts and the amplifiers disabled.
+    pub(super) fn new(converter: DAC, pins: (PA4, PA5), enable: PC9, rcc: &mut Rcc) -> Self {
+        let mut enable = enable.into_push_pull_output();
+        enable.set_low();
+        DAC::enable(rcc);
+        DAC::reset(rcc);
+        write_both(&converter, [0; 2]);
+        // SAFETY: the value is the manual's.
+        converter.cr().write(|w| unsafe { w.bits(BOTH_ON) });
+        // Analogue pins last: until then they float.
+        let _ = (pins.0.into_analog(), pins.1.into_analog());
+        Self {
+            converter,
+            enable,
+            states: [NoiseShaperState::default(); 2],
+        }
+    }
+}
+
+impl hal::Amplifiers for Amplifiers {
+    /// Disabled before the codes change, enabled after.
+    #[inline(always)]
+    fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
+        if !enabled {
+            self.enable.set_low();
+            self.states = [NoiseShaperState::default(); 2];
+        }
+        let [x, y, _] = codes;
+        let [of_x, of_y] = &mut self.states;
+        write_both(
+            &self.converter,
+            [SHAPER.step(of_x, x), SHAPER.step(of_y, y)],
+        );
+        if enabled {
+            self.enable.set_high();
+        }
+    }
+}
+
+/// Both words in one access, DAC_DHR12RD: they appear together.
+#[inline(always)]
+fn write_both(converter: &DAC, [x, y]: [i16; 2]) {
+    let word = |value: i16| ZERO.wrapping_add_signed(value.into()) & 0xFFF;
+    // SAFETY: twelve bits each.
+    converter
+        .dhr12rd()
+        .write(|w| unsafe { w.bits(word(x) | word(y) << 16) });
+}
+
+/// Zero volts, amplifiers disabled, from any context: also from a panic before or in the middle of anything.
+pub(crate) fn outputs_off() {
+    // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
+    // `halt`. Only single register writes are made, each valid in any state the owner left.
+    let (port_c, converter) = unsafe { (pac::GPIOC::steal(), DAC::steal()) };
+    port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
+    write_both(&converter, [0; 2]);
+}

@@ -1,0 +1,140 @@
+//! The debug probe's serial port: USART 2 on PA2 and PA3, 921 600 baud, 8 bits, no parity, moved by DMA alone.
+//!
+//! Received bytes go round in a ring of 1 KiB, 11 ms long; what is sent is copied once and goes out while the processor
+//! does something else. There are no interrupts: nothing here can delay the control tick but a few bus cycles.
+
+use core::cell::UnsafeCell;
+use core::sync::atomic::{Ordering, fence};
+
+use quadrant::driver::dma_ring::DmaRing;
+use quadrant::hal;
+use stm32f4xx_hal::gpio::{PA2, PA3, Pull};
+use stm32f4xx_hal::pac::{DMA1, USART2};
+use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
+
+/// Bits per second. With 45 MHz divided by 49 it is 0.35 % less.
+const BAUD: u32 = 921_600;
+/// Bytes of the ring.
+const RING: usize = 1024;
+/// Bytes sent at once: as long as the longest frame of the link.
+const SENDING: usize = 512;
+
+/// Streams of DMA 1 (RM0390, table 28): USART2_RX is stream 5, USART2_TX is stream 6, both on channel 4.
+const RECEIVER: usize = 5;
+const SENDER: usize = 6;
+const CHANNEL: u8 = 4;
+/// DMA_HIFCR: all five flags of stream 6 (CTCIF6 to CFEIF6).
+const CLEAR_SENDER: u32 = 0b11_1101 << 16;
+
+/// Memory that a DMA stream reads or writes by itself.
+struct Shared<const N: usize>(UnsafeCell<[u8; N]>);
+
+// SAFETY: `Serial` exists once, as it owns the peripherals, and only it touches these; what the streams do to them at the
+// same time is met with volatile accesses.
+unsafe impl<const N: usize> Sync for Shared<N> {}
+
+static RECEIVED: Shared<RING> = Shared(UnsafeCell::new([0; RING]));
+static TO_SEND: Shared<SENDING> = Shared(UnsafeCell::new([0; SENDING]));
+
+impl<const N: usize> Shared<N> {
+    fn address(&self) -> u32 {
+        self.0.get() as u32
+    }
+
+    fn byte(&self, index: usize) -> *mut u8 {
+        debug_assert!(index < N);
+        self.0.get().cast::<u8>().wrapping_add(index)
+    }
+}
+
+/// The serial port.
+pub(crate) struct Serial {
+    dma: DMA1,
+    usart: USART2,
+    ring: DmaRing<RING>,
+}
+
+impl Serial {
+    /// Starts to receive.
+    pub(super) fn new(usart: USART2, dma: DMA1, pins: (PA2, PA3), rcc: &mut Rcc) -> Self {
+        let _ = pins.0.into_alternate::<7>();
+        // Without the probe's chip the line would be read as noise.
+        let _ = pins.1.into_alternate::<7>().internal_resistor(Pull::Up);
+        USART2::enable(rcc);
+        USART2::reset(rcc);
+        DMA1::enable(rcc);
+        DMA1::reset(rcc);
+        // Oversampling by 16: USART_BRR is the divider itself (RM0390, 25.4.4).
+        let divider = (rcc.clocks.pclk1().raw() + BAUD / 2) / BAUD;
+        // SAFETY: mantissa and fraction together are the divider.
+        usart.brr().write(|w| unsafe { w.bits(divider as u16) });
+        usart.cr3().write(|w| w.dmar().set_bit().dmat().set_bit());
+        usart
+            .cr1()
+            .write(|w| w.ue().set_bit().te().set_bit().re().set_bit());
+        let data_register = usart.dr().as_ptr() as u32;
+
+        let receiver = dma.st(RECEIVER);
+        // SAFETY: the addresses are those of the data register and of memory that lives for ever.
+        unsafe {
+            receiver.par().write(|w| w.pa().bits(data_register));
+            receiver.m0ar().write(|w| w.m0a().bits(RECEIVED.address()));
+            dma.st(SENDER).par().write(|w| w.pa().bits(data_register));
+            dma.st(SENDER)
+                .m0ar()
+                .write(|w| w.m0a().bits(TO_SEND.address()));
+        }
+        receiver.ndtr().write(|w| w.ndt().set(RING as u16));
+        receiver.cr().write(|w| {
+            w.chsel().set(CHANNEL);
+            w.dir().peripheral_to_memory();
+            w.minc().incremented();
+            w.circ().enabled();
+            w.en().enabled()
+        });
+        Self {
+            dma,
+            usart,
+            ring: DmaRing::new(),
+        }
+    }
+}
+
+impl hal::Serial for Serial {
+    fn read(&mut self, into: &mut [u8]) -> usize {
+        // Reading the status, and the stream reading the data after it, clears the flags of a noisy or broken line.
+        let _ = self.usart.sr().read();
+        let remaining = self.dma.st(RECEIVER).ndtr().read().ndt().bits();
+        // What the counter says was written is read after the counter.
+        fence(Ordering::Acquire);
+        let byte = |index| {
+            // SAFETY: the index is one of the ring, which lives for ever; the stream writes it, hence volatile.
+            unsafe { RECEIVED.byte(index).read_volatile() }
+        };
+        self.ring.read(remaining.into(), byte, into)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> usize {
+        let sender = self.dma.st(SENDER);
+        // The hardware clears the bit when the last byte is on its way.
+        if bytes.is_empty() || sender.cr().read().en().is_enabled() {
+            return 0;
+        }
+        let count = bytes.len().min(SENDING);
+        for (index, byte) in bytes.iter().take(SENDING).enumerate() {
+            // SAFETY: the index is below the length; the stream, which reads this memory, is off.
+            unsafe { TO_SEND.byte(index).write_volatile(*byte) };
+        }
+        fence(Ordering::Release);
+        // SAFETY: ones clear these flags, zeros leave the other streams' alone.
+        self.dma.hifcr().write(|w| unsafe { w.bits(CLEAR_SENDER) });
+        sender.ndtr().write(|w| w.ndt().set(count as u16));
+        sender.cr().write(|w| {
+            w.chsel().set(CHANNEL);
+            w.dir().memory_to_peripheral();
+            w.minc().incremented();
+            w.en().enabled()
+        });
+        count
+    }
+}

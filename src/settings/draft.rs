@@ -1,0 +1,153 @@
+//! Settings that are being edited, beside those that are in force.
+//!
+//! A leaf is written at any time; nothing follows from it until [`Draft::apply`] has found the whole to be valid and
+//! said which axes are to be rebuilt ([`StageSettings::build_axis`]). The draft is the only full copy of the settings:
+//! what is in force is remembered only as far as an exchange of axes cannot change it.
+
+use core::fmt;
+
+use super::tree::TreeError;
+use super::{EncoderSettings, SettingsError, StageSettings};
+use crate::safety::AxisName;
+
+/// A set of settings that is edited leaf by leaf.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Draft {
+    settings: StageSettings,
+    touched: [bool; 3],
+    in_force: InForce,
+}
+
+/// What is in force and only changes with a restart, and what one axis' build takes from the others.
+#[derive(Clone, Debug, PartialEq)]
+struct InForce {
+    rate_hz: f64,
+    encoders: [EncoderSettings; 3],
+    longest_preview_ticks: usize,
+}
+
+impl InForce {
+    fn of(settings: &StageSettings) -> Self {
+        Self {
+            rate_hz: settings.rate_hz,
+            encoders: settings.axes.each_ref().map(|axis| axis.encoder),
+            longest_preview_ticks: settings.longest_preview_ticks(),
+        }
+    }
+}
+
+/// Why a draft does not take effect.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ApplyError {
+    /// It is not valid.
+    Refused(SettingsError),
+    /// The control rate differs from the one in force: the settings are to be stored and the machine restarted.
+    RateNeedsRestart,
+    /// An axis' encoder differs from the one in force, likewise.
+    EncoderNeedsRestart(AxisName),
+}
+
+impl fmt::Display for ApplyError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        const REMEDY: &str = "changes only with a restart: `store` the settings and restart";
+        match self {
+            Self::Refused(error) => error.fmt(f),
+            Self::RateNeedsRestart => write!(f, "rate_hz {REMEDY}"),
+            Self::EncoderNeedsRestart(axis) => write!(f, "{axis}.encoder {REMEDY}"),
+        }
+    }
+}
+
+impl core::error::Error for ApplyError {}
+
+impl From<SettingsError> for ApplyError {
+    fn from(error: SettingsError) -> Self {
+        Self::Refused(error)
+    }
+}
+
+impl Draft {
+    /// A draft of the settings that the stage was built from.
+    pub fn new(in_force: StageSettings) -> Self {
+        Self {
+            touched: [false; 3],
+            in_force: InForce::of(&in_force),
+            settings: in_force,
+        }
+    }
+
+    /// The settings as they are edited so far; valid only if [`validate`](StageSettings::validate) says so.
+    pub fn settings(&self) -> &StageSettings {
+        &self.settings
+    }
+
+    /// All of the settings, to be replaced by a stored set; every axis counts as changed.
+    pub fn settings_mut(&mut self) -> &mut StageSettings {
+        self.touched = [true; 3];
+        &mut self.settings
+    }
+
+    /// Writes a leaf, or makes or removes a part: [`StageSettings::set_json`].
+    ///
+    /// # Errors
+    /// As there; nothing has changed then.
+    pub fn set_json(&mut self, path: &str, json: &[u8]) -> Result<(), TreeError> {
+        let axis = self.settings.set_json(path, json)?;
+        self.touch(axis);
+        Ok(())
+    }
+
+    /// Writes a leaf, or makes or removes a part: [`StageSettings::set_bytes`].
+    ///
+    /// # Errors
+    /// As there; nothing has changed then.
+    pub fn set_bytes(&mut self, path: &str, kind: u8, bytes: &[u8]) -> Result<(), TreeError> {
+        let axis = self.settings.set_bytes(path, kind, bytes)?;
+        self.touch(axis);
+        Ok(())
+    }
+
+    /// What belongs to no axis concerns all of them.
+    fn touch(&mut self, axis: Option<usize>) {
+        for (index, touched) in self.touched.iter_mut().enumerate() {
+            *touched |= axis.is_none_or(|axis| axis == index);
+        }
+    }
+
+    /// Whether something was written since the draft last took effect.
+    pub fn is_edited(&self) -> bool {
+        self.touched.contains(&true)
+    }
+
+    /// Checks the draft as a whole, with `elements` the room for GMS elements, and says of each axis whether it has to be
+    /// rebuilt for the draft to take effect. The draft counts as in force from then on: the caller exchanges those axes.
+    /// Slow: the Popov bound is searched.
+    ///
+    /// # Errors
+    /// A value that is refused, or one that only changes with a restart; the draft stays as it is, and what was in force
+    /// stays in force.
+    pub fn apply(&mut self, elements: usize) -> Result<[bool; 3], ApplyError> {
+        self.settings.validate(elements)?;
+        let next = InForce::of(&self.settings);
+        if next.rate_hz != self.in_force.rate_hz {
+            return Err(ApplyError::RateNeedsRestart);
+        }
+        for (axis, (new, old)) in AxisName::ALL
+            .into_iter()
+            .zip(next.encoders.iter().zip(&self.in_force.encoders))
+        {
+            if new != old {
+                return Err(ApplyError::EncoderNeedsRestart(axis));
+            }
+        }
+        // Every axis waits for the one that looks ahead furthest.
+        let rebuild = if next.longest_preview_ticks == self.in_force.longest_preview_ticks {
+            self.touched
+        } else {
+            [true; 3]
+        };
+        self.in_force = next;
+        self.touched = [false; 3];
+        Ok(rebuild)
+    }
+}

@@ -1,0 +1,93 @@
+//! How an axis finds out where it is.
+
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
+use strum::{AsRefStr, EnumString, VariantNames};
+
+use super::AxisSettings;
+use crate::friction::Direction;
+use crate::homing::Homing;
+use crate::reference::{Approach, MotionScale, Velocity};
+use crate::safety::AxisSwitches;
+use crate::scalar::Scalar;
+use crate::units::{POSITION_UNITS_PER_COUNT, Position};
+
+/// The switch that homing looks for.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum HomeSwitch {
+    /// The home switch.
+    Home,
+    /// The limit switch at the end that is searched.
+    Limit,
+}
+
+/// How an axis finds out where it is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct HomingSettings {
+    /// Towards which end the switch is searched.
+    #[tree(with = miniconf::leaf)]
+    pub direction: Direction,
+    /// Which switch that is.
+    #[tree(with = miniconf::leaf)]
+    pub switch: HomeSwitch,
+    /// Velocity of the search and of the move to the parking position, mm/s; 0.001 to 1000, held to the axis' largest.
+    pub search_mm_s: f64,
+    /// Velocity away from the switch, over its edge and to the index pulse, mm/s; 0.001 to that of
+    /// the search.
+    pub latch_mm_s: f64,
+    /// For how long the switch may bounce, s; 0 to 0.1. It also delays what it says.
+    pub debounce_s: f64,
+    /// The mark is the first index pulse after the switch; else the switch's edge is. Needs `encoder.counts_per_index`.
+    pub index: bool,
+    /// Position of the mark, mm, rounded to a whole count; within +-1e4.
+    pub mark_mm: f64,
+    /// Where the axis goes in the end, mm; within +-1e4, held to the travel.
+    pub park_mm: f64,
+    /// How far the axis goes for the switch, and off it, before homing fails, mm; one count to 2e4.
+    pub travel_mm: f64,
+}
+
+/// How long an axis rests before its origin is defined, s: many times the longest preview at the usual control rates.
+const SETTLE_S: f64 = 0.02;
+
+impl AxisSettings {
+    /// Homing ready for the tick, if the axis has any.
+    pub(super) fn build_homing<S: Scalar>(&self, scale: MotionScale) -> Option<Homing<S>> {
+        let homing = self.homing.as_ref()?;
+        let resolution_mm = scale.resolution_mm;
+        let search_mm_s = homing.search_mm_s.min(self.limits.max_velocity_mm_s);
+        let park_mm = match &self.limits.travel_mm {
+            Some(travel) => homing.park_mm.max(travel.negative).min(travel.positive),
+            None => homing.park_mm,
+        };
+        let spacing = self.encoder.counts_per_index.filter(|_| homing.index);
+        let whole_counts = libm::round(homing.mark_mm / resolution_mm) * POSITION_UNITS_PER_COUNT;
+        Some(Homing {
+            direction: homing.direction,
+            switch: match (homing.switch, homing.direction) {
+                (HomeSwitch::Home, _) => AxisSwitches::HOME,
+                (HomeSwitch::Limit, Direction::Negative) => AxisSwitches::NEGATIVE_LIMIT,
+                (HomeSwitch::Limit, Direction::Positive) => AxisSwitches::POSITIVE_LIMIT,
+            },
+            search: Velocity::from_mm_s(search_mm_s, scale),
+            latch: Velocity::from_mm_s(homing.latch_mm_s.min(search_mm_s), scale),
+            debounce_ticks: libm::round(homing.debounce_s * scale.rate_hz) as u32,
+            settle_ticks: libm::round(SETTLE_S * scale.rate_hz) as u32,
+            index_spacing: spacing.map(|counts| Position(i64::from(counts) << 16)),
+            mark: Position(whole_counts as i64),
+            park: Position::from_mm(park_mm, resolution_mm),
+            travel: Position::from_mm(homing.travel_mm, resolution_mm),
+            approach: Approach::new(
+                search_mm_s,
+                self.limits.max_acceleration_mm_s2,
+                self.limits.max_jerk_mm_s3,
+                scale,
+            ),
+        })
+    }
+}

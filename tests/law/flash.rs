@@ -1,0 +1,181 @@
+//! A flash of two sectors that loses its power in the middle of things.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
+    check_write,
+};
+
+use crate::common::Noise;
+
+/// Bytes of a sector, as on the reference board.
+pub(crate) const SECTOR: usize = 16 * 1024;
+
+/// What a cut leaves of the operation it falls into.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Damage {
+    /// It has not begun.
+    Nothing,
+    /// The lower half of the word or sector is done.
+    LowHalf,
+    /// The upper half is done.
+    HighHalf,
+    /// Some bits are done and some are not.
+    SomeBits(u64),
+    /// It is done, and nothing after it.
+    All,
+}
+
+impl Damage {
+    pub(crate) fn each(seed: u64) -> [Self; 5] {
+        [
+            Self::Nothing,
+            Self::LowHalf,
+            Self::HighHalf,
+            Self::SomeBits(seed),
+            Self::All,
+        ]
+    }
+
+    /// Moves the bytes from what they hold towards `to`, as far as the operation got.
+    fn apply(self, bytes: &mut [u8], to: &[u8]) {
+        let half = bytes.len() / 2;
+        match self {
+            Self::Nothing => {}
+            Self::LowHalf => bytes[..half].copy_from_slice(&to[..half]),
+            Self::HighHalf => bytes[half..].copy_from_slice(&to[half..]),
+            Self::SomeBits(seed) => {
+                let mut noise = Noise::new(seed);
+                for (byte, to) in bytes.iter_mut().zip(to) {
+                    let done = (noise.bits() >> 20) as u8;
+                    *byte = (*byte & !done) | (to & done);
+                }
+            }
+            Self::All => bytes.copy_from_slice(to),
+        }
+    }
+}
+
+/// Two sectors, written by words of four bytes, each word once between erasures.
+#[derive(Clone, Debug)]
+pub(crate) struct Flash {
+    pub(crate) bytes: Vec<u8>,
+    programmed: Vec<bool>,
+    /// Words written and sectors erased so far.
+    pub(crate) operations: u64,
+    /// Erasures of each sector.
+    pub(crate) erasures: [u32; 2],
+    /// The operation that the power fails in, and what becomes of it.
+    pub(crate) cut: Option<(u64, Damage)>,
+    /// Words whose bits do not change any more.
+    pub(crate) worn: Option<std::ops::Range<usize>>,
+}
+
+impl Default for Flash {
+    fn default() -> Self {
+        Self {
+            bytes: vec![0xFF; 2 * SECTOR],
+            programmed: vec![false; 2 * SECTOR / 4],
+            operations: 0,
+            erasures: [0; 2],
+            cut: None,
+            worn: None,
+        }
+    }
+}
+
+/// What the flash says.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum FlashError {
+    /// There is no power.
+    Off,
+    /// The operation is not allowed.
+    Refused(NorFlashErrorKind),
+    /// The word has been written since it was erased.
+    WrittenTwice,
+}
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        match self {
+            Self::Refused(kind) => *kind,
+            Self::Off | Self::WrittenTwice => NorFlashErrorKind::Other,
+        }
+    }
+}
+
+impl Flash {
+    /// The power comes back.
+    pub(crate) fn reboot(mut self) -> Self {
+        self.cut = None;
+        self
+    }
+
+    /// One operation on `bytes[at..]`; the power may fail in it, and is off after that.
+    fn operate(&mut self, at: usize, to: &[u8]) -> Result<(), FlashError> {
+        let damage = match self.cut {
+            Some((cut, _)) if self.operations > cut => return Err(FlashError::Off),
+            Some((cut, damage)) if self.operations == cut => damage,
+            _ => Damage::All,
+        };
+        let cut = self.cut.is_some_and(|(cut, _)| self.operations == cut);
+        self.operations += 1;
+        if !self.worn.as_ref().is_some_and(|worn| worn.contains(&at)) {
+            damage.apply(&mut self.bytes[at..at + to.len()], to);
+        }
+        if cut { Err(FlashError::Off) } else { Ok(()) }
+    }
+}
+
+impl ErrorType for Flash {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for Flash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        check_read(self, offset, bytes.len()).map_err(FlashError::Refused)?;
+        if self.cut.is_some_and(|(cut, _)| self.operations > cut) {
+            return Err(FlashError::Off);
+        }
+        let at = offset as usize;
+        bytes.copy_from_slice(&self.bytes[at..at + bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.bytes.len()
+    }
+}
+
+impl NorFlash for Flash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        check_erase(self, from, to).map_err(FlashError::Refused)?;
+        for start in (from as usize..to as usize).step_by(SECTOR) {
+            self.operate(start, &[0xFF; SECTOR])?;
+            self.programmed[start / 4..(start + SECTOR) / 4].fill(false);
+            self.erasures[start / SECTOR] += 1;
+        }
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        check_write(self, offset, bytes.len()).map_err(FlashError::Refused)?;
+        for (index, word) in bytes.chunks_exact(4).enumerate() {
+            let at = offset as usize + 4 * index;
+            if self.programmed[at / 4] {
+                return Err(FlashError::WrittenTwice);
+            }
+            // A cut before the operation leaves the word as it is.
+            self.programmed[at / 4] = self.cut != Some((self.operations, Damage::Nothing));
+            // Writing can only clear bits.
+            let old = &self.bytes[at..at + 4];
+            let to: Vec<u8> = old.iter().zip(word).map(|(old, new)| old & new).collect();
+            self.operate(at, &to)?;
+        }
+        Ok(())
+    }
+}

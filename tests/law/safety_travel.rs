@@ -1,0 +1,300 @@
+//! Ends of the travel: limit switches and soft limits stop an axis on its way out, and let it come back.
+
+use proptest::prelude::*;
+use quadrant::encoder::EncoderReading;
+use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant::safety::{AxisName, AxisSwitches, Command, FaultCode, SafetyState, Switches};
+use quadrant::settings::{LossReaction, PlanSettings, StageSettings, TravelSettings};
+
+use crate::common::{Rig, repeatable, with_x};
+use crate::safety_faults::{follow, moving, sines};
+
+const RESOLUTION_MM: f64 = 5e-4;
+
+fn by(distance_mm: f64, velocity_mm_s: f64) -> PlanSettings {
+    let mut plan = PlanSettings::default();
+    plan.motions[0] = MotionSettings::PointToPoint(PointToPointSettings {
+        distance_mm,
+        max_velocity_mm_s: velocity_mm_s,
+        max_acceleration_mm_s2: 2000.0,
+        max_jerk_mm_s3: 1e5,
+    });
+    plan
+}
+
+fn travel(positive: f64) -> StageSettings {
+    with_x(|axis| {
+        axis.limits.travel_mm = Some(TravelSettings {
+            negative: -positive,
+            positive,
+        });
+    })
+}
+
+/// Follows exactly until the stage stands or is off; where the reference went at most, mm.
+fn to_the_end(rig: &mut Rig<f32>) -> f64 {
+    let mut furthest: f64 = 0.0;
+    let mut standing = 0;
+    for _ in 0..100_000 {
+        let reference = rig.state.axes()[0].telemetry().reference;
+        rig.inputs.readings[0] = EncoderReading::of((reference.0 >> 16) as u32);
+        rig.tick();
+        if rig.state.safety().drives() {
+            let reference = rig.state.axes()[0].telemetry().reference;
+            furthest = furthest.max(reference.to_mm(RESOLUTION_MM).abs());
+        }
+        let over = match rig.state.safety() {
+            SafetyState::Stopping(_) => false,
+            SafetyState::Faulted(_) => true,
+            _ => {
+                standing += u32::from(!rig.state.is_running());
+                // The feedback's reference is behind by the preview.
+                standing > 50
+            }
+        };
+        if over {
+            return furthest;
+        }
+    }
+    panic!("it never ends");
+}
+
+/// Goes over to another plan and runs it.
+fn run(rig: &mut Rig<f32>, settings: &StageSettings, plan: &PlanSettings) {
+    rig.plan = plan.build(settings).expect("valid");
+    rig.command(Command::Run);
+    assert!(rig.state.is_running(), "{:?}", rig.state.safety());
+}
+
+fn homed(settings: &StageSettings) -> Rig<f32> {
+    let mut rig = Rig::<f32>::new(settings, &PlanSettings::default());
+    rig.state.set_homed(AxisName::X, true);
+    rig.tick();
+    rig.command(Command::Enable);
+    rig
+}
+
+proptest! {
+    #![proptest_config(repeatable(60))]
+
+    #[test]
+    fn a_motion_out_of_the_travel_stops_before_it(
+        positive in 1.0f64..50.0,
+        beyond in 1.0f64..100.0,
+        velocity in 10.0f64..250.0,
+        backward in any::<bool>(),
+    ) {
+        let settings = travel(positive);
+        let mut rig = homed(&settings);
+        let distance = positive + beyond;
+        run(&mut rig, &settings, &by(if backward { -distance } else { distance }, velocity));
+        let furthest = to_the_end(&mut rig);
+        let fault = rig.state.safety().fault().expect("found");
+        prop_assert_eq!((fault.code, fault.axis), (FaultCode::TravelAhead, Some(AxisName::X)));
+        // Half a millimetre of following error is allowed beyond.
+        prop_assert!(furthest <= positive + 0.5, "{furthest} mm of {positive} mm");
+        // And not much is given away: the bound of the stopping distance is no more than 20 ticks of travel too long.
+        let given_away = velocity * 60e-4 + 0.05;
+        prop_assert!(furthest >= positive + 0.5 - given_away, "{furthest} mm of {positive} mm");
+    }
+
+    #[test]
+    fn a_motion_that_ends_on_the_limit_is_no_fault(
+        positive in 1.0f64..50.0,
+        velocity in 10.0f64..250.0,
+        backward in any::<bool>(),
+    ) {
+        let settings = travel(positive);
+        let mut rig = homed(&settings);
+        run(&mut rig, &settings, &by(if backward { -positive } else { positive }, velocity));
+        let furthest = to_the_end(&mut rig);
+        prop_assert!(rig.state.safety().is_enabled());
+        prop_assert!((furthest - positive).abs() < 1e-6, "{furthest} mm");
+    }
+}
+
+#[test]
+fn the_travel_is_in_force_only_when_homed() {
+    let settings = travel(1.0);
+    let mut rig = homed(&settings);
+    rig.state.set_homed(AxisName::X, false);
+    run(&mut rig, &settings, &by(5.0, 100.0));
+    to_the_end(&mut rig);
+    assert!(rig.state.safety().is_enabled());
+    assert!(!rig.state.axes()[0].is_homed());
+}
+
+#[test]
+fn beyond_the_travel_an_axis_can_come_back_but_not_go_further() {
+    let settings = travel(1.0);
+    let mut rig = homed(&settings);
+    rig.state.set_homed(AxisName::X, false);
+    run(&mut rig, &settings, &by(5.0, 100.0));
+    to_the_end(&mut rig);
+    rig.state.set_homed(AxisName::X, true);
+    // It was inside since it was enabled only while that was not in force: no fault at rest.
+    for _ in 0..100 {
+        assert!(rig.tick().enabled);
+    }
+    run(&mut rig, &settings, &by(1.0, 10.0));
+    to_the_end(&mut rig);
+    let fault = rig.state.safety().fault().expect("further out");
+    assert_eq!(fault.code, FaultCode::TravelAhead);
+    rig.command(Command::ResetFault);
+    rig.command(Command::Enable);
+    run(&mut rig, &settings, &by(-4.2, 100.0));
+    to_the_end(&mut rig);
+    assert!(rig.state.safety().is_enabled(), "{:?}", rig.state.safety());
+    // Back inside, the measured position counts again.
+    while rig.state.safety().is_enabled() {
+        rig.inputs.readings[0].count += 10;
+        rig.tick();
+    }
+    let fault = rig.state.safety().fault().expect("pushed out");
+    assert_eq!(fault.code, FaultCode::TravelExceeded);
+}
+
+#[test]
+fn a_pressed_limit_switch_lets_an_axis_away_and_not_further() {
+    for (switch, code, out) in [
+        (
+            AxisSwitches::POSITIVE_LIMIT,
+            FaultCode::PositiveLimitSwitch,
+            5.0,
+        ),
+        (
+            AxisSwitches::NEGATIVE_LIMIT,
+            FaultCode::NegativeLimitSwitch,
+            -5.0,
+        ),
+    ] {
+        let settings = StageSettings::default();
+        let mut rig = homed(&settings);
+        run(&mut rig, &settings, &by(out, 100.0));
+        for _ in 0..300 {
+            let reference = rig.state.axes()[0].telemetry().reference;
+            rig.inputs.readings[0] = EncoderReading::of((reference.0 >> 16) as u32);
+            assert!(rig.tick().enabled);
+        }
+        rig.inputs.switches = Switches::NONE.with_axis(AxisName::X, switch);
+        to_the_end(&mut rig);
+        let fault = rig.state.safety().fault().expect("pressed");
+        assert_eq!((fault.code, fault.axis), (code, Some(AxisName::X)));
+        // On the switch: enabling is possible, going on is not, going back is.
+        rig.command(Command::ResetFault);
+        assert!(rig.command(Command::Enable).enabled);
+        run(&mut rig, &settings, &by(out, 100.0));
+        to_the_end(&mut rig);
+        assert_eq!(rig.state.safety().fault().expect("again").code, code);
+        rig.command(Command::ResetFault);
+        rig.command(Command::Enable);
+        run(&mut rig, &settings, &by(-out, 100.0));
+        to_the_end(&mut rig);
+        assert!(rig.state.safety().is_enabled());
+    }
+}
+
+#[test]
+fn a_switch_of_an_axis_that_stands_is_no_fault() {
+    let mut rig = homed(&StageSettings::default());
+    let both = AxisSwitches::NEGATIVE_LIMIT.with(AxisSwitches::POSITIVE_LIMIT);
+    for axis in AxisName::ALL {
+        rig.inputs.switches = Switches::NONE.with_axis(axis, both.with(AxisSwitches::HOME));
+        assert!(rig.tick().enabled);
+    }
+}
+
+#[test]
+fn bad_inputs_keep_the_stage_from_being_enabled_and_are_named() {
+    type Spoil = fn(&mut Rig<f32>);
+    let cases: [(FaultCode, Spoil); 5] = [
+        (FaultCode::EmergencyStop, |rig| {
+            rig.inputs.switches = Switches::EMERGENCY_STOP
+        }),
+        (FaultCode::AmplifierFault, |rig| {
+            rig.inputs.switches =
+                Switches::NONE.with_axis(AxisName::Y, AxisSwitches::AMPLIFIER_FAULT);
+        }),
+        (FaultCode::OutputMismatch, |rig| {
+            rig.inputs.switches =
+                Switches::NONE.with_axis(AxisName::Y, AxisSwitches::OUTPUT_MISMATCH);
+        }),
+        (FaultCode::StaleSample, |rig| {
+            rig.inputs.readings[1].fresh = false
+        }),
+        (FaultCode::EncoderInvalid, |rig| {
+            rig.inputs.readings[1].valid = false
+        }),
+    ];
+    for (code, spoil) in cases {
+        let mut rig = Rig::<f32>::new(&StageSettings::default(), &sines());
+        // From the start, and again once there were good inputs.
+        for state in [SafetyState::Start, SafetyState::Disabled] {
+            for _ in 0..10 {
+                spoil(&mut rig);
+                assert!(!rig.command(Command::Enable).enabled, "{code:?}");
+                assert_eq!(rig.state.safety(), state);
+                let obstacle = rig.state.obstacle().expect("named");
+                let axis = (code != FaultCode::EmergencyStop).then_some(AxisName::Y);
+                assert_eq!((obstacle.code, obstacle.axis), (code, axis));
+            }
+            rig.inputs.switches = Switches::NONE;
+            rig.tick();
+            assert_eq!(rig.state.safety(), SafetyState::Disabled);
+            assert_eq!(rig.state.obstacle(), None);
+        }
+        assert!(rig.command(Command::Enable).enabled);
+    }
+}
+
+#[test]
+fn a_fault_that_switches_off_ends_a_stop_and_leaves_the_first_fault() {
+    let mut rig = moving(&StageSettings::default());
+    rig.inputs.link_lost = true;
+    assert!(rig.tick().enabled);
+    follow(&mut rig);
+    rig.inputs.switches = Switches::EMERGENCY_STOP;
+    assert!(!rig.tick().enabled);
+    let SafetyState::Faulted(fault) = rig.state.safety() else {
+        panic!("{:?}", rig.state.safety());
+    };
+    assert_eq!(fault.code, FaultCode::LinkLost);
+}
+
+#[test]
+fn disabling_ends_a_stop_and_keeps_its_fault() {
+    let mut rig = moving(&StageSettings::default());
+    rig.inputs.link_lost = true;
+    rig.tick();
+    follow(&mut rig);
+    assert!(!rig.command(Command::Disable).enabled);
+    assert!(
+        matches!(rig.state.safety(), SafetyState::Faulted(fault) if fault.code == FaultCode::LinkLost)
+    );
+}
+
+#[test]
+fn a_lost_link_that_holds_can_be_followed_by_a_motion() {
+    let mut settings = StageSettings::default();
+    settings.streaming.link_lost = LossReaction::Hold;
+    let mut rig = moving(&settings);
+    for _ in 0..1000 {
+        follow(&mut rig);
+        // As long as it lasts.
+        rig.inputs.link_lost = true;
+        assert!(rig.tick().enabled);
+    }
+    assert!(!rig.state.is_running());
+    assert_eq!(rig.state.held().expect("told").code, FaultCode::LinkLost);
+    rig.command(Command::Run);
+    assert!(rig.state.is_running(), "{:?}", rig.state.safety());
+    assert_eq!(rig.state.held(), None);
+}
+
+#[test]
+fn a_lost_link_is_nothing_to_an_axis_that_stands() {
+    let mut rig = homed(&StageSettings::default());
+    rig.inputs.link_lost = true;
+    assert!(rig.tick().enabled);
+    assert_eq!(rig.state.safety(), SafetyState::Enabled);
+}

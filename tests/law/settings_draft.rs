@@ -1,0 +1,102 @@
+//! Settings that are edited leaf by leaf and take effect as a whole.
+
+use quadrant::safety::AxisName;
+use quadrant::settings::StageSettings;
+use quadrant::settings::draft::{ApplyError, Draft};
+use quadrant::stage::Stage;
+
+fn draft() -> Draft {
+    Draft::new(StageSettings::default())
+}
+
+fn set(draft: &mut Draft, path: &str, json: &str) {
+    draft.set_json(path, json.as_bytes()).expect("a setting");
+}
+
+#[test]
+fn only_the_axes_that_were_written_are_rebuilt() {
+    let mut draft = draft();
+    assert_eq!(draft.apply(8), Ok([false; 3]));
+    set(&mut draft, "/axes/y/feedback/pid/kp_v_per_mm", "1.2");
+    assert!(draft.is_edited());
+    assert_eq!(draft.apply(8), Ok([false, true, false]));
+    assert!(!draft.is_edited());
+    assert_eq!(draft.apply(8), Ok([false; 3]));
+    set(&mut draft, "/axes/x/plant", "null");
+    set(&mut draft, "/axes/z/feedforward/kind", "\"static\"");
+    assert_eq!(draft.apply(8), Ok([true, false, true]));
+}
+
+/// The law and its parameters arrive one after the other.
+#[test]
+fn what_is_contradictory_only_for_a_while_is_accepted() {
+    let mut draft = draft();
+    set(&mut draft, "/axes/x/feedback/nctf", "null");
+    set(&mut draft, "/axes/x/feedback/law", "\"nctf\"");
+    let Err(ApplyError::Refused(error)) = draft.apply(8) else {
+        panic!("a law without its parameters");
+    };
+    assert_eq!(error.field, "feedback.nctf");
+    assert!(draft.is_edited(), "the draft is still there to be mended");
+    set(&mut draft, "/axes/x/feedback/nctf", "\"present\"");
+    assert_eq!(draft.apply(8), Ok([true, false, false]));
+}
+
+#[test]
+fn a_refused_value_refuses_the_whole() {
+    let mut draft = draft();
+    set(&mut draft, "/axes/x/feedback/pid/kp_v_per_mm", "1.0");
+    set(&mut draft, "/axes/z/amplifier/offset_v", "5");
+    let message = draft.apply(8).expect_err("beyond its range").to_string();
+    assert_eq!(message, "z.amplifier.offset_v = 5 is outside -1 to 1");
+    set(&mut draft, "/axes/z/amplifier/offset_v", "0.5");
+    assert_eq!(draft.apply(8), Ok([true, false, true]));
+}
+
+#[test]
+fn rate_and_encoders_wait_for_a_restart() {
+    let mut draft = draft();
+    set(&mut draft, "/rate_hz", "11000");
+    assert_eq!(draft.apply(8), Err(ApplyError::RateNeedsRestart));
+    set(&mut draft, "/rate_hz", "10000");
+    set(&mut draft, "/axes/y/encoder/resolution_mm", "0.001");
+    assert_eq!(
+        draft.apply(8),
+        Err(ApplyError::EncoderNeedsRestart(AxisName::Y))
+    );
+    draft.settings().validate(8).expect("can be stored");
+    // After the restart.
+    let mut draft = Draft::new(draft.settings().clone());
+    assert_eq!(draft.apply(8), Ok([false; 3]));
+}
+
+#[test]
+fn a_longer_preview_concerns_every_axis() {
+    let mut draft = draft();
+    set(&mut draft, "/axes/x/feedforward/preview_s", "0.0011");
+    assert_eq!(
+        draft.apply(8),
+        Ok([true, false, false]),
+        "z looks ahead further"
+    );
+    set(&mut draft, "/axes/z/feedforward/preview_s", "0.0021");
+    assert_eq!(draft.apply(8), Ok([true; 3]));
+}
+
+#[test]
+fn the_axes_built_one_by_one_are_those_of_the_stage() {
+    let mut draft = draft();
+    set(&mut draft, "/axes/y/feedforward/preview_s", "0.0019");
+    let stage: Stage<f32, 8> = draft.settings().build().expect("valid");
+    for axis in AxisName::ALL {
+        let alone = draft.settings().build_axis::<f32, 8>(axis);
+        assert_eq!(alone, *stage.axis(axis));
+    }
+}
+
+#[test]
+fn a_set_that_is_loaded_over_a_draft_concerns_every_axis() {
+    let mut draft = draft();
+    *draft.settings_mut() = StageSettings::default();
+    assert_eq!(draft.apply(8), Ok([true; 3]));
+}

@@ -1,0 +1,121 @@
+//! Settings in a flash: what it may hold before, and what becomes of a set.
+
+use quadrant::friction::gms::GmsElement;
+use quadrant::settings::{Reason, StageSettings};
+use quadrant::store::{BUFFER_BYTES, DecodeError, Finding, LoadError, Provenance, Store};
+
+use crate::common::Noise;
+use crate::flash::{Flash, FlashError, SECTOR};
+
+const ELEMENTS: usize = 8;
+
+fn save(flash: Flash, settings: &StageSettings, elements: usize) -> Flash {
+    let mut store = Store::new(flash, 0);
+    let provenance = Provenance::try_from("test").expect("fits");
+    store
+        .save(settings, elements, &provenance, &mut [0; BUFFER_BYTES])
+        .expect("stores");
+    store.into_flash()
+}
+
+type Stored = Result<Option<(u32, StageSettings)>, LoadError<FlashError>>;
+
+fn load(flash: &Flash) -> Stored {
+    let mut settings = StageSettings {
+        rate_hz: 77.0,
+        ..StageSettings::default()
+    };
+    let loaded = Store::new(flash.clone(), 0).load(
+        &mut settings,
+        ELEMENTS,
+        &mut [0; BUFFER_BYTES],
+        &mut |_: Finding| {},
+    );
+    if !matches!(loaded, Ok(Some(_))) {
+        assert_eq!(settings, StageSettings::default());
+    }
+    Ok(loaded?.map(|loaded| {
+        assert_eq!(loaded.provenance, "test");
+        (loaded.sequence, settings)
+    }))
+}
+
+fn numbered(number: u32) -> StageSettings {
+    let mut settings = StageSettings::default();
+    settings.axes[0].feedback.transfer_s = 0.1 + f64::from(number) * 1e-3;
+    settings
+}
+
+#[test]
+fn an_empty_flash_gives_the_default_settings() {
+    assert_eq!(load(&Flash::default()), Ok(None));
+}
+
+#[test]
+fn a_flash_full_of_something_else_takes_settings() {
+    let mut noise = Noise::new(3);
+    let random: Vec<u8> = (0..2 * SECTOR)
+        .map(|_| (noise.bits() >> 30) as u8)
+        .collect();
+    for bytes in [random, vec![0; 2 * SECTOR], b"Quadrant".repeat(SECTOR / 4)] {
+        let mut flash = Flash::default();
+        flash.bytes = bytes;
+        assert_eq!(load(&flash), Ok(None));
+        let flash = save(flash, &numbered(1), ELEMENTS);
+        assert_eq!(load(&flash), Ok(Some((1, numbered(1)))));
+    }
+}
+
+#[test]
+fn a_set_that_is_refused_stays_and_makes_room_for_another() {
+    let mut many = StageSettings::default();
+    let elements = &mut many.axes[1].friction.gms.elements;
+    let (weight, stiffness_v_per_mm) = (1.0 / 9.0, 1.0);
+    *elements = [GmsElement {
+        stiffness_v_per_mm,
+        weight,
+    }; 9]
+        .into_iter()
+        .collect();
+    let flash = save(Flash::default(), &many, 10);
+    for _ in 0..2 {
+        let Err(LoadError::Decode(DecodeError::Refused(error))) = load(&flash) else {
+            panic!("more elements than there is room for");
+        };
+        assert_eq!(error.field, "friction.gms.elements");
+        assert_eq!(error.reason, Reason::TooManyElements { room: 8 });
+    }
+    let flash = save(flash, &numbered(5), ELEMENTS);
+    assert_eq!(load(&flash), Ok(Some((2, numbered(5)))));
+}
+
+/// One flipped bit anywhere costs at most the set it is in.
+#[test]
+fn a_flipped_bit_never_makes_other_settings() {
+    let mut flash = Flash::default();
+    let mut ends = vec![4];
+    for number in 0..3 {
+        flash = save(flash, &numbered(number), ELEMENTS);
+        let used = flash
+            .bytes
+            .iter()
+            .rposition(|&byte| byte != 0xFF)
+            .expect("a set")
+            + 1;
+        ends.push(used.next_multiple_of(4));
+    }
+    let (mut kept, mut older) = (0, 0);
+    for at in (0..ends[3]).step_by(7) {
+        let mut flipped = flash.clone();
+        flipped.bytes[at] ^= 1 << (at % 8);
+        let (sequence, settings) = load(&flipped).expect("reads").expect("a set");
+        assert_eq!(settings, numbered(sequence - 1));
+        if at < ends[2] {
+            assert_eq!(sequence, 3, "a flip at {at}, before the newest set");
+        }
+        kept += u32::from(sequence == 3);
+        older += u32::from(sequence == 2);
+    }
+    println!("{kept} flips kept the newest set, {older} fell back to the one before it");
+    assert!(kept > 800 && older > 400, "{kept}, {older}");
+}

@@ -1,0 +1,199 @@
+//! Where an image lies in the machine's memories, and how much of them it takes.
+//!
+//! Two promises of the linker scripts are held against the linked image: the stack is below everything else in RAM, so
+//! that growing too far is a fault and nothing worse; and flashing an image never touches the sectors of the stored
+//! settings. The sizes are held against those committed in `golden/sizes.toml`.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::ops::Range;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail, ensure};
+use object::read::elf::{FileHeader, ProgramHeader};
+use object::{Endianness, Object, ObjectSection, elf};
+use serde::{Deserialize, Serialize};
+
+use crate::command;
+use crate::image::{Board, Image, Target};
+
+/// The reference board's sectors of stored settings.
+const SETTINGS: Range<u64> = 0x0800_4000..0x0800_C000;
+/// Growth that is no news, share of the committed size: compilers differ by as much.
+const TOLERANCE: f64 = 0.02;
+
+/// What an image takes, bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Sizes {
+    /// Code, constants, and the first values of variables.
+    pub(crate) flash: u64,
+    /// Variables.
+    pub(crate) variables: u64,
+    /// What is set aside for the stack.
+    pub(crate) stack: u64,
+}
+
+impl Sizes {
+    fn of(image: &Image) -> Result<Self> {
+        let footprint = image.footprint()?;
+        let stack = image.symbol("_stack_start")? - image.symbol("_stack_end")?;
+        Ok(Self {
+            flash: footprint.flash_bytes(),
+            variables: footprint.ram_bytes(),
+            stack,
+        })
+    }
+}
+
+/// Checks an image's layout, and its sizes against the committed ones; `overwrite` commits these.
+pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
+    stack_is_at_the_bottom(image)?;
+    if image.target.board == Board::NucleoF446re {
+        settings_are_left_alone(image)?;
+    }
+    let sizes = Sizes::of(image)?;
+    println!(
+        "{}: flash {} bytes, variables {} bytes, stack {} bytes",
+        image.target, sizes.flash, sizes.variables, sizes.stack
+    );
+    if overwrite {
+        commit(image.target, sizes)
+    } else {
+        compare(image.target, sizes)
+    }
+}
+
+/// The stack begins where RAM does, and everything else in RAM is above it.
+fn stack_is_at_the_bottom(image: &Image) -> Result<()> {
+    const RAM: u64 = 0x2000_0000;
+    let bottom = image.symbol("_stack_end")?;
+    let top = image.symbol("_stack_start")?;
+    ensure!(
+        bottom == RAM && top > bottom,
+        "{}: the stack is at {bottom:#010x} to {top:#010x}, but must begin at the bottom of RAM, {RAM:#010x}",
+        image.target
+    );
+    let file = object::File::parse(&*image.elf).context("the image is not an ELF file")?;
+    for section in file.sections() {
+        let object::SectionFlags::Elf { sh_flags } = section.flags() else {
+            continue;
+        };
+        let is_allocated = sh_flags & u64::from(elf::SHF_ALLOC) != 0;
+        if is_allocated && section.size() > 0 && section.address() >= RAM {
+            ensure!(
+                section.address() >= top,
+                "{}: section {} at {:#010x} is below the top of the stack, {top:#010x}",
+                image.target,
+                section.name().unwrap_or("?"),
+                section.address()
+            );
+        }
+    }
+    Ok(())
+}
+
+/// No part of the image is loaded into the sectors of the settings.
+fn settings_are_left_alone(image: &Image) -> Result<()> {
+    let header = elf::FileHeader32::<Endianness>::parse(&*image.elf)?;
+    let endian = header.endian()?;
+    for segment in header.program_headers(endian, &*image.elf)? {
+        let start = u64::from(segment.p_paddr(endian));
+        let end = start + u64::from(segment.p_filesz(endian));
+        let is_loaded = segment.p_type(endian) == elf::PT_LOAD && end > start;
+        ensure!(
+            !is_loaded || end <= SETTINGS.start || start >= SETTINGS.end,
+            "{}: {start:#010x} to {end:#010x} is loaded over the stored settings at {:#010x} to {:#010x}",
+            image.target,
+            SETTINGS.start,
+            SETTINGS.end
+        );
+    }
+    Ok(())
+}
+
+type Golden = BTreeMap<String, Sizes>;
+
+fn path() -> PathBuf {
+    command::root().join("xtask/golden/sizes.toml")
+}
+
+fn golden() -> Result<Golden> {
+    let path = path();
+    let text =
+        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
+    toml::from_str(&text).with_context(|| format!("cannot understand {}", path.display()))
+}
+
+fn key(target: Target) -> String {
+    target.to_string().replace(' ', "-")
+}
+
+/// Writes the sizes of one image to the committed ones.
+fn commit(target: Target, sizes: Sizes) -> Result<()> {
+    let mut golden = if path().exists() {
+        golden()?
+    } else {
+        Golden::new()
+    };
+    golden.insert(key(target), sizes);
+    let text = format!(
+        "# Bytes that the images take, written by `cargo xtask sizes --overwrite-expected`.\n\n{}",
+        toml::to_string(&golden)?
+    );
+    fs::write(path(), text).with_context(|| format!("cannot write {}", path().display()))
+}
+
+/// Holds sizes against the committed ones: larger is a failure, smaller a reason to commit.
+fn compare(target: Target, sizes: Sizes) -> Result<()> {
+    const REMEDY: &str = "if that is meant, run `cargo xtask sizes --overwrite-expected`";
+    let Some(expected) = golden()?.remove(&key(target)) else {
+        bail!("{target} has no committed sizes; {REMEDY}");
+    };
+    for (name, size, expected) in [
+        ("flash", sizes.flash, expected.flash),
+        ("variables", sizes.variables, expected.variables),
+        ("stack", sizes.stack, expected.stack),
+    ] {
+        let limit = (expected as f64 * (1.0 + TOLERANCE)) as u64;
+        ensure!(
+            size <= limit,
+            "{target}: {name} {size} bytes, more than the committed {expected} and {} % on top; {REMEDY}",
+            100.0 * TOLERANCE
+        );
+        if (size as f64) < expected as f64 * (1.0 - TOLERANCE) {
+            println!("{target}: {name} is down to {size} from {expected} bytes: worth committing");
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::image::Scalar;
+
+    #[test]
+    fn growth_beyond_the_tolerance_is_refused_and_names_both_sizes() {
+        let target = Target {
+            board: Board::NucleoF446re,
+            scalar: Scalar::F32,
+        };
+        let expected = golden().expect("sizes are committed")[&key(target)];
+        let grown = |flash| Sizes { flash, ..expected };
+        assert!(compare(target, grown(expected.flash + expected.flash / 100)).is_ok());
+        let error = compare(target, grown(expected.flash + expected.flash / 10)).unwrap_err();
+        let text = error.to_string();
+        assert!(
+            text.contains("flash") && text.contains(&expected.flash.to_string()),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn every_image_has_committed_sizes() {
+        let golden = golden().expect("sizes are committed");
+        for target in Target::ALL {
+            assert!(golden.contains_key(&key(target)), "{target}");
+        }
+    }
+}
