@@ -1,8 +1,6 @@
 //! Who has what among the friction models, by the simulated experiments of `quadrant friction`.
 
-mod command;
-
-use command::{fail, succeed};
+use crate::command::{fail, succeed};
 use indicatif::ProgressBar;
 use quadrant::settings::x_axis;
 use quadrant::units::DacCode;

@@ -1,7 +1,5 @@
 //! Pages that have everything a page can have.
 
-#![allow(dead_code, reason = "not every test draws everything")]
-
 use quadrant_sim::report::{
     Band, Block, Cell, Colour, Column, DeviationTrace, DotSeries, Dots, Figure, Lines, Page, Plot,
     PolarDeviation, Provenance, Scale, Section, Series, Spread, Style, Table,

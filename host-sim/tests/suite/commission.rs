@@ -1,11 +1,9 @@
 //! From an unknown axis to settings that a replay runs on, by the commands alone.
 
-mod command;
-
 use std::fmt::Write as _;
 use std::path::Path;
 
-use command::succeed;
+use crate::command::succeed;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::settings_file::SettingsFile;
 

@@ -1,7 +1,6 @@
 //! Part programs: their geometry, the limits of their motion, and `quadrant replay --gcode` from end to end.
 
-mod command;
-
+use crate::command;
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;

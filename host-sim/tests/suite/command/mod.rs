@@ -20,7 +20,6 @@ pub(crate) fn succeed(folder: &Path, arguments: &[&str]) -> String {
 }
 
 /// What a command that must fail says.
-#[allow(dead_code, reason = "not every test has a command that must fail")]
 pub(crate) fn fail(folder: &Path, arguments: &[&str]) -> String {
     let output = run(folder, arguments);
     assert!(!output.status.success(), "{arguments:?} succeeded");

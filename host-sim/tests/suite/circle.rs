@@ -1,7 +1,6 @@
 //! The circle test on the simulated stage, and the command `quadrant circle`.
 
-mod command;
-
+use crate::command;
 use indicatif::ProgressBar;
 use quadrant::reference::Plane;
 use quadrant_sim::experiment::circle::{

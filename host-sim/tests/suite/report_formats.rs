@@ -1,11 +1,10 @@
 //! A page as files: CSV, JSON and SVG from the same data as the HTML.
 
-mod sample;
-
+use crate::sample;
 use std::collections::BTreeSet;
 
+use crate::sample::{circle, dots, full, lines, page, response};
 use quadrant_sim::report::{Block, Figure, Format, Page, Plot, ReportError, Spread};
-use sample::{circle, dots, full, lines, page, response};
 
 const ALL: [Format; 4] = [Format::Html, Format::Csv, Format::Json, Format::Svg];
 

@@ -1,7 +1,6 @@
 //! The commands `quadrant identify frf`, `plant` and `motion`, from end to end.
 
-mod command;
-
+use crate::command;
 use std::path::Path;
 
 use quadrant::settings::StageSettings;

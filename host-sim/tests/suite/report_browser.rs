@@ -1,15 +1,12 @@
 //! The page in a browser: drawn whole, without complaints, on a phone, in the dark, on paper; and that a broken page is
 //! noticed.
 
-mod browser;
-mod sample;
-
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use browser::Browser;
+use crate::browser::Browser;
+use crate::sample::{full, lines, page, table};
 use quadrant_sim::report::{Block, Page};
-use sample::{full, lines, page, table};
 use serde_json::{Value, json};
 
 /// A phone, a tablet, a screen wide enough for the contents at the side; CSS pixels.

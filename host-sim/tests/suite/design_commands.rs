@@ -1,7 +1,6 @@
 //! The commands `quadrant design pid` and `npid`, from end to end.
 
-mod command;
-
+use crate::command;
 use std::path::Path;
 
 use quadrant_sim::settings_file::SettingsFile;

@@ -1,7 +1,6 @@
 //! `quadrant connect` on the simulated machine: whole sessions, through the command alone.
 
-mod command;
-
+use crate::command;
 use std::io::Write;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};

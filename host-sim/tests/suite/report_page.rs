@@ -1,9 +1,8 @@
 //! The page is complete, closed to the network, and the same for the same data.
 
-mod sample;
-
+use crate::sample;
+use crate::sample::{circle, lines, page, sample, table};
 use quadrant_sim::report::{Block, Plot, ReportError};
-use sample::{circle, lines, page, sample, table};
 
 /// What the page says besides the plotting library.
 fn own_part(html: &str) -> String {

@@ -1,8 +1,6 @@
 //! `quadrant robustness`, as a person runs it.
 
-mod command;
-
-use command::{fail, succeed};
+use crate::command::{fail, succeed};
 
 #[test]
 fn chosen_scenarios_leave_tables_a_page_and_a_force_that_can_be_read_back() {

@@ -1,0 +1,49 @@
+//! The host command and its library, tested against the simulated stage.
+//!
+//! One program of many modules: each would otherwise be linked with the whole library once more.
+
+mod browser;
+mod chapter5;
+mod circle;
+mod command;
+mod commission;
+mod connect;
+mod default_gains;
+mod design_commands;
+mod design_npid;
+mod design_pid;
+mod experiments;
+mod friction_models;
+mod identified_stage;
+mod identify_commands;
+mod identify_frf;
+mod identify_motion;
+mod identify_motor_constant;
+mod identify_nctf;
+mod identify_plant;
+mod identify_revise;
+mod identify_static_friction;
+mod identify_virgin_curve;
+mod laws;
+mod machine_motion;
+mod npid_lasting_error;
+mod part_program;
+mod plant;
+mod plant_disturbances;
+mod plant_drives;
+mod plant_unchanged;
+mod record_bad_input;
+mod record_emps;
+mod record_experiment;
+mod record_refusals;
+mod record_trace;
+mod report_browser;
+mod report_command;
+mod report_formats;
+mod report_page;
+mod report_parts;
+mod rig;
+mod robustness;
+mod robustness_command;
+mod sample;
+mod simulated_machine;
