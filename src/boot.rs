@@ -12,7 +12,7 @@ use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 
-use crate::board;
+use crate::{board, log};
 
 /// What is in force from the first tick on.
 pub(crate) struct Loaded<S: Scalar, F> {
@@ -48,14 +48,11 @@ pub(crate) fn load<S: Scalar, F: NorFlash>(
     let mut fault = None;
     match found {
         Ok(Some(stored)) => {
-            defmt::info!(
-                "settings number {=u32} from flash: {=str}",
-                stored.sequence,
-                stored.provenance.as_str()
-            );
+            log::settings_loaded(&settings, stored.sequence, &stored.provenance);
             provenance = stored.provenance;
         }
         Ok(None) => {
+            defmt::info!("no settings are stored: the defaults are in force, or a host's");
             settings = job.stage;
             built(settings.validate(FIRMWARE_ELEMENTS));
         }
@@ -78,6 +75,7 @@ pub(crate) fn load<S: Scalar, F: NorFlash>(
 
 /// What the last run left: logged, and as a fault if it did not end of its own accord.
 pub(crate) fn remains(cause: ResetCause) -> Option<FaultCode> {
+    log::started(cause);
     if let Some(words) = board::remains::take() {
         defmt::error!(
             "the firmware before this one ended in tick {=u32} by {=str}: {=str}",

@@ -69,6 +69,7 @@ pub mod homing;
 pub mod last_words;
 pub mod link;
 pub mod machine;
+pub mod rate_limiter;
 pub mod reference;
 pub mod safety;
 pub mod scalar;

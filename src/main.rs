@@ -8,7 +8,7 @@
 //! | control   | highest  | every control tick            | encoders in, law, amplifiers out, deadline check |
 //! | supervise | middle   | every tenth control tick      | lets requests through or refuses them |
 //! | serve     | low      | after supervise               | answers a host's requests |
-//! | log       | low      | when supervise has something  | prints through defmt |
+//! | show      | low      | when supervise has something  | prints through defmt |
 //! | idle      | none     | the rest of the time          | what the board asks for |
 #![cfg_attr(target_os = "none", no_std, no_main)]
 // Registers are the only reason for `unsafe`, and `board` is their only place.
@@ -25,6 +25,11 @@ mod board;
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
 mod boot;
+#[cfg(all(
+    target_os = "none",
+    any(feature = "board-mps2", feature = "board-nucleo-f446re")
+))]
+mod log;
 
 #[cfg(all(
     target_os = "none",
@@ -53,8 +58,7 @@ mod app {
         After, Axis, Control, ControlInputs, Liveness, Meters, Queues, Server, ServerParts,
         Snapshot, Supervision,
     };
-    use quadrant::safety::{AxisName, AxisSwitches, Command, Fault};
-    use quadrant::scalar::{Quantity, Scalar};
+    use quadrant::safety::{AxisName, AxisSwitches, Command};
     use quadrant::stage::StageState;
     use quadrant::store::BUFFER_BYTES;
     use quadrant::supervisor::Event;
@@ -64,6 +68,7 @@ mod app {
         Switches, Tick, Watchdog,
     };
     use crate::boot;
+    use crate::log::{self, Line, Narrator, Printer};
 
     /// What the control law computes with.
     #[cfg(not(feature = "scalar-fixed"))]
@@ -90,15 +95,6 @@ mod app {
     static LINK_LOST: AtomicBool = AtomicBool::new(false);
 
     defmt::timestamp!("{=u32:010}", TICK.load(Ordering::Relaxed));
-
-    /// What the supervising task has to say to a person.
-    #[derive(Clone, Copy)]
-    pub(crate) enum Line {
-        /// Something happened.
-        Event(Event),
-        /// All is as it was; the tracking errors.
-        Status([Number; 3]),
-    }
 
     #[shared]
     struct Shared {
@@ -128,8 +124,9 @@ mod app {
         snapshots_out: Consumer<'static, Snapshot<Number>>,
         events_in: Producer<'static, (u32, Event)>,
         events_out: Consumer<'static, (u32, Event)>,
-        lines_in: Producer<'static, Line>,
-        lines_out: Consumer<'static, Line>,
+        lines_in: Producer<'static, Line<Number>>,
+        lines_out: Consumer<'static, Line<Number>>,
+        narrator: Narrator,
     }
 
     #[init(local = [
@@ -141,7 +138,7 @@ mod app {
         commands: Queue<Command, 4> = Queue::new(),
         snapshots: Queue<Snapshot<Number>, 4> = Queue::new(),
         events: Queue<(u32, Event), 16> = Queue::new(),
-        lines: Queue<Line, 16> = Queue::new(),
+        lines: Queue<Line<Number>, 16> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let mut board = Board::init(cx.core);
@@ -211,6 +208,7 @@ mod app {
             events_out,
             lines_in,
             lines_out,
+            narrator: Narrator::new(),
         };
         let seen = Snapshot::default();
         (Shared { seen }, local)
@@ -281,21 +279,23 @@ mod app {
             if let Some(command) = supervised.command {
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
+                print(cx.local.lines_in, Line::Command(command));
             }
             for event in supervised.events.into_iter().flatten() {
                 // A server or a log that is late loses its newest; nothing waits for them.
                 let _ = cx.local.events_in.enqueue((snapshot.tick, event));
-                let _ = cx.local.lines_in.enqueue(Line::Event(event));
-                let _ = log::spawn();
+                print(cx.local.lines_in, Line::Event(event));
             }
             if supervised.status_due {
                 let errors = snapshot.axes.map(|axis| axis.error);
-                let _ = cx.local.lines_in.enqueue(Line::Status(errors));
-                let _ = log::spawn();
+                print(cx.local.lines_in, Line::Status(errors));
             }
             let polls = POLLS.load(Ordering::Relaxed);
             if cx.local.liveness.check(snapshot.tick, polls) {
                 cx.local.watchdog.feed(snapshot.view.safety.drives());
+            }
+            if let Some(silent_ms) = cx.local.liveness.warning_ms() {
+                log::warn_of_watchdog(silent_ms);
             }
             cx.shared.seen.lock(|seen| *seen = snapshot);
         }
@@ -303,7 +303,7 @@ mod app {
     }
 
     /// Answers a host's requests.
-    #[task(priority = 1, shared = [seen], local = [server, serial, events_out])]
+    #[task(priority = 1, shared = [seen], local = [server, serial, events_out, narrator])]
     async fn serve(mut cx: serve::Context) {
         POLLS.store(
             POLLS.load(Ordering::Relaxed).wrapping_add(1),
@@ -319,54 +319,27 @@ mod app {
         };
         let after = cx.local.server.poll(cx.local.serial, &seen, meters);
         LINK_LOST.store(cx.local.server.link_lost(), Ordering::Relaxed);
+        cx.local.narrator.tell(cx.local.server, &seen, meters);
         if after == After::Reboot {
             defmt::info!("restart, as a host has asked");
             board::restart();
         }
     }
 
+    /// Hands a line to the log, which prints when nothing more urgent is to be done.
+    fn print(lines: &mut Producer<'static, Line<Number>>, line: Line<Number>) {
+        if lines.enqueue(line).is_err() {
+            log::lose_line();
+        }
+        let _ = show::spawn();
+    }
+
     /// Prints.
-    #[task(priority = 1, local = [lines_out])]
-    async fn log(cx: log::Context) {
+    #[task(priority = 1, local = [lines_out, printer: Printer = Printer::new()])]
+    async fn show(cx: show::Context) {
         while let Some(line) = cx.local.lines_out.dequeue() {
-            match line {
-                Line::Event(event) => log_event(event),
-                Line::Status(errors) => {
-                    let [x, y, z] = errors.map(|error| 1e3 * error.to_f32(Quantity::Length));
-                    defmt::info!(
-                        "tracking error x {=f32} um, y {=f32} um, z {=f32} um",
-                        x,
-                        y,
-                        z
-                    );
-                }
-            }
+            cx.local.printer.print(TICK.load(Ordering::Relaxed), line);
         }
-    }
-
-    fn log_event(event: Event) {
-        match event {
-            Event::Enabled => defmt::info!("outputs enabled"),
-            Event::Disabled => defmt::info!("outputs disabled"),
-            Event::MotionStarted => defmt::info!("motion started"),
-            Event::MotionFinished => defmt::info!("motion finished"),
-            Event::Refused(_, refusal) => defmt::warn!("request refused: {=str}", refusal.as_str()),
-            Event::Faulted(fault) => log_fault(fault, "outputs are off"),
-            Event::Stopping(fault) => log_fault(fault, "the axes brake"),
-            Event::Held(fault) => log_fault(fault, "the axes brake and hold"),
-        }
-    }
-
-    fn log_fault(fault: Fault, reaction: &str) {
-        defmt::error!(
-            "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}; {=str}",
-            fault.code.number(),
-            fault.axis.map_or("the stage", AxisName::as_str),
-            fault.tick,
-            reaction,
-            fault.code.cause(),
-            fault.code.remedy()
-        );
     }
 
     #[idle(local = [idle])]

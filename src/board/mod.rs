@@ -5,7 +5,7 @@
 //! - `device`: what RTIC needs to know of the chip, with interrupts named by their *role*
 //!   (`CONTROL_TICK`, `DISPATCHER_0`..`DISPATCHER_2`) instead of by the peripheral behind them;
 //! - `Board::init`, which starts the chip and hands out `encoders`, `operator`, `amplifiers`, `tick` and `idle`, and on
-//!   the reference board `switches`, `serial`, `watchdog`, `supply`, `flash` and `reset_cause`: the traits are in
+//!   the reference board `switches`, `serial`, `watchdog`, `flash` and `reset_cause`: the traits are in
 //!   `quadrant::hal`;
 //! - `job`, what a host has left to run, if there is one;
 //! - `outputs_off`, which makes the machine safe from any context without owning anything;

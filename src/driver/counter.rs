@@ -9,11 +9,23 @@ pub struct ExtendedCounter {
 }
 
 impl ExtendedCounter {
+    /// A counter that stands at `count`.
+    #[inline(always)]
+    pub const fn at(count: u32) -> Self {
+        Self { count }
+    }
+
     /// The count now, 32 bits wide and wrapping, from the 16 bits read.
     #[inline(always)]
     pub const fn read(&mut self, raw: u16) -> u32 {
         let moved = raw.wrapping_sub(self.count as u16).cast_signed();
         self.count = self.count.wrapping_add_signed(moved as i32);
+        self.count
+    }
+
+    /// The count at the last [`read`](Self::read).
+    #[inline(always)]
+    pub const fn count(&self) -> u32 {
         self.count
     }
 

@@ -24,6 +24,15 @@ impl Liveness {
         (self.tick, self.polls) = (tick, polls);
         control && self.silent < SERVER_PATIENCE
     }
+
+    /// How long the server has been silent, ms, if that has just become half of what ends in a reset.
+    pub const fn warning_ms(&self) -> Option<u32> {
+        if self.silent == SERVER_PATIENCE / 2 {
+            Some(self.silent)
+        } else {
+            None
+        }
+    }
 }
 
 #[cfg(test)]
@@ -51,5 +60,17 @@ mod tests {
             .take_while(|run| liveness.check(10 + 10 * run, 1))
             .count();
         assert_eq!(fed as u32, SERVER_PATIENCE - 1);
+    }
+
+    #[test]
+    fn half_of_the_patience_is_worth_one_warning() {
+        let mut liveness = Liveness::default();
+        let warned = (0..20_000)
+            .filter(|run| {
+                liveness.check(10 + 10 * run, 1);
+                liveness.warning_ms().is_some()
+            })
+            .count();
+        assert_eq!(warned, 1);
     }
 }

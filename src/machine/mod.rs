@@ -18,6 +18,7 @@
 //! (`quadrant_sim::console`), in the order in which the target would.
 
 mod control;
+mod journal;
 mod liveness;
 mod queues;
 mod server;
@@ -25,9 +26,10 @@ mod snapshot;
 mod supervision;
 
 pub use control::{Control, ControlInputs};
+pub use journal::{Journal, MOST_NEWS, News};
 pub use liveness::Liveness;
 pub use queues::{ControlEnds, Queues, ServerEnds};
-pub use server::{After, Server, ServerParts};
+pub use server::{After, Server, ServerParts, Vitals};
 pub use snapshot::{AxisSnapshot, Meters, Snapshot};
 pub use supervision::{Supervised, Supervision};
 

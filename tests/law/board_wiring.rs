@@ -6,7 +6,7 @@ use quadrant::safety::{AxisName, AxisSwitches, Switches};
 #[path = "../../src/board/nucleo_f446re/wiring.rs"]
 mod wiring;
 
-use wiring::{ENCODER_FILTER, PORT_A_INPUTS, PORT_C_INPUTS, reset_cause, switches};
+use wiring::{ENCODER_FILTER, PORT_A_INPUTS, PORT_C_INPUTS, SUPPLY_LOW, reset_cause, switches};
 
 /// Every input: port, pin, and what it says when it is high.
 const WIRES: [(char, u32, Switches); 14] = {
@@ -65,6 +65,13 @@ fn other_pins_say_nothing_and_every_input_has_a_pull_up() {
     }
     assert_eq!((PORT_A_INPUTS, PORT_C_INPUTS), (port_a, port_c));
     assert_eq!(switches(!port_a, !port_c), Switches::NONE);
+}
+
+#[test]
+fn a_sagging_supply_reads_as_amplifiers_that_are_not_ready() {
+    let not_ready = switches(1 << 1, 0);
+    assert_eq!(SUPPLY_LOW, not_ready);
+    assert_eq!(switches(1, 0).with(SUPPLY_LOW), switches(0b11, 0));
 }
 
 #[test]

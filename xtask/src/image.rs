@@ -136,6 +136,20 @@ pub(crate) struct Image {
     pub(crate) elf: Vec<u8>,
 }
 
+/// Links the reference board's image with the fallback outputs, and with every line of the log.
+pub(crate) fn link_fallback(toolchain: Toolchain) -> Result<()> {
+    let target = Target {
+        board: Board::NucleoF446re,
+        scalar: Scalar::F32,
+    };
+    let mut cargo = toolchain.cargo("build");
+    cargo
+        .args(target.arguments())
+        .args(["--features", "output-on-chip"])
+        .env("DEFMT_LOG", "trace");
+    command::run(&mut cargo)
+}
+
 /// Builds an image.
 pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
     let mut cargo = toolchain.cargo("build");

@@ -16,6 +16,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::command;
 use crate::image::{Board, Image, Target};
+use crate::listing::{Instruction, Listing};
 
 /// The reference board's sectors of stored settings.
 const SETTINGS: Range<u64> = 0x0800_4000..0x0800_C000;
@@ -50,6 +51,7 @@ pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
     stack_is_at_the_bottom(image)?;
     if image.target.board == Board::NucleoF446re {
         settings_are_left_alone(image)?;
+        erasing_calls_nothing(image)?;
     }
     let sizes = Sizes::of(image)?;
     println!(
@@ -109,6 +111,40 @@ fn settings_are_left_alone(image: &Image) -> Result<()> {
         );
     }
     Ok(())
+}
+
+/// The function that waits for an erase lies in RAM and never leaves it: everything else is in the flash that cannot be read
+/// meanwhile, and a processor that fetches from there stands still until the watchdog bites.
+fn erasing_calls_nothing(image: &Image) -> Result<()> {
+    const SYMBOL: &str = "erase_from_ram";
+    let listing = Listing::of_ram(image)?;
+    let function = listing
+        .named(SYMBOL)
+        .with_context(|| format!("{}: `{SYMBOL}` is not in RAM", image.target))?;
+    for instruction in &function.instructions {
+        ensure!(
+            !leaves(instruction, SYMBOL),
+            "{}: `{SYMBOL}` leaves RAM at {:#010x}: {} {}",
+            image.target,
+            instruction.address,
+            instruction.mnemonic,
+            instruction.operands
+        );
+    }
+    Ok(())
+}
+
+/// Whether an instruction is a branch to anywhere but into the function itself and back to its caller.
+fn leaves(instruction: &Instruction, symbol: &str) -> bool {
+    let own = [format!("<{symbol}>"), format!("<{symbol}+")];
+    let is_own = own.iter().any(|own| instruction.operands.contains(own));
+    let mnemonic = instruction.mnemonic.as_str();
+    match mnemonic {
+        "bx" => instruction.operands != "lr",
+        "bl" | "blx" => true,
+        "bic" | "bics" | "bfi" | "bfc" | "bkpt" => false,
+        _ => (mnemonic.starts_with('b') || mnemonic.starts_with("cb")) && !is_own,
+    }
 }
 
 type Golden = BTreeMap<String, Sizes>;
@@ -187,6 +223,31 @@ mod tests {
             text.contains("flash") && text.contains(&expected.flash.to_string()),
             "{text}"
         );
+    }
+
+    #[test]
+    fn branches_within_the_function_stay_and_calls_leave() {
+        let is_leaving = |mnemonic: &str, operands: &str| {
+            let instruction = Instruction {
+                address: 0,
+                mnemonic: mnemonic.into(),
+                operands: operands.into(),
+            };
+            leaves(&instruction, "wait")
+        };
+        assert!(is_leaving("bl", "8001234 <memcpy>"));
+        assert!(is_leaving("b", "8001234 <memcpy>"));
+        assert!(is_leaving("blx", "r3"));
+        assert!(is_leaving("bx", "r3"));
+        for (mnemonic, operands) in [
+            ("bne", "20010010 <wait+0x10>"),
+            ("cbz", "r0, 20010010 <wait+0x10>"),
+            ("bx", "lr"),
+            ("bic", "r0, r0, #1"),
+            ("ldr", "r0, [pc, #8]"),
+        ] {
+            assert!(!is_leaving(mnemonic, operands), "{mnemonic} {operands}");
+        }
     }
 
     #[test]

@@ -53,6 +53,17 @@ impl Listing {
         Ok(listing)
     }
 
+    /// Disassembles what an image keeps among its variables: code that runs from RAM, and data that means nothing.
+    pub(crate) fn of_ram(image: &Image) -> Result<Self> {
+        let mut objdump = command::command("arm-none-eabi-objdump");
+        objdump
+            .args(["--disassemble-all", "--section=.data", "--no-show-raw-insn"])
+            .arg(&image.path);
+        let text = command::output(&mut objdump)
+            .context("`cargo xtask setup` installs the disassembler")?;
+        Ok(Self::parse(&text))
+    }
+
     fn parse(text: &str) -> Self {
         let mut functions: BTreeMap<u32, Function> = BTreeMap::new();
         let mut current = None;
@@ -81,6 +92,13 @@ impl Listing {
             function.range.end += 2;
         }
         Self { functions }
+    }
+
+    /// The function of a linker symbol.
+    pub(crate) fn named(&self, symbol: &str) -> Option<&Function> {
+        self.functions
+            .values()
+            .find(|function| function.symbol == symbol)
     }
 
     /// The function that covers an address.

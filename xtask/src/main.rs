@@ -1,7 +1,8 @@
-//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `count`, `prove-no-panic`, `sizes`, `test`.
+//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `board-smoke`, `count`, `prove-no-panic`, `sizes`, `test`.
 #![forbid(unsafe_code)]
 
 mod attribution;
+mod board_smoke;
 mod call_graph;
 mod combinations;
 mod command;
@@ -9,6 +10,7 @@ mod count;
 mod emulate;
 mod emulator;
 mod fault_paths;
+mod gdb;
 mod image;
 mod layout;
 mod listing;
@@ -49,6 +51,8 @@ enum Verb {
     Build(TargetArgs),
     /// Run the image in QEMU, in lockstep with a simulated stage
     Emulate(EmulateArgs),
+    /// Start the reference board's image in QEMU's model of a near relative of its chip
+    BoardSmoke,
     /// Drive the emulated firmware into a fault and a panic, and see the outputs off
     FaultPaths {
         /// The firmware's number type
@@ -175,6 +179,7 @@ fn run(cli: Cli) -> Result<bool> {
             };
             emulate::run(toolchain()?, args.scalar, job, args.seconds, args.paced)?;
         }
+        Verb::BoardSmoke => board_smoke::run(toolchain()?)?,
         Verb::FaultPaths { scalar } => fault_paths::run(toolchain()?, scalar)?,
         Verb::Count(args) => {
             count::run(

@@ -7,7 +7,9 @@ use anyhow::Result;
 
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
-use crate::{combinations, command, count, emulate, fault_paths, layout, prove, setup, twin};
+use crate::{
+    board_smoke, combinations, command, count, emulate, fault_paths, layout, prove, setup, twin,
+};
 
 /// Ticks of the counting run.
 const COUNTED_TICKS: u32 = 250;
@@ -120,6 +122,9 @@ fn firmware(report: &mut Report, toolchain: Toolchain) {
             command::run(&mut clippy)
         });
     }
+    report.step("firmware image, fallback outputs, log at trace", || {
+        image::link_fallback(toolchain)
+    });
     for target in Target::ALL {
         report.step(format!("firmware image, {target}"), || {
             layout::check(&image::build(toolchain, target)?, false)
@@ -132,6 +137,9 @@ fn firmware(report: &mut Report, toolchain: Toolchain) {
 
 /// What is emulated.
 fn emulated(report: &mut Report, toolchain: Toolchain) {
+    report.step("the reference board's image starts and ticks", || {
+        board_smoke::run(toolchain)
+    });
     for scalar in [Scalar::F32, Scalar::Fixed] {
         let target = Target {
             board: Board::Mps2,

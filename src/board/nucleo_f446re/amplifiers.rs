@@ -116,18 +116,22 @@ impl hal::Amplifiers for Amplifiers {
     }
 }
 
-/// Short waits by counting instructions.
+/// Short waits by counting turns of a loop.
 pub(super) struct CoreDelay;
+
+/// Cycles that a turn of `cortex_m::asm::delay`'s loop takes at least: one for the subtraction, two for a branch that is
+/// taken (Cortex-M4 TRM, 3.3.1).
+const CYCLES_PER_TURN: u32 = 3;
 
 impl DelayNs for CoreDelay {
     #[inline(always)]
     fn delay_ns(&mut self, ns: u32) {
         // Rounded up; all waits are constants, so nothing is divided at run time.
-        cortex_m::asm::delay((ns * (CORE_HZ / 1_000_000)).div_ceil(1_000));
+        cortex_m::asm::delay((ns * (CORE_HZ / 1_000_000)).div_ceil(1_000 * CYCLES_PER_TURN));
     }
 
     fn delay_us(&mut self, us: u32) {
-        cortex_m::asm::delay(us * (CORE_HZ / 1_000_000));
+        cortex_m::asm::delay((us * (CORE_HZ / 1_000_000)).div_ceil(CYCLES_PER_TURN));
     }
 }
 

@@ -123,9 +123,14 @@ impl SpiBus for ConverterBus {
         Ok(())
     }
 
-    /// Every byte sent was also received: nothing is under way.
+    /// Every byte sent was also received, which is at the middle of its last bit; waits for the rest of that bit.
     #[inline(always)]
     fn flush(&mut self) -> Result<(), Stuck> {
-        Ok(())
+        for _ in 0..PATIENCE {
+            if !self.spi.sr().read().bsy().bit_is_set() {
+                return Ok(());
+            }
+        }
+        Err(Stuck)
     }
 }

@@ -8,6 +8,8 @@
 //! These timers do not tell when both lines change at once: a count that is lost or gained that way shows as a distance
 //! between index pulses that is wrong.
 
+use core::sync::atomic::{AtomicU32, Ordering};
+
 use quadrant::driver::counter::ExtendedCounter;
 use quadrant::encoder::EncoderReading;
 use quadrant::hal;
@@ -30,6 +32,11 @@ const ENABLE: u32 = 1;
 /// TIMx_CR1: the filter clock is half the timer's (CKD = 01).
 const HALVE_FILTER_CLOCK: u32 = 0b01 << 8;
 
+/// The 16-bit counters of y and z, extended. They belong to the control tick; an erase of the flash, which holds that up
+/// for longer than 16 bits may last, follows them meanwhile.
+static Y_COUNT: AtomicU32 = AtomicU32::new(0);
+static Z_COUNT: AtomicU32 = AtomicU32::new(0);
+
 /// The pins of the encoders, as they are after reset: A, B and index of each.
 pub(super) struct Pins {
     pub(super) x: (PB8, PB9, PB10),
@@ -42,14 +49,29 @@ pub(crate) struct Encoders {
     x: TIM2,
     y: TIM3,
     z: TIM8,
-    /// The 16-bit counters of y and z, extended.
-    y_count: ExtendedCounter,
-    z_count: ExtendedCounter,
 }
 
-/// Starts a timer as an encoder's counter. The timers' types differ, their registers do not.
+/// A 16-bit counter's count now, extended and remembered.
+#[inline(always)]
+fn follow(counted: &AtomicU32, raw: u16) -> ExtendedCounter {
+    let mut counter = ExtendedCounter::at(counted.load(Ordering::Relaxed));
+    counted.store(counter.read(raw), Ordering::Relaxed);
+    counter
+}
+
+/// Follows the 16-bit counters in the control tick's place, which must not interrupt. Calls nothing, so that it can run
+/// from RAM.
+#[inline(always)]
+pub(super) fn keep_up() {
+    // SAFETY: reading a counter changes nothing and needs no owner.
+    let (y, z) = unsafe { (&*TIM3::ptr(), &*TIM8::ptr()) };
+    follow(&Y_COUNT, y.cnt().read().cnt().bits());
+    follow(&Z_COUNT, z.cnt().read().cnt().bits());
+}
+
+/// Starts a timer as an encoder's counter, which wraps behind `$last`. The timers' types differ, their registers do not.
 macro_rules! start {
-    ($type:ty, $timer:expr, $control:expr, $rcc:expr) => {{
+    ($type:ty, $timer:expr, $last:expr, $control:expr, $rcc:expr) => {{
         <$type>::enable($rcc);
         <$type>::reset($rcc);
         // SAFETY: the values are the manual's for these registers, as the constants say.
@@ -58,7 +80,7 @@ macro_rules! start {
             $timer.ccmr2_input().write(|w| w.bits(CAPTURE_INDEX as _));
             $timer.ccer().write(|w| w.bits(ENABLE_INDEX as _));
             $timer.smcr().write(|w| w.bits(COUNT_BOTH as _));
-            $timer.arr().write(|w| w.bits(u32::MAX as _));
+            $timer.arr().write(|w| w.bits($last.into()));
             $timer.cr1().write(|w| w.bits((ENABLE | $control) as _));
             // Whatever the inputs did on their way here was no index.
             $timer.sr().write(|w| w.bits(0));
@@ -98,16 +120,10 @@ impl Encoders {
             zb.into_alternate::<3>().internal_resistor(Pull::Up),
             zi.into_alternate::<3>().internal_resistor(Pull::Up),
         );
-        start!(TIM2, x, 0, rcc);
-        start!(TIM3, y, 0, rcc);
-        start!(TIM8, z, HALVE_FILTER_CLOCK, rcc);
-        Self {
-            x,
-            y,
-            z,
-            y_count: ExtendedCounter::default(),
-            z_count: ExtendedCounter::default(),
-        }
+        start!(TIM2, x, u32::MAX, 0, rcc);
+        start!(TIM3, y, u16::MAX, 0, rcc);
+        start!(TIM8, z, u16::MAX, HALVE_FILTER_CLOCK, rcc);
+        Self { x, y, z }
     }
 }
 
@@ -115,19 +131,17 @@ impl hal::Encoders for Encoders {
     /// All three wrap at 32 bits. The counts are read before the captures: a captured count is near the one read.
     #[inline(always)]
     fn read(&mut self) -> [EncoderReading; 3] {
-        let [x, y, z] = [
-            self.x.cnt().read().cnt().bits(),
-            self.y_count.read(self.y.cnt().read().cnt().bits()),
-            self.z_count.read(self.z.cnt().read().cnt().bits()),
-        ];
+        let x = self.x.cnt().read().cnt().bits();
+        let y = follow(&Y_COUNT, self.y.cnt().read().cnt().bits());
+        let z = follow(&Z_COUNT, self.z.cnt().read().cnt().bits());
         let reading = |count, index| EncoderReading {
             index,
             ..EncoderReading::of(count)
         };
         [
             reading(x, captured!(self.x)),
-            reading(y, captured!(self.y).map(|raw| self.y_count.captured(raw))),
-            reading(z, captured!(self.z).map(|raw| self.z_count.captured(raw))),
+            reading(y.count(), captured!(self.y).map(|raw| y.captured(raw))),
+            reading(z.count(), captured!(self.z).map(|raw| z.captured(raw))),
         ]
     }
 }

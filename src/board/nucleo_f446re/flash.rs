@@ -2,8 +2,8 @@
 //!
 //! The chip has one bank: while it erases or programs, nothing can be read from flash, and a processor that fetches from
 //! it stands still. Programming a word takes 16 us (100 us at most), erasing a sector 250 ms (500 ms at most): **only
-//! while the amplifiers are disabled**. An erase runs from RAM with interrupts off and feeds the watchdog meanwhile; what
-//! the serial port receives for longer than its ring lasts is lost.
+//! while the amplifiers are disabled**. An erase runs from RAM with interrupts off, feeds the watchdog and follows the
+//! encoders meanwhile; what the serial port receives for longer than its ring lasts is lost.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -13,6 +13,7 @@ use embedded_storage::nor_flash::{
 };
 use stm32f4xx_hal::pac::{FLASH, IWDG};
 
+use super::encoders::keep_up;
 use super::watchdog::KEY_RELOAD;
 
 /// Where the two sectors are; the linker's map leaves them out.
@@ -31,15 +32,17 @@ const NUMBER: u32 = 3;
 const BY_WORDS: u32 = 0b10 << 8;
 const START_ERASE: u32 = 1 << 16;
 const LOCK: u32 = 1 << 31;
-/// FLASH_SR: busy, and the five errors (OPERR, WRPERR, PGAERR, PGPERR, PGSERR), which ones clear.
+/// FLASH_SR: busy, and the six errors (OPERR, WRPERR, PGAERR, PGPERR, PGSERR, RDERR), which ones clear.
 const BUSY: u32 = 1 << 16;
-const ERRORS: u32 = 1 << 1 | 0b1111 << 4;
+const ERRORS: u32 = 1 << 1 | 0b1_1111 << 4;
 /// FLASH_ACR: data cache enabled, and its reset.
 const DATA_CACHE: u32 = 1 << 10;
 const DATA_CACHE_RESET: u32 = 1 << 12;
-/// How often to look at the busy bit before the watchdog is no longer fed: a look takes at least 10 cycles, so this is at
-/// least one second at 180 MHz.
-const LOOKS: u32 = 18_000_000;
+/// How often to look at the busy bit of an erase before the watchdog is no longer fed: a look takes at least 20 cycles, as
+/// three of its accesses cross a bus bridge, so this is at least one second at 180 MHz.
+const ERASE_LOOKS: u32 = 9_000_000;
+/// The same for a word: at least 1 ms, and the processor waits by itself, as it fetches from the same flash.
+const PROGRAM_LOOKS: u32 = 20_000;
 
 /// The flash did not do what it was told.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -50,6 +53,8 @@ pub(crate) enum FlashError {
     NotAligned,
     /// The controller's error flags (FLASH_SR).
     Controller(u32),
+    /// It did not end in time.
+    Stuck,
     /// It reads back differently: the cells are worn.
     Verify,
 }
@@ -59,7 +64,7 @@ impl NorFlashError for FlashError {
         match self {
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
             Self::NotAligned => NorFlashErrorKind::NotAligned,
-            Self::Controller(_) | Self::Verify => NorFlashErrorKind::Other,
+            Self::Controller(_) | Self::Stuck | Self::Verify => NorFlashErrorKind::Other,
         }
     }
 }
@@ -114,10 +119,21 @@ impl SettingsFlash {
         result
     }
 
-    fn errors(&self) -> Result<(), FlashError> {
-        match self.flash.sr().read().bits() & ERRORS {
-            0 => Ok(()),
-            errors => Err(FlashError::Controller(errors)),
+    /// How the last operation went.
+    fn outcome(&self) -> Result<(), FlashError> {
+        match self.flash.sr().read().bits() {
+            status if status & BUSY != 0 => Err(FlashError::Stuck),
+            status if status & ERRORS != 0 => Err(FlashError::Controller(status & ERRORS)),
+            _ => Ok(()),
+        }
+    }
+
+    /// Waits until the controller is idle, but not for ever.
+    fn wait(&self) {
+        for _ in 0..PROGRAM_LOOKS {
+            if self.flash.sr().read().bits() & BUSY == 0 {
+                break;
+            }
         }
     }
 
@@ -136,7 +152,7 @@ impl SettingsFlash {
                     );
                 });
             }
-            this.errors()
+            this.outcome()
         })
     }
 
@@ -152,34 +168,36 @@ impl SettingsFlash {
                 value.copy_from_slice(word);
                 // SAFETY: a word inside the sectors, as the caller has checked; no Rust object is there.
                 unsafe { write_volatile(address as *mut u32, u32::from_le_bytes(value)) };
-                // The processor waits by itself, as it fetches from the same flash: this ends at once.
-                while this.flash.sr().read().bits() & BUSY != 0 {}
-                this.errors()?;
+                this.wait();
+                this.outcome()?;
             }
             Ok(())
         })
     }
 }
 
-/// Starts an erase and waits for its end, in RAM; calls nothing, as everything else is in flash.
+/// Starts an erase and waits for its end, in RAM; calls nothing, as everything else is in flash: `cargo xtask sizes` looks
+/// into the image for that.
 ///
 /// # Safety
 /// `control` and `status` are FLASH_CR and FLASH_SR, unlocked; interrupts are disabled; `start` selects a sector that
 /// nothing lives in.
 #[inline(never)]
+#[unsafe(no_mangle)]
 #[unsafe(link_section = ".data.erase_from_ram")]
-unsafe fn erase_from_ram(control: *mut u32, status: *mut u32, start: u32) {
+unsafe extern "C" fn erase_from_ram(control: *mut u32, status: *mut u32, start: u32) {
     // SAFETY: the watchdog's key register always exists, and a reload of a watchdog that was not started does nothing.
     unsafe {
         let watchdog = (*IWDG::ptr()).kr().as_ptr();
         write_volatile(control, start);
         // Until the write has arrived, the busy bit says nothing.
         cortex_m::asm::dsb();
-        for _ in 0..LOOKS {
+        for _ in 0..ERASE_LOOKS {
             if read_volatile(status) & BUSY == 0 {
                 break;
             }
             write_volatile(watchdog, KEY_RELOAD);
+            keep_up();
         }
     }
 }

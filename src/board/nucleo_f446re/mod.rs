@@ -50,7 +50,8 @@ pub(crate) use self::flash::SettingsFlash;
 pub(crate) use self::serial::Serial;
 pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
-pub(crate) use self::watchdog::{Supply, Watchdog};
+use self::watchdog::Supply;
+pub(crate) use self::watchdog::Watchdog;
 use quadrant::hal::ResetCause;
 use quadrant::safety::Command;
 
@@ -78,8 +79,6 @@ pub(crate) struct Board {
     pub(crate) serial: Serial,
     /// The watchdog, not started.
     pub(crate) watchdog: Watchdog,
-    /// The supply's monitor.
-    pub(crate) supply: Supply,
     /// Where settings are stored.
     pub(crate) flash: SettingsFlash,
     /// Why the processor started.
@@ -119,7 +118,12 @@ impl Board {
         };
         #[cfg(feature = "output-on-chip")]
         let amplifiers = Amplifiers::new(chip.DAC, (port_a.pa4, port_a.pa5), port_c.pc9, &mut rcc);
-        let switches = Switches::new();
+        PWR::enable(&mut rcc);
+        let supply = Supply::new(chip.PWR);
+        if supply.is_low() {
+            defmt::warn!("the processor's supply is below 3 V: outputs stay off until it is not");
+        }
+        let switches = Switches::new(supply);
         let encoder_pins = encoders::Pins {
             x: (port_b.pb8, port_b.pb9, port_b.pb10),
             y: (port_a.pa6, port_a.pa7, port_b.pb0),
@@ -127,13 +131,12 @@ impl Board {
         };
         let encoders = Encoders::new(chip.TIM2, chip.TIM3, chip.TIM8, encoder_pins, &mut rcc);
         let serial = Serial::new(chip.USART2, chip.DMA1, (port_a.pa2, port_a.pa3), &mut rcc);
-        PWR::enable(&mut rcc);
-        let supply = Supply::new(chip.PWR);
-        defmt::info!(
-            "started by {=str}; brown-out reset: {=str}",
-            reset_cause.as_str(),
-            watchdog::brown_out_level(&chip.FLASH)
-        );
+        match watchdog::brown_out_level(&chip.FLASH) {
+            Some(level) => defmt::info!("brown-out reset: {=str}", level),
+            None => {
+                defmt::warn!("brown-out reset is off: set BOR_LEV once, as the board's page says")
+            }
+        }
         let operator = Operator {
             button: port_c.pc13.into_input(),
             history: u32::MAX,
@@ -149,7 +152,6 @@ impl Board {
             switches,
             serial,
             watchdog: Watchdog::new(chip.IWDG, chip.DBGMCU),
-            supply,
             flash: SettingsFlash::new(chip.FLASH),
             reset_cause,
         }

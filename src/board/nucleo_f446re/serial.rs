@@ -89,9 +89,10 @@ impl Serial {
             w.chsel().set(CHANNEL);
             w.dir().peripheral_to_memory();
             w.minc().incremented();
-            w.circ().enabled();
-            w.en().enabled()
+            w.circ().enabled()
         });
+        // On its own, as the other bits are taken only while this one is clear.
+        receiver.cr().modify(|_, w| w.en().enabled());
         Self {
             dma,
             usart,
@@ -132,9 +133,9 @@ impl hal::Serial for Serial {
         sender.cr().write(|w| {
             w.chsel().set(CHANNEL);
             w.dir().memory_to_peripheral();
-            w.minc().incremented();
-            w.en().enabled()
+            w.minc().incremented()
         });
+        sender.cr().modify(|_, w| w.en().enabled());
         count
     }
 }

@@ -1,19 +1,22 @@
-//! Switches, amplifier faults and the emergency stop: fourteen pins, two reads of a port.
+//! Switches, amplifier faults and the emergency stop: fourteen pins, two reads of a port. And the supply.
 
 use quadrant::{hal, safety};
 use stm32f4xx_hal::pac::{GPIOA, GPIOC};
 
-use super::wiring::{self, PORT_A_INPUTS, PORT_C_INPUTS};
+use super::watchdog::Supply;
+use super::wiring::{self, PORT_A_INPUTS, PORT_C_INPUTS, SUPPLY_LOW};
 
 /// The digital inputs of the stage.
-pub(crate) struct Switches(());
+pub(crate) struct Switches {
+    supply: Supply,
+}
 
 impl Switches {
     /// Gives every input a pull-up; inputs they are after reset.
     ///
     /// The ports were split, which has clocked and reset them. The pins are taken by number, as fourteen types would say
     /// less than two masks.
-    pub(super) fn new() -> Self {
+    pub(super) fn new(supply: Supply) -> Self {
         // SAFETY: two bits a pin, 01 for a pull-up (RM0390, 7.4.4); the pins of the masks are nobody else's, and this
         // runs before any interrupt that touches the ports.
         unsafe {
@@ -24,7 +27,7 @@ impl Switches {
                 .pupdr()
                 .modify(|r, w| w.bits(r.bits() | pull_ups(PORT_C_INPUTS)));
         }
-        Self(())
+        Self { supply }
     }
 }
 
@@ -33,10 +36,15 @@ impl hal::Switches for Switches {
     fn read(&mut self) -> safety::Switches {
         // SAFETY: reading a port's levels changes nothing and needs no owner.
         let (port_a, port_c) = unsafe { (&*GPIOA::ptr(), &*GPIOC::ptr()) };
-        wiring::switches(
+        let pins = wiring::switches(
             port_a.idr().read().bits() as u16,
             port_c.idr().read().bits() as u16,
-        )
+        );
+        if self.supply.is_low() {
+            pins.with(SUPPLY_LOW)
+        } else {
+            pins
+        }
     }
 }
 

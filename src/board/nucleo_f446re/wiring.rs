@@ -2,7 +2,7 @@
 
 use quadrant::driver::input_filter::{InputFilter, shortest_level_ns};
 use quadrant::hal::ResetCause;
-use quadrant::safety::Switches;
+use quadrant::safety::{AxisSwitches, Switches};
 
 /// The fastest an encoder may count, per second: an axis at 250 mm/s with 0.5 um per count, and twice that, as the
 /// control law believes an encoder up to twice the axis' largest velocity.
@@ -42,6 +42,10 @@ pub(crate) const fn switches(port_a: u16, port_c: u16) -> Switches {
             | (port_a & EMERGENCY_STOP) << 15,
     )
 }
+
+/// What a sagging supply of the processor reads as: the same as amplifiers that are not ready, as nothing that this
+/// processor says should drive them any more.
+pub(crate) const SUPPLY_LOW: Switches = Switches::of_axes([AxisSwitches::AMPLIFIER_FAULT; 3]);
 
 /// Limits, home and fault of one axis, in the lowest four bits.
 #[inline(always)]

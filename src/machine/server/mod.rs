@@ -10,6 +10,7 @@ mod outbox;
 mod settings;
 mod status;
 mod stream;
+mod vitals;
 
 use embedded_storage::nor_flash::NorFlash;
 use heapless::String;
@@ -32,6 +33,8 @@ use crate::settings::draft::Draft;
 use crate::store::{BUFFER_BYTES, Store};
 use crate::supervisor;
 use crate::telemetry::Packer;
+
+pub use self::vitals::Vitals;
 
 /// Bytes that are taken from the port at a time.
 const INBOX_BYTES: usize = 64;
@@ -101,6 +104,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     events: heapless::Deque<(u32, Event), EVENT_ROOM>,
     event_number: u16,
     dropped_events: u32,
+    applied: u16,
+    stored: u16,
     board: &'static str,
     cycle_hz: u32,
     number: NumberType,
@@ -133,6 +138,8 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             events: heapless::Deque::new(),
             event_number: 0,
             dropped_events: 0,
+            applied: 0,
+            stored: 0,
             board: parts.board,
             cycle_hz: parts.cycle_hz,
             number: parts.number,

@@ -43,6 +43,11 @@ impl<'a> Recorder<'a> {
             .map_or(CapturePhase::Armed, Capture::phase)
     }
 
+    /// Captures so far.
+    pub(super) const fn number(&self) -> u16 {
+        self.number
+    }
+
     /// Whether the frozen capture holds a tick.
     pub(super) fn holds_trace_of(&self, tick: u32) -> bool {
         let record = self.capture.as_ref().and_then(Capture::record);

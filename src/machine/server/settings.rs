@@ -119,6 +119,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             Ok(()) => {
                 self.pending = self.pending.iter().filter(|&other| other != name).collect();
                 if self.pending.is_empty() {
+                    self.applied = self.applied.wrapping_add(1);
                     self.tell(self.seen.tick, Event::SettingsApplied(AxisSet::ALL));
                 }
             }
@@ -143,6 +144,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             )
             .map_err(|error| LinkError::Storage(text(format_args!("{error}"))))?;
         self.provenance = provenance;
+        self.stored = self.stored.wrapping_add(1);
         self.tell(self.seen.tick, Event::SettingsStored);
         Ok(Reply::Done)
     }

@@ -49,6 +49,11 @@ pub(crate) fn command_line(image: &Image, memory: &Memory, clock: Clock) -> Resu
     Ok(qemu)
 }
 
+/// Decodes a log that was read out of a machine's memory, and prints it.
+pub(crate) fn decode_log(bytes: &[u8], elf: &[u8]) -> Result<Vec<String>> {
+    log::decode(bytes, elf, true)
+}
+
 impl Emulator {
     /// Starts the image. The memory must have been prepared.
     pub(crate) fn start(image: &Image, memory: &Memory, clock: Clock, echo: bool) -> Result<Self> {
