@@ -1,5 +1,6 @@
 //! One axis, one tick: counts in, a converter's word out.
 
+mod injected;
 mod state;
 
 pub use state::AxisState;
@@ -8,7 +9,7 @@ use crate::control::feedback::{Feedback, FeedbackInput, FeedbackState, FeedbackT
 pub use crate::course::CourseMode;
 use crate::course::{Course, CourseEvent};
 use crate::encoder::{Encoder, EncoderReading};
-use crate::feedforward::{Feedforward, ReferenceStep};
+use crate::feedforward::{Feedforward, FeedforwardTerms, ReferenceStep};
 use crate::homing::HomingInput;
 use crate::reference::Motion;
 use crate::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
@@ -128,6 +129,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             Command::Run | Command::StartMove(_) => self.course.run(course, here),
             Command::Jog(_, velocity) => self.course.jog(course, here, velocity),
             Command::StartStream => self.course.run_stream(course),
+            // Begins with the stage, not with an axis.
+            Command::StartInjection => {}
             Command::Stop => self.stop(state),
             Command::Home(_) => {
                 if self.course.home(course, here) {
@@ -213,6 +216,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let (ahead, event) =
             self.course
                 .advance(&mut state.course, motion, from, state.homed, input);
+        if event == CourseEvent::Open {
+            return self.refer_open(state, switches, tick);
+        }
         if let CourseEvent::Origin(offset) = event {
             Self::shift(state, offset);
         }
@@ -262,6 +268,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// it was, and the difference fades.
     #[inline(never)]
     pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
+        if state.mode() == CourseMode::OpenLoop {
+            return self.drive_open(state);
+        }
         let feedforward = self.feedforward.step(&mut state.springs, state.step);
         let total = feedforward.total();
         let input = FeedbackInput {
@@ -269,15 +278,27 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             velocity: state.velocity,
         };
         if changed {
-            self.transfer(state, input, total);
+            self.transfer(state, input, total + state.injected);
         }
-        let base = total + state.transfer;
+        let base = total + state.transfer + state.injected;
         let feedback = self.feed_back(&mut state.feedback, input, base);
         let limit = self.amplifier.limit;
         let output = (feedback.output + base).limit(-limit, limit);
         state.transfer = state
             .transfer
             .times(self.transfer_decay, Quantity::Fraction);
+        self.put_out(state, feedback, feedforward, output)
+    }
+
+    /// Makes a converter's word of the output, and leaves everything to be seen.
+    #[inline(always)]
+    fn put_out(
+        &self,
+        state: &mut AxisState<S, N>,
+        feedback: FeedbackTerms<S>,
+        feedforward: FeedforwardTerms<S>,
+        output: S,
+    ) -> DacCode {
         state.last_output = output;
         let code = self.amplifier.code(output);
         let telemetry = &mut state.telemetry;
@@ -286,6 +307,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         telemetry.transfer = state.transfer;
         telemetry.output = output;
         telemetry.code = code;
+        telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
         telemetry.limited_by = if feedback.saturated {
             LimitedBy::OutputLimit
         } else {
@@ -323,10 +345,12 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     pub(crate) fn rest(&self, state: &mut AxisState<S, N>) {
         let measured = state.encoder.count();
         state.course.hold();
+        state.injected = S::ZERO;
         state.last_output = S::ZERO;
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),
             measured,
+            code_sum: state.telemetry.code_sum,
             ..AxisTelemetry::default()
         };
     }

@@ -42,6 +42,8 @@ pub enum CourseMode {
     Stream,
     /// The braking ramp, to rest.
     Stopping,
+    /// The axis: a host drives the amplifier.
+    OpenLoop,
 }
 
 /// How far it has come.
@@ -99,6 +101,8 @@ pub(crate) enum CourseEvent {
     None,
     /// Every position of the axis is to be shifted by this much.
     Origin(Position),
+    /// The reference goes along with the axis.
+    Open,
     Fault(FaultCode),
 }
 
@@ -143,6 +147,13 @@ impl<S: Scalar> Course<S> {
         }
         state.mode = CourseMode::Stream;
         state.waiting = self.wait_ticks;
+    }
+
+    /// Lets the reference go along with the axis, from rest.
+    pub(crate) fn open(&self, state: &mut CourseState<S>) {
+        if state.mode == CourseMode::Hold {
+            state.mode = CourseMode::OpenLoop;
+        }
     }
 
     /// Brakes what is under way, unless it brakes already, and forgets what is there of a stream.
@@ -224,6 +235,13 @@ impl<S: Scalar> Course<S> {
                     )
                 }
             },
+            (CourseMode::OpenLoop, _) => {
+                let standing = ReferenceSample {
+                    position: from.position,
+                    ..ReferenceSample::default()
+                };
+                (standing, CourseEvent::Open)
+            }
             // Homing whose settings have gone brakes as well.
             (CourseMode::Home, None) => {
                 self.stop(state, from);

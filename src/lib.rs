@@ -66,6 +66,7 @@ pub mod feedforward;
 pub mod friction;
 pub mod hal;
 pub mod homing;
+pub mod injection;
 pub mod last_words;
 pub mod link;
 pub mod machine;

@@ -1,11 +1,13 @@
 //! Three axes, one tick: a pure function of settings, memory and inputs.
 
+mod injection;
 mod io;
 
 pub use io::{Inputs, Outputs};
 
 use crate::axis::{Axis, AxisState};
 use crate::friction::gms::FIRMWARE_ELEMENTS;
+use crate::injection::InjectionState;
 use crate::reference::{Motion, Segment};
 use crate::safety::{
     AxisName, Command, Fault, FaultCode, Obstacle, Reaction, SafetyState, StreamLoss, Switches,
@@ -46,6 +48,7 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
+    pub(super) injection: InjectionState<S>,
 }
 
 impl<S: Scalar, const N: usize> Default for StageState<S, N> {
@@ -57,6 +60,7 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             obstacle: None,
             held: None,
             settled: 0,
+            injection: InjectionState::default(),
         }
     }
 }
@@ -101,7 +105,7 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
 
     /// Whether any motion is under way.
     pub fn is_running(&self) -> bool {
-        self.axes.iter().any(AxisState::is_running)
+        self.injection.is_running() || self.axes.iter().any(AxisState::is_running)
     }
 
     /// Gives an axis the next segment of a stream; call it when [`AxisState::wants_segment`].
@@ -190,12 +194,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             state.safety = SafetyState::Disabled;
         }
         if let Some(command) = inputs.command {
-            self.obey(state, command, driven);
+            self.obey(state, command, driven, tick);
+        }
+        if state.injection.is_running() {
+            self.inject(state, tick);
         }
         if state.safety.drives() {
             self.refer(plan, state, inputs.switches, tick);
         }
         if !state.safety.drives() {
+            state.injection.end();
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
                 axis.rest(memory);
             }
@@ -301,6 +309,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if reaction == Reaction::Hold && state.held.is_none() {
             state.held = Some(fault);
         }
+        self.end_injection(state);
         for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
             axis.stop(memory);
         }
@@ -309,7 +318,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     /// Acts on a command. `driven`: the outputs were when the tick began.
     #[cold]
     #[inline(never)]
-    fn obey(&self, state: &mut StageState<S, N>, command: Command, driven: bool) {
+    fn obey(&self, state: &mut StageState<S, N>, command: Command, driven: bool, tick: u32) {
         // A reset is for a fault that was there to be seen, not for one of this tick.
         if driven && command == Command::ResetFault {
             return;
@@ -320,23 +329,31 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
                 axis.enable(memory);
             }
         } else if state.safety.is_enabled() {
-            self.start(state, command);
+            self.start(state, command, tick);
         }
     }
 
     /// Starts or ends motions of an enabled stage.
-    fn start(&self, state: &mut StageState<S, N>, command: Command) {
+    fn start(&self, state: &mut StageState<S, N>, command: Command, tick: u32) {
+        let free = !state.is_injecting();
         let starts = match command {
             Command::Run => !state.is_running(),
-            Command::StartStream => state.axes.iter().all(AxisState::is_stream_ready),
-            Command::Home(_) | Command::Jog(..) | Command::StartMove(_) | Command::Stop => true,
+            Command::StartStream => free && state.axes.iter().all(AxisState::is_stream_ready),
+            Command::StartInjection => state.is_injection_ready() && !state.is_running(),
+            Command::Home(_) | Command::Jog(..) | Command::StartMove(_) => free,
+            Command::Stop => true,
             Command::Enable | Command::Disable | Command::ResetFault => false,
         };
         if !starts {
             return;
         }
-        if command != Command::Stop {
-            state.held = None;
+        match command {
+            Command::Stop => self.end_injection(state),
+            _ => state.held = None,
+        }
+        if command == Command::StartInjection {
+            self.start_injection(state, tick);
+            return;
         }
         for ((axis, memory), name) in self
             .axes

@@ -30,6 +30,10 @@ pub struct StageView {
     pub homed: [bool; 3],
     /// The first segments of a stream are there, and start where the axes rest.
     pub stream_ready: bool,
+    /// The first value of an injected voltage is there.
+    pub injection_ready: bool,
+    /// A voltage is being injected.
+    pub injecting: bool,
 }
 
 impl StageView {
@@ -43,6 +47,8 @@ impl StageView {
             modes: state.axes().each_ref().map(AxisState::mode),
             homed: state.axes().each_ref().map(AxisState::is_homed),
             stream_ready: state.axes().iter().all(AxisState::is_stream_ready),
+            injection_ready: state.is_injection_ready(),
+            injecting: state.is_injecting(),
         }
     }
 }
@@ -68,6 +74,10 @@ pub enum Refusal {
     AxisBusy(AxisName),
     /// The axes have no first segment of a stream that starts where they rest.
     NoStream,
+    /// There is no injection that could begin.
+    NoInjection,
+    /// A voltage is being injected.
+    Injecting,
 }
 
 impl Refusal {
@@ -83,6 +93,10 @@ impl Refusal {
             Self::NoStream => {
                 "there is no stream that starts where the axes rest; open it again and send its first set points"
             }
+            Self::NoInjection => {
+                "there is no injection to begin; open it again and send its first values"
+            }
+            Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(obstacle) => match obstacle.code {
                 FaultCode::EmergencyStop => "the emergency stop is pressed; release it",
@@ -206,9 +220,13 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
         Command::Enable => None,
         _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
-        Command::Run | Command::StartStream if view.running => Some(Refusal::AlreadyRunning),
+        Command::Run | Command::StartStream | Command::StartInjection if view.running => {
+            Some(Refusal::AlreadyRunning)
+        }
         Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),
-        Command::Run | Command::StartStream => None,
+        Command::StartInjection if !view.injection_ready => Some(Refusal::NoInjection),
+        Command::Run | Command::StartStream | Command::StartInjection => None,
+        _ if view.injecting => Some(Refusal::Injecting),
         Command::Home(axis) | Command::StartMove(axis) if mode(view, axis) != CourseMode::Hold => {
             Some(Refusal::AxisBusy(axis))
         }

@@ -42,6 +42,8 @@ pub struct AxisState<S: Scalar, const N: usize> {
     pub(super) feedback: FeedbackState<S>,
     pub(super) springs: FeedforwardState<S, N>,
     pub(super) transfer: S,
+    /// What a host adds to the output in this tick, V.
+    pub(super) injected: S,
     pub(super) last_output: S,
     pub(super) telemetry: AxisTelemetry<S>,
 }
@@ -68,6 +70,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             feedback: FeedbackState::default(),
             springs: FeedforwardState::default(),
             transfer: S::ZERO,
+            injected: S::ZERO,
             last_output: S::ZERO,
             telemetry: AxisTelemetry::default(),
         }
@@ -88,6 +91,29 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// What the reference follows.
     pub fn mode(&self) -> CourseMode {
         self.course.mode()
+    }
+
+    /// What a host adds to the output, V.
+    #[inline(always)]
+    pub fn injected(&self) -> S {
+        self.injected
+    }
+
+    /// Where the axis is.
+    #[inline(always)]
+    pub(crate) fn measured(&self) -> Position {
+        self.encoder.position()
+    }
+
+    /// How fast it is, 2^-8 counts per tick.
+    #[inline(always)]
+    pub(crate) fn speed(&self) -> i32 {
+        self.overspeed.speed()
+    }
+
+    /// Sets what is added to the output from this tick on, V.
+    pub(crate) fn inject(&mut self, voltage: S) {
+        self.injected = voltage;
     }
 
     /// Where the reference stands, ahead of the feedback's by the preview.

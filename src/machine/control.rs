@@ -1,6 +1,6 @@
 //! The fast half: what the control interrupt owns and does.
 
-use super::queues::{CaptureOrder, ControlEnds, Exchange};
+use super::queues::{CaptureOrder, ControlEnds, Exchange, Feed};
 use super::{Axis, Snapshot};
 use crate::capture::Capture;
 use crate::encoder::EncoderReading;
@@ -37,6 +37,8 @@ pub struct Control<'q, 'a, S: Scalar> {
     sampling: SamplerState,
     capture: Option<Capture<'a>>,
     commanded: bool,
+    /// Values of the first waiting block that were taken.
+    place: usize,
     ends: ControlEnds<'q, 'a, S>,
 }
 
@@ -58,6 +60,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             sampling: SamplerState::default(),
             capture: None,
             commanded: false,
+            place: 0,
             ends,
         }
     }
@@ -77,12 +80,10 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         if let Some((name, motion)) = self.ends.motions.dequeue() {
             self.take_motion(name, motion);
         }
-        if self.state.axes().iter().all(|axis| axis.wants_segment())
-            && let Some(segments) = self.ends.segments.dequeue()
-        {
-            for (name, segment) in AxisName::ALL.into_iter().zip(segments) {
-                self.state.offer_segment(name, segment);
-            }
+        match self.ends.feeds.peek() {
+            None => {}
+            Some(Feed::Segments(_)) => self.take_segments(),
+            Some(Feed::Injection(_) | Feed::Voltages(_)) => self.take_voltage(),
         }
         let command = inputs.command.or_else(|| self.ends.commands.dequeue());
         self.commanded = command.is_some();
@@ -171,6 +172,45 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         };
         if !axis.is_running() {
             *place = motion;
+        }
+    }
+
+    /// Hands the axes the next segments of a stream, if they have room.
+    #[inline(always)]
+    fn take_segments(&mut self) {
+        if self.state.axes().iter().all(|axis| axis.wants_segment())
+            && let Some(Feed::Segments(segments)) = self.ends.feeds.dequeue()
+        {
+            for (name, segment) in AxisName::ALL.into_iter().zip(segments) {
+                self.state.offer_segment(name, segment);
+            }
+        }
+    }
+
+    /// Hands the next value of an injection on, if there is room. What is left of one that was broken off is dropped.
+    #[cold]
+    #[inline(never)]
+    fn take_voltage(&mut self) {
+        let used = match self.ends.feeds.peek() {
+            Some(Feed::Injection(injection)) => {
+                self.state.prepare_injection(injection.clone());
+                true
+            }
+            Some(Feed::Voltages(_)) if !self.state.has_injection() => true,
+            Some(Feed::Voltages(block)) => {
+                if self.state.wants_voltage()
+                    && let Some(value) = block.value(self.place)
+                {
+                    self.state.offer_value(value);
+                    self.place += 1;
+                }
+                self.place >= block.len()
+            }
+            Some(Feed::Segments(_)) | None => false,
+        };
+        if used {
+            self.place = 0;
+            let _ = self.ends.feeds.dequeue();
         }
     }
 

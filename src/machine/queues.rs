@@ -4,6 +4,7 @@ use heapless_queues::spsc::{Consumer, Producer, Queue};
 
 use super::Axis;
 use crate::capture::Capture;
+use crate::injection::{Injection, VoltageBlock};
 use crate::reference::{Motion, Segment};
 use crate::safety::{AxisName, Command, StreamLoss};
 use crate::scalar::Scalar;
@@ -15,6 +16,19 @@ pub(super) struct Exchange<'a, S: Scalar> {
     pub(super) name: AxisName,
     pub(super) axis: &'a mut Axis<S>,
     pub(super) streaming: StreamLoss,
+}
+
+/// What waits for the control law, tick for tick: of a stream or of an injection, never of both.
+#[derive(Clone, Debug)]
+// They share the room of one queue.
+#[allow(clippy::large_enum_variant)]
+pub(super) enum Feed<S: Scalar> {
+    /// The next segments of a stream.
+    Segments([Segment; 3]),
+    /// Another injection.
+    Injection(Injection<S>),
+    /// Its next values.
+    Voltages(VoltageBlock),
 }
 
 /// What the server asks of the capture.
@@ -30,12 +44,12 @@ pub(super) enum CaptureOrder<'a> {
 const ONE: usize = 2;
 const COMMANDS: usize = 8;
 const MOTIONS: usize = 4;
-const SEGMENTS: usize = 16;
+const FEEDS: usize = 16;
 /// Samples of each tick of 3 ms at 10 kHz.
 const SAMPLES: usize = 32;
 
-/// Segments of a stream that may wait for the control law.
-pub(super) const SEGMENT_ROOM: usize = SEGMENTS - 1;
+/// Segments of a stream, or blocks of an injection, that may wait for the control law.
+pub(super) const FEED_ROOM: usize = FEEDS - 1;
 
 /// The queues, each with room for one less than its size.
 pub struct Queues<'a, S: Scalar> {
@@ -43,7 +57,7 @@ pub struct Queues<'a, S: Scalar> {
     exchanges: Queue<Exchange<'a, S>, ONE>,
     spares: Queue<&'a mut Axis<S>, ONE>,
     motions: Queue<(AxisName, Motion<S>), MOTIONS>,
-    segments: Queue<[Segment; 3], SEGMENTS>,
+    feeds: Queue<Feed<S>, FEEDS>,
     samplers: Queue<Sampler, ONE>,
     samples: Queue<Sample, SAMPLES>,
     orders: Queue<CaptureOrder<'a>, ONE>,
@@ -64,7 +78,7 @@ impl<'a, S: Scalar> Queues<'a, S> {
             exchanges: Queue::new(),
             spares: Queue::new(),
             motions: Queue::new(),
-            segments: Queue::new(),
+            feeds: Queue::new(),
             samplers: Queue::new(),
             samples: Queue::new(),
             orders: Queue::new(),
@@ -78,7 +92,7 @@ impl<'a, S: Scalar> Queues<'a, S> {
         let (exchanges_in, exchanges) = self.exchanges.split();
         let (spares_in, spares) = self.spares.split();
         let (motions_in, motions) = self.motions.split();
-        let (segments_in, segments) = self.segments.split();
+        let (feeds_in, feeds) = self.feeds.split();
         let (samplers_in, samplers) = self.samplers.split();
         let (samples_in, samples) = self.samples.split();
         let (orders_in, orders) = self.orders.split();
@@ -88,7 +102,7 @@ impl<'a, S: Scalar> Queues<'a, S> {
             exchanges,
             spares: spares_in,
             motions,
-            segments,
+            feeds,
             samplers,
             samples: samples_in,
             orders,
@@ -99,7 +113,7 @@ impl<'a, S: Scalar> Queues<'a, S> {
             exchanges: exchanges_in,
             spares,
             motions: motions_in,
-            segments: segments_in,
+            feeds: feeds_in,
             samplers: samplers_in,
             samples,
             orders: orders_in,
@@ -115,7 +129,7 @@ pub struct ControlEnds<'q, 'a, S: Scalar> {
     pub(super) exchanges: Consumer<'q, Exchange<'a, S>, ONE>,
     pub(super) spares: Producer<'q, &'a mut Axis<S>, ONE>,
     pub(super) motions: Consumer<'q, (AxisName, Motion<S>), MOTIONS>,
-    pub(super) segments: Consumer<'q, [Segment; 3], SEGMENTS>,
+    pub(super) feeds: Consumer<'q, Feed<S>, FEEDS>,
     pub(super) samplers: Consumer<'q, Sampler, ONE>,
     pub(super) samples: Producer<'q, Sample, SAMPLES>,
     pub(super) orders: Consumer<'q, CaptureOrder<'a>, ONE>,
@@ -128,7 +142,7 @@ pub struct ServerEnds<'q, 'a, S: Scalar> {
     pub(super) exchanges: Producer<'q, Exchange<'a, S>, ONE>,
     pub(super) spares: Consumer<'q, &'a mut Axis<S>, ONE>,
     pub(super) motions: Producer<'q, (AxisName, Motion<S>), MOTIONS>,
-    pub(super) segments: Producer<'q, [Segment; 3], SEGMENTS>,
+    pub(super) feeds: Producer<'q, Feed<S>, FEEDS>,
     pub(super) samplers: Producer<'q, Sampler, ONE>,
     pub(super) samples: Consumer<'q, Sample, SAMPLES>,
     pub(super) orders: Producer<'q, CaptureOrder<'a>, ONE>,

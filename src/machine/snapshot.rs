@@ -1,6 +1,7 @@
 //! What the slow half sees of the fast one, once every [`PERIOD_TICKS`](crate::supervisor::PERIOD_TICKS).
 
 use crate::friction::gms::FIRMWARE_ELEMENTS;
+use crate::injection::InjectionProgress;
 use crate::safety::monitor::FollowingState;
 use crate::scalar::Scalar;
 use crate::stage::StageState;
@@ -34,6 +35,8 @@ pub struct Snapshot<S> {
     pub view: StageView,
     /// The axes.
     pub axes: [AxisSnapshot<S>; 3],
+    /// How far the injection under way has come, or the last one came.
+    pub injection: InjectionProgress,
 }
 
 impl<S: Scalar> Snapshot<S> {
@@ -53,6 +56,7 @@ impl<S: Scalar> Snapshot<S> {
                     following: axis.following(),
                 }
             }),
+            injection: state.injection_progress(),
         }
     }
 }

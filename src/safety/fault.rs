@@ -47,7 +47,7 @@ pub enum FaultCode {
     AmplifierFault = 14,
     /// The converter holds another word than was written.
     OutputMismatch = 15,
-    /// The host that streams set points has fallen silent.
+    /// The host that streams set points, jogs or injects a voltage has fallen silent.
     LinkLost = 16,
     /// The next set point of a stream did not come in time.
     StreamUnderrun = 17,
@@ -67,11 +67,15 @@ pub enum FaultCode {
     IndexMissing = 24,
     /// The home switch lets go too near an index pulse to tell which of them follows.
     IndexNearSwitch = 25,
+    /// The next value of an injected voltage did not come in time.
+    InjectionUnderrun = 26,
+    /// The axis left the travel, or exceeded the velocity, that was given with its injected voltage.
+    InjectionBounds = 27,
 }
 
 impl FaultCode {
     /// All faults, in order of their numbers.
-    pub const ALL: [Self; 25] = [
+    pub const ALL: [Self; 27] = [
         Self::FollowingError,
         Self::EncoderJump,
         Self::DeadlineMissed,
@@ -97,6 +101,8 @@ impl FaultCode {
         Self::HomeSwitchStuck,
         Self::IndexMissing,
         Self::IndexNearSwitch,
+        Self::InjectionUnderrun,
+        Self::InjectionBounds,
     ];
 
     /// The stable number.
@@ -138,7 +144,9 @@ impl FaultCode {
             | Self::HomeSwitchMissing
             | Self::HomeSwitchStuck
             | Self::IndexMissing
-            | Self::IndexNearSwitch => Reaction::Stop,
+            | Self::IndexNearSwitch
+            | Self::InjectionUnderrun
+            | Self::InjectionBounds => Reaction::Stop,
             _ => Reaction::Off,
         }
     }
@@ -225,8 +233,8 @@ impl FaultCode {
             ],
             Self::LinkLost => [
                 "link-lost",
-                "the host that streamed set points has fallen silent",
-                "check the cable and the host; open the stream again",
+                "the host that streamed set points, jogged or injected a voltage has fallen silent",
+                "check the cable and the host; then begin again; a jog goes on only while its host asks something twice a second",
             ],
             Self::StreamUnderrun => [
                 "stream-underrun",
@@ -272,6 +280,16 @@ impl FaultCode {
                 "index-near-switch",
                 "the home switch lets go within an eighth of a revolution of an index pulse",
                 "move the switch, or turn the encoder on its shaft, by a quarter of a revolution",
+            ],
+            Self::InjectionUnderrun => [
+                "injection-underrun",
+                "the next value of the injected voltage did not come in time",
+                "check the cable and the host's load; the line must carry 20 kB/s to the machine at 10 kHz",
+            ],
+            Self::InjectionBounds => [
+                "injection-bounds",
+                "the axis left the travel, or exceeded the velocity, that was given with its injected voltage",
+                "lower the voltage or its duration, or raise its lowest frequency; or allow more travel",
             ],
         }
     }

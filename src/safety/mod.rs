@@ -102,6 +102,8 @@ pub enum Command {
     StartMove(AxisName),
     /// Start the stream whose first segments the axes have. Ignored unless enabled, all at rest, and the segments there.
     StartStream,
+    /// Begin the injection that is ready: a voltage added to an axis' output. Ignored unless enabled, and all axes at rest.
+    StartInjection,
 }
 
 impl Command {
@@ -114,6 +116,7 @@ impl Command {
             4 => Self::Run,
             5 => Self::Stop,
             6 => Self::StartStream,
+            7 => Self::StartInjection,
             8 => Self::Home(AxisName::X),
             9 => Self::Home(AxisName::Y),
             10 => Self::Home(AxisName::Z),
@@ -133,6 +136,7 @@ impl Command {
             Self::Run => 4,
             Self::Stop => 5,
             Self::StartStream => 6,
+            Self::StartInjection => 7,
             Self::Home(axis) => 8 + axis as u32,
             Self::StartMove(axis) => 12 + axis as u32,
             Self::Jog(..) => return None,

@@ -24,6 +24,14 @@ pub struct OverspeedState {
     filtered: i32,
 }
 
+impl OverspeedState {
+    /// The filtered speed, 2^-8 counts per tick, towards larger positions.
+    #[inline(always)]
+    pub fn speed(&self) -> i32 {
+        self.filtered
+    }
+}
+
 impl Overspeed {
     /// A limit in counts per tick, at most 2^16; half a count is added for the quantisation. Settings time only.
     pub fn new(counts_per_tick: f64) -> Self {

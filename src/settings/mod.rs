@@ -10,6 +10,7 @@ pub mod draft;
 mod error;
 mod feedback;
 mod homing;
+mod injection;
 pub mod leaves;
 mod limits;
 pub(crate) mod parts;
@@ -21,6 +22,7 @@ pub use defaults::{x_axis, y_axis, z_axis};
 pub use destination::{MoveError, MoveFlaw};
 pub use error::{Reason, SettingsError};
 pub use homing::{HomeSwitch, HomingSettings};
+pub use injection::InjectionSettings;
 pub use limits::{LimitSettings, LossReaction, StreamingSettings, TravelSettings};
 pub use value::MAX_VALUE_BYTES;
 

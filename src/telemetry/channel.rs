@@ -44,6 +44,11 @@ pub enum AxisSignal {
     Code = 13,
     /// What limits the output: 0 nothing, 1 the output limit.
     LimitedBy = 14,
+    /// What a host adds to the output, V.
+    Injection = 15,
+    /// The sum of the converter's words of all ticks before this one; wraps. The difference from one sample to the next is
+    /// the sum over the ticks from the one on, up to the other.
+    CodeSum = 16,
 }
 
 /// A signal of the stage. The numbers are stable.
@@ -147,7 +152,7 @@ const STAGE_SOURCE: u8 = 3;
 
 impl AxisSignal {
     /// All signals of an axis, in order of their numbers.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 17] = [
         Self::Reference,
         Self::Position,
         Self::Error,
@@ -163,6 +168,8 @@ impl AxisSignal {
         Self::Output,
         Self::Code,
         Self::LimitedBy,
+        Self::Injection,
+        Self::CodeSum,
     ];
 
     /// Its name.
@@ -183,6 +190,8 @@ impl AxisSignal {
             Self::Output => "output",
             Self::Code => "code",
             Self::LimitedBy => "limited-by",
+            Self::Injection => "injection",
+            Self::CodeSum => "code-sum",
         }
     }
 
@@ -206,6 +215,8 @@ impl AxisSignal {
             Self::Output => volts(seen.output),
             Self::Code => i32::from(seen.code.0) as u32,
             Self::LimitedBy => seen.limited_by as u32,
+            Self::Injection => volts(axis.injected()),
+            Self::CodeSum => seen.code_sum.wrapping_sub(seen.code.0.into()) as u32,
         }
     }
 }
@@ -253,7 +264,8 @@ impl Channel {
                 AxisSignal::Reference
                 | AxisSignal::Position
                 | AxisSignal::Code
-                | AxisSignal::LimitedBy,
+                | AxisSignal::LimitedBy
+                | AxisSignal::CodeSum,
             ) => WordKind::Integer,
             Self::Axis(..) => WordKind::Float,
         }
@@ -264,7 +276,8 @@ impl Channel {
         match self {
             Self::Stage(StageSignal::Tick) => "tick",
             Self::Stage(StageSignal::Elapsed) => "cycle",
-            Self::Stage(_) | Self::Axis(_, AxisSignal::Code | AxisSignal::LimitedBy) => "",
+            Self::Stage(_)
+            | Self::Axis(_, AxisSignal::Code | AxisSignal::LimitedBy | AxisSignal::CodeSum) => "",
             Self::Axis(_, AxisSignal::Reference) => "count/256",
             Self::Axis(_, AxisSignal::Position) => "count",
             Self::Axis(_, AxisSignal::Error) => "mm",

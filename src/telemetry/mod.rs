@@ -52,6 +52,8 @@ pub struct AxisTelemetry<S> {
     pub output: S,
     /// The word sent to the converter.
     pub code: DacCode,
+    /// The sum of all words so far, this one included; wraps.
+    pub code_sum: i32,
     /// What limits the output.
     pub limited_by: LimitedBy,
 }

@@ -158,6 +158,26 @@ fn requests() -> Vec<(Body, &'static str)> {
         (capture(CaptureRequest::State), "0f02"),
         (capture(CaptureRequest::Read { offset: 112 }), "0f0370"),
         (Body::Reboot, "10"),
+        (
+            Body::Inject(InjectRequest::Open {
+                axis: Y,
+                open_loop: true,
+                with_plan: false,
+                limit_v: 1.0,
+                travel_mm: 2.0,
+                max_velocity_mm_s: 0.5,
+            }),
+            "1100010100000000000000f03f0000000000000040000000000000e03f",
+        ),
+        (
+            Body::Inject(InjectRequest::Values {
+                sequence: 128,
+                values: Voltages::new([1, -2, 300].into_iter()),
+                last: true,
+            }),
+            "11018001060100feff2c0101",
+        ),
+        (Body::Inject(InjectRequest::Close), "1102"),
     ]
 }
 
@@ -191,6 +211,8 @@ fn channels_have_their_golden_numbers() {
             "output[V]",
             "code[]",
             "limited-by[]",
+            "injection[V]",
+            "code-sum[]",
         ]
         .iter()
         .zip(first..)

@@ -6,8 +6,9 @@ use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{self, FRAME_BYTES, FrameCounters};
 use quadrant::link::message::{
     AxisMode, AxisPoint, AxisSet, AxisStatus, Body, CaptureRequest, CaptureStatus, Event,
-    FaultReport, Identity, LinkError, Message, Notice, NumberType, PathPage, Reply, Request,
-    Response, SetPoint, SettingsRequest, Status, StreamRequest, TelemetryRequest, Value, WordPage,
+    FaultReport, INJECT_VALUES, Identity, InjectRequest, LinkError, Message, Notice, NumberType,
+    PathPage, Reply, Request, Response, SetPoint, SettingsRequest, Status, StreamRequest,
+    TelemetryRequest, Value, Voltages, WordPage,
 };
 use quadrant::link::port::Port;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -73,6 +74,11 @@ fn largest_requests() -> Vec<Body> {
             value: long_value(),
         }),
         Body::Settings(SettingsRequest::Store(long())),
+        Body::Inject(InjectRequest::Values {
+            sequence: u32::MAX,
+            values: Voltages::new([i16::MIN; INJECT_VALUES].into_iter()),
+            last: true,
+        }),
         Body::Telemetry(TelemetryRequest::Select {
             channels: channels(),
             decimation: u16::MAX,

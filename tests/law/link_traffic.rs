@@ -4,8 +4,8 @@ use heapless::{String, Vec as Bounded};
 use quadrant::capture::{Edge, Level, Trigger};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{
-    AxisPoint, AxisSet, Body, CaptureRequest, Request, SetPoint, SettingsRequest, StreamRequest,
-    TelemetryRequest, Value,
+    AxisPoint, AxisSet, Body, CaptureRequest, InjectRequest, Request, SetPoint, SettingsRequest,
+    StreamRequest, TelemetryRequest, Value, Voltages,
 };
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::safety::AxisName;
@@ -100,6 +100,28 @@ impl Noise {
         }
     }
 
+    fn injection(&mut self) -> InjectRequest {
+        match self.below(3) {
+            0 => InjectRequest::Open {
+                axis: self.axis(),
+                open_loop: self.below(2) == 0,
+                with_plan: self.below(2) == 0,
+                limit_v: self.real(),
+                travel_mm: self.real(),
+                max_velocity_mm_s: self.real(),
+            },
+            1 => {
+                let count = self.below(193);
+                InjectRequest::Values {
+                    sequence: self.bits() as u32,
+                    values: Voltages::new((0..count).map(|_| self.bits() as i16)),
+                    last: self.below(2) == 0,
+                }
+            }
+            _ => InjectRequest::Close,
+        }
+    }
+
     fn settings(&mut self) -> SettingsRequest {
         match self.below(8) {
             0 => SettingsRequest::Get(self.text()),
@@ -146,7 +168,7 @@ impl Noise {
 
     /// Any request, all its numbers finite.
     pub(crate) fn body(&mut self) -> Body {
-        match self.below(17) {
+        match self.below(18) {
             0 => Body::Hello,
             1 => Body::Status,
             2 => Body::Fault,
@@ -178,6 +200,7 @@ impl Noise {
                 _ => TelemetryRequest::Stop,
             }),
             15 => Body::Capture(self.capture()),
+            16 => Body::Inject(self.injection()),
             _ => Body::Reboot,
         }
     }

@@ -102,7 +102,7 @@ fn every_command_without_a_value_has_its_number_and_no_other_number_a_command() 
         .chain([u32::MAX])
         .filter_map(|number| Some((number, Command::from_number(number)?)))
         .collect();
-    assert_eq!(found.len(), 6 + 3 + 3);
+    assert_eq!(found.len(), 7 + 3 + 3);
     for &(number, command) in &found {
         assert_eq!(command.number(), Some(number), "{command:?}");
     }

@@ -25,6 +25,7 @@ mod friction_smoothed_gms;
 mod friction_static;
 mod gain_schedule;
 mod homing;
+mod injection;
 mod jog;
 mod journal;
 mod last_words;

@@ -335,9 +335,12 @@ fn every_fault_is_found_in_its_tick_with_the_outputs_of_its_reaction() {
 }
 
 /// Those that the tick cannot find by itself.
-pub(crate) const OF_OTHERS: [FaultCode; 5] = [
+pub(crate) const OF_OTHERS: [FaultCode; 7] = [
     // Of a stream: see the tests of streaming.
     FaultCode::StreamUnderrun,
+    // Of an injected voltage: see its tests.
+    FaultCode::InjectionUnderrun,
+    FaultCode::InjectionBounds,
     FaultCode::WatchdogReset,
     FaultCode::Panic,
     FaultCode::HardFault,
@@ -396,11 +399,13 @@ fn numbers_and_names_are_stable() {
             "home-switch-stuck",
             "index-missing",
             "index-near-switch",
+            "injection-underrun",
+            "injection-bounds",
         ]
     );
     for code in FaultCode::ALL {
         assert_eq!(FaultCode::from_number(code.number()), Some(code));
     }
     assert_eq!(FaultCode::from_number(0), None);
-    assert_eq!(FaultCode::from_number(26), None);
+    assert_eq!(FaultCode::from_number(28), None);
 }

@@ -18,6 +18,8 @@ const DISABLED: StageView = StageView {
     modes: [CourseMode::Hold; 3],
     homed: [false; 3],
     stream_ready: false,
+    injection_ready: false,
+    injecting: false,
 };
 const ENABLED: StageView = StageView {
     safety: SafetyState::Enabled,

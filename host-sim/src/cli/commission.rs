@@ -1,16 +1,20 @@
-//! `quadrant commission`.
+//! `quadrant commission`, and what it shares with `quadrant connect commission`.
 
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use quadrant::settings::StageSettings;
+use quadrant::safety::AxisName;
+use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
 use quadrant_sim::presentation::{
     commission_page, friction_table, gains_table, gms_table, motor_constant_table, plant_tables,
     provenance, revise_table, verdict_table,
 };
+use quadrant_sim::report::Table;
+use quadrant_sim::rig::Rig;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
 use super::identify::rig::Axis;
@@ -25,6 +29,15 @@ pub(super) struct Arguments {
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    #[command(flatten)]
+    request: Request,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// What is asked of a commissioning, wherever the axis is.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Request {
     /// Gain margin of the PID, dB.
     #[arg(long, default_value_t = 9.9, value_name = "DB")]
     gain_margin_db: f64,
@@ -35,99 +48,145 @@ pub(super) struct Arguments {
     /// motion.
     #[arg(long)]
     quick: bool,
-    #[command(flatten)]
-    output: Output,
+}
+
+/// What a commissioning found.
+pub(super) struct Found {
+    pub(super) found: Commissioned,
+    checked: Option<CrossCheck>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let Arguments { axis, output, .. } = arguments;
+    let Arguments {
+        axis,
+        request,
+        output,
+        ..
+    } = arguments;
     let mut file = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?,
         None => SettingsFile::new(StageSettings::default()),
     };
-    let request = CommissionSettings {
-        target: Target::Margins {
-            gain_margin_db: arguments.gain_margin_db,
-            phase_margin_deg: arguments.phase_margin_deg,
-            crossover_hz: None,
-        },
-        ..CommissionSettings::default()
-    };
-    let bar = share("commissioning");
-    let mut rig = axis.rig(output.seed);
-    let found = commission(
-        &mut rig,
-        &file.stage.axes[axis.index()],
-        &request,
-        &mut |step, done| {
-            bar.set_message(step);
-            bar.set_position((1000.0 * done) as u64);
-        },
-    )?;
-    let checked = if arguments.quick {
-        None
-    } else {
-        bar.enable_steady_tick(Duration::from_millis(200));
-        let report = &mut |step, done: f64| {
-            bar.set_message(step);
-            bar.set_position((1000.0 * done) as u64);
-        };
-        Some(CrossCheck::run(
-            &mut rig,
-            &found.settings,
-            output.seed,
-            report,
-        )?)
-    };
-    bar.finish_and_clear();
+    let base = file.stage.axes[axis.index()].clone();
+    let found = request.run(&mut axis.rig(output.seed), &base, output.seed)?;
     println!(
         "Simulated, not measured: {} axis, seed {}\n",
         axis.name(),
         output.seed
     );
-    let [parameters, bands] = plant_tables(&found.plant);
-    let (_, friction, _) = &found.friction;
-    for table in [
-        motor_constant_table(&found.motor, None),
-        parameters,
-        bands,
-        friction_table(friction),
-        gms_table(&found.presliding.0),
-        gains_table(&found),
-        verdict_table(&found.verdicts),
-    ] {
-        output.table(&table)?;
+    print!("{}", found.text());
+    let who = format!("the {} axis of the simulated stage", axis.name());
+    let axis = AxisName::ALL[axis.index()];
+    for line in found.keep(output, &mut file, axis, &who)? {
+        println!("{line}");
     }
-    if let Some(checked) = &checked {
-        output.table(&revise_table(&found.plant.plant, &checked.revisions))?;
-        if let Some(agreement) = checked.inertia_agreement(&found.settings) {
-            println!(
+    Ok(())
+}
+
+impl Request {
+    /// Commissions the rig's axis, with a bar for whoever watches.
+    pub(super) fn run(
+        &self,
+        rig: &mut dyn Rig,
+        base: &AxisSettings,
+        seed: u64,
+    ) -> anyhow::Result<Found> {
+        let request = CommissionSettings {
+            target: Target::Margins {
+                gain_margin_db: self.gain_margin_db,
+                phase_margin_deg: self.phase_margin_deg,
+                crossover_hz: None,
+            },
+            ..CommissionSettings::default()
+        };
+        let bar = share("commissioning");
+        let mut report = |step, done: f64| {
+            bar.set_message(step);
+            bar.set_position((1000.0 * done) as u64);
+        };
+        let found = commission(rig, base, &request, &mut report)?;
+        let checked = if self.quick {
+            None
+        } else {
+            bar.enable_steady_tick(Duration::from_millis(200));
+            let checked = CrossCheck::run(rig, &found.settings, seed, &mut report)?;
+            Some(checked)
+        };
+        bar.finish_and_clear();
+        Ok(Found { found, checked })
+    }
+}
+
+impl Found {
+    fn tables(&self) -> Vec<Table> {
+        let found = &self.found;
+        let [parameters, bands] = plant_tables(&found.plant);
+        let (_, friction, _) = &found.friction;
+        let mut tables = vec![
+            motor_constant_table(&found.motor, None),
+            parameters,
+            bands,
+            friction_table(friction),
+            gms_table(&found.presliding.0),
+            gains_table(found),
+            verdict_table(&found.verdicts),
+        ];
+        if let Some(checked) = &self.checked {
+            tables.push(revise_table(&found.plant.plant, &checked.revisions));
+        }
+        tables
+    }
+
+    /// The tables for a terminal.
+    pub(super) fn text(&self) -> String {
+        let mut text = String::new();
+        for table in self.tables() {
+            let _ = writeln!(text, "{}\n", table.to_text());
+        }
+        let agreement = self
+            .checked
+            .as_ref()
+            .and_then(|checked| checked.inertia_agreement(&self.found.settings));
+        if let Some(agreement) = agreement {
+            let _ = writeln!(
+                text,
                 "An ordinary motion gives {agreement:.3} times the A of the frequency response.\n"
             );
         }
+        text
     }
-    let command = command_line();
-    let records = write_records(output, &found, checked.as_ref())?;
-    file.stage.axes[axis.index()] = found.settings.clone();
-    file.provenance.push(Provenance {
-        command: command.clone(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        axis: axis.name().to_owned(),
-        records,
-        sets: ["feedback", "friction", "feedforward", "plant"]
-            .map(str::to_owned)
-            .into(),
-    });
-    let settings = output.file("settings.toml")?;
-    file.write(&settings)?;
-    println!("{}: the settings of the stage", settings.display());
-    let page = commission_page(
-        &format!("the {} axis of the simulated stage", axis.name()),
-        &found,
-        checked.as_ref(),
-        provenance(&command, output.seed),
-    );
-    output.page(&page, "commission.html")
+
+    /// Writes everything: recordings, tables, the page, and the settings, which become those of `file`. Says what is where.
+    pub(super) fn keep(
+        &self,
+        output: &Output,
+        file: &mut SettingsFile,
+        axis: AxisName,
+        who: &str,
+    ) -> anyhow::Result<Vec<String>> {
+        let (found, checked) = (&self.found, self.checked.as_ref());
+        for table in self.tables() {
+            output.keep_table(&table)?;
+        }
+        let command = command_line();
+        let records = write_records(output, found, checked)?;
+        file.stage.axes[axis as usize] = found.settings.clone();
+        file.provenance.push(Provenance {
+            command: command.clone(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            axis: axis.as_str().to_owned(),
+            records,
+            sets: ["feedback", "friction", "feedforward", "plant"]
+                .map(str::to_owned)
+                .into(),
+        });
+        let settings = output.file("settings.toml")?;
+        file.write(&settings)?;
+        let page = commission_page(who, found, checked, provenance(&command, output.seed));
+        let mut lines = vec![format!("{}: the settings of the stage", settings.display())];
+        lines.extend(output.keep_page(&page, "commission.html")?);
+        Ok(lines)
+    }
 }
 
 /// Saves every recording that the settings rest on; their names.

@@ -47,6 +47,11 @@ impl Output {
     /// Prints a table and, where CSV is wanted, writes it.
     pub(super) fn table(&self, table: &Table) -> anyhow::Result<()> {
         println!("{}\n", table.to_text());
+        self.keep_table(table)
+    }
+
+    /// Writes a table where CSV is wanted.
+    pub(super) fn keep_table(&self, table: &Table) -> anyhow::Result<()> {
         if self.format.contains(&Format::Csv) {
             table.write_csv(self.file(&format!("{}.csv", table.id))?)?;
         }
@@ -55,18 +60,24 @@ impl Output {
 
     /// Writes a page in the formats that are wanted, under the stem of `name`.
     pub(super) fn page(&self, page: &Page, name: &str) -> anyhow::Result<()> {
-        let stem = name.strip_suffix(".html").unwrap_or(name);
-        page.write(&self.out, stem, &self.format)?;
-        for format in &self.format {
-            let folder = self.out.display();
-            match format {
-                Format::Html => println!("{folder}/{stem}.html: open it in a browser"),
-                Format::Json => println!("{folder}/{stem}.json: the page as data"),
-                Format::Csv => println!("{folder}/*.csv: its tables, and in figures/ its curves"),
-                Format::Svg => println!("{folder}/figures/*.svg: its figures, for print"),
-            }
+        for line in self.keep_page(page, name)? {
+            println!("{line}");
         }
         Ok(())
+    }
+
+    /// The same, and says where it is instead of printing it.
+    pub(super) fn keep_page(&self, page: &Page, name: &str) -> anyhow::Result<Vec<String>> {
+        let stem = name.strip_suffix(".html").unwrap_or(name);
+        page.write(&self.out, stem, &self.format)?;
+        let folder = self.out.display();
+        let line = |format: &Format| match format {
+            Format::Html => format!("{folder}/{stem}.html: open it in a browser"),
+            Format::Json => format!("{folder}/{stem}.json: the page as data"),
+            Format::Csv => format!("{folder}/*.csv: its tables, and in figures/ its curves"),
+            Format::Svg => format!("{folder}/figures/*.svg: its figures, for print"),
+        };
+        Ok(self.format.iter().map(line).collect())
     }
 
     /// Prints tables and writes a page of nothing else.

@@ -46,6 +46,20 @@ pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     settings
 }
 
+/// `base` with a law that does nothing: for experiments in open loop on an axis of which not even the sign is known, before
+/// and after which the loop is closed. Only friction holds it.
+pub fn limp_settings(base: &AxisSettings) -> AxisSettings {
+    let mut settings = measuring_settings(base);
+    settings.plant = None;
+    settings.feedback.pid = PidGains {
+        kp_v_per_mm: 0.0,
+        ki_v_per_mm_s: 0.0,
+        kd_v_s_per_mm: 0.0,
+        ..base.feedback.pid
+    };
+    settings
+}
+
 /// `base` with a PID that is quiet enough for the smallest motions: of an axis that is held by friction, the noise of a
 /// fast derivative shakes loose what is to be measured.
 pub fn quiet_settings(base: &AxisSettings, plant: &PlantModel, rate_hz: f64) -> AxisSettings {

@@ -7,7 +7,7 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 
-use super::bootstrap::{first_settings, measuring_settings, quiet_settings};
+use super::bootstrap::{first_settings, limp_settings, measuring_settings, quiet_settings};
 use super::error::CommissionError;
 use super::verify::{Trial, Verdict, verify};
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
@@ -120,6 +120,7 @@ pub fn commission(
         progress(STEPS[step].0, before + share * STEPS[step].1);
     };
 
+    rig.apply(&limp_settings(base))?;
     let motor = motor_constant::measure(rig, &MotorConstantSettings::default(), &mut |share| {
         report(step, share);
     })?;

@@ -61,11 +61,10 @@ impl CrossCheck {
             progress("response at rest", share);
         })?;
 
-        let rate_hz = rig.axis().rate_hz;
         approach(rig, 0.0)?;
         let moved = shuttle(rig, 1, &mut |share| progress("ordinary motion", share))?;
         let motion = MotionFitSettings {
-            dead_time_s: Some(plant.delay_s + 0.5 / rate_hz),
+            dead_time_s: Some(plant.delay_s + 0.5 * moved.sample_time_s),
             ..MotionFitSettings::default()
         };
         let motion = fit_motion(&moved, &motion, &|_| {})?;

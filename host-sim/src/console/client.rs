@@ -17,6 +17,9 @@ use super::transport::Transport;
 /// Notices that are kept until someone asks for them; of more, the oldest are dropped.
 const MOST_NOTICES: usize = 1 << 14;
 
+/// How long a host that jogs an axis asks nothing: half of what the machine waits for, and less.
+const ALIVE: Duration = Duration::from_millis(200);
+
 /// Times that a request which may be repeated is made before the machine counts as silent.
 const ATTEMPTS: u32 = 4;
 
@@ -26,6 +29,10 @@ pub struct Client {
     receiver: Receiver,
     identity: Option<Identity>,
     next_id: u16,
+    /// When a request was last made.
+    asked: Duration,
+    /// A jog may be under way, which the machine ends when its host falls silent.
+    jogs: bool,
     notices: VecDeque<Notice>,
     dropped_notices: u64,
 }
@@ -41,6 +48,8 @@ impl Client {
             receiver: Receiver::new(),
             identity: None,
             next_id: 1,
+            asked: Duration::ZERO,
+            jogs: false,
             notices: VecDeque::new(),
             dropped_notices: 0,
         };
@@ -170,7 +179,20 @@ impl Client {
     pub fn wait(&mut self, time: Duration) -> Result<(), ClientError> {
         let due = self.now() + time;
         while self.now() < due {
+            self.keep_alive()?;
             self.receive(due)?;
+        }
+        Ok(())
+    }
+
+    /// Lets the machine know that its host is there, if an axis jogs and nothing was asked for a while: it stops a jog whose
+    /// host has fallen silent. Whoever lets time pass without [`wait`](Self::wait) calls this a few times a second.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn keep_alive(&mut self) -> Result<(), ClientError> {
+        if self.jogs && self.now().saturating_sub(self.asked) >= ALIVE {
+            self.status()?;
         }
         Ok(())
     }
@@ -237,7 +259,13 @@ impl Client {
             Nature::Once => 1,
             Nature::Query | Nature::Repeatable => ATTEMPTS,
         };
+        match body {
+            Body::Jog { velocity_mm_s, .. } => self.jogs = *velocity_mm_s != 0.0,
+            Body::Stop | Body::Disable => self.jogs = false,
+            _ => {}
+        }
         let began = self.now();
+        self.asked = began;
         for attempt in 0..attempts {
             if attempt > 0 {
                 // What the line did to the last one may have begun a frame.
@@ -350,5 +378,6 @@ const fn reply_name(reply: &Reply) -> &'static str {
         Reply::Telemetry { .. } => "a telemetry selection",
         Reply::Capture(_) => "the state of a capture",
         Reply::Words(_) => "words of a capture",
+        Reply::Inject(_) => "the state of an injection",
     }
 }

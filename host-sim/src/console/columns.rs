@@ -39,6 +39,8 @@ const fn axis_column(signal: AxisSignal) -> &'static str {
         AxisSignal::Output => "voltage_v",
         AxisSignal::Code => "code",
         AxisSignal::LimitedBy => "limited_by",
+        AxisSignal::Injection => "injection_v",
+        AxisSignal::CodeSum => "code_sum",
     }
 }
 

@@ -2,7 +2,9 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{Body, CaptureRequest, SettingsRequest, StreamRequest};
+use quadrant::link::message::{
+    Body, CaptureRequest, InjectRequest, SettingsRequest, StreamRequest,
+};
 
 /// Time for an answer: a request is served within two runs of the link's task, 2 ms, and a frame each way takes 12 ms.
 pub(super) const ANSWER: Duration = Duration::from_millis(150);
@@ -44,6 +46,7 @@ pub(super) const fn nature(body: &Body) -> Nature {
         | Body::Jog { .. }
         | Body::SetPlan(_)
         | Body::Stream(StreamRequest::Points { .. } | StreamRequest::Close)
+        | Body::Inject(InjectRequest::Values { .. } | InjectRequest::Close)
         | Body::Settings(
             SettingsRequest::Set { .. } | SettingsRequest::Revert | SettingsRequest::Defaults,
         ) => Nature::Repeatable,
@@ -52,6 +55,7 @@ pub(super) const fn nature(body: &Body) -> Nature {
         | Body::Home(_)
         | Body::Move { .. }
         | Body::Stream(StreamRequest::Open { .. })
+        | Body::Inject(InjectRequest::Open { .. })
         | Body::Settings(SettingsRequest::Apply | SettingsRequest::Store(_))
         | Body::Capture(CaptureRequest::Arm { .. } | CaptureRequest::Disarm)
         | Body::Reboot => Nature::Once,

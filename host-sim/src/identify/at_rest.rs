@@ -51,8 +51,11 @@ impl AtRest {
             bias_velocity_mm_s: 0.0,
             open_loop: false,
         };
-        let experiment = standstill(&request, rig.axis().rate_hz);
+        let rate_hz = rig.axis().rate_hz;
+        let mut experiment = standstill(&request, rate_hz);
         let recording = rig.perform(&experiment, progress)?;
+        // A model is run as the axis was: the rig may have recorded more coarsely.
+        experiment.decimation = (recording.sample_time_s * rate_hz).round() as usize;
         Ok(Self {
             excitation,
             settings,

@@ -38,7 +38,7 @@ pub struct Experiment {
     /// after the last. The experiment lasts until both this and the motion have ended.
     pub injection_v: Vec<f64>,
     /// Control periods in a sample of the recording, at least 1: voltages are the mean over them, positions are those
-    /// at their beginning.
+    /// at their beginning. A rig that cannot sample so often takes more.
     pub decimation: usize,
     /// Time after which the experiment is given up, s.
     pub time_limit_s: f64,

@@ -263,18 +263,17 @@ fn errors_name_the_line_the_value_and_the_remedy() {
 }
 
 #[test]
-fn what_the_link_cannot_do_is_named() {
+fn an_axis_of_unknown_travel_is_not_excited() {
     let folder = tempfile::tempdir().unwrap();
-    let output = session(
-        folder.path(),
-        &[],
-        "identify motor-constant x --out a.csv\n",
-    );
-    let errors = String::from_utf8(output.stderr).unwrap();
-    assert!(
-        errors.contains("no message that adds a voltage"),
-        "{errors}"
-    );
+    for script in [
+        "identify plant x --out a.csv\n",
+        "commission --axis x --out x\n",
+    ] {
+        let output = session(folder.path(), &[], script);
+        assert!(!output.status.success());
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(errors.contains("--travel"), "{errors}");
+    }
 }
 
 #[test]

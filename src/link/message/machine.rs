@@ -57,6 +57,8 @@ pub enum AxisMode {
     Stream,
     /// A braking ramp.
     Stopping,
+    /// The axis itself: a host drives its amplifier.
+    OpenLoop,
 }
 
 impl From<CourseMode> for AxisMode {
@@ -68,6 +70,7 @@ impl From<CourseMode> for AxisMode {
             CourseMode::Home => Self::Home,
             CourseMode::Stream => Self::Stream,
             CourseMode::Stopping => Self::Stopping,
+            CourseMode::OpenLoop => Self::OpenLoop,
         }
     }
 }

@@ -7,6 +7,7 @@
 //! `Response` as the first message, and `Version` as the first error.
 
 mod error;
+mod inject;
 mod machine;
 mod motion;
 mod notice;
@@ -15,6 +16,7 @@ mod settings;
 mod text;
 
 pub use error::LinkError;
+pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
 pub use machine::{AxisMode, AxisStatus, FaultReport, Identity, NumberType, Status};
 pub use motion::{AxisPoint, AxisSet, STREAM_POINTS, SetPoint, StreamRequest, StreamStatus};
 pub use notice::{Event, Notice};
@@ -87,6 +89,8 @@ pub enum Body {
     Capture(CaptureRequest),
     /// Start afresh, as after power-up.
     Reboot,
+    /// A voltage added to an axis' output. [`Reply::Inject`].
+    Inject(InjectRequest),
 }
 
 impl Body {
@@ -110,6 +114,7 @@ impl Body {
             Self::Telemetry(_) => "telemetry",
             Self::Capture(_) => "capture",
             Self::Reboot => "reboot",
+            Self::Inject(_) => "inject",
         }
     }
 
@@ -123,6 +128,7 @@ impl Body {
                 | Self::Jog { .. }
                 | Self::Run
                 | Self::Stream(_)
+                | Self::Inject(_)
         )
     }
 
@@ -156,6 +162,16 @@ impl Body {
                     finite("velocity_mm_s", f64::from(axis.velocity_mm_s))?;
                     finite("acceleration_mm_s2", f64::from(axis.acceleration_mm_s2))?;
                 }
+            }
+            Self::Inject(InjectRequest::Open {
+                limit_v,
+                travel_mm,
+                max_velocity_mm_s,
+                ..
+            }) => {
+                finite("limit_v", *limit_v)?;
+                finite("travel_mm", *travel_mm)?;
+                finite("max_velocity_mm_s", *max_velocity_mm_s)?;
             }
             _ => {}
         }
@@ -213,4 +229,6 @@ pub enum Reply {
     Capture(CaptureStatus),
     /// Some of the capture's words.
     Words(WordPage),
+    /// How far an injected voltage has come.
+    Inject(InjectStatus),
 }

@@ -4,6 +4,7 @@
 //! not read before that answer is on its way: a host that asks too fast waits, and nothing grows. A request that takes
 //! long (settings are built, flash is written) holds up the link alone.
 
+mod inject;
 mod motion;
 mod observe;
 mod outbox;
@@ -15,11 +16,13 @@ mod vitals;
 use embedded_storage::nor_flash::NorFlash;
 use heapless::String;
 
+use self::inject::OpenInjection;
 use self::observe::Recorder;
 use self::outbox::Outbox;
 use self::stream::OpenStream;
 use super::queues::ServerEnds;
 use super::{Axis, Meters, Snapshot};
+use crate::axis::CourseMode;
 use crate::hal::Serial;
 use crate::link::frame::FrameCounters;
 use crate::link::message::{
@@ -97,6 +100,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     store: Store<F>,
     buffer: &'a mut [u8; BUFFER_BYTES],
     stream: Option<OpenStream>,
+    injection: Option<OpenInjection>,
     heard_tick: u32,
     packer: Packer,
     generation: u8,
@@ -131,6 +135,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             store: parts.store,
             buffer: parts.buffer,
             stream: None,
+            injection: None,
             heard_tick: 0,
             packer: Packer::default(),
             generation: 0,
@@ -168,9 +173,12 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         self.tell(tick, event.into());
     }
 
-    /// Whether the axes follow a host's set points, and it has fallen silent.
+    /// Whether the axes do what a host must be there for (set points, a jog, an injected voltage), and it has fallen silent.
     pub fn link_lost(&self) -> bool {
-        self.stream.is_some() && self.seen.tick.wrapping_sub(self.heard_tick) > LINK_PATIENCE_TICKS
+        let needed = self.stream.is_some()
+            || self.is_injecting()
+            || self.seen.view.modes.contains(&CourseMode::Jog);
+        needed && self.seen.tick.wrapping_sub(self.heard_tick) > LINK_PATIENCE_TICKS
     }
 
     /// Takes and sends what the port allows, and goes on with what takes longer. `seen` is the latest snapshot.
@@ -182,6 +190,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         self.build_pending();
         self.collect_capture();
         self.follow_stream();
+        self.follow_injection();
         for _ in 0..MESSAGES_PER_POLL {
             if !self.outbox.flush(serial) {
                 return After::GoOn;
@@ -262,6 +271,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             Body::Status => Ok(Reply::Status(self.status())),
             Body::Fault => Ok(Reply::Fault(self.fault())),
             Body::Stream(request) => self.serve_stream(request),
+            Body::Inject(request) => self.serve_inject(request),
             Body::Settings(request) => self.serve_settings(request),
             Body::Telemetry(request) => self.serve_telemetry(request),
             Body::Capture(request) => self.serve_capture(request),

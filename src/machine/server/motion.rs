@@ -23,6 +23,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             Body::Stop => {
                 self.stream = None;
                 self.command(Command::Stop)?;
+                self.give_up_injection();
             }
             Body::Run => self.command(Command::Run)?,
             Body::Home(axes) => {

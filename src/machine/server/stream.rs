@@ -4,7 +4,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, invalid, refused};
 use crate::link::message::{self, LinkError, Reply, StreamRequest, StreamStatus};
-use crate::machine::queues::SEGMENT_ROOM;
+use crate::machine::queues::{FEED_ROOM, Feed};
 use crate::reference::{
     AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
     StreamPlanner,
@@ -14,7 +14,7 @@ use crate::scalar::Scalar;
 use crate::units::Position;
 
 /// Segments that must wait before the axes start: the host is that far ahead.
-const START_SEGMENTS: usize = SEGMENT_ROOM / 2;
+const START_SEGMENTS: usize = FEED_ROOM / 2;
 
 /// A stream that a host has opened.
 #[derive(Debug)]
@@ -60,7 +60,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 "the outputs are off; enable them first"
             )));
         }
-        if view.running {
+        if view.running || self.is_injecting() {
             return Err(refused(format_args!(
                 "a motion is under way; stop it or wait until it ends"
             )));
@@ -97,7 +97,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     ) -> Result<bool, LinkError> {
         let scales: [MotionScale; 3] =
             core::array::from_fn(|axis| self.in_force.motion_scale(axis));
-        let room = self.ends.segments.ready();
+        let room = self.ends.feeds.ready();
         let stream = self.opened()?;
         if number < stream.next {
             return Ok(true);
@@ -131,22 +131,22 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         stream.next = number.saturating_add(1);
         stream.complete = last;
         // There is room: it was looked at before.
-        let _ = self.ends.segments.enqueue(segments);
+        let _ = self.ends.feeds.enqueue(Feed::Segments(segments));
         Ok(true)
     }
 
     fn stream_status(&mut self) -> Result<Reply, LinkError> {
-        let waiting = self.ends.segments.len();
+        let waiting = self.ends.feeds.len();
         let stream = self.opened()?;
         Ok(Reply::Stream(StreamStatus {
             next_sequence: stream.next,
-            free: (SEGMENT_ROOM - waiting) as u16,
+            free: (FEED_ROOM - waiting) as u16,
         }))
     }
 
     /// Starts the axes when enough is there, and forgets a stream that has ended.
     pub(super) fn follow_stream(&mut self) {
-        let waiting = self.ends.segments.len();
+        let waiting = self.ends.feeds.len();
         let view = &self.seen.view;
         let (running, enabled) = (view.running, view.safety.is_enabled());
         let Some(stream) = &self.stream else {

@@ -129,9 +129,12 @@ pub(super) enum Command {
         #[arg(long, default_value_t = 600.0, value_name = "S")]
         timeout: f64,
     },
-    /// Identify an axis from motions in closed loop.
+    /// Measure an axis, and say what it is like; the machine keeps its settings.
     #[command(subcommand)]
     Identify(super::identify::Command),
+    /// Measure an axis of which only encoder, amplifier and limits are known, and make settings for it, unattended; it moves
+    /// within its travel for about a quarter of an hour.
+    Commission(super::commission::Options),
     /// Restart the machine, as after power-up; the outputs must be off.
     Reboot,
     /// Flash firmware onto the board through its debug probe; needs probe-rs, and no connection.
@@ -324,6 +327,7 @@ impl Command {
             Self::Log { .. } => "log",
             Self::Wait { .. } => "wait",
             Self::Identify(_) => "identify",
+            Self::Commission(_) => "commission",
             Self::Reboot => "reboot",
             Self::Flash(_) => "flash",
             Self::Script => "-",

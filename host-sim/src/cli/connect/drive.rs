@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 
 use super::command::Command;
 use super::printer::Printer;
-use super::{identify, machine, observe, program, scope, settings};
+use super::{commission, identify, machine, observe, program, scope, settings};
 
 /// A session with a machine, and where its results go.
 pub(super) struct Session {
@@ -105,6 +105,7 @@ impl Session {
             Command::Scope(options) => scope::run(self, options),
             Command::Log { seconds } => observe::log(self, *seconds),
             Command::Identify(command) => identify::run(client, command),
+            Command::Commission(options) => commission::run(client, options),
             Command::Flash(_) | Command::Script => {
                 anyhow::bail!("this command is for the shell, not for a session")
             }

@@ -6,19 +6,22 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use quadrant::safety::AxisName;
 use quadrant::settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::{measuring_settings, quiet_settings};
+use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings, quiet_settings};
 use quadrant_sim::console::Client;
 use quadrant_sim::console::rig::ConnectedRig;
+use quadrant_sim::identify::frf::{self, FrfSettings};
 use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended, shuttle};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
+use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::identify::static_friction::{self, Exponent, StaticFrictionSettings, fit_map};
 use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
-use quadrant_sim::presentation::{friction_table, gms_table, motion_table};
+use quadrant_sim::presentation::{friction_table, gms_table, motion_table, plant_tables};
 use quadrant_sim::report::Table;
 use quadrant_sim::rig::Rig;
 use serde_json::json;
 
 use super::command::axis_parser;
+use super::commission::{travel, travel_mm};
 use super::drive::Answer;
 use crate::cli::output::share;
 
@@ -32,8 +35,12 @@ pub(super) enum Command {
     /// Move the axis in a slow sine of micrometres under a quiet controller, and identify the GMS model; needs a plant in the
     /// settings.
     VirginCurve(Options),
-    /// Measure the acceleration per volt in open loop: the first step of `quadrant commission`.
+    /// Measure the acceleration per volt in open loop, within some millimetres; needs nothing that works but encoder and
+    /// amplifier.
     MotorConstant(Options),
+    /// Excite the axis while it moves at 37 mm/s, measure its frequency response, position over voltage, and fit the linear
+    /// model; the file holds the response.
+    Plant(Options),
 }
 
 /// Options of a measurement.
@@ -42,11 +49,17 @@ pub(super) struct Options {
     /// The axis: x, y or z.
     #[arg(value_parser = axis_parser())]
     axis: AxisName,
-    /// File for the recording, CSV, which `quadrant identify ... --record` reads.
+    /// How far the axis may go from where it stands, either way, mm; without it, as far as its soft limits, once it is homed.
+    #[arg(long, value_name = "MM", value_parser = travel)]
+    travel: Option<f64>,
+    /// File for the recording, CSV, which `quadrant identify ... --record` reads; of a response, which `--frf` does.
     #[arg(long, value_name = "FILE")]
     out: PathBuf,
 }
 
+/// Travel of an axis that is not homed and has none stated, mm: of voltage steps, and of motions.
+const STEPS_TRAVEL_MM: f64 = 20.0;
+const MOTION_TRAVEL_MM: f64 = 200.0;
 /// Moves to and fro.
 const ROUNDS: usize = 1;
 /// Slip-blocks.
@@ -56,8 +69,15 @@ pub(super) fn run(client: &mut Client, command: &Command) -> anyhow::Result<Answ
     let (Command::Motion(options)
     | Command::StaticFriction(options)
     | Command::VirginCurve(options)
-    | Command::MotorConstant(options)) = command;
-    let mut rig = ConnectedRig::new(client, options.axis)?;
+    | Command::MotorConstant(options)
+    | Command::Plant(options)) = command;
+    let travel_mm = match (travel_mm(client, options.axis, options.travel), command) {
+        (Ok(travel_mm), _) => travel_mm,
+        (Err(error), Command::Plant(_)) => return Err(error),
+        (Err(_), Command::MotorConstant(_)) => STEPS_TRAVEL_MM,
+        (Err(_), _) => MOTION_TRAVEL_MM,
+    };
+    let mut rig = ConnectedRig::new(client, options.axis, travel_mm)?;
     let before = rig.settings().clone();
     let outcome = measure(&mut rig, command, options, &before);
     // Whatever came of it, the machine keeps the settings that it had.
@@ -115,7 +135,16 @@ fn measure(
             let found = virgin_curve::identify(&recording, known, &Knots::Automatic(BLOCKS))?;
             Ok(gms_table(&found))
         }
+        Command::Plant(_) => {
+            rig.apply(&measuring_settings(before))?;
+            let found = frf::measure(rig, &FrfSettings::default(), &mut progress)?;
+            let response = &found.estimate.response;
+            response.write_csv(&options.out)?;
+            let [parameters, _] = plant_tables(&fit_plant(response, &plant_fit())?);
+            Ok(parameters)
+        }
         Command::MotorConstant(_) => {
+            rig.apply(&limp_settings(before))?;
             let found =
                 motor_constant::measure(rig, &MotorConstantSettings::default(), &mut progress)?;
             found.recording.write_csv(&options.out)?;
@@ -123,5 +152,13 @@ fn measure(
                 &found, None,
             ))
         }
+    }
+}
+
+/// A model without a spring: what an axis on its guides is.
+fn plant_fit() -> PlantFitSettings {
+    PlantFitSettings {
+        stiffness: Stiffness::Zero,
+        ..PlantFitSettings::default()
     }
 }

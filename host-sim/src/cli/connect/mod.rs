@@ -1,6 +1,7 @@
 //! `quadrant connect`.
 
 mod command;
+mod commission;
 mod drive;
 mod flash;
 mod identify;

@@ -1,6 +1,9 @@
 //! Commands from standard input: a script, or a person at a prompt.
 
 use std::io::{self, BufRead, IsTerminal};
+use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
+use std::thread;
+use std::time::Duration;
 
 use anyhow::Context;
 use clap::Parser;
@@ -10,6 +13,9 @@ use rustyline::error::ReadlineError;
 
 use super::command::Command;
 use super::drive::Session;
+
+/// How long input is waited for before the machine is told that its host is there.
+const ATTENTION: Duration = Duration::from_millis(100);
 
 /// One line.
 #[derive(Debug, Parser)]
@@ -66,7 +72,19 @@ pub(super) fn run(session: &mut Session, keep_going: bool) -> anyhow::Result<boo
         return Ok(true);
     }
     let mut all = true;
-    for (index, line) in io::stdin().lock().lines().enumerate() {
+    let (lines, read) = mpsc::sync_channel(0);
+    thread::spawn(move || {
+        for line in io::stdin().lock().lines() {
+            // Nobody reads on after an error.
+            if lines.send(line).is_err() {
+                return;
+            }
+        }
+    });
+    for index in 0.. {
+        let Some(line) = attended(session, &read) else {
+            break;
+        };
         let line = line.context("cannot read standard input")?;
         let succeeded = one(session, &line, &format!("line {}", index + 1));
         all &= succeeded;
@@ -92,24 +110,52 @@ fn one(session: &mut Session, line: &str, place: &str) -> bool {
     }
 }
 
+/// The next of what another thread reads, or nothing when that has ended; meanwhile the machine knows that its host is there.
+fn attended<T>(session: &mut Session, read: &Receiver<T>) -> Option<T> {
+    loop {
+        match read.recv_timeout(ATTENTION) {
+            Ok(line) => return Some(line),
+            Err(RecvTimeoutError::Disconnected) => return None,
+            // A connection that is broken shows with the next command.
+            Err(RecvTimeoutError::Timeout) => drop(session.client.keep_alive()),
+        }
+    }
+}
+
 /// A person: errors end nothing, Ctrl-C stops the axes, Ctrl-D ends.
 fn prompt(session: &mut Session) -> anyhow::Result<()> {
     let mut editor = DefaultEditor::new().context("cannot use the terminal")?;
+    let (wanted, wants) = mpsc::channel();
+    let (lines, read) = mpsc::channel();
+    thread::spawn(move || {
+        while wants.recv().is_ok() {
+            let line = editor.readline("quadrant> ");
+            if let Ok(line) = &line {
+                let _ = editor.add_history_entry(line.as_str());
+            }
+            if lines.send(line).is_err() {
+                return;
+            }
+        }
+    });
     println!(
         "{}; `help` lists the commands, Ctrl-C stops the axes, Ctrl-D ends",
         session.greeting()
     );
     loop {
-        match editor.readline("quadrant> ") {
-            Ok(line) => {
-                let _ = editor.add_history_entry(line.as_str());
+        let line = match wanted.send(()) {
+            Ok(()) => attended(session, &read),
+            Err(_) => None,
+        };
+        match line {
+            Some(Ok(line)) => {
                 one(session, &line, "");
             }
-            Err(ReadlineError::Interrupted) => {
+            Some(Err(ReadlineError::Interrupted)) => {
                 session.run(&Command::Stop, "");
             }
-            Err(ReadlineError::Eof) => return Ok(()),
-            Err(error) => return Err(error).context("cannot read the terminal"),
+            Some(Err(ReadlineError::Eof)) | None => return Ok(()),
+            Some(Err(error)) => return Err(error).context("cannot read the terminal"),
         }
     }
 }

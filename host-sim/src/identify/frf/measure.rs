@@ -183,6 +183,7 @@ pub fn measure(
         let recording = rig.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);
         })?;
+        let period = in_samples(period, &recording, axis.rate_hz)?;
         let steady = steady_range(&recording, settings.bias_velocity_mm_s);
         check_sliding(&recording, &steady, settings)?;
         // Blocks begin where a period does, so that the excitation is the same in each; they overlap by half.
@@ -222,6 +223,19 @@ pub fn measure(
         closed_loop: !settings.open_loop,
         recordings,
     })
+}
+
+/// A period of control periods in samples of a recording, which may be coarser.
+fn in_samples(period: usize, recording: &Recording, rate_hz: f64) -> Result<usize, SettingError> {
+    let every = (recording.sample_time_s * rate_hz).round() as usize;
+    if every == 0 || !period.is_multiple_of(every) {
+        return Err(SettingError {
+            field: "period",
+            value: period as f64 / rate_hz,
+            expected: "it must be a whole number of the samples that the rig records",
+        });
+    }
+    Ok(period / every)
 }
 
 fn too_short(settings: &FrfSettings, travel_mm: f64) -> FrfError {

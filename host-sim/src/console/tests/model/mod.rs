@@ -197,7 +197,7 @@ fn read(channel: Channel, position_mm: &[f64; 3], tick: u32) -> u32 {
         Channel::Axis(axis, AxisSignal::Position) => counts(axis).round() as i32 as u32,
         Channel::Axis(axis, AxisSignal::Reference) => (256.0 * counts(axis)).round() as i32 as u32,
         Channel::Axis(_, AxisSignal::Error) => 0.001_f32.to_bits(),
-        Channel::Axis(_, AxisSignal::Code | AxisSignal::LimitedBy) => 0,
+        Channel::Axis(_, AxisSignal::Code | AxisSignal::LimitedBy | AxisSignal::CodeSum) => 0,
         Channel::Axis(..) => (0.25 * tick as f32).to_bits(),
         Channel::Stage(StageSignal::Tick) => tick,
         Channel::Stage(_) => 3,

@@ -90,6 +90,7 @@ impl Model {
             // What no block was filled with is let go.
             Body::Telemetry(TelemetryRequest::Stop) => self.telemetry = None,
             Body::Capture(request) => return self.capture(request),
+            Body::Inject(_) => return Err(refused("the model injects nothing")),
             Body::Reboot => self.bench.borrow_mut().restart = true,
         }
         Ok(Reply::Done)

@@ -1,0 +1,73 @@
+//! What a request to inject a voltage comes to under the settings. For the slow half.
+
+use super::{Reason, SettingsError, StageSettings};
+use crate::injection::Injection;
+use crate::safety::AxisName;
+use crate::scalar::{Quantity, Scalar};
+use crate::units::{DacCode, Position};
+
+/// What is to be injected, and within which bounds.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InjectionSettings {
+    /// The axis.
+    pub axis: AxisName,
+    /// The values alone drive the amplifier; the other axes hold.
+    pub open_loop: bool,
+    /// The plan's motions start with it; in closed loop only.
+    pub with_plan: bool,
+    /// The largest magnitude of a value, V; above zero, at most `amplifier.output_limit_v`.
+    pub limit_v: f64,
+    /// How far the axis may go from where it was, either way, mm; above zero, at most 10 000.
+    pub travel_mm: f64,
+    /// How fast it may be, mm/s; above zero, at most `limits.max_velocity_mm_s`.
+    pub max_velocity_mm_s: f64,
+}
+
+/// Farther than any machine's travel, mm.
+const MOST_TRAVEL_MM: f64 = 1e4;
+
+impl StageSettings {
+    /// Builds an injection, and says which magnitude of a word its limit is.
+    ///
+    /// # Errors
+    /// The first of its numbers that is out of range.
+    pub fn injection<S: Scalar>(
+        &self,
+        request: &InjectionSettings,
+    ) -> Result<(Injection<S>, u16), SettingsError> {
+        let axis = self.axis(request.axis);
+        let within = |field, value: f64, most: f64| {
+            // So written, what is not a number is refused.
+            if value > 0.0 && value <= most {
+                return Ok(());
+            }
+            Err(SettingsError {
+                axis: Some(request.axis),
+                field,
+                value,
+                reason: Reason::OutOfRange { least: 0.0, most },
+            })
+        };
+        within("limit_v", request.limit_v, axis.amplifier.output_limit_v)?;
+        within("travel_mm", request.travel_mm, MOST_TRAVEL_MM)?;
+        within(
+            "max_velocity_mm_s",
+            request.max_velocity_mm_s,
+            axis.limits.max_velocity_mm_s,
+        )?;
+        let volts_per_word = axis.amplifier.full_scale_v / DacCode::FULL_SCALE;
+        let resolution_mm = axis.encoder.resolution_mm;
+        let counts_per_tick = request.max_velocity_mm_s / (resolution_mm * self.rate_hz);
+        let injection = Injection {
+            axis: request.axis,
+            open_loop: request.open_loop,
+            with_plan: request.with_plan,
+            volts: S::gain(volts_per_word, Quantity::Integer, Quantity::Voltage),
+            travel: Position::from_mm(request.travel_mm, resolution_mm),
+            // Half a count for what quantisation adds, as the monitor of overspeed has it.
+            fastest: libm::round(256.0 * (counts_per_tick + 0.5)) as u32,
+        };
+        let most = libm::round(request.limit_v / volts_per_word) as u16;
+        Ok((injection, most))
+    }
+}
