@@ -6,6 +6,7 @@ mod state;
 pub use state::AxisState;
 
 use crate::control::feedback::{Feedback, FeedbackInput, FeedbackState, FeedbackTerms};
+use crate::control::pid::Pid;
 pub use crate::course::CourseMode;
 use crate::course::{Course, CourseEvent};
 use crate::encoder::{Encoder, EncoderReading};
@@ -26,7 +27,7 @@ pub const MAX_PREVIEW_TICKS: usize = 30;
 const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 2;
 
 /// The output stage of an axis.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Amplifier<S: Scalar> {
     pub(crate) limit: S,
     pub(crate) codes_per_volt: S::Gain,
@@ -66,6 +67,28 @@ pub struct Axis<S: Scalar, const N: usize> {
 }
 
 impl<S: Scalar, const N: usize> Axis<S, N> {
+    /// An axis that puts out nothing: room for one that is
+    /// [built in its place](crate::settings::StageSettings::build_axis_into).
+    #[inline(never)]
+    pub fn blank() -> Self {
+        Self {
+            encoder: Encoder::default(),
+            unit_mm: S::Gain::default(),
+            unit_mm_s: S::Gain::default(),
+            feedback: Feedback::Pid(Pid::default()),
+            feedforward: Feedforward::blank(),
+            preview_ticks: 0,
+            amplifier: Amplifier::default(),
+            transfer_decay: S::ZERO,
+            overspeed: Overspeed::default(),
+            silence: Silence::default(),
+            index: IndexSpacing::default(),
+            following: Following::default(),
+            travel: Travel::UNLIMITED,
+            course: Course::default(),
+        }
+    }
+
     /// Takes the encoder's reading; says whether there is nothing to suspect. What there is stays in `state.suspect`.
     #[inline(always)]
     pub(crate) fn measure(&self, state: &mut AxisState<S, N>, reading: &EncoderReading) -> bool {

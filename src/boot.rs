@@ -1,12 +1,16 @@
 //! What the firmware starts with: settings, and what the last run left.
 
+use core::mem::MaybeUninit;
+
 use embedded_storage::nor_flash::NorFlash;
+use quadrant::capture::CAPTURE_WORDS;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::ResetCause;
 use quadrant::last_words::Death;
 use quadrant::link::lockstep::Job;
-use quadrant::link::message::Provenance;
-use quadrant::safety::FaultCode;
+use quadrant::link::message::{NumberType, Provenance};
+use quadrant::machine::{Axis, Control, ControlEnds, Queues, Server, ServerParts};
+use quadrant::safety::{AxisName, FaultCode, StreamLoss};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
@@ -14,58 +18,147 @@ use quadrant::store::{BUFFER_BYTES, Finding, Store};
 
 use crate::{board, log};
 
-/// What is in force from the first tick on.
-pub(crate) struct Loaded<S: Scalar, F> {
-    /// Settings that have been checked.
-    pub(crate) settings: StageSettings,
-    /// The motions.
-    pub(crate) plan: Plan<S>,
-    /// Where the settings come from.
-    pub(crate) provenance: Provenance,
-    /// Where they are stored.
-    pub(crate) store: Store<F>,
-    /// Stored settings were refused.
-    pub(crate) fault: Option<FaultCode>,
+/// Where all that is large is made, and stays: the stack has no room for it.
+pub(crate) struct Places<S: Scalar + 'static, F: 'static> {
+    settings: MaybeUninit<StageSettings>,
+    draft: MaybeUninit<StageSettings>,
+    axes: [MaybeUninit<Axis<S>>; 4],
+    queues: Queues<'static, S>,
+    buffer: [u8; BUFFER_BYTES],
+    capture: [u32; CAPTURE_WORDS],
+    control: MaybeUninit<Control<'static, 'static, S>>,
+    server: MaybeUninit<Server<'static, 'static, S, F>>,
 }
 
-/// The settings in flash; without them those of the job that a host has left; without one, the defaults.
+impl<S: Scalar, F> Places<S, F> {
+    /// Before the start.
+    pub(crate) const fn new() -> Self {
+        Self {
+            settings: MaybeUninit::uninit(),
+            draft: MaybeUninit::uninit(),
+            axes: [const { MaybeUninit::uninit() }; 4],
+            queues: Queues::new(),
+            buffer: [0; BUFFER_BYTES],
+            capture: [0; CAPTURE_WORDS],
+            control: MaybeUninit::uninit(),
+            server: MaybeUninit::uninit(),
+        }
+    }
+}
+
+/// The two halves of the machine, ready for the first tick.
+pub(crate) struct Machine<S: Scalar + 'static, F: 'static> {
+    /// The control interrupt's.
+    pub(crate) control: &'static mut Control<'static, 'static, S>,
+    /// The slow one.
+    pub(crate) server: &'static mut Server<'static, 'static, S, F>,
+    /// Control rate, Hz.
+    pub(crate) rate_hz: u32,
+}
+
+/// Loads the settings and makes the machine of them. `remains` is what the last run left; `cycle_hz` is the rate of the
+/// timer that measures ticks.
+pub(crate) fn machine<S: Scalar, F: NorFlash>(
+    places: &'static mut Places<S, F>,
+    flash: F,
+    remains: Option<FaultCode>,
+    cycle_hz: u32,
+    number: NumberType,
+) -> Machine<S, F> {
+    let settings = defaults(&mut places.settings);
+    let Loaded {
+        plan,
+        provenance,
+        store,
+        fault,
+    } = load(flash, settings, &mut places.buffer);
+    // What the spare holds does not matter: it is built over before it is used.
+    let [x, y, z, spare] = places.axes.each_mut().map(blank_axis);
+    let mut axes = [x, y, z];
+    // Tables are filled and bounds are searched before the first tick is due.
+    for (name, axis) in AxisName::ALL.into_iter().zip(&mut axes) {
+        settings.build_axis_into(name, axis);
+    }
+    let rate_hz = settings.rate_hz as u32;
+    let streaming = settings.streaming.build();
+    let (control_ends, ends) = places.queues.split();
+    let control = place_control(&mut places.control, axes, streaming, plan, control_ends);
+    if let Some(code) = remains.or(fault) {
+        control.start_faulted(code);
+    }
+    let parts = ServerParts {
+        ends,
+        spare,
+        settings,
+        draft: defaults(&mut places.draft),
+        provenance,
+        store,
+        buffer: &mut places.buffer,
+        capture: &mut places.capture,
+        board: board::NAME,
+        cycle_hz,
+        number,
+    };
+    Machine {
+        control,
+        server: place_server(&mut places.server, parts),
+        rate_hz,
+    }
+}
+
+/// What is in force from the first tick on, beside the settings.
+struct Loaded<S: Scalar, F> {
+    /// The motions.
+    plan: Plan<S>,
+    /// Where the settings come from.
+    provenance: Provenance,
+    /// Where they are stored.
+    store: Store<F>,
+    /// Stored settings were refused.
+    fault: Option<FaultCode>,
+}
+
+/// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults.
+/// They have been checked then.
 ///
 /// # Panics
 /// When a job cannot be decoded or is refused: then there is nothing that could safely be run.
-pub(crate) fn load<S: Scalar, F: NorFlash>(
+// Each step of the start has a frame of its own, gone when the next one begins.
+#[inline(never)]
+fn load<S: Scalar, F: NorFlash>(
     flash: F,
+    settings: &mut StageSettings,
     buffer: &mut [u8; BUFFER_BYTES],
 ) -> Loaded<S, F> {
     let mut store = Store::new(flash, 0);
-    let mut settings = StageSettings::default();
     let mut report = |finding: Finding<'_>| match finding {
         Finding::Unknown(path) => defmt::warn!("{=str} is stored, but unknown here", path),
         Finding::Missing(path) => defmt::warn!("{=str} is not stored, and has its default", path),
     };
-    let found = store.load(&mut settings, FIRMWARE_ELEMENTS, buffer, &mut report);
-    let job = take(board::job());
+    let found = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut report);
     let mut provenance = Provenance::new();
     let mut fault = None;
-    match found {
+    let plan = match found {
         Ok(Some(stored)) => {
-            log::settings_loaded(&settings, stored.sequence, &stored.provenance);
+            log::settings_loaded(settings, stored.sequence, &stored.provenance);
             provenance = stored.provenance;
+            take(board::job(), None)
         }
-        Ok(None) => {
-            defmt::info!("no settings are stored: the defaults are in force, or a host's");
-            settings = job.stage;
+        not_stored => {
+            match not_stored {
+                Err(error) => {
+                    defmt::error!("stored settings refused: {}", defmt::Display2Format(&error));
+                    fault = Some(FaultCode::SettingsInvalid);
+                }
+                _ => defmt::info!("no settings are stored: the defaults are in force, or a host's"),
+            }
+            let plan = take(board::job(), Some(settings));
             built(settings.validate(FIRMWARE_ELEMENTS));
+            plan
         }
-        Err(error) => {
-            defmt::error!("stored settings refused: {}", defmt::Display2Format(&error));
-            settings = job.stage;
-            built(settings.validate(FIRMWARE_ELEMENTS));
-            fault = Some(FaultCode::SettingsInvalid);
-        }
-    }
-    let plan = built(job.plan.build(&settings));
+    };
+    let plan = built(plan.build(settings));
     Loaded {
-        settings,
         plan,
         provenance,
         store,
@@ -91,21 +184,58 @@ pub(crate) fn remains(cause: ResetCause) -> Option<FaultCode> {
     (cause == ResetCause::Watchdog).then_some(FaultCode::WatchdogReset)
 }
 
-/// Decodes the job that the board was given; without one, the default settings and no motion.
-fn take(bytes: Option<&[u8]>) -> Job {
+/// Decodes the job that the board was given: its motions, and its settings into `settings`. Without a job, there is no
+/// motion, and the settings stay as they are.
+#[inline(never)]
+fn take(bytes: Option<&[u8]>, settings: Option<&mut StageSettings>) -> PlanSettings {
     let Some(bytes) = bytes else {
-        return Job {
-            stage: StageSettings::default(),
-            plan: PlanSettings::default(),
-        };
+        return PlanSettings::default();
     };
-    match postcard::from_bytes(bytes) {
-        Ok(job) => job,
+    match postcard::from_bytes::<Job>(bytes) {
+        Ok(job) => {
+            if let Some(settings) = settings {
+                settings.copy_from(&job.stage);
+            }
+            job.plan
+        }
         Err(_) => panic!(
             "the job of {} bytes cannot be decoded: host and firmware differ in version",
             bytes.len()
         ),
     }
+}
+
+/// Makes the default settings in their place.
+#[inline(never)]
+fn defaults(place: &mut MaybeUninit<StageSettings>) -> &mut StageSettings {
+    place.write(StageSettings::default())
+}
+
+/// Makes room for an axis.
+#[inline(never)]
+fn blank_axis<S: Scalar>(place: &mut MaybeUninit<Axis<S>>) -> &mut Axis<S> {
+    place.write(Axis::blank())
+}
+
+/// Makes the fast half in its place.
+#[inline(never)]
+fn place_control<S: Scalar>(
+    place: &'static mut MaybeUninit<Control<'static, 'static, S>>,
+    axes: [&'static mut Axis<S>; 3],
+    streaming: StreamLoss,
+    plan: Plan<S>,
+    ends: ControlEnds<'static, 'static, S>,
+) -> &'static mut Control<'static, 'static, S> {
+    place.write(Control::new(axes, streaming, plan, ends))
+}
+
+/// Makes the slow half in its place.
+#[inline(never)]
+fn place_server<S: Scalar, F: NorFlash>(
+    place: &'static mut MaybeUninit<Server<'static, 'static, S, F>>,
+    parts: ServerParts<'static, 'static, S, F>,
+) -> &'static mut Server<'static, 'static, S, F> {
+    place.write(Server::new(parts))
 }
 
 /// What was built, if the settings were accepted.

@@ -10,7 +10,7 @@ use crate::scalar::Scalar;
 use crate::units::Position;
 
 /// What an axis can follow, ready for the tick.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Course<S: Scalar> {
     /// What a stop follows.
     pub(crate) braking: Ramp<S>,

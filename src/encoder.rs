@@ -44,7 +44,7 @@ pub struct Step {
 }
 
 /// An incremental encoder's counter.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Encoder {
     /// Bits that a count lies above the counter's own: 0 for a 32-bit counter, 16 for a 16-bit one.
     shift: u32,

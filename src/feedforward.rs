@@ -243,25 +243,50 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         friction: &FrictionSettings,
         period_s: f64,
     ) -> Self {
-        let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
+        let mut feedforward = Self::blank();
+        feedforward.build_over(kind, gains, friction, period_s);
+        feedforward
+    }
+
+    /// None at all, to be [built over](Self::build_over).
+    pub(crate) fn blank() -> Self {
         Self {
-            kind,
-            presliding: Presliding::build(kind, friction, period_s),
-            level_gain: share(gains.level),
-            gms_gain: share(gains.gms),
-            viscous: friction.sliding.map(|model| {
-                S::gain(
-                    gains.viscous * model.viscous_v_s_per_mm,
-                    Quantity::Velocity,
-                    Quantity::Voltage,
-                )
-            }),
-            inertia: S::gain(
-                gains.inertia_v_s2_per_mm,
-                Quantity::Acceleration,
-                Quantity::Voltage,
-            ),
+            kind: FeedforwardKind::None,
+            presliding: Presliding::blank(),
+            level_gain: S::Gain::default(),
+            gms_gain: S::Gain::default(),
+            viscous: PerDirection::default(),
+            inertia: S::Gain::default(),
         }
+    }
+
+    /// As [`build`](Self::build), in place.
+    #[inline(never)]
+    pub(crate) fn build_over(
+        &mut self,
+        kind: FeedforwardKind,
+        gains: &FeedforwardGains,
+        friction: &FrictionSettings,
+        period_s: f64,
+    ) {
+        let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
+        self.kind = kind;
+        self.level_gain = share(gains.level);
+        self.gms_gain = share(gains.gms);
+        self.viscous = friction.sliding.map(|model| {
+            S::gain(
+                gains.viscous * model.viscous_v_s_per_mm,
+                Quantity::Velocity,
+                Quantity::Voltage,
+            )
+        });
+        self.inertia = S::gain(
+            gains.inertia_v_s2_per_mm,
+            Quantity::Acceleration,
+            Quantity::Voltage,
+        );
+        self.presliding = Presliding::without_tables(kind, friction, period_s);
+        self.presliding.fill_tables(friction, period_s);
     }
 
     /// One control period.
@@ -320,30 +345,52 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
 }
 
 impl<S: Scalar, const N: usize> Presliding<S, N> {
+    fn blank() -> Self {
+        Self::Gms {
+            elements: Gms::build(&[]),
+            surface: SlidingTable::blank(),
+            breakaway: PerDirection::default(),
+        }
+    }
+
+    /// Fills the tables of a model made by [`without_tables`](Self::without_tables) of the same parameters.
+    fn fill_tables(&mut self, friction: &FrictionSettings, period_s: f64) {
+        let curves = friction.sliding.map(|model| model.curve);
+        match self {
+            Self::Gms { surface, .. } | Self::Smoothed { surface, .. } => {
+                surface.fill(&curves, friction.gms.attraction_v_s, period_s);
+            }
+            Self::Lugre(model) => {
+                if let Some(parameters) = &friction.lugre {
+                    model.fill(parameters, &curves, period_s);
+                }
+            }
+            // Its tables are small, and made with it.
+            Self::Dahl(_) => {}
+        }
+    }
+
     /// The model of a kind. Settings without the parameters of their kind are refused before they come here; the
     /// elements would stand in.
-    fn build(kind: FeedforwardKind, friction: &FrictionSettings, period_s: f64) -> Self {
+    fn without_tables(kind: FeedforwardKind, friction: &FrictionSettings, period_s: f64) -> Self {
         let (sliding, gms) = (&friction.sliding, &friction.gms);
-        let curves = sliding.map(|model| model.curve);
-        let surface = || SlidingTable::build(&curves, gms.attraction_v_s, period_s);
         match (kind, &friction.lugre, &friction.dahl) {
-            (FeedforwardKind::Lugre, Some(lugre), _) => {
-                Self::Lugre(Lugre::build(lugre, &curves, period_s))
-            }
-            (FeedforwardKind::Dahl, _, Some(dahl)) => {
-                Self::Dahl(Dahl::build(dahl, curves.map(|curve| curve.coulomb_v)))
-            }
+            (FeedforwardKind::Lugre, Some(_), _) => Self::Lugre(Lugre::blank()),
+            (FeedforwardKind::Dahl, _, Some(dahl)) => Self::Dahl(Dahl::build(
+                dahl,
+                sliding.map(|model| model.curve.coulomb_v),
+            )),
             (FeedforwardKind::SmoothedGms, ..) => Self::Smoothed {
                 elements: SmoothedGms::build(
                     &gms.elements,
                     &friction.smoothed_gms,
                     friction.mean_breakaway_v(),
                 ),
-                surface: surface(),
+                surface: SlidingTable::blank(),
             },
             _ => Self::Gms {
                 elements: Gms::build(&gms.elements),
-                surface: surface(),
+                surface: SlidingTable::blank(),
                 breakaway: sliding.map(|model| {
                     Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
                 }),

@@ -50,24 +50,19 @@ mod app {
     use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
-    use quadrant::capture::CAPTURE_WORDS;
-    use quadrant::friction::gms::FIRMWARE_ELEMENTS;
     use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
     use quadrant::link::message::NumberType;
     use quadrant::machine::{
-        After, Axis, Control, ControlInputs, Liveness, Meters, Queues, Server, ServerParts,
-        Snapshot, Supervision,
+        After, Control, ControlInputs, Liveness, Meters, Server, Snapshot, Supervision,
     };
     use quadrant::safety::{AxisName, AxisSwitches, Command};
-    use quadrant::stage::StageState;
-    use quadrant::store::BUFFER_BYTES;
     use quadrant::supervisor::Event;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
         Switches, Tick, Watchdog,
     };
-    use crate::boot;
+    use crate::boot::{self, Places};
     use crate::log::{self, Line, Narrator, Printer};
 
     /// What the control law computes with.
@@ -104,8 +99,8 @@ mod app {
 
     #[local]
     struct Local {
-        control: Control<'static, 'static, Number>,
-        server: Server<'static, 'static, Number, SettingsFlash>,
+        control: &'static mut Control<'static, 'static, Number>,
+        server: &'static mut Server<'static, 'static, Number, SettingsFlash>,
         amplifiers: Amplifiers,
         encoders: Encoders,
         switches: Switches,
@@ -130,10 +125,7 @@ mod app {
     }
 
     #[init(local = [
-        axes: [Option<Axis<Number>>; 4] = [const { None }; 4],
-        queues: Queues<'static, Number> = Queues::new(),
-        buffer: [u8; BUFFER_BYTES] = [0; BUFFER_BYTES],
-        capture: [u32; CAPTURE_WORDS] = [0; CAPTURE_WORDS],
+        places: Places<Number, SettingsFlash> = Places::new(),
         requests: Queue<Command, 4> = Queue::new(),
         commands: Queue<Command, 4> = Queue::new(),
         snapshots: Queue<Snapshot<Number>, 4> = Queue::new(),
@@ -143,50 +135,22 @@ mod app {
     fn init(cx: init::Context) -> (Shared, Local) {
         let mut board = Board::init(cx.core);
         let remains = boot::remains(board.reset_cause);
-        // Tables are filled and bounds are searched before the first tick is due.
-        let boot::Loaded {
-            settings,
-            plan,
-            provenance,
-            store,
-            fault,
-        } = boot::load(board.flash, cx.local.buffer);
-        let [x, y, z, spare] = cx.local.axes;
-        let axes = [
-            x.insert(settings.build_axis(AxisName::X)),
-            y.insert(settings.build_axis(AxisName::Y)),
-            z.insert(settings.build_axis(AxisName::Z)),
-        ];
-        let spare = spare.insert(axes[0].clone());
-        let state = match remains.or(fault) {
-            Some(code) => StageState::<Number, FIRMWARE_ELEMENTS>::with_fault(code),
-            None => StageState::default(),
-        };
-        let rate_hz = settings.rate_hz as u32;
+        let cycle_hz = board.tick.cycle_hz();
+        let boot::Machine {
+            control,
+            server,
+            rate_hz,
+        } = boot::machine(cx.local.places, board.flash, remains, cycle_hz, NUMBER);
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
-        let (control_ends, ends) = cx.local.queues.split();
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
         let (snapshots_in, snapshots_out) = cx.local.snapshots.split();
         let (events_in, events_out) = cx.local.events.split();
         let (lines_in, lines_out) = cx.local.lines.split();
-        let streaming = settings.streaming.build();
-        let server = Server::new(ServerParts {
-            ends,
-            spare,
-            settings,
-            provenance,
-            store,
-            buffer: cx.local.buffer,
-            capture: cx.local.capture,
-            board: board::NAME,
-            cycle_hz: board.tick.cycle_hz(),
-            number: NUMBER,
-        });
         board.tick.start(rate_hz);
         board.watchdog.start();
         let local = Local {
-            control: Control::new(axes, streaming, plan, state, control_ends),
+            control,
             server,
             amplifiers: board.amplifiers,
             encoders: board.encoders,

@@ -68,14 +68,18 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
 impl<S: Scalar, const N: usize> StageState<S, N> {
     /// A stage that starts with a fault latched: what the last run or the stored settings left.
     pub fn with_fault(code: FaultCode) -> Self {
-        Self {
-            safety: SafetyState::Faulted(Fault {
-                code,
-                axis: None,
-                tick: 0,
-            }),
-            ..Self::default()
-        }
+        let mut state = Self::default();
+        state.start_faulted(code);
+        state
+    }
+
+    /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet.
+    pub fn start_faulted(&mut self, code: FaultCode) {
+        self.safety = SafetyState::Faulted(Fault {
+            code,
+            axis: None,
+            tick: 0,
+        });
     }
 
     /// The axes' memories.

@@ -40,26 +40,45 @@ fn end_exponent(end: f64) -> i32 {
 }
 
 impl<S: Scalar, const CURVES: usize> OctaveTable<S, CURVES> {
-    /// Tabulates `curve` from zero to the first power of two at or above `end`, which must be positive and within the
-    /// range of the `argument` quantity. `values` are the quantities of the curves. Settings time only.
+    /// A table of zeros, to be [filled](Self::fill).
+    pub fn blank() -> Self {
+        Self {
+            start: OctaveStart::default(),
+            nodes: [[S::ZERO; CURVES]; NODES],
+        }
+    }
+
+    /// A table that is [filled](Self::fill) at once.
     pub fn build(
         end: f64,
         argument: Quantity,
         values: [Quantity; CURVES],
-        mut curve: impl FnMut(f64) -> [f64; CURVES],
+        curve: impl Fn(f64) -> [f64; CURVES],
     ) -> Self {
+        let mut table = Self::blank();
+        table.fill(end, argument, values, &curve);
+        table
+    }
+
+    /// Tabulates `curve` from zero to the first power of two at or above `end`, which must be positive and within the
+    /// range of the `argument` quantity. `values` are the quantities of the curves. Settings time only.
+    // In place, and once in the image for all curves: a table is larger than the firmware's stack ought to be.
+    #[inline(never)]
+    pub fn fill(
+        &mut self,
+        end: f64,
+        argument: Quantity,
+        values: [Quantity; CURVES],
+        curve: &dyn Fn(f64) -> [f64; CURVES],
+    ) {
         let end = end_exponent(end);
-        let mut nodes = [[S::ZERO; CURVES]; NODES];
-        for (index, node) in nodes.iter_mut().enumerate() {
+        for (index, node) in self.nodes.iter_mut().enumerate() {
             let exact = curve(node_argument(index, end));
             for ((slot, value), quantity) in node.iter_mut().zip(exact).zip(values) {
                 *slot = S::quantise(value, quantity);
             }
         }
-        Self {
-            start: OctaveStart::new(end - OCTAVES as i32, argument),
-            nodes,
-        }
+        self.start = OctaveStart::new(end - OCTAVES as i32, argument);
     }
 
     /// The curves at a non-negative argument, by linear interpolation.

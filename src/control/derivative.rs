@@ -9,7 +9,7 @@ use crate::scalar::{Quantity, Scalar};
 const ERROR_LIMIT_MM: f64 = 31.0;
 
 /// The derivative ready for the tick.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Derivative<S: Scalar> {
     gain: S::Gain,
     pole: S,

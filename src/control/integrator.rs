@@ -5,7 +5,7 @@ use super::feedback::{FeedbackState, FeedbackTerms};
 use crate::scalar::{Quantity, Scalar};
 
 /// The integral ready for the tick. It is held in volts, so that a change of its gain does not move the output.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Integrator<S: Scalar> {
     per_tick: S::Gain,
     limit: S,

@@ -11,7 +11,7 @@ use crate::scalar::{Quantity, Scalar};
 pub use super::popov::PidGains;
 
 /// The PID ready for the tick.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pid<S: Scalar> {
     pub(super) proportional: S::Gain,
     pub(super) derivative: Derivative<S>,

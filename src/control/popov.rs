@@ -81,7 +81,7 @@ impl PidGains {
 /// parameter outside the range its field states, NaN included, or a loop so fast against its delay that the frequency
 /// grid does not reach the end of it.
 ///
-/// Settings time only: some 400,000 operations in double precision and 16 KiB of stack.
+/// Settings time only: some 400,000 operations in double precision and 5 KiB of stack.
 pub fn sector_bound(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> f64 {
     sector_proof(plant, gains, sample_time_s).popov
 }
@@ -116,20 +116,21 @@ pub fn sector_proof(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) ->
         delay_s: plant.delay_s + sample_time_s / 2.0,
         ..*plant
     };
-    let popov = Loop {
+    let tested = Loop {
         plant: held,
         gains: *gains,
+    };
+    let mut plot = PopovPlot::EMPTY;
+    if tested.tabulate(&mut plot).is_none() {
+        return SectorProof::NOTHING;
     }
-    .tabulate();
-    popov.map_or(SectorProof::NOTHING, |plot| {
-        let bound = |intercept: f64| (1.0 - 1.0 / intercept).min(NO_LIMIT);
-        let (slope_s, intercept) = plot.best_line();
-        SectorProof {
-            popov: bound(intercept),
-            slope_s,
-            circle: bound(plot.leftmost(0.0).0.min(-f64::MIN_POSITIVE)),
-        }
-    })
+    let bound = |intercept: f64| (1.0 - 1.0 / intercept).min(NO_LIMIT);
+    let (slope_s, intercept) = plot.best_line();
+    SectorProof {
+        popov: bound(intercept),
+        slope_s,
+        circle: bound(plot.leftmost(0.0).0.min(-f64::MIN_POSITIVE)),
+    }
 }
 
 /// The largest answer.
@@ -222,8 +223,8 @@ impl Loop {
         self.shifted(low).re
     }
 
-    /// The Popov plot, or nothing when the loop is not shown to be stable.
-    fn tabulate(&self) -> Option<PopovPlot> {
+    /// Fills the Popov plot; nothing when the loop is not shown to be stable.
+    fn tabulate(&self, plot: &mut PopovPlot) -> Option<()> {
         let longest_step = if self.plant.delay_s > 0.0 {
             DELAY_STEP_RAD / self.plant.delay_s
         } else {
@@ -234,13 +235,12 @@ impl Loop {
         if !(previous.re > 0.0 && previous.im == 0.0) {
             return None;
         }
-        let mut points = [(0.0, 0.0); POINTS];
         let mut omega = scale * 1e-3;
         let mut last = omega;
         let mut below = self.shifted(omega);
         let mut angle = 0.0;
         let mut crossing = 0.0;
-        for point in &mut points {
+        for point in &mut plot.points {
             let (numerator, characteristic) = self.polynomials(omega);
             let turn = angle_between(previous, characteristic);
             // Also false for NaN, from parameters too large for their products to be finite.
@@ -253,7 +253,11 @@ impl Loop {
             if (shifted.im < 0.0) != (below.im < 0.0) && shifted.re.min(below.re) < 0.0 {
                 crossing = self.real_part_at_crossing(last, omega).min(crossing);
             }
-            *point = (shifted.re, omega * shifted.im);
+            *point = (shifted.re as f32, (omega * shifted.im) as f32);
+            let held = point.0.is_finite() && point.1.is_finite();
+            if !held {
+                return None;
+            }
             (previous, below, last) = (characteristic, shifted, omega);
             omega += (omega * LOG_STEP).min(longest_step);
         }
@@ -268,12 +272,10 @@ impl Loop {
             return None;
         }
         let tail = bound / (1.0 - bound);
-        Some(PopovPlot {
-            points,
-            crossing,
-            tail: (-tail, last * tail),
-            largest_q: 1e3 / scale,
-        })
+        plot.crossing = crossing;
+        plot.tail = (-tail, last * tail);
+        plot.largest_q = 1e3 / scale;
+        Some(())
     }
 }
 
@@ -285,8 +287,9 @@ fn angle_between(from: Complex64, to: Complex64) -> f64 {
 
 /// The Popov plot of `H`: Re H against w Im H, per point of the frequency grid.
 struct PopovPlot {
-    /// Re H, and w Im H in rad/s.
-    points: [(f64, f64); POINTS],
+    /// Re H, and w Im H in rad/s. In single precision, whose rounding is far below what the grid leaves uncertain: this is
+    /// the largest thing on the firmware's stack.
+    points: [(f32, f32); POINTS],
     /// The leftmost crossing of the real axis, Re H; 0 without one on its negative half.
     crossing: f64,
     /// No point above the grid lies further left or higher than this.
@@ -296,6 +299,13 @@ struct PopovPlot {
 }
 
 impl PopovPlot {
+    const EMPTY: Self = Self {
+        points: [(0.0, 0.0); POINTS],
+        crossing: 0.0,
+        tail: (0.0, 0.0),
+        largest_q: 0.0,
+    };
+
     /// The q >= 0 for which the smallest `Re H - q w Im H` is largest, and that value, below zero: where the Popov line
     /// meets the real axis.
     fn best_line(&self) -> (f64, f64) {
@@ -328,11 +338,14 @@ impl PopovPlot {
             }
         };
         consider((self.crossing, 0.0));
-        consider((value(self.points[0]), -self.points[0].1));
+        let wide = |(x, y): (f32, f32)| (f64::from(x), f64::from(y));
+        let first = wide(self.points[0]);
+        consider((value(first), -first.1));
         for window in self.points.windows(3) {
             let &[before, here, after] = window else {
                 continue;
             };
+            let (before, here, after) = (wide(before), wide(here), wide(after));
             if value(here) > value(before).min(value(after)) {
                 continue;
             }

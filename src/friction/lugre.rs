@@ -73,25 +73,47 @@ impl<S: Scalar> Lugre<S> {
         curves: &PerDirection<StribeckCurve>,
         step_s: f64,
     ) -> Self {
-        let stiffness = parameters.stiffness_v_per_mm;
+        let mut model = Self::blank();
+        model.fill(parameters, curves, step_s);
+        model
+    }
+
+    /// A model that puts out nothing, to be [filled](Self::fill).
+    pub(crate) fn blank() -> Self {
         Self {
-            tables: curves.map(|curve| {
-                OctaveTable::build(
-                    table_end_mm_s(curve, stiffness, step_s),
-                    Quantity::Velocity,
-                    [Quantity::Voltage, Quantity::Fraction],
-                    |velocity| {
-                        let level = curve.level_v(velocity);
-                        [level, -libm::expm1(-stiffness * velocity * step_s / level)]
-                    },
-                )
-            }),
-            damping: S::gain(
-                parameters.damping_v_s_per_mm / (stiffness * step_s),
-                Quantity::Voltage,
-                Quantity::Voltage,
-            ),
+            tables: PerDirection {
+                positive: OctaveTable::blank(),
+                negative: OctaveTable::blank(),
+            },
+            damping: S::Gain::default(),
         }
+    }
+
+    /// As [`build`](Self::build), in place.
+    pub(crate) fn fill(
+        &mut self,
+        parameters: &LugreParameters,
+        curves: &PerDirection<StribeckCurve>,
+        step_s: f64,
+    ) {
+        let stiffness = parameters.stiffness_v_per_mm;
+        for direction in [Direction::Positive, Direction::Negative] {
+            let curve = curves.of(direction);
+            self.tables.of_mut(direction).fill(
+                table_end_mm_s(curve, stiffness, step_s),
+                Quantity::Velocity,
+                [Quantity::Voltage, Quantity::Fraction],
+                &|velocity| {
+                    let level = curve.level_v(velocity);
+                    [level, -libm::expm1(-stiffness * velocity * step_s / level)]
+                },
+            );
+        }
+        self.damping = S::gain(
+            parameters.damping_v_s_per_mm / (stiffness * step_s),
+            Quantity::Voltage,
+            Quantity::Voltage,
+        );
     }
 
     /// `sigma0 z + sigma1 dz/dt` in V after a step at `speed` (mm/s, not negative) in the sense of `displacement` (mm);

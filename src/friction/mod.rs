@@ -59,6 +59,14 @@ impl<T> PerDirection<T> {
         }
     }
 
+    /// The thing for one sense of motion, to be changed.
+    pub fn of_mut(&mut self, direction: Direction) -> &mut T {
+        match direction {
+            Direction::Positive => &mut self.positive,
+            Direction::Negative => &mut self.negative,
+        }
+    }
+
     /// Each thing turned into another.
     pub fn map<U>(&self, mut change: impl FnMut(&T) -> U) -> PerDirection<U> {
         PerDirection {

@@ -72,7 +72,7 @@ impl StaticFriction {
 }
 
 /// What the sliding surface is at this instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sliding<S> {
     /// s(v), V.
     pub level: S,
@@ -89,18 +89,39 @@ pub struct SlidingTable<S: Scalar> {
 impl<S: Scalar> SlidingTable<S> {
     /// Tabulates the curves. `attraction_v_s` is C, in V/s; `step_s` the time between evaluations. Settings time only.
     pub fn build(curves: &PerDirection<StribeckCurve>, attraction_v_s: f64, step_s: f64) -> Self {
+        let mut table = Self::blank();
+        table.fill(curves, attraction_v_s, step_s);
+        table
+    }
+
+    /// Zeros, to be [filled](Self::fill).
+    pub(crate) fn blank() -> Self {
         Self {
-            tables: curves.map(|curve| {
-                OctaveTable::build(
-                    curve.flat_velocity_mm_s(),
-                    Quantity::Velocity,
-                    [Quantity::Voltage, Quantity::Fraction],
-                    |velocity| {
-                        let level = curve.level_v(velocity);
-                        [level, decay(attraction_v_s, step_s, level)]
-                    },
-                )
-            }),
+            tables: PerDirection {
+                positive: OctaveTable::blank(),
+                negative: OctaveTable::blank(),
+            },
+        }
+    }
+
+    /// As [`build`](Self::build), in place.
+    pub(crate) fn fill(
+        &mut self,
+        curves: &PerDirection<StribeckCurve>,
+        attraction_v_s: f64,
+        step_s: f64,
+    ) {
+        for direction in [Direction::Positive, Direction::Negative] {
+            let curve = curves.of(direction);
+            self.tables.of_mut(direction).fill(
+                curve.flat_velocity_mm_s(),
+                Quantity::Velocity,
+                [Quantity::Voltage, Quantity::Fraction],
+                &|velocity| {
+                    let level = curve.level_v(velocity);
+                    [level, decay(attraction_v_s, step_s, level)]
+                },
+            );
         }
     }
 

@@ -6,7 +6,7 @@ use crate::capture::Capture;
 use crate::encoder::EncoderReading;
 use crate::friction::gms::FIRMWARE_ELEMENTS;
 use crate::reference::Motion;
-use crate::safety::{AxisName, Command, StreamLoss, Switches};
+use crate::safety::{AxisName, Command, FaultCode, StreamLoss, Switches};
 use crate::scalar::Scalar;
 use crate::stage::{Inputs, Outputs, Plan, StageRef, StageState};
 use crate::supervisor::PERIOD_TICKS;
@@ -44,18 +44,18 @@ pub struct Control<'q, 'a, S: Scalar> {
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// Ready for the first tick.
+    #[inline(never)]
     pub fn new(
         axes: [&'a mut Axis<S>; 3],
         streaming: StreamLoss,
         plan: Plan<S>,
-        state: StageState<S, FIRMWARE_ELEMENTS>,
         ends: ControlEnds<'q, 'a, S>,
     ) -> Self {
         Self {
             axes,
             streaming,
             plan,
-            state,
+            state: StageState::default(),
             sampler: Sampler::default(),
             sampling: SamplerState::default(),
             capture: None,
@@ -63,6 +63,11 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             place: 0,
             ends,
         }
+    }
+
+    /// Starts with a fault latched, before the first tick: what the last run or the stored settings left.
+    pub fn start_faulted(&mut self, code: FaultCode) {
+        self.state.start_faulted(code);
     }
 
     /// The control law's memory.

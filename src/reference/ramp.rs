@@ -85,7 +85,7 @@ pub(super) fn steps_per_mm(scale: MotionScale) -> f64 {
 }
 
 /// The limits of a ramp, ready for the tick.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Ramp<S: Scalar> {
     /// Change of the acceleration in a tick.
     jerk: i64,
@@ -315,7 +315,7 @@ impl<S: Scalar> Ramp<S> {
 const MARGIN_TICKS: u64 = 3;
 
 /// A positive factor: a mantissa, rounded up, and the bits to drop from the product with it.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Factor {
     mantissa: u32,
     shift: u32,

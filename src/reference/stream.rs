@@ -109,7 +109,7 @@ impl StreamState {
 }
 
 /// The gains of an axis' streams, ready for the tick.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Stream<S: Scalar> {
     velocity: S::Gain,
     acceleration: S::Gain,

@@ -12,7 +12,7 @@ const LARGEST_STEP: i32 = 1 << 16;
 const SPEED_NOISE_COUNTS: f64 = 0.5;
 
 /// Watches the measured speed.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overspeed {
     limit: u32,
 }
@@ -55,7 +55,7 @@ const DITHER_COUNTS: u32 = 2;
 
 /// Watches for an encoder that shows no motion while the output is high. An encoder of which one line is dead dithers by
 /// a count; that is no motion.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Silence<S> {
     /// The output from which the axis must move, V.
     pub(crate) level: S,
@@ -96,7 +96,7 @@ impl<S: Scalar> Silence<S> {
 }
 
 /// Watches the counts between index pulses: an encoder that loses edges comes to the next pulse with others.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct IndexSpacing {
     /// Counts between neighbouring pulses; zero: there is no index, or its spacing is not known.
     counts: u32,
@@ -158,7 +158,7 @@ impl IndexSpacing {
 }
 
 /// Watches the tracking error against a limit that grows with the speed of the reference.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Following<S: Scalar> {
     /// The limit at rest, mm.
     pub(crate) at_rest: S,

@@ -9,7 +9,7 @@ use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
 pub struct Fixed(pub i32);
 
 /// A constant as a normalised mantissa and a shift, `mantissa * 2^-shift`: 31 significant bits whatever its size.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct FixedGain {
     mantissa: i32,
     shift: u32,

@@ -72,7 +72,7 @@ pub trait Scalar:
     + 'static
 {
     /// A constant that multiplies a signal, made by [`Scalar::gain`].
-    type Gain: Copy + Debug + PartialEq + Send + Sync + 'static;
+    type Gain: Copy + Debug + Default + PartialEq + Send + Sync + 'static;
 
     /// A sum over many ticks, wide enough that terms far below the signal's step still count.
     type Sum: Copy + Debug + Default + PartialEq + Send + Sync + 'static;
@@ -132,7 +132,7 @@ pub trait Scalar:
 }
 
 /// Where a logarithmic table starts: the first octave's lower bound, a power of two.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OctaveStart<S: Scalar> {
     /// The key (exponent and leading mantissa bits) of the first octave's lower bound; negative, wrapped, when that lies
     /// below a fixed-point format's step.

@@ -1,10 +1,11 @@
 //! From checked settings to what the tick reads.
 
-use super::{AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings};
+use super::{
+    AmplifierSettings, AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings,
+};
 use crate::axis::{Amplifier, Axis};
 use crate::course::Course;
 use crate::encoder::Encoder;
-use crate::feedforward::Feedforward;
 use crate::reference::{Motion, MotionScale, Ramp, Stream, Velocity};
 use crate::safety::AxisName;
 use crate::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
@@ -21,13 +22,8 @@ impl StageSettings {
     /// The first field that is refused; see [`StageSettings::validate`].
     pub fn build<S: Scalar, const N: usize>(&self) -> Result<Stage<S, N>, SettingsError> {
         self.validate(N)?;
-        let period_s = 1.0 / self.rate_hz;
-        let longest = self.longest_preview_ticks();
         Ok(Stage {
-            axes: self
-                .axes
-                .each_ref()
-                .map(|axis| axis.build(period_s, longest)),
+            axes: AxisName::ALL.map(|axis| self.build_axis(axis)),
             streaming: self.streaming.build(),
         })
     }
@@ -36,8 +32,21 @@ impl StageSettings {
     /// [`StageRef`](crate::stage::StageRef). How long an axis waits at the start of a motion depends on the longest preview
     /// of all: a change of that concerns every axis. Slow, as the build of the stage.
     pub fn build_axis<S: Scalar, const N: usize>(&self, axis: AxisName) -> Axis<S, N> {
+        let mut built = Axis::blank();
+        self.build_axis_into(axis, &mut built);
+        built
+    }
+
+    /// As [`build_axis`](Self::build_axis), in the place of an axis that is no longer used: what was there does not
+    /// matter, and nothing of an axis' size is on the stack.
+    pub fn build_axis_into<S: Scalar, const N: usize>(
+        &self,
+        axis: AxisName,
+        place: &mut Axis<S, N>,
+    ) {
+        let longest = self.longest_preview_ticks();
         self.axis(axis)
-            .build(1.0 / self.rate_hz, self.longest_preview_ticks())
+            .build_into(1.0 / self.rate_hz, longest, place);
     }
 
     /// The longest preview of any axis: the others wait for it.
@@ -62,84 +71,85 @@ impl AxisSettings {
     }
 
     /// `longest_preview_ticks` is the stage's.
-    fn build<S: Scalar, const N: usize>(
+    // Field by field: no temporary is as large as the axis.
+    #[inline(never)]
+    fn build_into<S: Scalar, const N: usize>(
         &self,
         period_s: f64,
         longest_preview_ticks: usize,
-    ) -> Axis<S, N> {
+        axis: &mut Axis<S, N>,
+    ) {
         let preview_ticks = self.preview_ticks(period_s);
         let (encoder, amplifier) = (&self.encoder, &self.amplifier);
         let (feedback, feedforward) = (&self.feedback, &self.feedforward);
         let largest_step = 2.0 * self.limits.max_velocity_mm_s * period_s / encoder.resolution_mm;
-        let sign = if amplifier.reversed { -1.0 } else { 1.0 };
-        let codes_per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
         let scale = MotionScale {
             resolution_mm: encoder.resolution_mm,
             rate_hz: 1.0 / period_s,
         };
+        axis.encoder = Encoder::new(
+            encoder.counter_bits.into(),
+            encoder.reversed,
+            // One count more: a slow axis still steps by whole counts, and noise adds one.
+            libm::ceil(largest_step) as i32 + 1,
+        );
+        let unit_mm = encoder.resolution_mm / POSITION_UNITS_PER_COUNT;
+        axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
+        axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
+        axis.feedback = feedback.build(period_s);
+        axis.feedforward.build_over(
+            feedforward.kind,
+            &feedforward.gains,
+            &self.friction,
+            period_s,
+        );
+        axis.preview_ticks = preview_ticks;
+        axis.amplifier = amplifier.build();
+        axis.following = self.limits.build_following();
+        axis.overspeed = Overspeed::new(self.limits.overspeed_ratio * 0.5 * largest_step);
+        axis.silence = Silence {
+            level: S::quantise(
+                self.limits.silent_share * amplifier.output_limit_v,
+                Quantity::Voltage,
+            ),
+            ticks: libm::round(self.limits.silent_s / period_s) as u32,
+        };
+        axis.index = IndexSpacing::new(encoder.counts_per_index, encoder.index_tolerance_counts);
+        let wait_ticks = (longest_preview_ticks - preview_ticks) as u32;
+        axis.course = self.build_course(scale, wait_ticks);
+        axis.travel = self.limits.build_travel(scale, &axis.course.braking);
+        axis.transfer_decay = S::quantise(
+            libm::exp(-period_s / feedback.transfer_s),
+            Quantity::Fraction,
+        );
+    }
+
+    #[inline(never)]
+    fn build_course<S: Scalar>(&self, scale: MotionScale, wait_ticks: u32) -> Course<S> {
         let limits = &self.limits;
-        let braking = Ramp::new(limits.braking_mm_s2, limits.braking_jerk_mm_s3, scale);
-        Axis {
-            encoder: Encoder::new(
-                encoder.counter_bits.into(),
-                encoder.reversed,
-                // One count more: a slow axis still steps by whole counts, and noise adds one.
-                libm::ceil(largest_step) as i32 + 1,
-            ),
-            unit_mm: S::gain(
-                encoder.resolution_mm / POSITION_UNITS_PER_COUNT,
-                Quantity::Integer,
-                Quantity::Length,
-            ),
-            unit_mm_s: S::gain(
-                encoder.resolution_mm / POSITION_UNITS_PER_COUNT / period_s,
-                Quantity::Integer,
-                Quantity::Velocity,
-            ),
-            feedback: feedback.build(period_s),
-            feedforward: Feedforward::build(
-                feedforward.kind,
-                &feedforward.gains,
-                &self.friction,
-                period_s,
-            ),
-            preview_ticks,
-            amplifier: Amplifier {
-                limit: S::quantise(amplifier.output_limit_v, Quantity::Voltage),
-                codes_per_volt: S::gain(
-                    sign * codes_per_volt,
-                    Quantity::Voltage,
-                    Quantity::Integer,
-                ),
-                offset_code: libm::round(amplifier.offset_v * codes_per_volt) as i32,
-            },
-            following: self.limits.build_following(),
-            overspeed: Overspeed::new(self.limits.overspeed_ratio * 0.5 * largest_step),
-            silence: Silence {
-                level: S::quantise(
-                    self.limits.silent_share * amplifier.output_limit_v,
-                    Quantity::Voltage,
-                ),
-                ticks: libm::round(self.limits.silent_s / period_s) as u32,
-            },
-            index: IndexSpacing::new(encoder.counts_per_index, encoder.index_tolerance_counts),
-            travel: self.limits.build_travel(scale, &braking),
-            course: Course {
-                braking,
-                moving: Ramp::new(limits.max_acceleration_mm_s2, limits.max_jerk_mm_s3, scale),
-                fastest: Velocity::from_mm_s(limits.max_velocity_mm_s, scale),
-                span: limits.travel_mm.as_ref().map(|travel| {
-                    let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
-                    (position(travel.negative), position(travel.positive))
-                }),
-                homing: self.build_homing(scale),
-                stream: Stream::new(scale),
-                wait_ticks: (longest_preview_ticks - preview_ticks) as u32,
-            },
-            transfer_decay: S::quantise(
-                libm::exp(-period_s / feedback.transfer_s),
-                Quantity::Fraction,
-            ),
+        Course {
+            braking: Ramp::new(limits.braking_mm_s2, limits.braking_jerk_mm_s3, scale),
+            moving: Ramp::new(limits.max_acceleration_mm_s2, limits.max_jerk_mm_s3, scale),
+            fastest: Velocity::from_mm_s(limits.max_velocity_mm_s, scale),
+            span: limits.travel_mm.as_ref().map(|travel| {
+                let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
+                (position(travel.negative), position(travel.positive))
+            }),
+            homing: self.build_homing(scale),
+            stream: Stream::new(scale),
+            wait_ticks,
+        }
+    }
+}
+
+impl AmplifierSettings {
+    fn build<S: Scalar>(&self) -> Amplifier<S> {
+        let sign = if self.reversed { -1.0 } else { 1.0 };
+        let codes_per_volt = DacCode::FULL_SCALE / self.full_scale_v;
+        Amplifier {
+            limit: S::quantise(self.output_limit_v, Quantity::Voltage),
+            codes_per_volt: S::gain(sign * codes_per_volt, Quantity::Voltage, Quantity::Integer),
+            offset_code: libm::round(self.offset_v * codes_per_volt) as i32,
         }
     }
 }

@@ -33,12 +33,15 @@ struct Character {
     lugre_stiffness_v_per_mm: f64,
 }
 
+/// Control rate, Hz.
+const RATE_HZ: f64 = 10e3;
 /// Largest velocity of every axis, mm/s.
 const MAX_VELOCITY_MM_S: f64 = 250.0;
 
 /// Break points of the virgin curve as shares of the pre-sliding range, and the weights that break there.
 const VIRGIN_CURVE: [(f64, f64); 4] = [(0.07, 0.30), (0.20, 0.30), (0.47, 0.25), (1.0, 0.15)];
 
+#[inline(never)]
 fn axis(character: &Character) -> AxisSettings {
     let elements: Vec<GmsElement, _> = VIRGIN_CURVE
         .iter()
@@ -228,11 +231,40 @@ pub fn z_axis() -> AxisSettings {
     })
 }
 
+impl StageSettings {
+    /// Takes the [default](Self::default) settings over, in place.
+    // Axis by axis: the firmware's stack has no room for a whole set.
+    #[inline(never)]
+    pub fn set_default(&mut self) {
+        self.rate_hz = RATE_HZ;
+        self.streaming = StreamingSettings::default();
+        let [x, y, z] = &mut self.axes;
+        *x = x_axis();
+        *y = y_axis();
+        *z = z_axis();
+    }
+
+    /// Takes other settings over, in place.
+    #[inline(never)]
+    pub fn copy_from(&mut self, other: &Self) {
+        let Self {
+            rate_hz,
+            streaming,
+            axes,
+        } = self;
+        *rate_hz = other.rate_hz;
+        *streaming = other.streaming;
+        for (axis, other) in axes.iter_mut().zip(&other.axes) {
+            axis.clone_from(other);
+        }
+    }
+}
+
 impl Default for StageSettings {
     /// The simulated XYZ stage at 10 kHz, N-PID with combined feedforward.
     fn default() -> Self {
         Self {
-            rate_hz: 10e3,
+            rate_hz: RATE_HZ,
             streaming: StreamingSettings::default(),
             axes: [x_axis(), y_axis(), z_axis()],
         }

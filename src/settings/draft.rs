@@ -1,39 +1,21 @@
 //! Settings that are being edited, beside those that are in force.
 //!
 //! A leaf is written at any time; nothing follows from it until [`Draft::apply`] has found the whole to be valid and
-//! said which axes are to be rebuilt ([`StageSettings::build_axis`]). The draft is the only full copy of the settings:
-//! what is in force is remembered only as far as an exchange of axes cannot change it.
+//! said which axes are to be rebuilt ([`StageSettings::build_axis`]). Both sets stay where they are: they are too large to
+//! be moved over the firmware's stack.
 
 use core::fmt;
 
 use super::tree::TreeError;
-use super::{EncoderSettings, SettingsError, StageSettings};
+use super::{SettingsError, StageSettings};
 use crate::safety::AxisName;
 
-/// A set of settings that is edited leaf by leaf.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Draft {
-    settings: StageSettings,
+/// A set of settings that is edited leaf by leaf, and the one in force.
+#[derive(Debug)]
+pub struct Draft<'a> {
+    settings: &'a mut StageSettings,
+    in_force: &'a mut StageSettings,
     touched: [bool; 3],
-    in_force: InForce,
-}
-
-/// What is in force and only changes with a restart, and what one axis' build takes from the others.
-#[derive(Clone, Debug, PartialEq)]
-struct InForce {
-    rate_hz: f64,
-    encoders: [EncoderSettings; 3],
-    longest_preview_ticks: usize,
-}
-
-impl InForce {
-    fn of(settings: &StageSettings) -> Self {
-        Self {
-            rate_hz: settings.rate_hz,
-            encoders: settings.axes.each_ref().map(|axis| axis.encoder),
-            longest_preview_ticks: settings.longest_preview_ticks(),
-        }
-    }
 }
 
 /// Why a draft does not take effect.
@@ -66,25 +48,37 @@ impl From<SettingsError> for ApplyError {
     }
 }
 
-impl Draft {
-    /// A draft of the settings that the stage was built from.
-    pub fn new(in_force: StageSettings) -> Self {
+impl<'a> Draft<'a> {
+    /// A draft of the settings that the stage was built from, in the place of `settings`.
+    pub fn new(in_force: &'a mut StageSettings, settings: &'a mut StageSettings) -> Self {
+        settings.copy_from(in_force);
         Self {
+            settings,
+            in_force,
             touched: [false; 3],
-            in_force: InForce::of(&in_force),
-            settings: in_force,
         }
+    }
+
+    /// The settings in force.
+    pub fn in_force(&self) -> &StageSettings {
+        self.in_force
     }
 
     /// The settings as they are edited so far; valid only if [`validate`](StageSettings::validate) says so.
     pub fn settings(&self) -> &StageSettings {
-        &self.settings
+        self.settings
     }
 
-    /// All of the settings, to be replaced by a stored set; every axis counts as changed.
+    /// All of the settings, to be replaced by another set; every axis counts as changed.
     pub fn settings_mut(&mut self) -> &mut StageSettings {
         self.touched = [true; 3];
-        &mut self.settings
+        self.settings
+    }
+
+    /// Takes back what was written since the draft last took effect.
+    pub fn revert(&mut self) {
+        self.settings.copy_from(self.in_force);
+        self.touched = [false; 3];
     }
 
     /// Writes a leaf, or makes or removes a part: [`StageSettings::set_json`].
@@ -128,25 +122,22 @@ impl Draft {
     /// stays in force.
     pub fn apply(&mut self, elements: usize) -> Result<[bool; 3], ApplyError> {
         self.settings.validate(elements)?;
-        let next = InForce::of(&self.settings);
-        if next.rate_hz != self.in_force.rate_hz {
+        if self.settings.rate_hz != self.in_force.rate_hz {
             return Err(ApplyError::RateNeedsRestart);
         }
-        for (axis, (new, old)) in AxisName::ALL
-            .into_iter()
-            .zip(next.encoders.iter().zip(&self.in_force.encoders))
-        {
-            if new != old {
+        for axis in AxisName::ALL {
+            if self.settings.axis(axis).encoder != self.in_force.axis(axis).encoder {
                 return Err(ApplyError::EncoderNeedsRestart(axis));
             }
         }
         // Every axis waits for the one that looks ahead furthest.
-        let rebuild = if next.longest_preview_ticks == self.in_force.longest_preview_ticks {
+        let waits = self.settings.longest_preview_ticks();
+        let rebuild = if waits == self.in_force.longest_preview_ticks() {
             self.touched
         } else {
             [true; 3]
         };
-        self.in_force = next;
+        self.in_force.copy_from(self.settings);
         self.touched = [false; 3];
         Ok(rebuild)
     }

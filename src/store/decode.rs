@@ -119,7 +119,7 @@ pub fn decode(
     settings: &mut StageSettings,
     report: &mut dyn FnMut(Finding<'_>),
 ) -> Result<Provenance, DecodeError> {
-    *settings = StageSettings::default();
+    settings.set_default();
     let decoded = decode_over(bytes, settings, report).and_then(|provenance| {
         settings
             .validate(elements)
@@ -127,7 +127,7 @@ pub fn decode(
             .map(|()| provenance)
     });
     if decoded.is_err() {
-        *settings = StageSettings::default();
+        settings.set_default();
     }
     decoded
 }

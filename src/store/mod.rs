@@ -154,7 +154,7 @@ impl<F: NorFlash> Store<F> {
         let place = match self.log.read(buffer) {
             Ok(Some(place)) => place,
             none => {
-                *settings = StageSettings::default();
+                settings.set_default();
                 return none.map(|_| None).map_err(LoadError::Log);
             }
         };

@@ -1,12 +1,20 @@
 //! Settings that are edited leaf by leaf and take effect as a whole.
 
+use quadrant::feedforward::FeedforwardKind;
 use quadrant::safety::AxisName;
 use quadrant::settings::StageSettings;
 use quadrant::settings::draft::{ApplyError, Draft};
 use quadrant::stage::Stage;
 
-fn draft() -> Draft {
-    Draft::new(StageSettings::default())
+fn draft_of(settings: StageSettings) -> Draft<'static> {
+    let room = || Box::leak(Box::new(StageSettings::default()));
+    let in_force = room();
+    *in_force = settings;
+    Draft::new(in_force, room())
+}
+
+fn draft() -> Draft<'static> {
+    draft_of(StageSettings::default())
 }
 
 fn set(draft: &mut Draft, path: &str, json: &str) {
@@ -66,7 +74,7 @@ fn rate_and_encoders_wait_for_a_restart() {
     );
     draft.settings().validate(8).expect("can be stored");
     // After the restart.
-    let mut draft = Draft::new(draft.settings().clone());
+    let mut draft = draft_of(draft.settings().clone());
     assert_eq!(draft.apply(8), Ok([false; 3]));
 }
 
@@ -97,6 +105,48 @@ fn the_axes_built_one_by_one_are_those_of_the_stage() {
 #[test]
 fn a_set_that_is_loaded_over_a_draft_concerns_every_axis() {
     let mut draft = draft();
-    *draft.settings_mut() = StageSettings::default();
+    draft.settings_mut().set_default();
     assert_eq!(draft.apply(8), Ok([true; 3]));
+}
+
+#[test]
+fn what_is_in_force_stays_until_the_draft_takes_effect_and_can_be_gone_back_to() {
+    let mut draft = draft();
+    set(&mut draft, "/axes/y/feedback/pid/kp_v_per_mm", "1.2");
+    assert_eq!(*draft.in_force(), StageSettings::default());
+    draft.revert();
+    assert!(!draft.is_edited());
+    assert_eq!(*draft.settings(), StageSettings::default());
+    set(&mut draft, "/axes/y/feedback/pid/kp_v_per_mm", "1.2");
+    draft.apply(8).expect("valid");
+    assert_eq!(draft.in_force().axes[1].feedback.pid.kp_v_per_mm, 1.2);
+    draft.revert();
+    assert_eq!(draft.settings(), draft.in_force());
+}
+
+#[test]
+fn settings_made_in_place_are_the_default_ones_and_copies_are_the_same() {
+    let mut settings = StageSettings::default();
+    settings.rate_hz = 5e3;
+    settings.streaming.link_lost = quadrant::settings::LossReaction::Hold;
+    settings.axes[2].homing = None;
+    settings.axes[0].feedback.pid.kp_v_per_mm = 7.0;
+    let mut copy = StageSettings::default();
+    copy.copy_from(&settings);
+    assert_eq!(copy, settings);
+    copy.set_default();
+    assert_eq!(copy, StageSettings::default());
+}
+
+/// The server builds into an axis that was another's.
+#[test]
+fn an_axis_built_in_the_place_of_another_is_the_same() {
+    let settings = StageSettings::default();
+    for kind in FeedforwardKind::ALL {
+        let mut settings = settings.clone();
+        settings.axes[0].feedforward.kind = kind;
+        let mut place = settings.build_axis::<f32, 8>(AxisName::Z);
+        settings.build_axis_into(AxisName::X, &mut place);
+        assert_eq!(place, settings.build_axis(AxisName::X), "{kind:?}");
+    }
 }

@@ -15,7 +15,7 @@ use quadrant::machine::{
 };
 use quadrant::safety::{FaultCode, Switches};
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::{Outputs, StageState};
+use quadrant::stage::Outputs;
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
 
 pub use self::flash::MemoryFlash;
@@ -182,36 +182,41 @@ impl Running {
         let mut store = Store::new(flash, 0);
         // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
         let buffer: &'static mut [u8; BUFFER_BYTES] = Box::leak(Box::new([0; BUFFER_BYTES]));
-        let mut settings = defaults.clone();
+        let settings: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
+        let draft: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
         let mut fault = fault;
-        let loaded = store.load(&mut settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
+        let loaded = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
         let provenance = match loaded {
             Ok(Some(Loaded { provenance, .. })) => provenance,
             Ok(None) => {
-                settings = defaults.clone();
+                settings.copy_from(defaults);
                 Default::default()
             }
             Err(LoadError::Decode(_) | LoadError::Log(_)) => {
-                settings = defaults.clone();
+                settings.copy_from(defaults);
                 fault = Some(FaultCode::SettingsInvalid);
                 Default::default()
             }
         };
         let stage = settings.build::<f32, FIRMWARE_ELEMENTS>()?;
-        let plan = PlanSettings::default().build(&settings)?;
+        let plan = PlanSettings::default().build(settings)?;
         let (axes, streaming) = stage.into_axes();
         let spare: &'static mut Axis<f32> = Box::leak(Box::new(axes[0].clone()));
         let axes = axes.map(|axis| -> &'static mut Axis<f32> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
         let (control_ends, ends) = queues.split();
-        let state = fault.map_or_else(StageState::default, StageState::with_fault);
+        let mut control = Control::new(axes, streaming, plan, control_ends);
+        if let Some(code) = fault {
+            control.start_faulted(code);
+        }
         Ok(Self {
-            control: Control::new(axes, streaming, plan, state, control_ends),
+            control,
             supervision: Supervision::default(),
             server: Server::new(ServerParts {
                 ends,
                 spare,
                 settings,
+                draft,
                 provenance,
                 store,
                 buffer,

@@ -55,7 +55,9 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     /// The axis that the control law does not use, where new settings are built.
     pub spare: &'a mut Axis<S>,
     /// The settings in force.
-    pub settings: StageSettings,
+    pub settings: &'a mut StageSettings,
+    /// Room for settings that are being edited; what it holds does not matter.
+    pub draft: &'a mut StageSettings,
     /// Where the settings in force come from.
     pub provenance: Provenance,
     /// The memory for settings.
@@ -94,8 +96,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     /// Axes whose new settings are not built yet.
     pending: AxisSet,
     spare: Option<&'a mut Axis<S>>,
-    draft: Draft,
-    in_force: StageSettings,
+    draft: Draft<'a>,
     provenance: Provenance,
     store: Store<F>,
     buffer: &'a mut [u8; BUFFER_BYTES],
@@ -118,6 +119,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
 
 impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     /// A server that nobody has spoken to.
+    // In place: it is made once, and the stack has no room for two.
+    #[inline(never)]
     pub fn new(parts: ServerParts<'q, 'a, S, F>) -> Self {
         let mut server = Self {
             ends: parts.ends,
@@ -129,8 +132,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             meters: Meters::default(),
             pending: AxisSet::NONE,
             spare: Some(parts.spare),
-            draft: Draft::new(parts.settings.clone()),
-            in_force: parts.settings,
+            draft: Draft::new(parts.settings, parts.draft),
             provenance: parts.provenance,
             store: parts.store,
             buffer: parts.buffer,

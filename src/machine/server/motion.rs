@@ -29,7 +29,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             Body::Home(axes) => {
                 for axis in axes.iter() {
                     self.check(Command::Home(axis))?;
-                    let known = self.in_force.can_home(axis);
+                    let known = self.draft.in_force().can_home(axis);
                     known.map_err(|error| refused(format_args!("{error}")))?;
                 }
                 for axis in axes.iter() {
@@ -41,7 +41,8 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 velocity_mm_s,
             } => {
                 let velocity = self
-                    .in_force
+                    .draft
+                    .in_force()
                     .jog_at(axis, velocity_mm_s)
                     .map_err(|error| invalid(format_args!("{error}")))?;
                 self.command(Command::Jog(axis, velocity))?;
@@ -86,7 +87,8 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             self.seen.view.homed[index(axis)],
         );
         let motion = self
-            .in_force
+            .draft
+            .in_force()
             .move_to(axis, ahead, homed, target_mm, velocity_mm_s)
             .map_err(|error| invalid(format_args!("{error}")))?;
         self.hand_over(axis, &MotionSettings::PointToPoint(motion))?;
@@ -101,7 +103,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 "a motion is under way; stop it before the plan is exchanged"
             )));
         }
-        plan.validate(&self.in_force)
+        plan.validate(self.draft.in_force())
             .map_err(|error| invalid(format_args!("{error}")))?;
         for (axis, motion) in AxisName::ALL.into_iter().zip(&plan.motions) {
             self.hand_over(axis, motion)?;
@@ -110,7 +112,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     fn hand_over(&mut self, axis: AxisName, motion: &MotionSettings) -> Result<(), LinkError> {
-        let motion = Motion::build(motion, self.in_force.scale_of(axis));
+        let motion = Motion::build(motion, self.draft.in_force().scale_of(axis));
         self.ends.motions.enqueue((axis, motion)).map_err(|_| {
             busy(format_args!(
                 "the control law has motions waiting; ask again"

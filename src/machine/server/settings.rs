@@ -11,8 +11,8 @@ use crate::link::message::{
 use crate::machine::queues::Exchange;
 use crate::safety::AxisName;
 use crate::scalar::Scalar;
-use crate::settings::draft::{ApplyError, Draft};
-use crate::settings::{MAX_VALUE_BYTES, StageSettings};
+use crate::settings::MAX_VALUE_BYTES;
+use crate::settings::draft::ApplyError;
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     pub(super) fn serve_settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
@@ -37,11 +37,11 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             SettingsRequest::List { cursor } => self.list(cursor),
             SettingsRequest::Apply => self.apply(),
             SettingsRequest::Revert => {
-                self.draft = Draft::new(self.in_force.clone());
+                self.draft.revert();
                 Ok(Reply::Done)
             }
             SettingsRequest::Defaults => {
-                *self.draft.settings_mut() = StageSettings::default();
+                self.draft.settings_mut().set_default();
                 Ok(Reply::Done)
             }
             SettingsRequest::Store(provenance) => self.save(provenance),
@@ -86,7 +86,6 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 }));
             }
         };
-        self.in_force = self.draft.settings().clone();
         let changed = AxisName::ALL
             .into_iter()
             .filter(|&axis| changed[index(axis)])
@@ -109,11 +108,12 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         let Some(axis) = self.spare.take() else {
             return;
         };
-        *axis = self.in_force.build_axis(name);
+        let settings = self.draft.in_force();
+        settings.build_axis_into(name, axis);
         let exchange = Exchange {
             name,
             axis,
-            streaming: self.in_force.streaming.build(),
+            streaming: settings.streaming.build(),
         };
         match self.ends.exchanges.enqueue(exchange) {
             Ok(()) => {

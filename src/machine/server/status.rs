@@ -16,7 +16,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             protocol: PROTOCOL_VERSION,
             firmware: text(format_args!("{}", env!("CARGO_PKG_VERSION"))),
             board: text(format_args!("{}", self.board)),
-            rate_hz: self.in_force.rate_hz,
+            rate_hz: self.draft.in_force().rate_hz,
             cycle_hz: self.cycle_hz,
             number: self.number,
             tick: self.seen.tick,
@@ -26,7 +26,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     pub(super) fn status(&self) -> Status {
         let view = &self.seen.view;
         let axes = core::array::from_fn(|index| {
-            let (axis, settings) = (&self.seen.axes[index], &self.in_force.axes[index]);
+            let (axis, settings) = (&self.seen.axes[index], &self.draft.in_force().axes[index]);
             let measured = Position(axis.measured.0 << POSITION_FRACTION_BITS);
             AxisStatus {
                 mode: view.modes[index].into(),

@@ -70,7 +70,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 "period_ticks = {period_ticks} is outside {LEAST_PERIOD_TICKS} to {MOST_SEGMENT_TICKS}"
             )));
         }
-        let limits = self.in_force.stream_limits(view.homed);
+        let limits = self.draft.in_force().stream_limits(view.homed);
         let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
         self.stream = Some(OpenStream {
             planner: StreamPlanner::new(limits, period_ticks, start),
@@ -96,7 +96,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         last: bool,
     ) -> Result<bool, LinkError> {
         let scales: [MotionScale; 3] =
-            core::array::from_fn(|axis| self.in_force.motion_scale(axis));
+            core::array::from_fn(|axis| self.draft.in_force().motion_scale(axis));
         let room = self.ends.feeds.ready();
         let stream = self.opened()?;
         if number < stream.next {
