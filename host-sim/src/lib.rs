@@ -11,6 +11,8 @@
 //! - [`settings_reference`]: what every setting means, as a page;
 //! - [`scenario`]: the motion that the firmware is emulated with;
 //! - [`console`]: a machine with the firmware on it, or a simulated one, over the link;
+//! - [`emulator`]: QEMU with the firmware in it;
+//! - [`emulated_machine`]: the firmware's image in it on the simulated stage, as [`simulated_machine`] is without it;
 //! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
 //! - [`identify`]: from recordings to the parameters of an axis;
 //! - [`design`]: margins, loop shaping, the choice of gains.
@@ -19,6 +21,8 @@
 pub mod commission;
 pub mod console;
 pub mod design;
+pub mod emulated_machine;
+pub mod emulator;
 pub mod experiment;
 pub mod identify;
 pub mod machine;

@@ -74,7 +74,7 @@ pub enum MachineState {
     Start = 0,
     /// Nobody: the outputs are off.
     Disabled = 1,
-    /// The homing routine.
+    /// The homing routine of an axis at least. Samples show [`Enabled`](Self::Enabled) then.
     Homing = 2,
     /// The control law.
     Enabled = 3,

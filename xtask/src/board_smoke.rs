@@ -11,7 +11,6 @@ use std::time::Duration;
 use anyhow::{Context, Result, bail, ensure};
 
 use crate::command;
-use crate::emulator;
 use crate::gdb::{Debugger, PROGRAM_COUNTER};
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::toolchain::Toolchain;
@@ -106,7 +105,10 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
         tick(&mut debugger)?;
     }
     log.read(&mut debugger)?;
-    let lines = emulator::decode_log(&log.bytes, &image.elf)?;
+    let lines = image.program()?.decode_log(&log.bytes);
+    for line in &lines {
+        println!("  firmware: {line}");
+    }
     for words in EXPECTED {
         ensure!(
             lines.iter().any(|line| line.contains(words)),

@@ -10,11 +10,11 @@ use std::process::Stdio;
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::lockstep::{Job, Mode};
+use quadrant_sim::emulator::{self, Clock, Emulator, Memory};
 use serde::{Deserialize, Serialize};
 
 use crate::attribution::Attribution;
 use crate::call_graph::CallGraph;
-use crate::emulator::{self, Clock, Emulator, Memory};
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::listing::Listing;
 use crate::prove::ROOT;
@@ -141,11 +141,12 @@ fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
     // The rehearsal's beginning is spent at rest and is not counted.
     let (inputs, _) = Twin::of(image.target.scalar, job.clone())?.rehearse(SETTLING_TICKS + ticks);
     emulate::load(&memory, Mode::Unpaced, &job, &inputs)?;
-    let mut qemu = emulator::command_line(image, &memory, Clock::Host)?;
+    let program = image.program()?;
+    let mut qemu = emulator::command_line(&program, &memory, Clock::Host);
     qemu.args(["-singlestep", "-d", "exec,nochain"])
         .args(["-dfilter", &trace_filter(image, &listing, &graph)?])
         .stderr(Stdio::piped());
-    let mut emulator = Emulator::spawn(qemu, image, false)?;
+    let mut emulator = Emulator::spawn(qemu, &program, |_| {})?;
     let trace = emulator.take_stderr().context("QEMU's trace is a pipe")?;
     let closed = tally.read(trace)?;
     emulator.wait()?;

@@ -5,24 +5,19 @@ use std::time::{Duration, Instant};
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::link::lockstep::{
-    END_OF_RUN, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
-    OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+    InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
 use quadrant::stage::Outputs;
+use quadrant_sim::emulator::{Clock, Emulator, Lockstep, Memory};
 
-use crate::emulator::{Clock, Emulator, Memory};
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::toolchain::Toolchain;
 use crate::twin::{self, Tally, Twin};
 
 /// Control ticks per second of the firmware's time.
 const RATE_HZ: f64 = 10_000.0;
-/// How long the firmware may take to answer, in the host's time.
-const PATIENCE: Duration = Duration::from_secs(20);
 /// How late, in us of firmware time, the last tick may look at the clock: the interrupt's latency.
 const LATENCY_US: u64 = 10;
-/// Looks at the answer between two looks at the clock.
-const LOOKS: u32 = 1 << 14;
 /// Ticks between two steps of the progress bar.
 const PROGRESS_TICKS: u32 = 10_000;
 
@@ -90,43 +85,41 @@ pub(crate) fn run(
 pub(crate) fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
     memory.prepare(Mode::Lockstep, 0, &twin::encode(twin.job())?)?;
-    let mut emulator = Emulator::start(image, &memory, Clock::Host, true)?;
+    let mut firmware = Lockstep::start(image.program()?, memory, show)?;
     let bar = progress(ticks);
     let mut started = None;
+    let mut log = Vec::new();
     let mut last = Outputs::default();
-    let mut bytes = [0; OutputRecord::BYTES];
     for tick in 1..=ticks {
         let input = twin.input();
-        memory.write(INPUT, &input.encode())?;
-        memory.set_word(INPUT_SEQUENCE, tick)?;
+        firmware.ask(&input)?;
         // The twin computes while the firmware does.
         twin.compute(&input);
-        if let Err(error) = wait_for(&memory, &mut emulator, tick) {
-            // Why the firmware has stopped is in its log.
-            return match emulator.ended()? {
-                Some(_) => emulator.wait().and(Err(error)),
-                None => Err(error),
-            };
-        }
+        last = firmware
+            .answer()?
+            .with_context(|| format!("the firmware ended before it answered tick {tick}"))?;
         started.get_or_insert_with(Instant::now);
-        memory.read(OUTPUT, &mut bytes)?;
-        last = OutputRecord::decode(&bytes).outputs;
         twin.compare(last);
         twin.step(&last);
         if tick % PROGRESS_TICKS == 0 {
             bar.inc(1);
+            log.extend(firmware.new_lines()?);
         }
     }
     let elapsed = started.map_or(Duration::ZERO, |started| started.elapsed());
     bar.finish_and_clear();
-    memory.set_word(INPUT_SEQUENCE, END_OF_RUN)?;
-    let log = emulator.wait()?;
+    log.extend(firmware.finish()?);
     Ok(Run {
         tally: *twin.tally(),
         elapsed,
         last,
         log,
     })
+}
+
+/// Prints a line of the firmware's log.
+pub(crate) fn show(line: &str) {
+    println!("  firmware: {line}");
 }
 
 /// A bar over seconds of firmware time; hidden where nobody watches.
@@ -137,27 +130,6 @@ fn progress(ticks: u32) -> ProgressBar {
     ProgressBar::new((ticks / PROGRESS_TICKS).into()).with_style(style)
 }
 
-/// Waits until the firmware has answered tick number `tick`.
-fn wait_for(memory: &Memory, emulator: &mut Emulator, tick: u32) -> Result<()> {
-    let mut since = None;
-    loop {
-        for _ in 0..LOOKS {
-            if memory.word(OUTPUT_SEQUENCE)? == tick {
-                return Ok(());
-            }
-            std::hint::spin_loop();
-        }
-        let since = *since.get_or_insert_with(Instant::now);
-        if let Some(status) = emulator.ended()? {
-            bail!("the emulator ended ({status}) before it answered tick {tick}");
-        }
-        ensure!(
-            since.elapsed() < PATIENCE,
-            "the firmware has not answered tick {tick} within {PATIENCE:?}"
-        );
-    }
-}
-
 /// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
 fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
@@ -165,7 +137,7 @@ fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
     let (inputs, expected) = twin.rehearse(ticks);
     load(&memory, Mode::Paced, &job, &inputs)?;
     let started = Instant::now();
-    let log = Emulator::start(image, &memory, Clock::Instructions, true)?.wait()?;
+    let log = Emulator::start(&image.program()?, &memory, Clock::Instructions, show)?.wait()?;
     let elapsed = started.elapsed();
     check_paced(&log, ticks)?;
     let mut bytes = vec![0; inputs.len() * OutputRecord::BYTES];
@@ -195,7 +167,7 @@ pub(crate) fn load(memory: &Memory, mode: Mode, job: &Job, inputs: &[InputRecord
     let ticks = u32::try_from(inputs.len())?;
     let bytes: Vec<u8> = inputs.iter().flat_map(InputRecord::encode).collect();
     memory.write(RECORDED_INPUTS, &bytes)?;
-    memory.prepare(mode, ticks, &twin::encode(job)?)
+    Ok(memory.prepare(mode, ticks, &twin::encode(job)?)?)
 }
 
 /// Checks what the firmware says of a paced run: all ticks, no overrun, and the time they should take.

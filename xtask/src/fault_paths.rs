@@ -2,9 +2,9 @@
 
 use anyhow::{Result, ensure};
 use quadrant::link::lockstep::{Mode, OUTPUT, OutputRecord};
+use quadrant_sim::emulator::{Clock, Emulator, Memory};
 
 use crate::emulate;
-use crate::emulator::{Clock, Emulator, Memory};
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::Toolchain;
 use crate::twin::{self, Twin};
@@ -46,7 +46,8 @@ fn refused_settings(image: &image::Image) -> Result<()> {
     job.stage.axes[1].feedback.pid.kp_v_per_mm = f64::NAN;
     memory.prepare(Mode::Lockstep, 0, &twin::encode(&job)?)?;
     memory.write(OUTPUT, &[0xFF; OutputRecord::BYTES])?;
-    let (succeeded, log) = Emulator::start(image, &memory, Clock::Host, true)?.end()?;
+    let (succeeded, log) =
+        Emulator::start(&image.program()?, &memory, Clock::Host, emulate::show)?.end()?;
     ensure!(
         !succeeded,
         "the firmware took settings that must be refused"

@@ -6,6 +6,7 @@ use std::path::PathBuf;
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use object::{Object, ObjectSymbol};
+use quadrant_sim::emulator::Program;
 
 use crate::command;
 use crate::toolchain::Toolchain;
@@ -67,15 +68,6 @@ impl Target {
         match (self.board, self.scalar) {
             (Board::Mps2, Scalar::Fixed) => TRIPLES[1],
             _ => TRIPLES[0],
-        }
-    }
-
-    /// QEMU's name of the machine, if it is emulated.
-    pub(crate) fn machine(self) -> Option<&'static str> {
-        match (self.board, self.scalar) {
-            (Board::Mps2, Scalar::F32) => Some("mps2-an386"),
-            (Board::Mps2, Scalar::Fixed) => Some("mps2-an385"),
-            (Board::NucleoF446re, _) => None,
         }
     }
 
@@ -173,6 +165,16 @@ pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
 }
 
 impl Image {
+    /// The image as the emulator takes it.
+    pub(crate) fn program(&self) -> Result<Program> {
+        ensure!(
+            self.target.board == Board::Mps2,
+            "{} is a real board: it is not emulated",
+            self.target
+        );
+        Ok(Program::read(&self.path)?)
+    }
+
     /// The address of a function, without the bit that says Thumb.
     pub(crate) fn function(&self, name: &str) -> Result<u32> {
         Ok(u32::try_from(self.symbol(name)?)? & !1)

@@ -8,7 +8,6 @@ mod combinations;
 mod command;
 mod count;
 mod emulate;
-mod emulator;
 mod fault_paths;
 mod gdb;
 mod image;

@@ -11,6 +11,7 @@ use quadrant::link::message::{
 use quadrant::telemetry::{MachineState, TelemetryBlock};
 
 use super::error::ClientError;
+use super::hands::Hands;
 use super::patience::{ANSWER, BUSY, BUSY_PAUSE, Nature, nature, patience};
 use super::transport::Transport;
 
@@ -75,6 +76,11 @@ impl Client {
     /// What is at the other end.
     pub fn place(&self) -> String {
         self.transport.place()
+    }
+
+    /// Hands at the machine, if it is not a real one.
+    pub fn hands(&mut self) -> Option<&mut dyn Hands> {
+        self.transport.hands()
     }
 
     /// Asks, and waits for the answer. A request that may be made twice is made again if none comes; one that is refused

@@ -5,7 +5,8 @@
 //! ```
 //!
 //! - [`Transport`]: bytes both ways, and the clock by which they are waited for: [`SerialTransport`], [`TcpTransport`],
-//!   [`InProcess`], of which [`SimulatedLink`] is one;
+//!   [`InProcess`], of which [`SimulatedLink`] and [`EmulatedLink`] are two;
+//! - [`hands`]: what a person does at a machine beside the link;
 //! - [`Client`]: a session; requests are answered or fail in words, notices are kept until someone asks;
 //! - [`settings`]: leaf by leaf, and as the file that every other command reads;
 //! - [`samples`], [`columns`]: telemetry and captures, and their CSV files;
@@ -18,7 +19,10 @@
 
 mod client;
 pub mod columns;
+mod emulated;
 mod error;
+mod flash_file;
+pub mod hands;
 mod patience;
 pub mod plot;
 pub mod rig;
@@ -33,6 +37,7 @@ mod transport;
 mod tests;
 
 pub use client::Client;
+pub use emulated::EmulatedLink;
 pub use error::ClientError;
 pub use simulated::SimulatedLink;
 pub use transport::{BAUD, Exchange, InProcess, SerialTransport, TcpTransport, Transport};

@@ -1,43 +1,87 @@
 //! The simulated machine as the other end of a link.
 
+use std::io;
+use std::path::Path;
 use std::time::Duration;
 
-use quadrant::settings::{SettingsError, StageSettings};
+use quadrant::link::lockstep::FLASH_BYTES;
+use quadrant::safety::Switches;
+use quadrant::settings::StageSettings;
 use quadrant::supervisor::PERIOD_TICKS;
 
+use super::flash_file::FlashFile;
+use super::hands::Hands;
 use super::transport::{Exchange, InProcess};
 use crate::plant::StageTruth;
-use crate::simulated_machine::SimulatedMachine;
+use crate::simulated_machine::{MemoryFlash, SimulatedMachine};
 
 /// The firmware's application on the simulated stage, with the firmware's default settings, and the bytes to and from it.
 pub struct SimulatedLink {
     machine: SimulatedMachine,
+    flash: Option<FlashFile>,
     period: Duration,
 }
 
 impl SimulatedLink {
-    /// A machine that has just been switched on; `seed` decides the noise of its encoders.
+    /// A machine that has just been switched on; `seed` decides the noise of its encoders, and a file keeps its flash.
     ///
     /// # Errors
-    /// Defaults that are refused.
-    pub fn start(seed: u64) -> Result<InProcess<Self>, SettingsError> {
+    /// Defaults that are refused, or a file that is no flash.
+    pub fn start(seed: u64, flash: Option<&Path>) -> io::Result<InProcess<Self>> {
         let settings = StageSettings::default();
-        let machine = SimulatedMachine::new(&settings, &StageTruth::real(), seed)?;
+        let flash = flash
+            .map(|path| FlashFile::open(path, FLASH_BYTES))
+            .transpose()?;
+        let content = flash
+            .as_ref()
+            .and_then(|file| MemoryFlash::of(file.content().to_vec()))
+            .unwrap_or_default();
+        let machine = SimulatedMachine::with_flash(&settings, &StageTruth::real(), seed, content)
+            .map_err(io::Error::other)?;
         Ok(InProcess::new(Self {
             machine,
-            period: Duration::from_secs_f64(f64::from(PERIOD_TICKS) / settings.rate_hz),
+            flash,
+            period: period(&settings),
         }))
     }
 }
 
+/// Time from one look of the server at its port to the next.
+pub(super) fn period(settings: &StageSettings) -> Duration {
+    Duration::from_secs_f64(f64::from(PERIOD_TICKS) / settings.rate_hz)
+}
+
 impl Exchange for SimulatedLink {
-    fn exchange(&mut self, sent: &[u8]) -> Vec<u8> {
+    fn exchange(&mut self, sent: &[u8]) -> io::Result<Vec<u8>> {
         self.machine.send(sent);
         self.machine.run(PERIOD_TICKS);
-        self.machine.receive()
+        if let Some(file) = &mut self.flash {
+            file.keep(self.machine.flash().bytes())?;
+        }
+        Ok(self.machine.receive())
     }
 
     fn period(&self) -> Duration {
         self.period
+    }
+
+    fn hands(&mut self) -> Option<&mut dyn Hands> {
+        Some(self)
+    }
+}
+
+impl Hands for SimulatedLink {
+    fn press(&mut self, switches: Switches) {
+        self.machine.press(switches);
+    }
+
+    fn power_cycle(&mut self) -> io::Result<()> {
+        self.machine.power_cycle();
+        Ok(())
+    }
+
+    /// The library's code logs nothing: that is the firmware's business.
+    fn log(&mut self) -> io::Result<Option<Vec<String>>> {
+        Ok(None)
     }
 }

@@ -5,6 +5,8 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
+use super::hands::Hands;
+
 /// A connection that carries bytes both ways, and the clock by which it waits.
 pub trait Transport {
     /// Sends all of the bytes.
@@ -28,6 +30,11 @@ pub trait Transport {
 
     /// What to check if the other end is silent.
     fn remedy(&self) -> &'static str;
+
+    /// Hands at the machine, where a program can have any: at a simulated one.
+    fn hands(&mut self) -> Option<&mut dyn Hands> {
+        None
+    }
 }
 
 /// The speed of the serial port, baud; 8 data bits, no parity, one stop bit.
@@ -162,13 +169,26 @@ fn or_none(read: io::Result<usize>) -> io::Result<usize> {
     }
 }
 
-/// A machine in this process.
+/// A machine in this process, or one that runs in step with it.
 pub trait Exchange {
     /// Lets the machine run for [`period`](Self::period), with bytes for it; gives its bytes.
-    fn exchange(&mut self, sent: &[u8]) -> Vec<u8>;
+    ///
+    /// # Errors
+    /// A machine that has failed.
+    fn exchange(&mut self, sent: &[u8]) -> io::Result<Vec<u8>>;
 
     /// The machine's time that one exchange takes.
     fn period(&self) -> Duration;
+
+    /// What it is, for messages.
+    fn place(&self) -> String {
+        "the simulated machine".to_owned()
+    }
+
+    /// Hands at it.
+    fn hands(&mut self) -> Option<&mut dyn Hands> {
+        None
+    }
 }
 
 /// A machine in this process as the other end. Its time passes only while it is waited for, as fast as it can, so that the
@@ -202,7 +222,7 @@ impl<E: Exchange> Transport for InProcess<E> {
         let due = self.now + timeout;
         while self.received.is_empty() && (self.now < due || !self.sent.is_empty()) {
             let sent = std::mem::take(&mut self.sent);
-            self.received = self.machine.exchange(&sent);
+            self.received = self.machine.exchange(&sent)?;
             self.now += self.machine.period();
         }
         let count = self.received.len().min(buffer.len());
@@ -217,11 +237,15 @@ impl<E: Exchange> Transport for InProcess<E> {
     }
 
     fn place(&self) -> String {
-        "the simulated machine".to_owned()
+        self.machine.place()
     }
 
     fn remedy(&self) -> &'static str {
         "this is a defect of Quadrant: please report the commands that led to it"
+    }
+
+    fn hands(&mut self) -> Option<&mut dyn Hands> {
+        self.machine.hands()
     }
 }
 

@@ -84,6 +84,12 @@ pub enum ReportError {
         /// The schema that is understood.
         expected: &'static str,
     },
+    /// An image that cannot be drawn.
+    #[error("the picture cannot be drawn: {reason}; the image as SVG can be written")]
+    Picture {
+        /// Why.
+        reason: String,
+    },
     /// The file could not be written.
     #[error("cannot write {}", path.display())]
     Write {
@@ -95,6 +101,12 @@ pub enum ReportError {
 }
 
 impl ReportError {
+    pub(super) fn picture(reason: impl std::fmt::Display) -> Self {
+        Self::Picture {
+            reason: reason.to_string(),
+        }
+    }
+
     pub(super) fn json(source: serde_json::Error) -> Self {
         Self::Json { source }
     }

@@ -19,6 +19,7 @@ mod mark;
 mod number;
 mod page;
 mod palette;
+mod png;
 mod polar;
 mod scale;
 mod svg;

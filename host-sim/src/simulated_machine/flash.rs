@@ -14,6 +14,18 @@ const BYTES: usize = 2 * SECTOR_BYTES;
 #[derive(Clone, Debug)]
 pub struct MemoryFlash(Vec<u8>);
 
+impl MemoryFlash {
+    /// A flash that holds `bytes`, if they are as many as it has.
+    pub fn of(bytes: Vec<u8>) -> Option<Self> {
+        (bytes.len() == BYTES).then_some(Self(bytes))
+    }
+
+    /// What it holds.
+    pub fn bytes(&self) -> &[u8] {
+        &self.0
+    }
+}
+
 impl Default for MemoryFlash {
     fn default() -> Self {
         Self(vec![0xFF; BYTES])

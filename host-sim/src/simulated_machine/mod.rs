@@ -26,7 +26,9 @@ const BOARD: &str = "simulated";
 /// Words of the capture, as on the reference board.
 const CAPTURE_WORDS: usize = quadrant::capture::CAPTURE_WORDS;
 /// Bytes that the port carries in a run of the server: what 921 600 baud do in a millisecond.
-const PORT_BYTES: usize = 92;
+pub(crate) const PORT_BYTES: usize = 92;
+/// Ticks for which a power cycle leaves the stage to itself: 1 s at 10 kHz.
+pub(crate) const OFF_TICKS: u32 = 10_000;
 
 /// The host's end of the port, and its wire.
 #[derive(Debug, Default)]
@@ -85,8 +87,21 @@ impl SimulatedMachine {
         truth: &StageTruth,
         seed: u64,
     ) -> Result<Self, SettingsError> {
+        Self::with_flash(settings, truth, seed, MemoryFlash::default())
+    }
+
+    /// The same, on a flash that may have been used before.
+    ///
+    /// # Errors
+    /// The first of the settings that is refused.
+    pub fn with_flash(
+        settings: &StageSettings,
+        truth: &StageTruth,
+        seed: u64,
+        flash: MemoryFlash,
+    ) -> Result<Self, SettingsError> {
         Ok(Self {
-            running: Running::start(settings, MemoryFlash::default(), None)?,
+            running: Running::start(settings, flash, None)?,
             plant: SimulatedStage::new(truth, settings.rate_hz, seed),
             defaults: settings.clone(),
             wire: Wire::default(),
@@ -113,6 +128,11 @@ impl SimulatedMachine {
     /// Presses inputs, or lets go of them: emergency stop, switches, amplifier faults.
     pub fn press(&mut self, switches: Switches) {
         self.pressed = switches;
+    }
+
+    /// What the flash for settings holds.
+    pub fn flash(&self) -> &MemoryFlash {
+        self.running.server.flash()
     }
 
     /// Sends bytes to the machine.
@@ -162,13 +182,23 @@ impl SimulatedMachine {
 
     /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
     pub fn restart(&mut self) {
-        let Running { server, .. } = &self.running;
-        let flash = server.flash().clone();
+        let flash = self.flash().clone();
         match Running::start(&self.defaults, flash, None) {
             Ok(running) => self.running = running,
             // The defaults were accepted when the machine was made.
             Err(_) => unreachable!("the same settings were accepted before"),
         }
+    }
+
+    /// Cuts the supply, lets the stage coast, and switches it on again: what is in flash stays.
+    pub fn power_cycle(&mut self) {
+        self.outputs = Outputs::default();
+        for _ in 0..OFF_TICKS {
+            self.plant.step(&self.outputs);
+        }
+        // What was on its way to the machine is lost.
+        self.wire.to_machine.clear();
+        self.restart();
     }
 }
 

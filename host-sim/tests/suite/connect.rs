@@ -88,14 +88,14 @@ fn a_circle_is_homed_run_and_recorded_for_the_other_commands() {
 
 #[test]
 fn the_same_session_is_the_same_to_the_last_byte() {
-    let script = "enable\nhome x\nwait homed x\nrecord --out a.csv --seconds 0.3 -- move x 1\nwait rest\nstatus\nlog\n";
+    let script = "enable\nhome x\nwait homed x\nrecord --out a.csv --seconds 0.3 -- move x 1\nwait rest\nstatus\nevents\n";
     let [one, other] = [0, 1].map(|_| {
         let folder = tempfile::tempdir().unwrap();
         let said = succeeds(folder.path(), &["--seed", "3"], script);
         (said, std::fs::read(folder.path().join("a.csv")).unwrap())
     });
     assert_eq!(one, other);
-    // What happened before and while it was recorded is in the log all the same.
+    // What happened before and while it was recorded is told all the same.
     for event in ["outputs on", "motion begins", "motion ends"] {
         assert!(one.0.contains(event), "{event}: {}", one.0);
     }
@@ -282,13 +282,15 @@ fn a_scope_draws_and_keeps_what_it_drew() {
     let said = succeeds(
         folder.path(),
         &[],
-        "enable\njog x 5\nscope x.error,y.error --seconds 0.5 --svg scope.svg --csv scope.csv\nstop\n",
+        "enable\njog x 5\nscope x.error,y.error --seconds 0.5 --svg scope.svg --png scope.png --csv scope.csv\nstop\n",
     );
     assert!(said.contains("x.error, mm"), "{said}");
     let braille = |c: char| ('\u{2801}'..='\u{28ff}').contains(&c);
     assert!(said.contains(braille), "{said}");
     let svg = std::fs::read_to_string(folder.path().join("scope.svg")).unwrap();
     assert!(svg.contains("<svg") && svg.contains("x.error"));
+    let png = std::fs::read(folder.path().join("scope.png")).unwrap();
+    assert!(png.starts_with(b"\x89PNG"));
     assert!(folder.path().join("scope-x.csv").is_file());
 }
 
@@ -323,5 +325,67 @@ fn every_shell_gets_its_completions() {
             said.contains("connect") && said.contains("velocity"),
             "{shell}"
         );
+    }
+}
+
+#[test]
+fn hands_press_inputs_and_pull_the_plug() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = succeeds(
+        folder.path(),
+        &["--json"],
+        "press emergency-stop x.positive-limit\nwait 0.1\nrelease emergency-stop\nenable\nwait 0.1\nstatus\n\
+         release\njog y 5\nwait 0.5\npower-cycle\nstatus\n",
+    );
+    let results = results(&said);
+    let pressed = |index: usize| results[index]["result"]["pressed"].to_string();
+    assert_eq!(pressed(0), r#"["emergency-stop","x.positive-limit"]"#);
+    assert_eq!(pressed(2), r#"["x.positive-limit"]"#);
+    assert_eq!(pressed(6), "[]");
+    assert_eq!(results[5]["result"]["state"], "enabled");
+    // Whatever it did: it has just been switched on.
+    let after = &results[10]["result"];
+    assert_eq!(after["state"], "disabled");
+    assert!(after["tick"].as_u64().unwrap() < 1000, "{after}");
+
+    let refused = session(
+        folder.path(),
+        &[],
+        "press emergency-stop\nwait 0.1\nenable\n",
+    );
+    let errors = String::from_utf8(refused.stderr).unwrap();
+    assert!(
+        errors.contains("line 3") && errors.contains("emergency stop"),
+        "{errors}"
+    );
+}
+
+#[test]
+fn a_flash_file_keeps_what_was_stored_from_one_command_to_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let flash = ["--flash", "settings.flash"];
+    let get = "get x/feedback/pid/kp_v_per_mm\n";
+    let change = "set x/feedback/pid/kp_v_per_mm 0.8\napply\nstore 'a test'\n";
+    succeeds(folder.path(), &flash, change);
+    let kept = succeeds(folder.path(), &flash, &format!("provenance\n{get}"));
+    assert_eq!(kept, "a test\n0.8\n");
+    assert_ne!(succeeds(folder.path(), &[], get), "0.8\n");
+    std::fs::write(folder.path().join("short"), "no flash").unwrap();
+    let refused = session(folder.path(), &["--flash", "short"], get);
+    let errors = String::from_utf8(refused.stderr).unwrap();
+    assert!(errors.contains("short has 8 bytes"), "{errors}");
+}
+
+#[test]
+fn what_a_place_lacks_is_named_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let no_log = command::fail(folder.path(), &["connect", "--simulated", "log"]);
+    assert!(no_log.contains("`events`"), "{no_log}");
+    let no_image = command::fail(folder.path(), &["connect", "--emulated", "hello"]);
+    for part in [
+        "target/images/mps2-f32.elf",
+        "cargo xtask build --board mps2",
+    ] {
+        assert!(no_image.contains(part), "{no_image}");
     }
 }

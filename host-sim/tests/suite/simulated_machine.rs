@@ -158,7 +158,9 @@ fn a_session_homes_moves_streams_changes_a_gain_and_survives_a_restart() {
     session.run(100);
     session.done(Body::Home(AxisSet::ALL));
     session.run(100);
+    assert_eq!(session.status().state, MachineState::Homing);
     session.until_rest();
+    assert_eq!(session.status().state, MachineState::Enabled);
     assert_eq!(session.status().homed, AxisSet::ALL);
     let events = session.events();
     assert!(events.contains(&Event::Homed(AxisName::Z)), "{events:?}");

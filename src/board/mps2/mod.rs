@@ -65,8 +65,9 @@ pub(crate) struct Board {
 /// What the board calls itself.
 pub(crate) const NAME: &str = "mps2";
 
-/// Ends the emulator; the host starts it afresh.
+/// Ends the emulator; the host starts it afresh. The answer to whoever asked for it is on its way by then.
 pub(crate) fn restart() -> ! {
+    serial::exchange();
     halt(Outcome::Done)
 }
 
@@ -223,9 +224,12 @@ impl Tick {
         PERIOD.store(self.period, Ordering::Relaxed);
     }
 
-    /// Rate of the timer, Hz.
+    /// Rate of the timer, Hz; zero, if none measures the ticks, as in lockstep.
     pub(crate) fn cycle_hz(&self) -> u32 {
-        timer::CLOCK_HZ
+        match self.mode {
+            Mode::Paced => timer::CLOCK_HZ,
+            Mode::Lockstep | Mode::Unpaced => 0,
+        }
     }
 
     /// Begins a tick: clears its interrupt and counts it.

@@ -23,7 +23,7 @@ static WRITTEN: AtomicU32 = AtomicU32::new(0);
 /// Bytes that the host has read.
 static GONE: AtomicU32 = AtomicU32::new(0);
 
-/// Lets bytes change hands. Not while a task that uses the port is under way: the idle loop calls it.
+/// Lets bytes change hands. Not while the port is in use: the idle loop calls it, and whoever ends the emulator.
 pub(super) fn exchange() {
     ARRIVED.store(mailbox::read(LINK_IN_WRITTEN), Ordering::Relaxed);
     GONE.store(mailbox::read(LINK_OUT_TAKEN), Ordering::Relaxed);

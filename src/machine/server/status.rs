@@ -3,6 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::Server;
+use crate::axis::CourseMode;
 use crate::link::PROTOCOL_VERSION;
 use crate::link::message::{AxisSet, AxisStatus, FaultReport, Identity, Status, text};
 use crate::safety::{AxisName, SafetyState};
@@ -40,7 +41,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         let homed = AxisName::ALL.into_iter().zip(view.homed);
         Status {
             tick: self.seen.tick,
-            state: MachineState::from(view.safety),
+            state: self.state(),
             fault: view.safety.fault().map(|fault| fault.code.number()),
             running: view.running,
             homed: homed
@@ -53,6 +54,16 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             frames: self.frames,
             dropped_samples: self.packer.dropped(),
             dropped_events: self.dropped_events,
+        }
+    }
+
+    /// Homing is a motion for the safety, but for a person a state of the machine.
+    fn state(&self) -> MachineState {
+        let view = &self.seen.view;
+        let homing = view.modes.into_iter().any(|mode| mode == CourseMode::Home);
+        match MachineState::from(view.safety) {
+            MachineState::Enabled if homing => MachineState::Homing,
+            state => state,
         }
     }
 

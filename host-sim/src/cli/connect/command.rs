@@ -6,6 +6,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use quadrant::safety::AxisName;
 use quadrant::telemetry::Channel;
+use quadrant_sim::console::hands;
 
 /// One thing to ask of the machine.
 #[derive(Clone, Debug, Subcommand)]
@@ -110,14 +111,31 @@ pub(super) enum Command {
     /// Capture channels at the full control rate, around a trigger.
     #[command(subcommand)]
     Capture(CaptureCommand),
-    /// Draw channels in the terminal while they are sampled; with --svg or --csv, keep what was drawn.
+    /// Draw channels in the terminal while they are sampled; with --svg, --png or --csv, keep what was drawn.
     Scope(ScopeOptions),
-    /// Show events as they happen: states, faults, motions, settings.
-    Log {
+    /// Show events as the link tells them: states, faults, motions, settings.
+    Events {
         /// How long, s; 0 shows only those that have come already.
         #[arg(default_value_t = 0.0)]
         seconds: f64,
     },
+    /// Show the firmware's log (defmt): of the emulated board what has come since the last time; of a board, with --elf and
+    /// without a connection, through its debug probe until Ctrl-C.
+    Log(super::flash::LogArguments),
+    /// Press inputs of a simulated or emulated machine, until `release`.
+    Press {
+        /// The inputs: emergency-stop, x.negative-limit, x.positive-limit, x.home, x.amplifier-fault, and of y and z.
+        #[arg(required = true, value_parser = input_parser())]
+        inputs: Vec<String>,
+    },
+    /// Let go of inputs; without any, of all.
+    Release {
+        /// The inputs, as for `press`.
+        #[arg(value_parser = input_parser())]
+        inputs: Vec<String>,
+    },
+    /// Cut the supply of a simulated or emulated machine for a second, whatever it does; what is stored stays.
+    PowerCycle,
     /// Wait: for some seconds of the machine's time, for the axes to rest, or until axes are homed.
     Wait {
         /// Seconds, `rest` or `homed`.
@@ -278,6 +296,9 @@ pub(super) struct ScopeOptions {
     /// Write what was sampled as a figure for print.
     #[arg(long, value_name = "FILE")]
     pub(super) svg: Option<PathBuf>,
+    /// The same as a picture.
+    #[arg(long, value_name = "FILE")]
+    pub(super) png: Option<PathBuf>,
     /// Write what was sampled as CSV.
     #[arg(long, value_name = "FILE")]
     pub(super) csv: Option<PathBuf>,
@@ -291,6 +312,11 @@ pub(super) fn axis_parser() -> impl TypedValueParser<Value = AxisName> {
             .find(|axis| axis.as_str() == name)
             .unwrap_or(AxisName::X)
     })
+}
+
+/// Reads the name of an input that can be pressed.
+fn input_parser() -> PossibleValuesParser {
+    PossibleValuesParser::new(hands::INPUTS.map(|(name, _)| name))
 }
 
 impl Command {
@@ -324,7 +350,11 @@ impl Command {
             Self::Record(_) => "record",
             Self::Capture(_) => "capture",
             Self::Scope(_) => "scope",
-            Self::Log { .. } => "log",
+            Self::Events { .. } => "events",
+            Self::Log(_) => "log",
+            Self::Press { .. } => "press",
+            Self::Release { .. } => "release",
+            Self::PowerCycle => "power-cycle",
             Self::Wait { .. } => "wait",
             Self::Identify(_) => "identify",
             Self::Commission(_) => "commission",

@@ -3,17 +3,20 @@
 use std::fmt::Display;
 use std::time::Duration;
 
+use quadrant::safety::Switches;
 use quadrant_sim::console::{Client, ClientError};
 use serde_json::{Value, json};
 
 use super::command::Command;
 use super::printer::Printer;
-use super::{commission, identify, machine, observe, program, scope, settings};
+use super::{commission, hands, identify, machine, observe, program, scope, settings};
 
 /// A session with a machine, and where its results go.
 pub(super) struct Session {
     pub(super) client: Client,
     pub(super) printer: Printer,
+    /// Inputs that `press` holds.
+    pub(super) pressed: Switches,
 }
 
 /// What a command leaves: for a person, and as data.
@@ -38,7 +41,11 @@ impl Answer {
 
 impl Session {
     pub(super) const fn new(client: Client, printer: Printer) -> Self {
-        Self { client, printer }
+        Self {
+            client,
+            printer,
+            pressed: Switches::NONE,
+        }
     }
 
     /// Who is at the other end, in a line.
@@ -103,7 +110,11 @@ impl Session {
             Command::Record(options) => observe::record(self, options),
             Command::Capture(command) => observe::capture(client, command),
             Command::Scope(options) => scope::run(self, options),
-            Command::Log { seconds } => observe::log(self, *seconds),
+            Command::Events { seconds } => observe::events(self, *seconds),
+            Command::Log(options) => hands::log(self, options),
+            Command::Press { inputs } => hands::press(self, inputs),
+            Command::Release { inputs } => hands::release(self, inputs),
+            Command::PowerCycle => hands::power_cycle(client),
             Command::Identify(command) => identify::run(client, command),
             Command::Commission(options) => commission::run(client, options),
             Command::Flash(_) | Command::Script => {

@@ -1,7 +1,7 @@
-//! `quadrant connect flash`.
+//! What goes through a board's debug probe: `quadrant connect flash` and `log`.
 
 use std::io::ErrorKind;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, bail};
@@ -20,14 +20,36 @@ pub(super) struct Arguments {
     run: bool,
 }
 
-/// Flashes the firmware and lets it start.
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    if !arguments.elf.is_file() {
+/// Options of `log`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct LogArguments {
+    /// The firmware that is on the board: the ELF file it was flashed from, for its strings.
+    #[arg(long, value_name = "FILE")]
+    pub(super) elf: Option<PathBuf>,
+    /// The chip, as probe-rs calls it.
+    #[arg(long, default_value = "STM32F446RETx", requires = "elf")]
+    chip: String,
+}
+
+/// Shows the log of a board that runs, until Ctrl-C.
+pub(super) fn log(elf: &PathBuf, arguments: &LogArguments) -> anyhow::Result<()> {
+    exists(elf)?;
+    probe_rs(&["attach", "--chip", &arguments.chip], Some(elf))
+}
+
+fn exists(elf: &Path) -> anyhow::Result<()> {
+    if !elf.is_file() {
         bail!(
             "{}: no such file; build the firmware first (docs/board-nucleo-f446re.md)",
-            arguments.elf.display()
+            elf.display()
         );
     }
+    Ok(())
+}
+
+/// Flashes the firmware and lets it start.
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    exists(&arguments.elf)?;
     if arguments.run {
         return probe_rs(&["run", "--chip", &arguments.chip], Some(&arguments.elf));
     }

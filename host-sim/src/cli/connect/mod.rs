@@ -4,6 +4,7 @@ mod command;
 mod commission;
 mod drive;
 mod flash;
+mod hands;
 mod identify;
 mod machine;
 mod observe;
@@ -13,25 +14,36 @@ mod scope;
 mod script;
 mod settings;
 
+use std::path::PathBuf;
+
 use anyhow::Context;
 use clap::Args;
-use quadrant_sim::console::{Client, SerialTransport, SimulatedLink, TcpTransport};
+use quadrant_sim::console::{Client, EmulatedLink, SerialTransport, SimulatedLink, TcpTransport};
 
 use command::Command;
 use drive::Session;
 use printer::Printer;
+
+/// Where `cargo xtask build --board mps2` leaves the image, from the workspace's folder.
+const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
 
 /// Options of `quadrant connect`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
     place: Place,
-    /// Seed of the simulated machine's noise; the same seed gives the same results.
-    #[arg(long, default_value_t = 1, requires = "simulated")]
+    /// Seed of the simulated stage's noise; the same seed gives the same results.
+    #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp"])]
     seed: u64,
+    /// Keep the flash of the simulated or emulated machine in a file, so that what is stored survives this command.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "tcp"])]
+    flash: Option<PathBuf>,
     /// Print one JSON object a line: {"command": ..., "result": ...} or {"command": ..., "error": ...}.
     #[arg(long)]
     json: bool,
+    /// Print each command of a script before what comes of it.
+    #[arg(long, conflicts_with = "json")]
+    echo: bool,
     /// Go on after a command that failed; the exit code is 1 all the same.
     #[arg(long)]
     keep_going: bool,
@@ -53,32 +65,45 @@ struct Place {
     /// waited for.
     #[arg(long)]
     simulated: bool,
+    /// The firmware's image in QEMU on the simulated stage, the same way; without a path, the one that `cargo xtask build
+    /// --board mps2` has left below this folder.
+    #[arg(long, value_name = "ELF", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_IMAGE)]
+    emulated: Option<PathBuf>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(Command::Flash(flash)) = &arguments.command {
         return flash::run(flash);
     }
+    if let Some(Command::Log(log)) = &arguments.command
+        && let Some(elf) = &log.elf
+    {
+        return flash::log(elf, log);
+    }
     let printer = Printer {
         json: arguments.json,
     };
     let mut session = Session::new(connect(arguments)?, printer);
     let succeeded = match &arguments.command {
-        None | Some(Command::Script) => script::run(&mut session, arguments.keep_going)?,
+        None | Some(Command::Script) => {
+            script::run(&mut session, arguments.echo, arguments.keep_going)?
+        }
         Some(command) => session.run(command, ""),
     };
     if succeeded {
         Ok(())
     } else {
-        // What failed has been said.
+        // What failed has been said. The emulator ends with the session.
+        drop(session);
         std::process::exit(1)
     }
 }
 
 fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
     let place = &arguments.place;
-    let client = match (&place.port, &place.tcp, place.simulated) {
-        (Some(path), _, _) => {
+    let flash = arguments.flash.as_deref();
+    let client = match (&place.port, &place.tcp, &place.emulated, place.simulated) {
+        (Some(path), ..) => {
             let port = SerialTransport::open(path).with_context(|| {
                 format!(
                     "serial port {path} cannot be opened; check the cable, the name (on Linux `ls /dev/ttyACM* \
@@ -87,7 +112,7 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
             })?;
             Client::open(port)
         }
-        (_, Some(address), _) => {
+        (_, Some(address), ..) => {
             let socket = TcpTransport::connect(address).with_context(|| {
                 format!(
                     "tcp:{address} does not answer; check the address and that the machine runs"
@@ -95,9 +120,11 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
             })?;
             Client::open(socket)
         }
-        (_, _, true) => Client::open(SimulatedLink::start(arguments.seed)?),
+        (_, _, Some(image), _) => Client::open(EmulatedLink::start(image, arguments.seed, flash)?),
+        (.., true) => Client::open(SimulatedLink::start(arguments.seed, flash)?),
         _ => anyhow::bail!(
-            "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated to try without one"
+            "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \
+             without one"
         ),
     };
     Ok(client?)

@@ -201,8 +201,8 @@ fn state(status: &CaptureStatus) -> Answer {
     Answer::new(text, data)
 }
 
-pub(super) fn log(session: &mut Session, time_s: f64) -> anyhow::Result<Answer> {
-    let due = session.client.now() + seconds("log", time_s)?;
+pub(super) fn events(session: &mut Session, time_s: f64) -> anyhow::Result<Answer> {
+    let due = session.client.now() + seconds("events", time_s)?;
     let rate_hz = session.client.identity().rate_hz;
     let mut shown = 0;
     // What has come, and at least what is on its way.
@@ -210,7 +210,7 @@ pub(super) fn log(session: &mut Session, time_s: f64) -> anyhow::Result<Answer> 
     loop {
         for notice in session.client.take_notices() {
             if let Some((text, data)) = line(&notice, rate_hz) {
-                session.printer.result("log", &text, &data);
+                session.printer.result("events", &text, &data);
                 shown += 1;
             }
         }
@@ -222,7 +222,7 @@ pub(super) fn log(session: &mut Session, time_s: f64) -> anyhow::Result<Answer> 
     }
 }
 
-/// A notice as a line of the log.
+/// A notice as a line.
 fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
     match notice {
         Notice::Event {

@@ -1,6 +1,7 @@
 //! `scope`: channels in the terminal while they are sampled.
 
 use std::io::{IsTerminal, Write, stdout};
+use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
@@ -32,14 +33,14 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
         );
     }
     let unit = columns::unit(options.channels[0]);
-    if options.svg.is_some()
+    if (options.svg.is_some() || options.png.is_some())
         && let Some(other) = options
             .channels
             .iter()
             .find(|channel| columns::unit(**channel) != unit)
     {
         bail!(
-            "--svg: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
+            "--svg, --png: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
             options.channels[0],
             columns::unit(*other)
         );
@@ -74,8 +75,11 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
         files.extend(columns::write(&samples, path, &resolutions_mm)?);
     }
     if let Some(path) = &options.svg {
-        let svg = figure(&samples, &resolutions_mm).to_svg()?;
-        std::fs::write(path, svg).with_context(|| format!("cannot write {}", path.display()))?;
+        write(path, figure(&samples, &resolutions_mm).to_svg()?.as_bytes())?;
+        files.push(path.clone());
+    }
+    if let Some(path) = &options.png {
+        write(path, &figure(&samples, &resolutions_mm).to_png()?)?;
         files.push(path.clone());
     }
     let data = json!({
@@ -89,6 +93,10 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
         if live { String::new() } else { picture },
         data,
     ))
+}
+
+fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
+    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// The end of the samples, as much as `window` shows, one channel below the other.

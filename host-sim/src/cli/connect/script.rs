@@ -66,7 +66,7 @@ pub(super) fn parse(line: &str) -> Result<Said, String> {
 }
 
 /// Takes commands until the input ends; says whether all succeeded.
-pub(super) fn run(session: &mut Session, keep_going: bool) -> anyhow::Result<bool> {
+pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow::Result<bool> {
     if io::stdin().is_terminal() {
         prompt(session)?;
         return Ok(true);
@@ -86,6 +86,9 @@ pub(super) fn run(session: &mut Session, keep_going: bool) -> anyhow::Result<boo
             break;
         };
         let line = line.context("cannot read standard input")?;
+        if echo {
+            println!("> {line}");
+        }
         let succeeded = one(session, &line, &format!("line {}", index + 1));
         all &= succeeded;
         if !(succeeded || keep_going) {

@@ -23,7 +23,7 @@ fn serve(mut line: impl Read + Write, requests: usize) {
             Err(error) if matches!(error.kind(), ErrorKind::TimedOut | ErrorKind::WouldBlock) => 0,
             Err(_) => return,
         };
-        let answer = model.exchange(&buffer[..count]);
+        let answer = model.exchange(&buffer[..count]).unwrap();
         if line.write_all(&answer).and_then(|()| line.flush()).is_err() {
             return;
         }
@@ -51,6 +51,8 @@ fn a_session(transport: impl Transport + 'static) {
     let before = client.now();
     client.wait(Duration::from_millis(20)).unwrap();
     assert!(client.now() - before >= Duration::from_millis(20));
+    // Nobody presses the emergency stop of a machine that is not there.
+    assert!(client.hands().is_none());
 }
 
 #[test]

@@ -205,7 +205,7 @@ fn read(channel: Channel, position_mm: &[f64; 3], tick: u32) -> u32 {
 }
 
 impl Exchange for Model {
-    fn exchange(&mut self, sent: &[u8]) -> Vec<u8> {
+    fn exchange(&mut self, sent: &[u8]) -> std::io::Result<Vec<u8>> {
         self.step();
         let mut answers = Vec::new();
         let mut port = std::mem::take(&mut self.port);
@@ -224,7 +224,7 @@ impl Exchange for Model {
             drop(bench);
             self.put(&Message::Response(response));
         }
-        std::mem::take(&mut self.outbox)
+        Ok(std::mem::take(&mut self.outbox))
     }
 
     fn period(&self) -> Duration {
