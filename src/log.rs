@@ -247,6 +247,7 @@ impl Narrator {
         meters: Meters,
     ) {
         let tick = seen.tick;
+        self.thinner.settle(tick);
         for news in self.journal.look(tick, &seen.view, server.vitals(), meters) {
             if !self.thinner.admits(topic_of(news), tick) {
                 continue;

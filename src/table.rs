@@ -36,7 +36,13 @@ fn node_argument(index: usize, end_exponent: i32) -> f64 {
 
 /// The smallest exponent with `2^exponent >= end`.
 fn end_exponent(end: f64) -> i32 {
-    libm::ceil(libm::log2(end)) as i32
+    // Exact, and smaller than a logarithm.
+    let (fraction, exponent) = libm::frexp(end);
+    if fraction > 0.5 {
+        exponent
+    } else {
+        exponent - 1
+    }
 }
 
 impl<S: Scalar, const CURVES: usize> OctaveTable<S, CURVES> {

@@ -5,6 +5,8 @@
 
 use core::ops::{Add, Neg, Sub};
 
+use crate::rounding;
+
 use serde::{Deserialize, Serialize};
 
 /// Number of fraction bits of [`Position`]: one unit is 2^-16 encoder count (7.6 pm at 0.5 um per count).
@@ -35,8 +37,9 @@ impl Position {
     }
 
     /// Rounds `value_mm` to the nearest unit; `resolution_mm` is the length of one encoder count. Settings time only.
+    #[inline(never)]
     pub fn from_mm(value_mm: f64, resolution_mm: f64) -> Self {
-        Self(libm::round(value_mm / resolution_mm * POSITION_UNITS_PER_COUNT) as i64)
+        Self(rounding::round(value_mm / resolution_mm * POSITION_UNITS_PER_COUNT) as i64)
     }
 
     /// The position in mm; `resolution_mm` is the length of one encoder count. For people and files, not for the tick.

@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::CaptureError;
+use crate::rounding;
 use crate::scalar::Scalar;
 use crate::telemetry::{Channel, Observation, WordKind};
 
@@ -118,7 +119,7 @@ impl Watch {
             }
             Trigger::Level(Level { channel, level, .. }) => match channel.word_kind() {
                 WordKind::Float => Threshold::Float(level as f32),
-                WordKind::Integer => Threshold::Integer(libm::round(level) as i32),
+                WordKind::Integer => Threshold::Integer(rounding::round(level) as i32),
             },
             _ => Threshold::Integer(0),
         };

@@ -147,6 +147,17 @@ pub struct Ad5754r<Bus, Sync, Load, Clear, Delay> {
     codes: [i16; 3],
     /// What is read back next: 0 to 2 a code, 3 the power register.
     turn: u8,
+    /// A register that read wrong, until it reads right.
+    wrong: Option<Wrong>,
+}
+
+/// A register that read wrong.
+#[derive(Clone, Copy)]
+struct Wrong {
+    turn: u8,
+    item: Item,
+    expected: u16,
+    answered: u16,
 }
 
 impl<Bus, Sync, Load, Clear, Delay> Ad5754r<Bus, Sync, Load, Clear, Delay>
@@ -169,6 +180,7 @@ where
             delay,
             codes: [0; 3],
             turn: 0,
+            wrong: None,
         }
     }
 
@@ -190,13 +202,20 @@ where
         self.update();
         self.codes = [0; 3];
         self.turn = 0;
+        self.wrong = None;
         for (address, bits, item, expected) in [
             (register::RANGE, RANGE_BITS, Item::Range, RANGE_10_V_BIPOLAR),
             (register::POWER, POWER_BITS, Item::Power, POWER_UP),
         ] {
             self.ask(address)?;
             let answer = self.send_and_listen(frame(register::CONTROL | CONTROL_NOTHING, 0))?;
-            compare(answer, bits, item, expected)?;
+            if answer & bits != expected {
+                return Err(Error::Mismatch {
+                    item,
+                    expected,
+                    answered: answer,
+                });
+            }
         }
         let _ = self.pins.clear.set_high();
         Ok(())
@@ -207,7 +226,8 @@ where
     ///
     /// # Errors
     /// The bus' error, after which the outputs hold the codes of the call before; or a mismatch, after which they hold
-    /// these.
+    /// these. A mismatch is reported by every call until its register reads right: a chip that has lost its supply keeps
+    /// the codes that it is sent, but is no longer powered up.
     #[inline(always)]
     pub fn write(&mut self, codes: [i16; 3]) -> Result<(), Error<Bus::Error>> {
         let [a, b, c] = self.codes.map(i16::cast_unsigned);
@@ -217,15 +237,33 @@ where
             2 => (register::DAC | 2, ALL_BITS, Item::Code(2), c),
             _ => (register::POWER, POWER_BITS, Item::Power, POWER_UP),
         };
-        self.turn = (self.turn + 1) & 3;
+        let turn = self.turn;
+        self.turn = (turn + 1) & 3;
         let [a, b, c] = codes.map(i16::cast_unsigned);
         self.ask(address)?;
-        let answer = self.send_and_listen(frame(register::DAC, a))?;
+        let answered = self.send_and_listen(frame(register::DAC, a))?;
         self.send(frame(register::DAC | 1, b))?;
         self.send(frame(register::DAC | 2, c))?;
         self.update();
         self.codes = codes;
-        compare(answer, bits, item, expected)
+        if answered & bits != expected {
+            self.wrong = Some(Wrong {
+                turn,
+                item,
+                expected,
+                answered,
+            });
+        } else if self.wrong.is_some_and(|wrong| wrong.turn == turn) {
+            self.wrong = None;
+        }
+        match self.wrong {
+            None => Ok(()),
+            Some(wrong) => Err(Error::Mismatch {
+                item: wrong.item,
+                expected: wrong.expected,
+                answered: wrong.answered,
+            }),
+        }
     }
 
     /// Asks for a register: the answer comes in the next frame.
@@ -269,19 +307,5 @@ where
         let _ = self.pins.load.set_low();
         self.delay.delay_ns(LOAD_NS);
         let _ = self.pins.load.set_high();
-    }
-}
-
-/// Holds an answer against what the chip should hold.
-#[inline(always)]
-fn compare<E>(answered: u16, bits: u16, item: Item, expected: u16) -> Result<(), Error<E>> {
-    if answered & bits == expected {
-        Ok(())
-    } else {
-        Err(Error::Mismatch {
-            item,
-            expected,
-            answered,
-        })
     }
 }

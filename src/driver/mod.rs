@@ -4,5 +4,6 @@
 pub mod ad5754r;
 pub mod counter;
 pub mod dma_ring;
+pub mod hold_button;
 pub mod input_filter;
 pub mod noise_shaper;

@@ -26,6 +26,21 @@ pub const INPUT_SEQUENCE: usize = 0x80;
 pub const INPUT: usize = 0x90;
 /// The [`BootBlock`].
 pub const BOOT: usize = 0x100;
+/// How often the firmware has started since the memory was made, a word. A firmware that has reset the processor
+/// begins with exchange number 1 again, and with empty rings.
+pub const STARTS: usize = 0x110;
+/// How often the firmware may still reset the processor after it has failed, a word; at zero it ends the emulator.
+pub const RESETS_LEFT: usize = 0x114;
+/// Why the processor was reset, a [`Reset`]; the firmware reads it once.
+pub const RESET: usize = 0x118;
+/// What the firmware is to do to itself, a [`Provocation`].
+pub const PROVOCATION: usize = 0x11C;
+/// When: instead of the tick of this number in lockstep, after it in a paced run; a word.
+pub const PROVOCATION_TICK: usize = 0x120;
+/// The clock, which counts down, when a firmware began to hang, a word.
+pub const HANGS_FROM: usize = 0x124;
+/// The clock the last time that a hanging firmware looked at it, a word.
+pub const HANGS_UNTIL: usize = 0x128;
 /// The job: a postcard-encoded [`Job`].
 pub const JOB: usize = 0x200;
 /// Largest encoded job.
@@ -111,6 +126,62 @@ impl BootBlock {
     }
 }
 
+/// Why the emulated processor was reset.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Reset {
+    /// It was not: it has just been switched on.
+    PowerOn = 0,
+    /// The watchdog was not fed.
+    Watchdog = 1,
+    /// The firmware asked for it.
+    Software = 2,
+}
+
+impl Reset {
+    /// The cause of a word.
+    pub const fn from_word(word: u32) -> Self {
+        match word {
+            1 => Self::Watchdog,
+            2 => Self::Software,
+            _ => Self::PowerOn,
+        }
+    }
+}
+
+/// What a host makes the idle loop of an emulated firmware do, to see what becomes of it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u32)]
+pub enum Provocation {
+    /// Panic.
+    Panic = 1,
+    /// Execute an instruction that there is not.
+    UndefinedInstruction = 2,
+    /// Read where there is nothing.
+    BusError = 3,
+    /// Call itself until the stack is full.
+    StackOverflow = 4,
+    /// Ask for an interrupt that has no handler.
+    StrayInterrupt = 5,
+    /// Do nothing any more, with interrupts masked.
+    Hang = 6,
+}
+
+impl Provocation {
+    /// The provocation of a word.
+    pub const fn from_word(word: u32) -> Option<Self> {
+        Some(match word {
+            1 => Self::Panic,
+            2 => Self::UndefinedInstruction,
+            3 => Self::BusError,
+            4 => Self::StackOverflow,
+            5 => Self::StrayInterrupt,
+            6 => Self::Hang,
+            _ => return None,
+        })
+    }
+}
+
 /// What the target is to run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Job {
@@ -129,6 +200,10 @@ pub struct InputRecord {
     pub switches: Switches,
     /// The host whose set points the axes follow has fallen silent.
     pub link_lost: bool,
+    /// Whose converters have a bit that is stuck; see [`held`].
+    pub stuck: [bool; 3],
+    /// The encoders take a whole control period to be read, where there is a clock that tells.
+    pub slow: bool,
     /// A request to the supervising task.
     pub request: Option<Command>,
 }
@@ -147,6 +222,8 @@ impl InputRecord {
     const STALE: u32 = 19;
     const INVALID: u32 = 22;
     const LINK_LOST: u32 = 25;
+    const STUCK: u32 = 26;
+    const SLOW: u32 = 29;
 
     /// Fresh and valid raw counts and a request: a stage without switches and index pulses.
     pub fn of_counts(counts: [u32; 3], request: Option<Command>) -> Self {
@@ -168,6 +245,12 @@ impl InputRecord {
         }
     }
 
+    /// Whose converters have a stuck bit, by the word of the flags.
+    #[inline(always)]
+    pub fn stuck_of(flags: u32) -> [bool; 3] {
+        [0, 1, 2].map(|bit| flags >> (Self::STUCK + bit) & 1 == 1)
+    }
+
     /// The record as words: three counts, the request, the flags, three latched counts.
     pub fn encode(&self) -> [u8; Self::BYTES] {
         let mut flags = u32::from(self.switches.bits());
@@ -175,8 +258,10 @@ impl InputRecord {
             flags |= u32::from(reading.index.is_some()) << (Self::INDEX_SEEN as usize + bit);
             flags |= u32::from(!reading.fresh) << (Self::STALE as usize + bit);
             flags |= u32::from(!reading.valid) << (Self::INVALID as usize + bit);
+            flags |= u32::from(self.stuck[bit]) << (Self::STUCK as usize + bit);
         }
         flags |= u32::from(self.link_lost) << Self::LINK_LOST;
+        flags |= u32::from(self.slow) << Self::SLOW;
         let [x, y, z] = self.readings.map(|reading| reading.count);
         let [at_x, at_y, at_z] = self.readings.map(|reading| reading.index.unwrap_or(0));
         let request = self.request.and_then(Command::number).unwrap_or(0);
@@ -207,15 +292,29 @@ impl InputRecord {
             ],
             switches: Switches::from_bits(flags as u16),
             link_lost: is_set(Self::LINK_LOST, 0),
+            stuck: Self::stuck_of(flags),
+            slow: is_set(Self::SLOW, 0),
             request: Command::from_number(request),
         }
     }
 }
 
+/// The bit of a converter's word that sticks at one: 1.25 V of 10 V.
+const STUCK_BIT: i16 = 1 << 12;
+
+/// What the converters hold of the codes that they were told: all of them, but for a bit that is stuck.
+#[inline(always)]
+pub fn held(codes: [DacCode; 3], stuck: [bool; 3]) -> [DacCode; 3] {
+    let [x, y, z] = codes;
+    let [at_x, at_y, at_z] = stuck;
+    let held = |code: DacCode, sticks| DacCode(code.0 | if sticks { STUCK_BIT } else { 0 });
+    [held(x, at_x), held(y, at_y), held(z, at_z)]
+}
+
 /// What the target tells the host of one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OutputRecord {
-    /// What the stage put out.
+    /// What the converters hold, and whether the amplifiers are enabled.
     pub outputs: Outputs,
 }
 

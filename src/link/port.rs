@@ -50,10 +50,11 @@ impl Port {
         if body.is_err() {
             self.count_undecodable();
         }
-        let result = body
-            .and_then(|body| self.admit(body))
-            .and_then(|body| body.check())
-            .and_then(serve);
+        let result = body.and_then(|body| {
+            self.admit(&body)?;
+            body.check()?;
+            serve(body)
+        });
         Some(Response { id, result })
     }
 
@@ -72,10 +73,10 @@ impl Port {
         self.greeted = false;
     }
 
-    fn admit(&mut self, body: Body) -> Result<Body, LinkError> {
+    fn admit(&mut self, body: &Body) -> Result<(), LinkError> {
         self.greeted |= matches!(body, Body::Hello);
         if self.greeted || matches!(body, Body::Disable | Body::Stop) {
-            Ok(body)
+            Ok(())
         } else {
             Err(LinkError::NoHello)
         }

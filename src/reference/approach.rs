@@ -5,6 +5,7 @@
 
 use super::point_to_point::FRACTION_BITS;
 use super::{MotionScale, PointToPoint, PointToPointSettings};
+use crate::rounding;
 use crate::scalar::Scalar;
 use crate::units::Position;
 
@@ -25,7 +26,7 @@ pub struct Approach<S: Scalar> {
 
 /// The power of two of ticks that is at least `seconds`.
 fn exponent(seconds: f64, rate_hz: f64) -> u32 {
-    let ticks = libm::ceil(seconds * rate_hz).max(1.0) as u32;
+    let ticks = rounding::ceil(seconds * rate_hz).max(1.0) as u32;
     (u32::BITS - (ticks - 1).leading_zeros()).min(MOST_EXPONENT / 2)
 }
 

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::sine::{SINE_BITS, sine, sine_and_cosine};
 use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
+use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_FRACTION_BITS, Position};
 
@@ -164,8 +165,8 @@ impl<S: Scalar> Harmonic<S> {
     pub(super) fn build(settings: &HarmonicSettings, scale: MotionScale) -> Self {
         let amplitude = Position::from_mm(settings.amplitude_mm, scale.resolution_mm).0;
         let turns_per_tick = settings.frequency_hz / scale.rate_hz;
-        let phase_per_tick = libm::round(libm::scalbn(turns_per_tick, 64)) as u64;
-        let ticks = |seconds: f64| libm::round(seconds * scale.rate_hz) as u32;
+        let phase_per_tick = rounding::round(libm::scalbn(turns_per_tick, 64)) as u64;
+        let ticks = |seconds: f64| rounding::round(seconds * scale.rate_hz) as u32;
         let lead_ticks = ticks(settings.lead_s).max(1);
         let cruise_ticks = settings
             .cycles
@@ -173,8 +174,8 @@ impl<S: Scalar> Harmonic<S> {
         // The lead-in covers half of what full speed would.
         let lead_turns = 0.5 * f64::from(lead_ticks) * turns_per_tick;
         let start_turns = settings.phase_rad / TAU - lead_turns;
-        let start_turns = start_turns - libm::floor(start_turns);
-        let start_phase = libm::round(libm::scalbn(start_turns, 32)) as u64 as u32;
+        let start_turns = start_turns - rounding::floor(start_turns);
+        let start_phase = rounding::round(libm::scalbn(start_turns, 32)) as u64 as u32;
         let angular = TAU * settings.frequency_hz;
         let unit = 1.0 / f64::from(1u32 << SINE_BITS);
         // Settings are refused whose amplitude does not fit.

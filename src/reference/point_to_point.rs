@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::{MotionScale, MotionState, ReferenceSample};
+use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
@@ -84,7 +85,7 @@ impl<S: Scalar> PointToPoint<S> {
         let target = Position::from_mm(settings.distance_mm, scale.resolution_mm);
         let [velocity, acceleration, jerk] = settings
             .durations_s()
-            .map(|seconds| (libm::ceil(seconds * scale.rate_hz) as u32).max(1));
+            .map(|seconds| (rounding::ceil(seconds * scale.rate_hz) as u32).max(1));
         // Rounded up one by one, they could overlap by a tick, and their jerks add.
         let acceleration = acceleration.max(jerk);
         let velocity = velocity.max(acceleration + jerk);

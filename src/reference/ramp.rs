@@ -8,6 +8,7 @@
 use core::ops::Neg;
 
 use super::{MotionScale, ReferenceSample};
+use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
@@ -29,8 +30,9 @@ impl Velocity {
     pub const ZERO: Self = Self(0);
 
     /// The nearest velocity to `value_mm_s`, saturating; `NaN` gives rest. Settings time only.
+    #[inline(never)]
     pub fn from_mm_s(value_mm_s: f64, scale: MotionScale) -> Self {
-        Self::clamped(libm::round(value_mm_s * steps_per_mm(scale) / scale.rate_hz) as i64)
+        Self::clamped(rounding::round(value_mm_s * steps_per_mm(scale) / scale.rate_hz) as i64)
     }
 
     /// The velocity of a displacement in one tick, saturating.
@@ -157,15 +159,16 @@ impl RampState {
 impl<S: Scalar> Ramp<S> {
     /// A ramp within `acceleration_mm_s2` and `jerk_mm_s3`, both above zero; an infinite jerk leaves the acceleration
     /// alone limited. Both are rounded down, the acceleration to a multiple of the jerk. Settings time only.
+    #[inline(never)]
     pub fn new(acceleration_mm_s2: f64, jerk_mm_s3: f64, scale: MotionScale) -> Self {
         let rate = scale.rate_hz;
         let acceleration = acceleration_mm_s2 * steps_per_mm(scale) / (rate * rate);
         let jerk = jerk_mm_s3 * steps_per_mm(scale) / (rate * rate * rate);
         let jerk = jerk.min(acceleration).clamp(1.0, LARGEST as f64);
-        let jerk = libm::floor(jerk);
+        let jerk = rounding::floor(jerk);
         // T(levels) stays below the largest velocity.
         let most = libm::sqrt(LARGEST as f64 / jerk).min(f64::from(i32::MAX));
-        let levels = libm::floor(acceleration / jerk).clamp(1.0, most.max(1.0));
+        let levels = rounding::floor(acceleration / jerk).clamp(1.0, most.max(1.0));
         let unit_mm = scale.resolution_mm / POSITION_UNITS_PER_COUNT;
         let one = libm::scalbn(1.0, FRACTION_BITS as i32);
         Self {
@@ -328,7 +331,7 @@ impl Factor {
         let excess = (-31 - power).max(0);
         // `as` saturates.
         Self {
-            mantissa: libm::ceil(libm::scalbn(fraction, 32 - excess)) as u32,
+            mantissa: rounding::ceil(libm::scalbn(fraction, 32 - excess)) as u32,
             shift: (32 - power - excess).max(0) as u32,
         }
     }

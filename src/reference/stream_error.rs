@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::stream_planner::{MOST_MISSING, MOST_SEGMENT_TICKS};
+use crate::decimal::Decimal;
 use crate::safety::AxisName;
 
 /// What is wrong with a set point.
@@ -80,8 +81,10 @@ impl fmt::Display for StreamError {
                 limit_mm_s,
             } => write!(
                 f,
-                "{axis} would move at {value_mm_s:.3} mm/s, above its limit of {limit_mm_s:.3} mm/s; \
-                 check for a jump of the position, or lower the feed"
+                "{axis} would move at {:.3} mm/s, above its limit of {:.3} mm/s; \
+                 check for a jump of the position, or lower the feed",
+                Decimal(value_mm_s),
+                Decimal(limit_mm_s)
             ),
             StreamFlaw::Acceleration {
                 axis,
@@ -89,8 +92,10 @@ impl fmt::Display for StreamError {
                 limit_mm_s2,
             } => write!(
                 f,
-                "{axis} would accelerate at {value_mm_s2:.1} mm/s^2, above its limit of {limit_mm_s2:.1} mm/s^2; \
-                 check that position, velocity and acceleration agree, or lower the feed"
+                "{axis} would accelerate at {:.1} mm/s^2, above its limit of {:.1} mm/s^2; \
+                 check that position, velocity and acceleration agree, or lower the feed",
+                Decimal(value_mm_s2),
+                Decimal(limit_mm_s2)
             ),
             StreamFlaw::Travel {
                 axis,
@@ -98,7 +103,9 @@ impl fmt::Display for StreamError {
                 limit_mm,
             } => write!(
                 f,
-                "{axis} would be at {value_mm:.3} mm, beyond the end of its travel at {limit_mm:.3} mm"
+                "{axis} would be at {:.3} mm, beyond the end of its travel at {:.3} mm",
+                Decimal(value_mm),
+                Decimal(limit_mm)
             ),
             StreamFlaw::NotAtRest { axis } => write!(
                 f,

@@ -7,6 +7,7 @@ use super::ramp::{Velocity, steps_per_mm};
 use super::stream::{FRACTION_BITS, Segment};
 use super::stream_error::{StreamError, StreamFlaw};
 use super::{MotionScale, ReferenceSample};
+use crate::rounding;
 use crate::safety::AxisName;
 use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
@@ -52,7 +53,7 @@ impl AxisPoint {
             position: sample.position,
             velocity: Velocity::from_mm_s(sample.velocity, scale),
             // `as` turns NaN into zero.
-            acceleration: Acceleration(libm::round(acceleration).clamp(-most, most) as i64),
+            acceleration: Acceleration(rounding::round(acceleration).clamp(-most, most) as i64),
         }
     }
 

@@ -1,5 +1,6 @@
 //! What is watched on each axis in every tick: one small pure step each, without a division.
 
+use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
 
 /// Fraction bits of a filtered speed.
@@ -37,7 +38,7 @@ impl Overspeed {
     pub fn new(counts_per_tick: f64) -> Self {
         let limit = (counts_per_tick + SPEED_NOISE_COUNTS) * f64::from(1 << SPEED_FRACTION_BITS);
         Self {
-            limit: libm::round(limit) as u32,
+            limit: rounding::round(limit) as u32,
         }
     }
 

@@ -3,6 +3,7 @@
 use core::ops::{Add, Neg, Sub};
 
 use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
+use crate::rounding;
 
 /// A saturating 32-bit number. The binary point is the [`Quantity`]'s, known to the code that holds the value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
@@ -80,9 +81,9 @@ impl Scalar for Fixed {
     const ZERO: Self = Self(0);
 
     fn quantise(value: f64, quantity: Quantity) -> Self {
-        let scaled = value * libm::exp2(f64::from(quantity.fraction_bits()));
+        let scaled = value * libm::scalbn(1.0, quantity.fraction_bits() as i32);
         // `as` saturates and turns NaN into zero.
-        Self(libm::round(scaled) as i32)
+        Self(rounding::round(scaled) as i32)
     }
 
     fn to_f32(self, quantity: Quantity) -> f32 {
@@ -109,7 +110,7 @@ impl Scalar for Fixed {
             (libm::scalbn(fraction, 30), shift)
         };
         FixedGain {
-            mantissa: libm::round(mantissa) as i32,
+            mantissa: rounding::round(mantissa) as i32,
             shift: shift as u32,
         }
     }

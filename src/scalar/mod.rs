@@ -150,16 +150,12 @@ impl<S: Scalar> OctaveStart<S> {
     /// The start at `2^exponent` of a signal of the given quantity. Settings time only.
     pub(crate) fn new(exponent: i32, quantity: Quantity) -> Self {
         // The first octaves of a curve over small values may lie below the step of a fixed-point format.
-        let quantise = |exponent: i32| S::quantise(libm::exp2(f64::from(exponent)), quantity);
+        let quantise = |exponent: i32| S::quantise(libm::scalbn(1.0, exponent), quantity);
         let held = (exponent..0)
-            .find(|&e| quantise(e).to_f64(quantity) == libm::exp2(f64::from(e)))
+            .find(|&e| quantise(e).to_f64(quantity) == libm::scalbn(1.0, e))
             .unwrap_or(exponent);
         let bound = quantise(held);
-        let below = S::gain(
-            libm::exp2(f64::from(-exponent)),
-            quantity,
-            Quantity::Fraction,
-        );
+        let below = S::gain(libm::scalbn(1.0, -exponent), quantity, Quantity::Fraction);
         let origin = Self {
             key: 0,
             below,

@@ -7,6 +7,7 @@ use crate::axis::{Amplifier, Axis};
 use crate::course::Course;
 use crate::encoder::Encoder;
 use crate::reference::{Motion, MotionScale, Ramp, Stream, Velocity};
+use crate::rounding;
 use crate::safety::AxisName;
 use crate::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
 use crate::safety::travel::Travel;
@@ -66,8 +67,9 @@ impl StageSettings {
 
 impl AxisSettings {
     /// The preview in whole ticks.
+    #[inline(never)]
     fn preview_ticks(&self, period_s: f64) -> usize {
-        libm::round(self.feedforward.preview_s / period_s) as usize
+        rounding::round(self.feedforward.preview_s / period_s) as usize
     }
 
     /// `longest_preview_ticks` is the stage's.
@@ -91,7 +93,7 @@ impl AxisSettings {
             encoder.counter_bits.into(),
             encoder.reversed,
             // One count more: a slow axis still steps by whole counts, and noise adds one.
-            libm::ceil(largest_step) as i32 + 1,
+            rounding::ceil(largest_step) as i32 + 1,
         );
         let unit_mm = encoder.resolution_mm / POSITION_UNITS_PER_COUNT;
         axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
@@ -112,7 +114,7 @@ impl AxisSettings {
                 self.limits.silent_share * amplifier.output_limit_v,
                 Quantity::Voltage,
             ),
-            ticks: libm::round(self.limits.silent_s / period_s) as u32,
+            ticks: rounding::round(self.limits.silent_s / period_s) as u32,
         };
         axis.index = IndexSpacing::new(encoder.counts_per_index, encoder.index_tolerance_counts);
         let wait_ticks = (longest_preview_ticks - preview_ticks) as u32;
@@ -149,7 +151,7 @@ impl AmplifierSettings {
         Amplifier {
             limit: S::quantise(self.output_limit_v, Quantity::Voltage),
             codes_per_volt: S::gain(sign * codes_per_volt, Quantity::Voltage, Quantity::Integer),
-            offset_code: libm::round(self.offset_v * codes_per_volt) as i32,
+            offset_code: rounding::round(self.offset_v * codes_per_volt) as i32,
         }
     }
 }

@@ -3,6 +3,7 @@
 use core::fmt;
 
 use super::{AxisSettings, StageSettings};
+use crate::decimal::Decimal;
 use crate::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
 use crate::safety::AxisName;
 use crate::units::Position;
@@ -52,14 +53,19 @@ impl fmt::Display for MoveError {
                 travel_mm: (negative, positive),
             } => write!(
                 f,
-                "{target_mm} mm is outside the travel of {negative} to {positive} mm"
+                "{} mm is outside the travel of {} to {} mm",
+                Decimal(target_mm),
+                Decimal(negative),
+                Decimal(positive)
             ),
             MoveFlaw::Velocity {
                 value_mm_s,
                 limit_mm_s,
             } => write!(
                 f,
-                "a velocity of {value_mm_s} mm/s is outside 0 (exclusive) to {limit_mm_s} mm/s"
+                "a velocity of {} mm/s is outside 0 (exclusive) to {} mm/s",
+                Decimal(value_mm_s),
+                Decimal(limit_mm_s)
             ),
         }
     }

@@ -2,6 +2,7 @@
 
 use core::fmt;
 
+use crate::decimal::Decimal;
 use crate::safety::AxisName;
 
 /// Why a value is refused.
@@ -70,7 +71,7 @@ impl fmt::Display for SettingsError {
         }
         f.write_str(self.field)?;
         if self.reason != Reason::Missing {
-            write!(f, " = {}", self.value)?;
+            write!(f, " = {}", Decimal(self.value))?;
         }
         match self.reason {
             Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
@@ -84,7 +85,7 @@ impl fmt::Display for SettingsError {
             Reason::NotRising => f.write_str(" must lie above the point before it"),
             Reason::NotFinite => f.write_str(" is not a finite number"),
             Reason::OutOfRange { least, most } => {
-                write!(f, " is outside {least} to {most}")
+                write!(f, " is outside {} to {}", Decimal(least), Decimal(most))
             }
             Reason::WeightsSum => f.write_str(": the weights of all elements must sum to 1 within 1e-6"),
             Reason::TooManyElements { room } => {
@@ -92,8 +93,9 @@ impl fmt::Display for SettingsError {
             }
             Reason::BeyondPopov { bound } => write!(
                 f,
-                ": cosh(rate * range) exceeds {bound:.3}, the Popov bound of this PID on this plant; \
-                 lower the rate, the range or the PID's gains"
+                ": cosh(rate * range) exceeds {:.3}, the Popov bound of this PID on this plant; \
+                 lower the rate, the range or the PID's gains",
+                Decimal(bound)
             ),
             Reason::TableError => f.write_str(
                 ": the curve bends too sharply near zero for its table (error above 0.1 % of the breakaway level); \
@@ -101,12 +103,14 @@ impl fmt::Display for SettingsError {
             ),
             Reason::TooStiffForRate { most } => write!(
                 f,
-                ": the stiffness (of GMS elements their sum) exceeds {most:.4} V/mm, beyond which the pre-sliding resonance \
-                 on this plant is not resolved at the control rate"
+                ": the stiffness (of GMS elements their sum) exceeds {:.4} V/mm, beyond which the pre-sliding resonance \
+                 on this plant is not resolved at the control rate",
+                Decimal(most)
             ),
             Reason::TooFastForRate { most } => write!(
                 f,
-                " exceeds {most:.4} V/s, beyond which sliding friction changes within one control period"
+                " exceeds {:.4} V/s, beyond which sliding friction changes within one control period",
+                Decimal(most)
             ),
         }
     }

@@ -8,6 +8,7 @@ use super::AxisSettings;
 use crate::friction::Direction;
 use crate::homing::Homing;
 use crate::reference::{Approach, MotionScale, Velocity};
+use crate::rounding;
 use crate::safety::AxisSwitches;
 use crate::scalar::Scalar;
 use crate::units::{POSITION_UNITS_PER_COUNT, Position};
@@ -66,7 +67,8 @@ impl AxisSettings {
             None => homing.park_mm,
         };
         let spacing = self.encoder.counts_per_index.filter(|_| homing.index);
-        let whole_counts = libm::round(homing.mark_mm / resolution_mm) * POSITION_UNITS_PER_COUNT;
+        let whole_counts =
+            rounding::round(homing.mark_mm / resolution_mm) * POSITION_UNITS_PER_COUNT;
         Some(Homing {
             direction: homing.direction,
             switch: match (homing.switch, homing.direction) {
@@ -76,8 +78,8 @@ impl AxisSettings {
             },
             search: Velocity::from_mm_s(search_mm_s, scale),
             latch: Velocity::from_mm_s(homing.latch_mm_s.min(search_mm_s), scale),
-            debounce_ticks: libm::round(homing.debounce_s * scale.rate_hz) as u32,
-            settle_ticks: libm::round(SETTLE_S * scale.rate_hz) as u32,
+            debounce_ticks: rounding::round(homing.debounce_s * scale.rate_hz) as u32,
+            settle_ticks: rounding::round(SETTLE_S * scale.rate_hz) as u32,
             index_spacing: spacing.map(|counts| Position(i64::from(counts) << 16)),
             mark: Position(whole_counts as i64),
             park: Position::from_mm(park_mm, resolution_mm),

@@ -100,7 +100,8 @@ fn canonical(path: &str) -> Result<Path, TreeError> {
         None => return Err(TreeError::NotFound),
         Some(rest) => {
             let end = rest.find('/').unwrap_or(rest.len());
-            let (name, below) = rest.split_at(end);
+            // By `get`: slicing, should it fail, would want to print the text.
+            let (name, below) = rest.split_at_checked(end).unwrap_or((rest, ""));
             let index = match name {
                 "x" | "0" => "0",
                 "y" | "1" => "1",

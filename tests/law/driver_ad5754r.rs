@@ -262,19 +262,52 @@ fn every_wrong_bit_of_every_register_is_reported_and_the_codes_are_written_all_t
         }
         for bit in 0..16 {
             for (turn, (_, item, expected, bits)) in questions.into_iter().enumerate() {
-                let answered = wrong(turn, bit);
-                let expected = if bits >> bit & 1 == 1 {
-                    Err(Error::Mismatch {
+                // A bit that means nothing leaves the mismatch of the register before.
+                let found = if bits >> bit & 1 == 1 {
+                    Error::Mismatch {
                         item,
                         expected,
-                        answered,
-                    })
+                        answered: wrong(turn, bit),
+                    }
                 } else {
-                    Ok(())
+                    Error::Mismatch {
+                        item: questions[2].1,
+                        expected: questions[2].2,
+                        answered: wrong(2, bit),
+                    }
                 };
-                assert_eq!(converter.write(codes), expected, "bit {bit} of {item:?}");
+                assert_eq!(converter.write(codes), Err(found), "bit {bit} of {item:?}");
             }
         }
+    });
+}
+
+#[test]
+fn a_chip_that_lost_its_supply_is_reported_by_every_write_until_it_is_powered_up() {
+    let codes = [0; 3];
+    let questions = [0x80, 0x81, 0x82, 0x90];
+    let mut script = Script::started();
+    for power in [0, 0, 0x1F] {
+        for question in questions {
+            let answer = if question == 0x90 { power } else { 0 };
+            script = script.write(question, answer, codes);
+        }
+    }
+    script.run(|converter| {
+        assert_eq!(converter.start(), STARTED);
+        let off = Err(Error::Mismatch {
+            item: Item::Power,
+            expected: 0x1F,
+            answered: 0,
+        });
+        let found: Vec<_> = (0..12).map(|_| converter.write(codes)).collect();
+        assert_eq!(found[..3], [STARTED; 3]);
+        assert_eq!(
+            found[3..11],
+            [off; 8],
+            "the codes read right, the chip is off"
+        );
+        assert_eq!(found[11], STARTED);
     });
 }
 

@@ -1,28 +1,28 @@
-//! A host's voltage through the whole tick: what it adds up to, how it ends, and what ends it.
+//! A host's voltage through the whole tick: what it adds up to, and when it is taken.
 
 use proptest::prelude::*;
 use quadrant::axis::CourseMode;
 use quadrant::injection::Injection;
 use quadrant::reference::Velocity;
-use quadrant::safety::{AxisName, AxisSwitches, Command, FaultCode, SafetyState, Switches};
+use quadrant::safety::{AxisName, Command, FaultCode};
 use quadrant::scalar::{Fixed, Scalar};
-use quadrant::settings::{InjectionSettings, PlanSettings, StageSettings, TravelSettings};
+use quadrant::settings::{InjectionSettings, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant::supervisor::{Refusal, StageView, refusal};
 
-use crate::common::{Rig, any_f32, repeatable, sine_on_x, with_x};
+use crate::common::{Rig, any_f32, repeatable, sine_on_x};
 
 /// An x axis without friction, at 0.1 ms: 70 m/s^2 per volt, and a drag.
-struct Bench<S: Scalar> {
-    rig: Rig<S>,
-    words: Vec<i16>,
-    sent: usize,
-    position_mm: f64,
-    velocity_mm_s: f64,
-    outputs: Outputs,
+pub(crate) struct Bench<S: Scalar> {
+    pub(crate) rig: Rig<S>,
+    pub(crate) words: Vec<i16>,
+    pub(crate) sent: usize,
+    pub(crate) position_mm: f64,
+    pub(crate) velocity_mm_s: f64,
+    pub(crate) outputs: Outputs,
 }
 
-fn request(open_loop: bool) -> InjectionSettings {
+pub(crate) fn request(open_loop: bool) -> InjectionSettings {
     InjectionSettings {
         axis: AxisName::X,
         open_loop,
@@ -34,7 +34,7 @@ fn request(open_loop: bool) -> InjectionSettings {
 }
 
 impl<S: Scalar> Bench<S> {
-    fn new(settings: &StageSettings, plan: &PlanSettings) -> Self {
+    pub(crate) fn new(settings: &StageSettings, plan: &PlanSettings) -> Self {
         let mut rig = Rig::new(settings, plan);
         rig.tick();
         rig.command(Command::Enable);
@@ -48,7 +48,7 @@ impl<S: Scalar> Bench<S> {
         }
     }
 
-    fn begin(&mut self, request: &InjectionSettings, words: &[i16]) {
+    pub(crate) fn begin(&mut self, request: &InjectionSettings, words: &[i16]) {
         let (injection, _): (Injection<S>, u16) =
             StageSettings::default().injection(request).unwrap();
         self.rig.state.prepare_injection(injection);
@@ -69,14 +69,14 @@ impl<S: Scalar> Bench<S> {
     }
 
     /// A tick of the law alone, the axis where it was put.
-    fn tick(&mut self) -> Outputs {
+    pub(crate) fn tick(&mut self) -> Outputs {
         self.feed();
         self.outputs = self.rig.tick();
         self.outputs
     }
 
     /// A tick of the law and of the axis.
-    fn step(&mut self) -> Outputs {
+    pub(crate) fn step(&mut self) -> Outputs {
         self.rig.inputs.readings[0].count = (self.position_mm / 5e-4).round() as i32 as u32;
         let outputs = self.tick();
         let volts = 10.0 * f64::from(outputs.codes[0].0) / 32767.0;
@@ -86,22 +86,22 @@ impl<S: Scalar> Bench<S> {
         outputs
     }
 
-    fn steps(&mut self, ticks: usize) {
+    pub(crate) fn steps(&mut self, ticks: usize) {
         for _ in 0..ticks {
             self.step();
         }
     }
 
-    fn fault(&self) -> Option<FaultCode> {
+    pub(crate) fn fault(&self) -> Option<FaultCode> {
         self.rig.state.safety().fault().map(|fault| fault.code)
     }
 
-    fn mode(&self) -> CourseMode {
+    pub(crate) fn mode(&self) -> CourseMode {
         self.rig.state.axes()[0].mode()
     }
 }
 
-fn bench() -> Bench<f32> {
+pub(crate) fn bench() -> Bench<f32> {
     Bench::new(&StageSettings::default(), &PlanSettings::default())
 }
 
@@ -186,167 +186,6 @@ fn in_open_loop_the_law_is_off_and_the_others_hold() {
     assert_eq!(bench.mode(), CourseMode::OpenLoop);
     let seen = bench.rig.state.axes()[0].telemetry();
     assert_eq!(seen.reference.0 >> 16, seen.measured.0);
-}
-
-#[test]
-fn the_loop_is_closed_without_a_bump_from_a_moving_axis() {
-    let mut bench = bench();
-    // 0.4 V for 15 ms: up to some 170 mm/s.
-    bench.begin(&request(true), &[1300; 150]);
-    bench.steps(151);
-    let fast = bench.velocity_mm_s;
-    assert!(fast > 100.0, "{fast}");
-    let mut before = 0.0;
-    let mut most_mm: f64 = 0.0;
-    for tick in 0..2_000 {
-        let outputs = bench.step();
-        let volts = 10.0 * f64::from(outputs.codes[0].0) / 32_767.0;
-        if tick == 0 {
-            // What braking takes, and no more.
-            assert!(volts.abs() < 1.0, "{volts}");
-            before = volts;
-        }
-        assert!((volts - before).abs() < 1.0, "{volts} after {before}");
-        before = volts;
-        most_mm = most_mm.max(f64::from(bench.rig.state.axes()[0].telemetry().error_mm()).abs());
-    }
-    assert!(bench.rig.state.safety().is_enabled(), "{:?}", bench.fault());
-    assert_eq!(bench.mode(), CourseMode::Hold);
-    assert!(bench.velocity_mm_s.abs() < 1.0, "{}", bench.velocity_mm_s);
-    assert!(most_mm < 0.2, "{most_mm}");
-}
-
-#[test]
-fn a_missing_value_ends_it_and_stops_the_axes() {
-    for open_loop in [false, true] {
-        let mut bench = bench();
-        bench.begin(&request(open_loop), &[300; 50]);
-        bench.words.push(0);
-        // All but the last: the next one never comes.
-        for _ in 0..50 {
-            bench.step();
-        }
-        bench.sent = usize::MAX;
-        assert_eq!(bench.fault(), None);
-        bench.step();
-        assert_eq!(bench.fault(), Some(FaultCode::InjectionUnderrun));
-        assert_eq!(bench.rig.state.axes()[0].injected(), 0.0);
-        assert!(bench.outputs.enabled, "it brakes under control");
-        bench.steps(2_000);
-        assert!(matches!(bench.rig.state.safety(), SafetyState::Faulted(_)));
-        assert_eq!(bench.outputs, Outputs::default());
-    }
-}
-
-#[test]
-fn leaving_the_given_travel_or_velocity_ends_it() {
-    let near = InjectionSettings {
-        travel_mm: 0.5,
-        ..request(true)
-    };
-    let slow = InjectionSettings {
-        max_velocity_mm_s: 20.0,
-        ..request(true)
-    };
-    for (request, far_mm, fast_mm_s) in [(near, 0.5, 200.0), (slow, 50.0, 20.0)] {
-        for sign in [1, -1] {
-            let mut bench = bench();
-            bench.begin(&request, &[sign * 400; 1_000]);
-            while bench.fault().is_none() {
-                bench.step();
-            }
-            assert_eq!(bench.fault(), Some(FaultCode::InjectionBounds));
-            let (place, speed) = (bench.position_mm.abs(), bench.velocity_mm_s.abs());
-            assert!(place < far_mm + 0.1, "{place}");
-            // The speed is filtered over 8 ticks, and half a count is allowed for.
-            assert!(speed < fast_mm_s + 12.0, "{speed}");
-            bench.steps(3_000);
-            assert!(matches!(bench.rig.state.safety(), SafetyState::Faulted(_)));
-        }
-    }
-}
-
-#[test]
-fn every_monitor_but_the_following_error_watches_an_open_loop() {
-    let settings = with_x(|x| {
-        x.homing = None;
-        x.limits.travel_mm = Some(TravelSettings {
-            negative: -3.0,
-            positive: 200.0,
-        });
-    });
-    let provoke = |change: fn(&mut Bench<f32>)| {
-        let mut bench = Bench::<f32>::new(&settings, &PlanSettings::default());
-        bench.rig.state.set_homed(AxisName::X, true);
-        bench.begin(&request(true), &[0; 3_000]);
-        bench.tick();
-        for _ in 0..2_500 {
-            change(&mut bench);
-            bench.tick();
-            if let Some(fault) = bench.fault() {
-                return Some((fault, bench.outputs.enabled));
-            }
-        }
-        None
-    };
-    assert_eq!(
-        provoke(|bench| bench.rig.inputs.switches = Switches::EMERGENCY_STOP),
-        Some((FaultCode::EmergencyStop, false))
-    );
-    assert_eq!(
-        provoke(|bench| bench.rig.inputs.readings[0].valid = false),
-        Some((FaultCode::EncoderInvalid, false))
-    );
-    assert_eq!(
-        provoke(|bench| bench.rig.inputs.deadline_missed = true),
-        Some((FaultCode::DeadlineMissed, false))
-    );
-    assert_eq!(
-        provoke(|bench| bench.rig.inputs.link_lost = true),
-        Some((FaultCode::LinkLost, true))
-    );
-    let creep = |bench: &mut Bench<f32>| {
-        let count = &mut bench.rig.inputs.readings[0].count;
-        *count = count.wrapping_sub(4);
-    };
-    // 20 mm/s towards smaller positions: the travel of the axis ends before that of the request.
-    let (fault, enabled) = provoke(creep).unwrap();
-    assert!(
-        matches!(fault, FaultCode::TravelAhead | FaultCode::TravelExceeded),
-        "{fault:?}"
-    );
-    assert!(enabled);
-    assert_eq!(
-        provoke(|bench| {
-            bench.rig.inputs.switches =
-                Switches::NONE.with_axis(AxisName::X, AxisSwitches::NEGATIVE_LIMIT);
-            let count = &mut bench.rig.inputs.readings[0].count;
-            *count = count.wrapping_sub(1);
-        }),
-        Some((FaultCode::NegativeLimitSwitch, true))
-    );
-}
-
-#[test]
-fn a_stop_and_a_disable_end_it() {
-    for open_loop in [false, true] {
-        let mut bench = bench();
-        bench.begin(&request(open_loop), &[400; 1_000]);
-        bench.steps(100);
-        bench.rig.inputs.command = Some(Command::Stop);
-        bench.steps(1_500);
-        assert!(!bench.rig.state.is_injecting() && !bench.rig.state.is_running());
-        assert!(bench.rig.state.safety().is_enabled(), "{:?}", bench.fault());
-        // What is left of it is not taken up again.
-        assert!(!bench.rig.state.wants_voltage());
-
-        bench.begin(&request(open_loop), &[400; 1_000]);
-        bench.steps(50);
-        bench.rig.inputs.command = Some(Command::Disable);
-        assert_eq!(bench.step(), Outputs::default());
-        assert!(!bench.rig.state.is_injecting());
-        assert_eq!(bench.mode(), CourseMode::Hold);
-    }
 }
 
 #[test]

@@ -65,8 +65,10 @@ fn homing_that_finds_nothing_is_told_too() {
 
 #[test]
 fn a_host_is_told_when_it_comes_falls_silent_and_comes_back() {
-    let mut machine = Machine::default();
-    machine.tick = 50_000;
+    let mut machine = Machine {
+        tick: 50_000,
+        ..Machine::default()
+    };
     machine.vitals.greeted = true;
     machine.vitals.heard_tick = 50_000;
     assert_eq!(machine.look(), [News::Greeted]);

@@ -197,10 +197,8 @@ fn largest_notices() -> Vec<Notice> {
 #[test]
 fn the_largest_messages_fit_a_frame_and_survive_the_way() {
     for body in largest_requests() {
-        let request = Request {
-            id: u16::MAX,
-            body: body.check().expect("finite"),
-        };
+        body.check().expect("finite");
+        let request = Request { id: u16::MAX, body };
         assert_eq!(there_and_back(&request), request);
     }
     let refused = LinkError::Invalid(long());

@@ -2,7 +2,9 @@
 
 use proptest::prelude::*;
 use quadrant::encoder::EncoderReading;
-use quadrant::link::lockstep::{BootBlock, InputRecord, JOB_BYTES, Job, Mode, OutputRecord};
+use quadrant::link::lockstep::{
+    BootBlock, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Provocation, Reset, held,
+};
 use quadrant::reference::Velocity;
 use quadrant::safety::{AxisName, AxisSwitches, Command, Switches};
 use quadrant::settings::{PlanSettings, StageSettings};
@@ -22,6 +24,8 @@ proptest! {
         valid in any::<[bool; 3]>(),
         switches in any::<u16>(),
         link_lost in any::<bool>(),
+        stuck in any::<[bool; 3]>(),
+        slow in any::<bool>(),
         number in 0u32..=5,
     ) {
         let reading = |axis: usize| EncoderReading {
@@ -34,6 +38,8 @@ proptest! {
             readings: [0, 1, 2].map(reading),
             switches: Switches::from_bits(switches),
             link_lost,
+            stuck,
+            slow,
             request: Command::from_number(number),
         };
         prop_assert_eq!(InputRecord::decode(&record.encode()), record);
@@ -71,7 +77,9 @@ fn records_are_little_endian_words() {
     record.readings[1].fresh = false;
     record.readings[2].valid = false;
     record.link_lost = true;
-    bytes[16..22].copy_from_slice(&[0x80, 0x80, 0x11, 0x03, 7, 8]);
+    record.stuck[2] = true;
+    record.slow = true;
+    bytes[16..22].copy_from_slice(&[0x80, 0x80, 0x11, 0x33, 7, 8]);
     assert_eq!(record.encode(), bytes);
     let record = OutputRecord {
         outputs: Outputs {
@@ -80,6 +88,28 @@ fn records_are_little_endian_words() {
         },
     };
     assert_eq!(record.encode(), [0xFF, 0xFF, 2, 0, 0xFD, 0xFF, 1, 0]);
+}
+
+#[test]
+fn a_stuck_bit_shows_in_the_words_that_lack_it() {
+    let codes = [DacCode(-1), DacCode(3), DacCode(3)];
+    assert_eq!(held(codes, [false; 3]), codes);
+    assert_eq!(
+        held(codes, [true, true, false]),
+        [DacCode(-1), DacCode(0x1003), DacCode(3)]
+    );
+}
+
+#[test]
+fn words_of_resets_and_provocations_round_trip() {
+    for reset in [Reset::PowerOn, Reset::Watchdog, Reset::Software] {
+        assert_eq!(Reset::from_word(reset as u32), reset);
+    }
+    let known: Vec<_> = (0..100).filter_map(Provocation::from_word).collect();
+    assert_eq!(known.len(), 6);
+    for (word, provocation) in (1..).zip(known) {
+        assert_eq!(provocation as u32, word);
+    }
 }
 
 #[test]

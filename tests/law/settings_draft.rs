@@ -126,8 +126,10 @@ fn what_is_in_force_stays_until_the_draft_takes_effect_and_can_be_gone_back_to()
 
 #[test]
 fn settings_made_in_place_are_the_default_ones_and_copies_are_the_same() {
-    let mut settings = StageSettings::default();
-    settings.rate_hz = 5e3;
+    let mut settings = StageSettings {
+        rate_hz: 5e3,
+        ..StageSettings::default()
+    };
     settings.streaming.link_lost = quadrant::settings::LossReaction::Hold;
     settings.axes[2].homing = None;
     settings.axes[0].feedback.pid.kp_v_per_mm = 7.0;

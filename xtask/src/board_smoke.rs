@@ -23,22 +23,24 @@ const CLOCK_REGISTERS: [std::ops::Range<u32>; 2] =
 /// Instructions that are looked at for a wait, and how often to look before giving up.
 const INSTRUCTIONS: usize = 40;
 const LOOKS: usize = 40;
-/// Control ticks to run: the button, which reads as pressed here, asks to enable after 32.
+/// Control ticks to run, and how often the supervising task and the server run in them at least.
 const TICKS: u32 = 100;
+const POLLS: u32 = 9;
 /// NVIC_ISPR1, and TIM7 in it.
 const SET_PENDING: u32 = 0xE000_E204;
 const TIM7: u32 = 1 << (55 - 32);
 /// `str r0, [r1]` and a branch to itself, at the bottom of the stack, where nobody is.
 const PEND: [u8; 4] = [0x08, 0x60, 0xFE, 0xE7];
 const SCRATCH: u32 = 0x2000_0000;
-/// What the log must say: SPI was asked and answered zero, initialisation came to its end, and the supervising task let
-/// nobody enable a machine without a converter.
+/// What the log must say: SPI was asked and answered zero, the flash was found empty, initialisation came to its end.
 const EXPECTED: [&str; 4] = [
-    "started by",
     "the converter answers 0x0000 instead of 0x0004",
+    "quadrant ",
+    "no settings are stored",
     "10000 control ticks per second, outputs off",
-    "request refused: x: the converter holds another word than was written",
 ];
+/// What it must not say: the button reads as pressed here, but was never seen up.
+const FORBIDDEN: [&str; 2] = ["outputs enabled", "request refused"];
 
 /// QEMU, ended with its socket when dropped.
 struct Machine {
@@ -105,10 +107,14 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
         tick(&mut debugger)?;
     }
     log.read(&mut debugger)?;
-    let lines = image.program()?.decode_log(&log.bytes);
-    for line in &lines {
-        println!("  firmware: {line}");
-    }
+    let ticked = debugger.word(image.variable("TICK")?)?;
+    let polled = debugger.word(image.variable("POLLS")?)?;
+    println!("{ticked} control ticks, {polled} polls of the server");
+    ensure!(
+        ticked == TICKS && polled >= POLLS,
+        "expected {TICKS} ticks and at least {POLLS} polls"
+    );
+    let lines = log.lines(&image)?;
     for words in EXPECTED {
         ensure!(
             lines.iter().any(|line| line.contains(words)),
@@ -116,11 +122,12 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
             lines.join("\n")
         );
     }
-    ensure!(
-        !lines.iter().any(|line| line.contains("outputs enabled")),
-        "the outputs were enabled without a converter"
-    );
-    println!("{TICKS} control ticks of the board's own image, none of them enabled");
+    for words in FORBIDDEN {
+        ensure!(
+            !lines.iter().any(|line| line.contains(words)),
+            "the log says `{words}`, though nobody pressed the button"
+        );
+    }
     Ok(())
 }
 
@@ -230,6 +237,15 @@ impl Log {
             next = (next + 1) % size;
         }
         debugger.write(self.channel + 16, &end.to_le_bytes())
+    }
+
+    /// The lines, printed as well.
+    fn lines(&self, image: &Image) -> Result<Vec<String>> {
+        let lines = image.program()?.decode_log(&self.bytes);
+        for line in &lines {
+            println!("  firmware: {line}");
+        }
+        Ok(lines)
     }
 }
 

@@ -23,9 +23,12 @@ pub(crate) struct CallGraph<'a> {
 }
 
 /// Where an instruction may go besides the next one.
-enum Flow {
+pub(crate) enum Flow {
+    /// Nowhere.
     Onward,
+    /// To an address.
     To(u32),
+    /// To an address that is not in the code.
     Indirect,
 }
 
@@ -78,7 +81,8 @@ impl<'a> CallGraph<'a> {
     }
 }
 
-fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flow {
+/// Where the instruction at `index` of a function may go.
+pub(crate) fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flow {
     let Instruction {
         mnemonic, operands, ..
     } = instruction;

@@ -4,23 +4,18 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::io::{BufRead, BufReader, Read};
 use std::path::PathBuf;
-use std::process::Stdio;
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::lockstep::{Job, Mode};
-use quadrant_sim::emulator::{self, Clock, Emulator, Memory};
+use quadrant_sim::emulator::{Emulator, Memory};
 use serde::{Deserialize, Serialize};
 
-use crate::attribution::Attribution;
-use crate::call_graph::CallGraph;
 use crate::image::{self, Board, Image, Scalar, Target};
-use crate::listing::Listing;
-use crate::prove::ROOT;
 use crate::toolchain::Toolchain;
+use crate::trace::{Tick, Trace};
 use crate::twin::{self, SETTLING_TICKS, Twin};
-use crate::{command, emulate, stages};
+use crate::{command, emulate};
 
 /// How much more than expected is accepted, in percent.
 const TOLERANCE_PERCENT: f64 = 5.0;
@@ -120,35 +115,15 @@ fn emulated(toolchain: Toolchain, scalar: Scalar) -> Result<Image> {
 
 /// Runs the image and counts.
 fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
-    // A missing hot symbol must not look like a fast one.
-    let root = image.function(ROOT)?;
-    let listing = Listing::of(image)?;
-    let graph = CallGraph::from(&listing, root)?;
-    let tally = Tally {
-        root,
-        inside: Box::new(|address| {
-            listing
-                .at(address)
-                .filter(|f| graph.reached.contains_key(&f.range.start))
-                .map(|f| f.range.start)
-        }),
-        attribution: Attribution::of(image)?,
-        open: None,
-        closed: Vec::new(),
-    };
-
+    let trace = Trace::of(image)?;
     let memory = Memory::create()?;
     // The rehearsal's beginning is spent at rest and is not counted.
     let (inputs, _) = Twin::of(image.target.scalar, job.clone())?.rehearse(SETTLING_TICKS + ticks);
     emulate::load(&memory, Mode::Unpaced, &job, &inputs)?;
     let program = image.program()?;
-    let mut qemu = emulator::command_line(&program, &memory, Clock::Host);
-    qemu.args(["-singlestep", "-d", "exec,nochain"])
-        .args(["-dfilter", &trace_filter(image, &listing, &graph)?])
-        .stderr(Stdio::piped());
-    let mut emulator = Emulator::spawn(qemu, &program, |_| {})?;
-    let trace = emulator.take_stderr().context("QEMU's trace is a pipe")?;
-    let closed = tally.read(trace)?;
+    let mut emulator = Emulator::spawn(trace.command_line(image, &memory)?, &program, |_| {})?;
+    let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
+    let closed = trace.read(image, lines)?;
     emulator.wait()?;
     let Some(counted) = closed.get(SETTLING_TICKS as usize..) else {
         bail!("only {} control ticks seen in the trace", closed.len());
@@ -159,141 +134,6 @@ fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
         counted.len()
     );
     Ok(summary(ticks, counted))
-}
-
-/// What follows a control tick: seeing its first instruction ends the tick.
-const FOLLOWERS: [&str; 4] = ["DISPATCHER_0", "DISPATCHER_1", "DISPATCHER_2", "main"];
-
-/// The address ranges worth a line in the trace: what the control interrupt can reach and what follows it. The tables
-/// that are filled before the first tick take thousands of times as many instructions as all ticks.
-fn trace_filter(image: &Image, listing: &Listing, graph: &CallGraph) -> Result<String> {
-    let mut starts: Vec<u32> = graph.reached.keys().copied().collect();
-    for name in FOLLOWERS {
-        starts.push(image.function(name)?);
-    }
-    let ranges = starts.iter().filter_map(|start| listing.at(*start));
-    let ranges = ranges.map(|f| format!("{:#x}..{:#x}", f.range.start, f.range.end - 1));
-    Ok(ranges.collect::<Vec<_>>().join(","))
-}
-
-/// Instructions of one tick, by stage.
-type Tick = BTreeMap<&'static str, u32>;
-
-/// Follows a trace.
-struct Tally<'a> {
-    root: u32,
-    /// The first address of the function around an address, if it can be reached from the interrupt.
-    inside: Box<dyn Fn(u32) -> Option<u32> + 'a>,
-    attribution: Attribution,
-    open: Option<OpenTick>,
-    closed: Vec<Tick>,
-}
-
-/// A tick that has begun.
-struct OpenTick {
-    tick: Tick,
-    /// The functions entered and not left, each with the stage it was called from.
-    calls: Vec<(u32, &'static str)>,
-    last: &'static str,
-}
-
-impl Tally<'_> {
-    /// Reads a trace to its end.
-    fn read(mut self, trace: impl Read) -> Result<Vec<Tick>> {
-        let mut lines = BufReader::with_capacity(1 << 20, trace);
-        let mut line = Vec::new();
-        let mut previous = None;
-        loop {
-            line.clear();
-            if lines
-                .read_until(b'\n', &mut line)
-                .context("cannot read QEMU's trace")?
-                == 0
-            {
-                break;
-            }
-            match traced(&line) {
-                // A line comes before its instruction is executed: it counts when the next one comes.
-                Some(Traced::Begun(address)) => {
-                    if let Some(address) = previous.replace(address) {
-                        self.executed(address)?;
-                    }
-                }
-                // An interrupt came first: the instruction announced last was not executed.
-                Some(Traced::Stopped) => previous = None,
-                None => eprint!("{}", String::from_utf8_lossy(&line)),
-            }
-        }
-        if let Some(address) = previous {
-            self.executed(address)?;
-        }
-        self.closed.extend(self.open.take().map(|open| open.tick));
-        Ok(self.closed)
-    }
-
-    fn executed(&mut self, address: u32) -> Result<()> {
-        if address == self.root {
-            self.closed.extend(self.open.take().map(|open| open.tick));
-            self.open = Some(OpenTick {
-                tick: Tick::new(),
-                calls: Vec::new(),
-                last: stages::OTHER,
-            });
-        }
-        let Some(open) = &mut self.open else {
-            return Ok(());
-        };
-        let Some(function) = (self.inside)(address) else {
-            // The interrupt has returned.
-            self.closed.extend(self.open.take().map(|open| open.tick));
-            return Ok(());
-        };
-        if let Some(depth) = open
-            .calls
-            .iter()
-            .position(|(called, _)| *called == function)
-        {
-            open.calls.truncate(depth + 1);
-        } else {
-            open.calls.push((function, open.last));
-        }
-        // A function of no stage, such as a copy of memory, works for the stage that called it.
-        let caller = open
-            .calls
-            .last()
-            .map_or(stages::OTHER, |(_, caller)| caller);
-        let stage = self.attribution.stage(address)?.unwrap_or(caller);
-        *open.tick.entry(stage).or_default() += 1;
-        open.last = stage;
-        Ok(())
-    }
-}
-
-/// A line of the trace.
-#[derive(Debug, PartialEq)]
-enum Traced {
-    Begun(u32),
-    Stopped,
-}
-
-/// `Trace 0: 0x7f41c4000100 [00000000/000000d8/00000110/00000201] CONTROL_TICK`
-fn traced(line: &[u8]) -> Option<Traced> {
-    if line.starts_with(b"Stopped execution") {
-        return Some(Traced::Stopped);
-    }
-    let line = line.strip_prefix(b"Trace ")?;
-    let open = line.iter().position(|byte| *byte == b'[')?;
-    let fields = std::str::from_utf8(&line[open + 1..]).ok()?;
-    let address = fields.split('/').nth(1)?;
-    u32::from_str_radix(
-        address
-            .trim_start_matches("00000000")
-            .trim_start_matches("0x"),
-        16,
-    )
-    .or_else(|_| u32::from_str_radix(address, 16))
-    .ok()
-    .map(Traced::Begun)
 }
 
 fn summary(ticks: u32, closed: &[Tick]) -> Count {
@@ -376,18 +216,4 @@ fn compare(key: &str, count: &Count) -> Result<()> {
         );
     }
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn trace_lines_are_read() {
-        let line = b"Trace 0: 0x7f41c4000100 [00000000/000000d8/00000110/00000201] CONTROL_TICK\n";
-        assert_eq!(traced(line), Some(Traced::Begun(0xd8)));
-        let line = b"Stopped execution of TB chain before 0x7f41c4000100 [000000d8] CONTROL_TICK\n";
-        assert_eq!(traced(line), Some(Traced::Stopped));
-        assert_eq!(traced(b"qemu-system-arm: terminating\n"), None);
-    }
 }

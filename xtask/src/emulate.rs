@@ -7,7 +7,6 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::link::lockstep::{
     InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
-use quadrant::stage::Outputs;
 use quadrant_sim::emulator::{Clock, Emulator, Lockstep, Memory};
 
 use crate::image::{self, Board, Image, Scalar, Target};
@@ -27,10 +26,6 @@ pub(crate) struct Run {
     pub(crate) tally: Tally,
     /// How long the ticks took.
     elapsed: Duration,
-    /// The firmware's last outputs.
-    pub(crate) last: Outputs,
-    /// The firmware's log.
-    pub(crate) log: Vec<String>,
 }
 
 /// Runs the image for some seconds of its time and fails on any difference.
@@ -88,32 +83,28 @@ pub(crate) fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<Run>
     let mut firmware = Lockstep::start(image.program()?, memory, show)?;
     let bar = progress(ticks);
     let mut started = None;
-    let mut log = Vec::new();
-    let mut last = Outputs::default();
     for tick in 1..=ticks {
         let input = twin.input();
         firmware.ask(&input)?;
         // The twin computes while the firmware does.
         twin.compute(&input);
-        last = firmware
+        let answer = firmware
             .answer()?
             .with_context(|| format!("the firmware ended before it answered tick {tick}"))?;
         started.get_or_insert_with(Instant::now);
-        twin.compare(last);
-        twin.step(&last);
+        twin.compare(answer);
+        twin.step(&answer);
         if tick % PROGRESS_TICKS == 0 {
             bar.inc(1);
-            log.extend(firmware.new_lines()?);
+            firmware.new_lines()?;
         }
     }
     let elapsed = started.map_or(Duration::ZERO, |started| started.elapsed());
     bar.finish_and_clear();
-    log.extend(firmware.finish()?);
+    firmware.finish()?;
     Ok(Run {
         tally: *twin.tally(),
         elapsed,
-        last,
-        log,
     })
 }
 
@@ -144,17 +135,10 @@ fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
     memory.read(RECORDED_OUTPUTS, &mut bytes)?;
     let (records, _) = bytes.as_chunks();
     let mut tally = Tally::default();
-    let mut last = Outputs::default();
     for ((tick, expected), record) in (0..).zip(expected).zip(records) {
-        last = OutputRecord::decode(record).outputs;
-        tally.add(tick, expected, last);
+        tally.add(tick, expected, OutputRecord::decode(record).outputs);
     }
-    Ok(Run {
-        tally,
-        elapsed,
-        last,
-        log,
-    })
+    Ok(Run { tally, elapsed })
 }
 
 /// Prepares a run of recorded inputs.

@@ -180,6 +180,16 @@ impl Image {
         Ok(u32::try_from(self.symbol(name)?)? & !1)
     }
 
+    /// The address of a variable of the application, by its name in the source: compilers add to it.
+    pub(crate) fn variable(&self, name: &str) -> Result<u32> {
+        let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
+        let mangled = format!("3app{}{name}", name.len());
+        let is_it = |symbol: &object::Symbol| symbol.name().is_ok_and(|n| n.contains(&mangled));
+        let symbol = file.symbols().find(is_it);
+        let symbol = symbol.with_context(|| format!("the image has no variable `{name}`"))?;
+        Ok(u32::try_from(symbol.address())?)
+    }
+
     /// The address of a symbol.
     pub(crate) fn symbol(&self, name: &str) -> Result<u64> {
         let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;

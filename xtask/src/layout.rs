@@ -32,16 +32,20 @@ pub(crate) struct Sizes {
     pub(crate) variables: u64,
     /// What is set aside for the stack.
     pub(crate) stack: u64,
+    /// What may be in use of it at most: [`crate::stack`].
+    pub(crate) stack_bound: u64,
 }
 
 impl Sizes {
     fn of(image: &Image) -> Result<Self> {
         let footprint = image.footprint()?;
         let stack = image.symbol("_stack_start")? - image.symbol("_stack_end")?;
+        let stack_bound = crate::stack::check(image)?.into();
         Ok(Self {
             flash: footprint.flash_bytes(),
             variables: footprint.ram_bytes(),
             stack,
+            stack_bound,
         })
     }
 }
@@ -55,8 +59,8 @@ pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
     }
     let sizes = Sizes::of(image)?;
     println!(
-        "{}: flash {} bytes, variables {} bytes, stack {} bytes",
-        image.target, sizes.flash, sizes.variables, sizes.stack
+        "{}: flash {} bytes, variables {} bytes, stack {} bytes, of which at most {} are in use",
+        image.target, sizes.flash, sizes.variables, sizes.stack, sizes.stack_bound
     );
     if overwrite {
         commit(image.target, sizes)
@@ -189,6 +193,7 @@ fn compare(target: Target, sizes: Sizes) -> Result<()> {
         ("flash", sizes.flash, expected.flash),
         ("variables", sizes.variables, expected.variables),
         ("stack", sizes.stack, expected.stack),
+        ("stack bound", sizes.stack_bound, expected.stack_bound),
     ] {
         let limit = (expected as f64 * (1.0 + TOLERANCE)) as u64;
         ensure!(

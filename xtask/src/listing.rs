@@ -101,6 +101,11 @@ impl Listing {
             .find(|function| function.symbol == symbol)
     }
 
+    /// All functions, in order of their addresses.
+    pub(crate) fn functions(&self) -> impl Iterator<Item = &Function> {
+        self.functions.values()
+    }
+
     /// The function that covers an address.
     pub(crate) fn at(&self, address: u32) -> Option<&Function> {
         let (_, function) = self.functions.range(..=address).next_back()?;

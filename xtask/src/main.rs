@@ -1,4 +1,5 @@
-//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `board-smoke`, `count`, `prove-no-panic`, `sizes`, `test`.
+//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `faults`, `board-smoke`, `count`, `prove-no-panic`, `sizes`,
+//! `test`.
 #![forbid(unsafe_code)]
 
 mod attribution;
@@ -8,16 +9,19 @@ mod combinations;
 mod command;
 mod count;
 mod emulate;
-mod fault_paths;
+mod faults;
+mod frames;
 mod gdb;
 mod image;
 mod layout;
 mod listing;
 mod prove;
 mod setup;
+mod stack;
 mod stages;
 mod test;
 mod toolchain;
+mod trace;
 mod twin;
 
 use std::path::PathBuf;
@@ -52,8 +56,10 @@ enum Verb {
     Emulate(EmulateArgs),
     /// Start the reference board's image in QEMU's model of a near relative of its chip
     BoardSmoke,
-    /// Drive the emulated firmware into a fault and a panic, and see the outputs off
-    FaultPaths {
+    /// Provoke every fault in the emulated firmware, and tell how it was found
+    Faults(FaultArgs),
+    /// Count the instructions of a control tick while link, queues and log are overloaded
+    Saturation {
         /// The firmware's number type
         #[arg(long, value_enum, default_value_t = Scalar::F32)]
         scalar: Scalar,
@@ -115,6 +121,20 @@ struct EmulateArgs {
     /// Run on the settings of a file, as `quadrant commission` leaves it, instead of the default ones
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+}
+
+/// Which faults.
+#[derive(Args)]
+struct FaultArgs {
+    /// The firmware's number type
+    #[arg(long, value_enum, default_value_t = Scalar::F32)]
+    scalar: Scalar,
+    /// Only this one, by its name
+    #[arg(long, value_name = "NAME")]
+    only: Option<String>,
+    /// Write the table to the file that later runs are held against
+    #[arg(long)]
+    overwrite_expected: bool,
 }
 
 /// What to count.
@@ -179,7 +199,11 @@ fn run(cli: Cli) -> Result<bool> {
             emulate::run(toolchain()?, args.scalar, job, args.seconds, args.paced)?;
         }
         Verb::BoardSmoke => board_smoke::run(toolchain()?)?,
-        Verb::FaultPaths { scalar } => fault_paths::run(toolchain()?, scalar)?,
+        Verb::Faults(args) => {
+            let only = args.only.as_deref();
+            faults::run(toolchain()?, args.scalar, only, args.overwrite_expected)?;
+        }
+        Verb::Saturation { scalar } => faults::saturation::run(toolchain()?, scalar)?,
         Verb::Count(args) => {
             count::run(
                 toolchain()?,

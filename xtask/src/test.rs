@@ -8,7 +8,7 @@ use anyhow::Result;
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
 use crate::{
-    board_smoke, combinations, command, count, emulate, fault_paths, layout, prove, setup, twin,
+    board_smoke, combinations, command, count, emulate, faults, layout, prove, setup, twin,
 };
 
 /// Ticks of the counting run.
@@ -158,8 +158,11 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
         report.step(format!("emulation paced by the timer, {target}"), || {
             emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, true)
         });
-        report.step(format!("fault paths, {target}"), || {
-            fault_paths::run(toolchain, scalar)
+        report.step(format!("every fault provoked, {target}"), || {
+            faults::run(toolchain, scalar, None, false)
+        });
+        report.step(format!("control under overload, {target}"), || {
+            faults::saturation::run(toolchain, scalar)
         });
         report.step(format!("instructions per tick, {target}"), || {
             count::run(toolchain, scalar, COUNTED_TICKS, false)

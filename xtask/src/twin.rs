@@ -75,8 +75,6 @@ pub(crate) struct Twin {
     plant: SimulatedStage,
     operator: Operator,
     tick: u32,
-    /// The encoder of x stands still.
-    blocked: bool,
     expected: Outputs,
     tally: Tally,
 }
@@ -95,7 +93,6 @@ impl Twin {
             plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, SEED),
             operator: Operator::runs_the_plan(),
             tick: 0,
-            blocked: false,
             expected: Outputs::default(),
             tally: Tally::default(),
             job,
@@ -107,20 +104,9 @@ impl Twin {
         &self.job
     }
 
-    /// The same with x clamped, as its encoder sees it.
-    pub(crate) fn with_blocked_axis(self) -> Self {
-        Self {
-            blocked: true,
-            ..self
-        }
-    }
-
     /// What firmware and twin read in the next tick.
     pub(crate) fn input(&mut self) -> InputRecord {
-        let mut counts = self.plant.read_counters();
-        if self.blocked {
-            counts[0] = 0;
-        }
+        let counts = self.plant.read_counters();
         InputRecord::of_counts(counts, self.operator.request(self.tick))
     }
 

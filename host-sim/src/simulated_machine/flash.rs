@@ -24,6 +24,11 @@ impl MemoryFlash {
     pub fn bytes(&self) -> &[u8] {
         &self.0
     }
+
+    /// The same, to be damaged.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut self.0
+    }
 }
 
 impl Default for MemoryFlash {

@@ -9,13 +9,15 @@ use std::collections::VecDeque;
 
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
+use quadrant::link::lockstep::InputRecord;
 use quadrant::link::message::NumberType;
 use quadrant::machine::{
     After, Axis, Control, ControlInputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
 };
-use quadrant::safety::{FaultCode, Switches};
+use quadrant::safety::{Command, FaultCode, Switches};
+use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant::stage::{Outputs, StageState};
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
 
 pub use self::flash::MemoryFlash;
@@ -56,19 +58,55 @@ impl Serial for Wire {
     }
 }
 
-type SimulatedServer = Server<'static, 'static, f32, MemoryFlash>;
+/// Requests of the operator at the machine that may wait, as in the firmware.
+const REQUESTS: usize = 3;
 
 /// The application, as it runs between two starts.
-struct Running {
-    control: Control<'static, 'static, f32>,
+pub struct Running<S: Scalar> {
+    control: Control<'static, 'static, S>,
     supervision: Supervision,
-    server: SimulatedServer,
-    seen: Snapshot<f32>,
+    server: Server<'static, 'static, S, MemoryFlash>,
+    seen: Snapshot<S>,
+    /// Requests of the operator at the machine.
+    requests: VecDeque<Command>,
+    /// What the supervising task let through.
+    command: Option<Command>,
+}
+
+/// What the application starts with.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// The settings of a machine whose flash is empty.
+    pub defaults: &'a StageSettings,
+    /// The motions.
+    pub plan: &'a PlanSettings,
+    /// What the run before has left.
+    pub fault: Option<FaultCode>,
+    /// What the machine calls itself.
+    pub board: &'static str,
+    /// Rate of the timer that measures ticks, Hz.
+    pub cycle_hz: u32,
+    /// What the control law computes with, for the host.
+    pub number: NumberType,
+}
+
+impl<'a> Start<'a> {
+    /// As the simulated machine starts: without a motion.
+    fn simulated(defaults: &'a StageSettings, plan: &'a PlanSettings) -> Self {
+        Self {
+            defaults,
+            plan,
+            fault: None,
+            board: BOARD,
+            cycle_hz: 0,
+            number: NumberType::F32,
+        }
+    }
 }
 
 /// The firmware's application on the simulated stage.
 pub struct SimulatedMachine {
-    running: Running,
+    running: Running<f32>,
     plant: SimulatedStage,
     defaults: StageSettings,
     wire: Wire,
@@ -101,7 +139,7 @@ impl SimulatedMachine {
         flash: MemoryFlash,
     ) -> Result<Self, SettingsError> {
         Ok(Self {
-            running: Running::start(settings, flash, None)?,
+            running: Running::start(Start::simulated(settings, &PlanSettings::default()), flash)?,
             plant: SimulatedStage::new(truth, settings.rate_hz, seed),
             defaults: settings.clone(),
             wire: Wire::default(),
@@ -153,28 +191,12 @@ impl SimulatedMachine {
     }
 
     fn step(&mut self) {
-        let inputs = self.plant.read_inputs(None);
-        let running = &mut self.running;
-        self.outputs = running.control.tick(&ControlInputs {
-            readings: inputs.readings,
-            switches: inputs.switches.with(self.pressed),
-            command: None,
-            deadline_missed: false,
-            link_lost: running.server.link_lost(),
-        });
-        self.plant.step(&self.outputs);
-        let Some(seen) = running.control.observe(0) else {
-            return;
-        };
-        running.seen = seen;
-        let supervised = running.supervision.run(&seen, None);
-        for event in supervised.events.into_iter().flatten() {
-            running.server.tell_of(seen.tick, event);
-        }
+        let mut inputs = self.plant.read_inputs(None);
+        inputs.switches = inputs.switches.with(self.pressed);
         self.wire.room = PORT_BYTES;
-        let after = running
-            .server
-            .poll(&mut self.wire, &running.seen, Meters::default());
+        let (outputs, after) = self.running.tick(&inputs, &mut self.wire);
+        self.outputs = outputs;
+        self.plant.step(&self.outputs);
         if after == After::Reboot {
             self.restart();
         }
@@ -183,7 +205,8 @@ impl SimulatedMachine {
     /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
     pub fn restart(&mut self) {
         let flash = self.flash().clone();
-        match Running::start(&self.defaults, flash, None) {
+        let plan = PlanSettings::default();
+        match Running::start(Start::simulated(&self.defaults, &plan), flash) {
             Ok(running) => self.running = running,
             // The defaults were accepted when the machine was made.
             Err(_) => unreachable!("the same settings were accepted before"),
@@ -202,19 +225,19 @@ impl SimulatedMachine {
     }
 }
 
-impl Running {
+impl<S: Scalar> Running<S> {
     /// As the firmware does after a reset.
-    fn start(
-        defaults: &StageSettings,
-        flash: MemoryFlash,
-        fault: Option<FaultCode>,
-    ) -> Result<Self, SettingsError> {
+    ///
+    /// # Errors
+    /// The first of the default settings that is refused.
+    pub fn start(start: Start<'_>, flash: MemoryFlash) -> Result<Self, SettingsError> {
+        let Start { defaults, .. } = start;
+        let mut fault = None;
         let mut store = Store::new(flash, 0);
         // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
         let buffer: &'static mut [u8; BUFFER_BYTES] = Box::leak(Box::new([0; BUFFER_BYTES]));
         let settings: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
         let draft: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
-        let mut fault = fault;
         let loaded = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
         let provenance = match loaded {
             Ok(Some(Loaded { provenance, .. })) => provenance,
@@ -228,15 +251,15 @@ impl Running {
                 Default::default()
             }
         };
-        let stage = settings.build::<f32, FIRMWARE_ELEMENTS>()?;
-        let plan = PlanSettings::default().build(settings)?;
+        let stage = settings.build::<S, FIRMWARE_ELEMENTS>()?;
+        let plan = start.plan.build(settings)?;
         let (axes, streaming) = stage.into_axes();
-        let spare: &'static mut Axis<f32> = Box::leak(Box::new(axes[0].clone()));
-        let axes = axes.map(|axis| -> &'static mut Axis<f32> { Box::leak(Box::new(axis)) });
-        let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
+        let spare: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
+        let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
+        let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
         let (control_ends, ends) = queues.split();
         let mut control = Control::new(axes, streaming, plan, control_ends);
-        if let Some(code) = fault {
+        if let Some(code) = start.fault.or(fault) {
             control.start_faulted(code);
         }
         Ok(Self {
@@ -251,11 +274,43 @@ impl Running {
                 store,
                 buffer,
                 capture: Box::leak(vec![0; CAPTURE_WORDS].into_boxed_slice()),
-                board: BOARD,
-                cycle_hz: 0,
-                number: NumberType::F32,
+                board: start.board,
+                cycle_hz: start.cycle_hz,
+                number: start.number,
             }),
             seen: Snapshot::default(),
+            requests: VecDeque::new(),
+            command: None,
         })
+    }
+
+    /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
+    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, After) {
+        let outputs = self.control.tick(&ControlInputs {
+            readings: inputs.readings,
+            switches: inputs.switches,
+            command: self.command.take(),
+            deadline_missed: false,
+            link_lost: self.server.link_lost(),
+        });
+        if self.requests.len() < REQUESTS {
+            self.requests.extend(inputs.request);
+        }
+        let Some(seen) = self.control.observe(0) else {
+            return (outputs, After::GoOn);
+        };
+        self.seen = seen;
+        let supervised = self.supervision.run(&seen, self.requests.pop_front());
+        self.command = supervised.command;
+        for event in supervised.events.into_iter().flatten() {
+            self.server.tell_of(seen.tick, event);
+        }
+        let after = self.server.poll(serial, &self.seen, Meters::default());
+        (outputs, after)
+    }
+
+    /// What the control law knows.
+    pub fn state(&self) -> &StageState<S, FIRMWARE_ELEMENTS> {
+        self.control.state()
     }
 }

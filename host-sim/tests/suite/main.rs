@@ -8,6 +8,8 @@ mod circle;
 mod command;
 mod commission;
 mod connect;
+mod connect_commission;
+mod connected_rig;
 mod default_gains;
 mod design_commands;
 mod design_npid;

@@ -2,7 +2,9 @@
 
 use core::sync::atomic::{Ordering, fence};
 
-use quadrant::link::lockstep::{BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS};
+use quadrant::link::lockstep::{
+    BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS, RESET, Reset,
+};
 
 /// Where the machine's PSRAM is, which the host backs by a shared file.
 const BASE: usize = 0x2100_0000;
@@ -62,6 +64,13 @@ pub(super) fn read_sequence(offset: usize) -> u32 {
 pub(super) fn write_sequence(offset: usize, sequence: u32) {
     fence(Ordering::Release);
     write(offset, sequence);
+}
+
+/// Why the processor was reset; the next time it says that it was not.
+pub(super) fn take_reset() -> Reset {
+    let reset = Reset::from_word(read(RESET));
+    write(RESET, Reset::PowerOn as u32);
+    reset
 }
 
 /// Reads the boot block. Panics when no host has written one, or one that makes no sense.

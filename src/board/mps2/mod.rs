@@ -5,9 +5,12 @@
 
 pub(crate) mod device;
 mod flash;
+mod guard;
 mod mailbox;
+mod provocation;
 mod serial;
 mod timer;
+mod watchdog;
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
@@ -23,10 +26,11 @@ use quadrant::units::DacCode;
 
 pub(crate) use self::flash::SettingsFlash;
 pub(crate) use self::serial::Serial;
+pub(crate) use self::watchdog::Watchdog;
 use super::{Finished, Outcome};
 use quadrant::link::lockstep::{
     self, END_OF_RUN, InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS,
-    RECORDED_TICKS,
+    RECORDED_TICKS, Reset,
 };
 
 /// Control ticks begun. Written by [`Tick::acknowledge`] alone.
@@ -54,7 +58,7 @@ pub(crate) struct Board {
     pub(crate) idle: Idle,
     /// The link's port, in the shared memory.
     pub(crate) serial: Serial,
-    /// A watchdog that never bites: the emulator's user is watching.
+    /// The watchdog, which bites in a paced run.
     pub(crate) watchdog: Watchdog,
     /// Where settings are stored: in the shared memory.
     pub(crate) flash: SettingsFlash,
@@ -73,13 +77,27 @@ pub(crate) fn restart() -> ! {
 
 impl Board {
     /// Prepares the machine; the idle loop starts the control ticks.
-    pub(crate) fn init(_core: cortex_m::Peripherals) -> Self {
+    pub(crate) fn init(core: cortex_m::Peripherals) -> Self {
+        guard::start(&core.MPU);
         let boot = mailbox::boot();
+        let reset = mailbox::take_reset();
+        if reset != Reset::PowerOn {
+            serial::reset();
+            mailbox::write(lockstep::INPUT_SEQUENCE, 0);
+            mailbox::write(lockstep::OUTPUT_SEQUENCE, 0);
+        }
+        let starts = mailbox::read(lockstep::STARTS).wrapping_add(1);
+        mailbox::write_sequence(lockstep::STARTS, starts);
         Self {
             encoders: Encoders { mode: boot.mode },
             switches: Switches { mode: boot.mode },
             operator: Operator { mode: boot.mode },
-            amplifiers: Amplifiers { mode: boot.mode },
+            amplifiers: Amplifiers {
+                mode: boot.mode,
+                mismatches: [false; 3],
+                // What the firmware put out before a reset is kept.
+                earlier: starts.wrapping_sub(1).wrapping_mul(boot.ticks) as usize,
+            },
             tick: Tick {
                 mode: boot.mode,
                 period: u32::MAX,
@@ -92,9 +110,13 @@ impl Board {
                 started: false,
             },
             serial: Serial::new(boot.mode),
-            watchdog: Watchdog,
+            watchdog: Watchdog::new(boot.mode),
             flash: SettingsFlash,
-            reset_cause: ResetCause::PowerOn,
+            reset_cause: match reset {
+                Reset::PowerOn => ResetCause::PowerOn,
+                Reset::Watchdog => ResetCause::Watchdog,
+                Reset::Software => ResetCause::Software,
+            },
         }
     }
 }
@@ -138,7 +160,11 @@ pub(crate) struct Encoders {
 impl hal::Encoders for Encoders {
     #[inline(always)]
     fn read(&mut self) -> [EncoderReading; 3] {
-        inputs(self.mode).readings
+        let inputs = inputs(self.mode);
+        if inputs.slow && self.mode == Mode::Paced {
+            timer::CONTROL.wait_until_due();
+        }
+        inputs.readings
     }
 }
 
@@ -170,17 +196,28 @@ impl Operator {
     }
 }
 
-/// Three amplifiers.
+/// Three amplifiers. Their converters can be read back.
 pub(crate) struct Amplifiers {
     mode: Mode,
+    mismatches: [bool; 3],
+    /// Records that a firmware before this one has written.
+    earlier: usize,
 }
 
 impl hal::Amplifiers for Amplifiers {
-    /// Hands this tick's codes to the host.
+    /// Hands to the host what the converters hold of this tick's codes.
     #[inline(always)]
     fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
+        let flags = mailbox::read(input(self.mode) + 4 * InputRecord::FLAGS_WORD);
+        let held = lockstep::held(codes, InputRecord::stuck_of(flags));
+        let [x, y, z] = codes;
+        let [held_x, held_y, held_z] = held;
+        self.mismatches = [x != held_x, y != held_y, z != held_z];
         let answer = OutputRecord {
-            outputs: Outputs { codes, enabled },
+            outputs: Outputs {
+                codes: held,
+                enabled: enabled && self.mismatches == [false; 3],
+            },
         };
         let [low, high] = answer.words();
         match self.mode {
@@ -193,21 +230,18 @@ impl hal::Amplifiers for Amplifiers {
                 mailbox::write_sequence(lockstep::OUTPUT_SEQUENCE, tick);
             }
             Mode::Paced | Mode::Unpaced => {
-                let at = RECORDED_OUTPUTS + OutputRecord::BYTES * record();
+                let index = (self.earlier + record()).min(RECORDED_TICKS - 1);
+                let at = RECORDED_OUTPUTS + OutputRecord::BYTES * index;
                 mailbox::write(at, low);
                 mailbox::write(at + 4, high);
             }
         }
     }
-}
 
-/// A watchdog that never bites.
-pub(crate) struct Watchdog;
-
-impl hal::Watchdog for Watchdog {
-    fn start(&mut self) {}
-
-    fn feed(&mut self, _driving: bool) {}
+    #[inline(always)]
+    fn mismatches(&self) -> [bool; 3] {
+        self.mismatches
+    }
 }
 
 /// The control tick.
@@ -289,6 +323,7 @@ impl Idle {
                 let sequence = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
                 if sequence != self.sequence && sequence != END_OF_RUN {
                     self.sequence = sequence;
+                    provocation::act_on(sequence);
                     serial::exchange();
                     pend_tick();
                 }
@@ -301,7 +336,9 @@ impl Idle {
                     timer::CLOCK.start(u32::MAX, false);
                     timer::CONTROL.start(PERIOD.load(Ordering::Relaxed) - 1, true);
                 }
-                TICKS.load(Ordering::Relaxed) == self.last
+                let ticks = TICKS.load(Ordering::Relaxed);
+                provocation::act_on(ticks);
+                ticks == self.last
             }
             Mode::Unpaced => {
                 let over = TICKS.load(Ordering::Relaxed) == self.last;
@@ -333,8 +370,15 @@ pub(crate) fn outputs_off() {
     mailbox::write(lockstep::OUTPUT + 4, 0);
 }
 
-/// Ends the emulator with an exit code that says how it went.
+/// Ends the emulator with an exit code that says how it went; a firmware that has failed resets the processor instead, as
+/// often as the host allows it.
 pub(crate) fn halt(outcome: Outcome) -> ! {
+    let resets = mailbox::read(lockstep::RESETS_LEFT);
+    if outcome == Outcome::Failed && resets > 0 {
+        mailbox::write(lockstep::RESETS_LEFT, resets - 1);
+        mailbox::write(lockstep::RESET, Reset::Software as u32);
+        cortex_m::peripheral::SCB::sys_reset();
+    }
     loop {
         debug::exit(match outcome {
             Outcome::Done => debug::EXIT_SUCCESS,

@@ -31,6 +31,18 @@ pub(super) fn exchange() {
     mailbox::write(LINK_OUT_SHOWN, WRITTEN.load(Ordering::Relaxed));
 }
 
+/// Empties the rings, which a firmware before this one has used.
+pub(super) fn reset() {
+    for word in [
+        LINK_IN_WRITTEN,
+        LINK_IN_TAKEN,
+        LINK_OUT_SHOWN,
+        LINK_OUT_TAKEN,
+    ] {
+        mailbox::write(word, 0);
+    }
+}
+
 /// The link's port.
 pub(crate) struct Serial {
     /// Only a host in lockstep has something to say.

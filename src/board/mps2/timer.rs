@@ -57,6 +57,17 @@ impl Timer {
         self.read(Self::INTERRUPT) & 1 != 0
     }
 
+    /// Waits for the next reload, but not for ever.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn wait_until_due(self) {
+        for _ in 0..CLOCK_HZ {
+            if self.is_due() {
+                return;
+            }
+        }
+    }
+
     /// Clears the interrupt.
     #[inline(always)]
     pub(super) fn acknowledge(self) {

@@ -52,6 +52,7 @@ pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
+use quadrant::driver::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
 use quadrant::safety::Command;
 
@@ -139,8 +140,7 @@ impl Board {
         }
         let operator = Operator {
             button: port_c.pc13.into_input(),
-            history: u32::MAX,
-            held: false,
+            hold: HoldButton::new(),
         };
         let tick = Tick::new(chip.TIM7, &mut rcc);
         Self {
@@ -174,29 +174,15 @@ pub(crate) fn job() -> Option<&'static [u8]> {
 /// What the operator asks for: the button is a dead man's switch.
 pub(crate) struct Operator {
     button: PC13<Input>,
-    /// The button's level in the last ticks, the newest in the lowest bit; all ones is a button at rest.
-    history: u32,
-    held: bool,
+    hold: HoldButton,
 }
 
 impl Operator {
-    /// What is asked for in this tick: to enable once the button has been down for 32 ticks, and to disable at the
-    /// first tick it is up.
+    /// What is asked for in this tick.
     #[inline(always)]
     pub(crate) fn request(&mut self) -> Option<Command> {
         // Pressed is low.
-        self.history = self.history << 1 | u32::from(self.button.is_high());
-        match (self.held, self.history) {
-            (false, 0) => {
-                self.held = true;
-                Some(Command::Enable)
-            }
-            (true, history) if history & 1 == 1 => {
-                self.held = false;
-                Some(Command::Disable)
-            }
-            _ => None,
-        }
+        self.hold.step(self.button.is_low())
     }
 }
 

@@ -68,7 +68,7 @@ pub enum Body {
         /// How fast at most, mm/s; above zero, at most the axis' limit.
         velocity_mm_s: f64,
     },
-    /// Move one axis at a velocity until told otherwise.
+    /// Move one axis at a velocity until told otherwise, or until its host falls silent.
     Jog {
         /// The axis.
         axis: AxisName,
@@ -132,8 +132,9 @@ impl Body {
         )
     }
 
-    /// The body itself, unless a number of a motion in it is infinite or none: those never get further than the link.
-    pub fn check(self) -> Result<Self, LinkError> {
+    /// Refuses a number of a motion that is infinite or none: those never get further than the link.
+    #[inline(never)]
+    pub fn check(&self) -> Result<(), LinkError> {
         // Says what the number is without the formatting of floats, which takes kilobytes of flash.
         let kind = |value: f64| match value.is_nan() {
             true => "NaN",
@@ -146,7 +147,7 @@ impl Body {
                 kind(value)
             )))),
         };
-        match &self {
+        match self {
             Self::Move {
                 target_mm,
                 velocity_mm_s,
@@ -175,7 +176,7 @@ impl Body {
             }
             _ => {}
         }
-        Ok(self)
+        Ok(())
     }
 }
 

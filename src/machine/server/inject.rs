@@ -91,7 +91,8 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             )));
         }
         let (injection, most) = self
-            .in_force
+            .draft
+            .in_force()
             .injection(request)
             .map_err(|error| invalid(format_args!("{error}")))?;
         // There is room: nothing waits.

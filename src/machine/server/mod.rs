@@ -267,6 +267,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     }
 
     /// Does what a request asks for.
+    #[inline(never)]
     fn serve(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
             Body::Hello => Ok(Reply::Identity(self.identity())),

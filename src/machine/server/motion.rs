@@ -12,6 +12,7 @@ use crate::supervisor;
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     /// Requests that are commands of the control law.
+    #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
             Body::Enable => {
@@ -75,6 +76,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     /// Moves one axis to a position.
+    #[inline(never)]
     pub(super) fn start_move(
         &mut self,
         axis: AxisName,
@@ -97,6 +99,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     /// Exchanges the plan.
+    #[inline(never)]
     pub(super) fn set_plan(&mut self, plan: &PlanSettings) -> Result<Reply, LinkError> {
         if self.seen.view.running {
             return Err(refused(format_args!(
@@ -111,6 +114,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         Ok(Reply::Done)
     }
 
+    #[inline(never)]
     fn hand_over(&mut self, axis: AxisName, motion: &MotionSettings) -> Result<(), LinkError> {
         let motion = Motion::build(motion, self.draft.in_force().scale_of(axis));
         self.ends.motions.enqueue((axis, motion)).map_err(|_| {

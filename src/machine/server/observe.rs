@@ -60,6 +60,7 @@ impl<'a> Recorder<'a> {
 }
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    #[inline(never)]
     pub(super) fn serve_telemetry(
         &mut self,
         request: TelemetryRequest,
@@ -93,6 +94,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     /// The next block that is full, or what there is.
+    #[inline(never)]
     pub(super) fn next_block(&mut self) -> Option<TelemetryBlock> {
         while let Some(sample) = self.ends.samples.dequeue() {
             if let Some(block) = self.packer.push(&sample) {
@@ -102,6 +104,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         self.packer.flush()
     }
 
+    #[inline(never)]
     pub(super) fn serve_capture(&mut self, request: CaptureRequest) -> Result<Reply, LinkError> {
         match request {
             CaptureRequest::Arm {
@@ -211,6 +214,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
+    #[inline(never)]
     fn read_capture(&self, offset: u16) -> Result<Reply, LinkError> {
         let Some(capture) = &self.recorder.capture else {
             return Err(refused(format_args!(

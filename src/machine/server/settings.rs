@@ -15,6 +15,7 @@ use crate::settings::MAX_VALUE_BYTES;
 use crate::settings::draft::ApplyError;
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    #[inline(never)]
     pub(super) fn serve_settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
         match request {
             SettingsRequest::Get(path) => {
@@ -49,6 +50,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
+    #[inline(never)]
     fn list(&self, cursor: u16) -> Result<Reply, LinkError> {
         let mut page = PathPage::default();
         let mut number = 0;
@@ -69,6 +71,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     /// Takes the draft over as a whole, or not at all. The axes get theirs one after the other within milliseconds.
+    #[inline(never)]
     fn apply(&mut self) -> Result<Reply, LinkError> {
         if !self.pending.is_empty() {
             return Err(busy(format_args!(
@@ -129,6 +132,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     /// Stores the draft, which is what is in force unless it was edited since, or needs a restart.
+    #[inline(never)]
     fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
         if self.seen.view.safety.drives() {
             return Err(refused(format_args!(

@@ -29,6 +29,7 @@ pub(super) struct OpenStream {
 }
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    #[inline(never)]
     pub(super) fn serve_stream(&mut self, request: StreamRequest) -> Result<Reply, LinkError> {
         match request {
             StreamRequest::Open { period_ticks } => self.open_stream(period_ticks.into()),
@@ -53,6 +54,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
+    #[inline(never)]
     fn open_stream(&mut self, period_ticks: u32) -> Result<Reply, LinkError> {
         let view = &self.seen.view;
         if !view.safety.is_enabled() {
@@ -89,6 +91,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
 
     /// Takes a point unless it is known, or there is no room; says whether there may be room for more. Missing points are
     /// bridged as far as the planner can.
+    #[inline(never)]
     fn take_point(
         &mut self,
         number: u32,

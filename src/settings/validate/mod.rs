@@ -7,6 +7,7 @@ mod limits;
 mod motion;
 
 use super::{AxisSettings, Reason, SettingsError, StageSettings};
+use crate::rounding;
 use crate::safety::AxisName;
 
 /// Where a check stands.
@@ -25,6 +26,7 @@ impl Place {
         })
     }
 
+    #[inline(never)]
     fn within(
         self,
         field: &'static str,
@@ -83,7 +85,7 @@ impl AxisSettings {
             let field = "encoder.counts_per_index";
             at.within(field, counts.into(), 16.0, 1e9)?;
             let field = "encoder.index_tolerance_counts";
-            let most = libm::floor(f64::from(counts) / 4.0);
+            let most = rounding::floor(f64::from(counts) / 4.0);
             at.within(field, encoder.index_tolerance_counts.into(), 0.0, most)?;
         }
         let amplifier = &self.amplifier;

@@ -120,7 +120,9 @@ fn attended<T>(session: &mut Session, read: &Receiver<T>) -> Option<T> {
             Ok(line) => return Some(line),
             Err(RecvTimeoutError::Disconnected) => return None,
             // A connection that is broken shows with the next command.
-            Err(RecvTimeoutError::Timeout) => drop(session.client.keep_alive()),
+            Err(RecvTimeoutError::Timeout) => {
+                let _ = session.client.keep_alive();
+            }
         }
     }
 }

@@ -5,9 +5,10 @@ use std::time::Duration;
 use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
 use quadrant::safety::AxisName;
 use quadrant::settings::AxisSettings;
+use quadrant::telemetry::MachineState;
 use quadrant::units::DacCode;
 
-use super::{Injected, Stop};
+use super::{Injected, LOOK, Stop};
 use crate::console::client::Client;
 use crate::console::error::ClientError;
 use crate::console::samples::Recording as Telemetry;
@@ -15,7 +16,7 @@ use crate::rig::{Drive, Experiment};
 
 /// Pause before a full queue is asked again.
 const PAUSE: Duration = Duration::from_millis(2);
-/// Looks after which an injection that all values were sent of must have ended.
+/// Looks after which an injection that all values were sent of must have ended, and a stop.
 const LOOKS: usize = 200;
 
 /// A voltage on its way.
@@ -79,7 +80,7 @@ impl Injection {
             };
             status = ask(client, request)?;
             if status.ended {
-                return Err(Stop::Broken(status));
+                return Err(broken(client, status)?);
             }
             telemetry.gather(client, if room { Duration::ZERO } else { PAUSE })?;
         }
@@ -110,11 +111,24 @@ impl Injection {
                         .map(|&word| f64::from(word) * self.volts_per_word)
                         .collect(),
                 }),
-                _ => Err(Stop::Broken(status)),
+                _ => Err(broken(client, status)?),
             };
         }
         Err(Stop::TimedOut)
     }
+}
+
+/// Why an injection ended early: the fault, once the axes have braked for it, if it was one.
+fn broken(client: &mut Client, injection: InjectStatus) -> Result<Stop, ClientError> {
+    for _ in 0..LOOKS {
+        let status = client.status()?;
+        client.refuse_fault("the experiment", &status)?;
+        if status.state != MachineState::Stopping {
+            break;
+        }
+        client.wait(LOOK)?;
+    }
+    Ok(Stop::Broken(injection))
 }
 
 fn ask(client: &mut Client, request: InjectRequest) -> Result<InjectStatus, ClientError> {

@@ -137,7 +137,9 @@ impl<'a> ConnectedRig<'a> {
             progress((elapsed.as_secs_f64() / experiment.time_limit_s).min(1.0));
             let status = self.client.status()?;
             self.client.refuse_fault("the experiment", &status)?;
-            if elapsed >= least && !status.running {
+            // Axes that brake for a fault have it latched when they stand.
+            let ends = !status.running && status.state != MachineState::Stopping;
+            if elapsed >= least && ends {
                 break;
             }
             if elapsed.as_secs_f64() > experiment.time_limit_s {

@@ -17,7 +17,7 @@ use quadrant_sim::plant::StageTruth;
 use quadrant_sim::rig::{Drive, Experiment, Rig, RigError, SimulatedRig};
 
 fn client() -> Client {
-    Client::open(SimulatedLink::start(1).unwrap()).unwrap()
+    Client::open(SimulatedLink::start(1, None).unwrap()).unwrap()
 }
 
 fn enabled() -> Client {

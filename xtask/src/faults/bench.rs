@@ -1,0 +1,329 @@
+//! The emulated firmware on the simulated stage beside its twin in this process, with a host at its link and somebody who
+//! breaks things.
+
+mod talk;
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Result, bail, ensure};
+use quadrant::axis::CourseMode;
+use quadrant::link::lockstep::{
+    END_OF_RUN, FLASH, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
+    OutputRecord, PROVOCATION, PROVOCATION_TICK, Provocation, RESETS_LEFT, STARTS, held,
+};
+use quadrant::link::message::{Body, NumberType};
+use quadrant::safety::{AxisName, AxisSwitches, FaultCode};
+use quadrant::scalar::{Fixed, Scalar};
+use quadrant::stage::Outputs;
+use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use quadrant_sim::plant::{MarkTruth, SimulatedStage, StageTruth};
+use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
+
+use self::talk::Talk;
+use super::port::Port;
+use crate::image::{self, Image};
+use crate::twin;
+
+/// Seed of the simulated stage's noise.
+const SEED: u64 = 1;
+/// How long the firmware may take to answer, in the host's time: when it is traced, its start takes longest.
+const PATIENCE: Duration = Duration::from_secs(120);
+/// Looks at the answer between two pauses.
+const LOOKS: u32 = 1 << 8;
+/// Pauses between two looks at the clock.
+const PAUSES: u32 = 1 << 8;
+/// Rate of the emulated board's timers, Hz.
+const CYCLE_HZ: u32 = 25_000_000;
+/// Ticks until the firmware has looked at what was asked or has happened.
+pub(super) const A_WHILE: u32 = 40;
+
+/// What goes wrong: changes what the firmware reads, or the stage itself, given the ticks since it began to.
+pub(super) type Cause = Box<dyn FnMut(&mut InputRecord, &mut SimulatedStage, u32)>;
+
+/// An application of either number type.
+trait Application {
+    fn tick(&mut self, input: &InputRecord, port: &mut Port) -> Outputs;
+    fn mode_of_x(&self) -> CourseMode;
+}
+
+impl<S: Scalar> Application for Running<S> {
+    fn tick(&mut self, input: &InputRecord, port: &mut Port) -> Outputs {
+        Running::tick(self, input, port).0
+    }
+
+    fn mode_of_x(&self) -> CourseMode {
+        self.state().axes()[0].mode()
+    }
+}
+
+/// What firmware and twin start with.
+pub(super) struct Setup {
+    /// Settings of a machine whose flash is empty, and motions.
+    pub(super) job: Job,
+    /// Where the stage's marks are.
+    pub(super) marks: MarkTruth,
+    /// The flash for settings.
+    pub(super) flash: MemoryFlash,
+}
+
+/// Firmware and twin.
+pub(super) struct Bench {
+    memory: Memory,
+    emulator: Emulator,
+    scalar: image::Scalar,
+    setup: Setup,
+    twin: Box<dyn Application>,
+    port: Port,
+    plant: SimulatedStage,
+    cause: Option<(u32, Cause)>,
+    /// Ticks since the firmware's start.
+    tick: u32,
+    /// The outputs of each.
+    outputs: Vec<Outputs>,
+    talk: Talk,
+    mismatches: [bool; 3],
+    streams_since: Option<u32>,
+    starts: u32,
+    /// Converter words and bytes of the link that were compared.
+    pub(super) compared: (u64, u64),
+}
+
+impl Bench {
+    /// Starts both.
+    pub(super) fn start(image: &Image, setup: Setup) -> Result<Self> {
+        Self::start_with(image, setup, |memory| {
+            Ok(Emulator::start(
+                &image.program()?,
+                memory,
+                Clock::Host,
+                |_| {},
+            )?)
+        })
+    }
+
+    /// The same with an emulator of one's own.
+    pub(super) fn start_with(
+        image: &Image,
+        setup: Setup,
+        emulator: impl FnOnce(&Memory) -> Result<Emulator>,
+    ) -> Result<Self> {
+        let memory = Memory::create()?;
+        memory.prepare(Mode::Lockstep, 0, &twin::encode(&setup.job)?)?;
+        let flash: Vec<u8> = setup.flash.bytes().iter().map(|byte| !byte).collect();
+        memory.write(FLASH, &flash)?;
+        let mut plant = SimulatedStage::new(&StageTruth::real(), setup.job.stage.rate_hz, SEED);
+        plant.set_marks([setup.marks; 3]);
+        let scalar = image.target.scalar;
+        let mut bench = Self {
+            emulator: emulator(&memory)?,
+            memory,
+            scalar,
+            twin: application(scalar, &setup, None)?,
+            setup,
+            port: Port::default(),
+            plant,
+            cause: None,
+            tick: 0,
+            outputs: Vec::new(),
+            talk: Talk::default(),
+            mismatches: [false; 3],
+            streams_since: None,
+            starts: 0,
+            compared: (0, 0),
+        };
+        bench.await_start()?;
+        bench.run(A_WHILE)?;
+        bench.done(Body::Hello)?;
+        Ok(bench)
+    }
+
+    /// Waits until the firmware has started once more.
+    fn await_start(&mut self) -> Result<()> {
+        self.starts += 1;
+        wait_for(&self.memory, &mut self.emulator, STARTS, self.starts)
+    }
+
+    /// Ticks since the firmware's start.
+    pub(super) fn tick(&self) -> u32 {
+        self.tick
+    }
+
+    /// The stage.
+    pub(super) fn plant(&self) -> &SimulatedStage {
+        &self.plant
+    }
+
+    /// The first tick in which x followed a stream.
+    pub(super) fn streams_since(&self) -> Option<u32> {
+        self.streams_since
+    }
+
+    /// The outputs of a tick; ticks count from zero.
+    pub(super) fn outputs(&self, tick: u32) -> Option<Outputs> {
+        self.outputs.get(tick as usize).copied()
+    }
+
+    /// Lets something go wrong from the next tick on.
+    pub(super) fn break_with(&mut self, cause: Cause) {
+        self.cause = Some((0, cause));
+    }
+
+    /// Runs some ticks.
+    pub(super) fn run(&mut self, ticks: u32) -> Result<()> {
+        (0..ticks).try_for_each(|_| self.step().map(drop))
+    }
+
+    /// Runs until something is so, for `ticks` ticks at most.
+    pub(super) fn run_until(
+        &mut self,
+        ticks: u32,
+        what: &str,
+        mut reached: impl FnMut(&Self) -> bool,
+    ) -> Result<()> {
+        for _ in 0..ticks {
+            self.step()?;
+            if reached(self) {
+                return Ok(());
+            }
+        }
+        bail!("not within {ticks} ticks: {what}")
+    }
+
+    /// One control period: the same inputs for both, and the same outputs from both.
+    fn step(&mut self) -> Result<Outputs> {
+        let mut input = self.plant.read_inputs(None);
+        if let Some((since, cause)) = &mut self.cause {
+            cause(&mut input, &mut self.plant, *since);
+            *since += 1;
+        }
+        let arriving = self.send()?;
+        self.memory.write(INPUT, &input.encode())?;
+        self.memory.set_word(INPUT_SEQUENCE, self.tick + 1)?;
+        // The twin computes while the firmware does.
+        let shown = self.port.exchange(&arriving, self.talk.freed());
+        let expected = self.compute(input);
+        wait_for(
+            &self.memory,
+            &mut self.emulator,
+            OUTPUT_SEQUENCE,
+            self.tick + 1,
+        )?;
+        let mut bytes = [0; OutputRecord::BYTES];
+        self.memory.read(OUTPUT, &mut bytes)?;
+        let found = OutputRecord::decode(&bytes).outputs;
+        ensure!(
+            found == expected,
+            "tick {}: {expected:?} here, {found:?} in the firmware",
+            self.tick
+        );
+        self.receive(&shown)?;
+        self.plant.step(&found);
+        self.outputs.push(found);
+        self.compared.0 += 3;
+        self.tick += 1;
+        Ok(found)
+    }
+
+    /// The twin's answer, behind converters that hold what the firmware's do and are read back as those are.
+    fn compute(&mut self, mut input: InputRecord) -> Outputs {
+        for (axis, differs) in AxisName::ALL.into_iter().zip(self.mismatches) {
+            if differs {
+                let switches = input.switches;
+                input.switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
+            }
+        }
+        let told = self.twin.tick(&input, &mut self.port);
+        if self.twin.mode_of_x() == CourseMode::Stream {
+            self.streams_since.get_or_insert(self.tick);
+        }
+        let codes = held(told.codes, input.stuck);
+        self.mismatches = [0, 1, 2].map(|axis| codes[axis] != told.codes[axis]);
+        Outputs {
+            codes,
+            enabled: told.enabled && self.mismatches == [false; 3],
+        }
+    }
+
+    /// Makes the idle loop of the firmware do something instead of the next tick, and waits until the firmware has started
+    /// again. Gives what the firmware has left at the outputs; the twin starts with the fault that it is to find.
+    pub(super) fn provoke(&mut self, what: Provocation, finds: FaultCode) -> Result<Outputs> {
+        self.memory.set_word(RESETS_LEFT, 1)?;
+        self.memory.set_word(PROVOCATION_TICK, self.tick + 1)?;
+        self.memory.set_word(PROVOCATION, what as u32)?;
+        self.memory.set_word(INPUT_SEQUENCE, self.tick + 1)?;
+        self.await_start()?;
+        let mut bytes = [0; OutputRecord::BYTES];
+        self.memory.read(OUTPUT, &mut bytes)?;
+        self.begin_again(finds)?;
+        Ok(OutputRecord::decode(&bytes).outputs)
+    }
+
+    /// The twin after a reset, at which the stage stays where it is.
+    fn begin_again(&mut self, finds: FaultCode) -> Result<()> {
+        self.twin = application(self.scalar, &self.setup, Some(finds))?;
+        self.port = Port::default();
+        self.mismatches = [false; 3];
+        self.tick = 0;
+        self.outputs.clear();
+        self.talk = Talk::default();
+        self.run(A_WHILE)?;
+        self.done(Body::Hello)
+    }
+
+    /// Ends the run; gives the firmware's log.
+    pub(super) fn end(self) -> Result<Vec<String>> {
+        self.memory.set_word(INPUT_SEQUENCE, END_OF_RUN)?;
+        Ok(self.emulator.wait()?)
+    }
+}
+
+/// The application with the number type of an image.
+fn application(
+    scalar: image::Scalar,
+    setup: &Setup,
+    fault: Option<FaultCode>,
+) -> Result<Box<dyn Application>> {
+    let start = |number| Start {
+        defaults: &setup.job.stage,
+        plan: &setup.job.plan,
+        fault,
+        board: "mps2",
+        cycle_hz: CYCLE_HZ,
+        number,
+    };
+    let flash = setup.flash.clone();
+    Ok(match scalar {
+        image::Scalar::F32 => Box::new(Running::<f32>::start(start(NumberType::F32), flash)?),
+        image::Scalar::Fixed => Box::new(Running::<Fixed>::start(start(NumberType::Fixed), flash)?),
+    })
+}
+
+/// Waits until the firmware has written `value` to a word: the number of the tick that it has answered, or of its start.
+fn wait_for(memory: &Memory, emulator: &mut Emulator, word: usize, value: u32) -> Result<()> {
+    let mut since = None;
+    loop {
+        for _ in 0..PAUSES {
+            for _ in 0..LOOKS {
+                if memory.word(word)? == value {
+                    return Ok(());
+                }
+                std::hint::spin_loop();
+            }
+            // The firmware may need this very core.
+            std::thread::yield_now();
+        }
+        let since = *since.get_or_insert_with(Instant::now);
+        let what = if word == OUTPUT_SEQUENCE {
+            "answered tick"
+        } else {
+            "come to start"
+        };
+        if let Some(status) = emulator.ended()? {
+            bail!("the emulator ended ({status}) before it {what} {value}");
+        }
+        ensure!(
+            since.elapsed() < PATIENCE,
+            "the firmware has not {what} {value} within {PATIENCE:?}"
+        );
+    }
+}

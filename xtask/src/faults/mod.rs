@@ -1,0 +1,170 @@
+//! `cargo xtask faults`: every fault provoked from outside in the emulated firmware, with its twin in this process beside
+//! it, and what was found held against the committed table.
+
+mod bench;
+mod case;
+mod feeds;
+mod finding;
+mod masking;
+mod paced;
+mod port;
+pub(crate) mod saturation;
+mod starts;
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::PathBuf;
+
+use anyhow::{Context, Result, bail, ensure};
+use quadrant::safety::FaultCode;
+use serde::{Deserialize, Serialize};
+
+use self::bench::Bench;
+use self::finding::Finding;
+use crate::command;
+use crate::image::{self, Board, Image, Scalar, Target};
+use crate::toolchain::Toolchain;
+
+/// What was found, in order of the faults' numbers.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+struct Table {
+    #[serde(default)]
+    finding: Vec<Finding>,
+}
+
+/// The committed tables, by number type.
+type Expected = BTreeMap<String, Table>;
+
+/// Provokes every fault, prints the table, and holds it against the committed one.
+pub(crate) fn run(
+    toolchain: Toolchain,
+    scalar: Scalar,
+    only: Option<&str>,
+    overwrite: bool,
+) -> Result<()> {
+    let board = Board::Mps2;
+    let image = image::build(toolchain, Target { board, scalar })?;
+    let codes: Vec<FaultCode> = match only {
+        Some(name) => FaultCode::ALL
+            .into_iter()
+            .filter(|code| code.name() == name)
+            .collect(),
+        None => FaultCode::ALL.to_vec(),
+    };
+    ensure!(
+        !codes.is_empty(),
+        "there is no fault `{}`",
+        only.unwrap_or("")
+    );
+    println!(
+        "| no. | fault | provoked by | found on | reaction | ticks | outputs in that tick | ticks until off | trace |"
+    );
+    println!("|---|---|---|---|---|---|---|---|---|");
+    let mut table = Table::default();
+    let mut compared = (0, 0);
+    for code in codes {
+        let findings =
+            provoke(&image, code).with_context(|| format!("{} was provoked", code.name()))?;
+        // A fault without a provocation must not look like one that was found.
+        ensure!(!findings.is_empty(), "{} is not provoked", code.name());
+        for finding in findings {
+            println!("{}", finding.row(code));
+            compared.0 += finding.compared.0;
+            compared.1 += finding.compared.1;
+            table.finding.push(finding);
+        }
+    }
+    println!(
+        "{} provocations, all found; {} converter words and {} bytes of the link compared with the twin's, 0 differ",
+        table.finding.len(),
+        compared.0,
+        compared.1
+    );
+    if only.is_some() {
+        return Ok(());
+    }
+    starts::refused_job(&image).context("a job with settings that are refused")?;
+    let key = image.target.scalar_name();
+    if overwrite {
+        store(&key, table)
+    } else {
+        compare(&key, &table)
+    }
+}
+
+/// All ways to provoke a fault.
+fn provoke(image: &Image, code: FaultCode) -> Result<Vec<Finding>> {
+    if let Some(case) = case::of(code) {
+        let mut setup = case::setup();
+        (case.adjust)(&mut setup);
+        let mut bench = Bench::start(image, setup)?;
+        let finding = finding::provoke(&mut bench, code, &case);
+        let log = bench.end()?;
+        let finding = finding.with_context(|| format!("the log:\n{}", log.join("\n")))?;
+        finding::said(
+            &log,
+            &format!("fault {} on {} at tick", code.number(), finding.axis),
+        )?;
+        return Ok(vec![finding]);
+    }
+    Ok(match code {
+        FaultCode::DeadlineMissed => vec![paced::deadline_missed(image)?],
+        FaultCode::WatchdogReset => {
+            let (finding, periods) = paced::watchdog(image)?;
+            println!(
+                "(the watchdog reset the processor {periods:.1} control periods after it hung)"
+            );
+            vec![finding]
+        }
+        FaultCode::Panic | FaultCode::HardFault => starts::deaths(image, code)?,
+        FaultCode::SettingsInvalid => vec![starts::refused_settings(image)?],
+        _ => Vec::new(),
+    })
+}
+
+fn path() -> PathBuf {
+    command::root().join("xtask/golden/faults.toml")
+}
+
+fn expected() -> Result<Expected> {
+    let path = path();
+    match fs::read_to_string(&path) {
+        Ok(text) => {
+            toml::from_str(&text).with_context(|| format!("{} does not parse", path.display()))
+        }
+        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Expected::new()),
+        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
+    }
+}
+
+fn store(key: &str, table: Table) -> Result<()> {
+    let mut expected = expected()?;
+    expected.insert(key.to_owned(), table);
+    let path = path();
+    let head = "# Written by `cargo xtask faults --overwrite-expected`; `cargo xtask faults` holds what it finds against this.\n\n";
+    fs::write(&path, format!("{head}{}", toml::to_string(&expected)?))
+        .with_context(|| format!("cannot write {}", path.display()))?;
+    println!("written to {}", path.display());
+    Ok(())
+}
+
+fn compare(key: &str, table: &Table) -> Result<()> {
+    let Some(expected) = expected()?.remove(key) else {
+        bail!(
+            "no table is committed for {key}: `cargo xtask faults --overwrite-expected` makes one"
+        );
+    };
+    ensure!(
+        expected.finding.len() == table.finding.len(),
+        "{} provocations instead of {}; if that is wanted, `cargo xtask faults --overwrite-expected` accepts it",
+        table.finding.len(),
+        expected.finding.len()
+    );
+    for (found, expected) in table.finding.iter().zip(&expected.finding) {
+        ensure!(
+            found == expected,
+            "{found:?}\ninstead of\n{expected:?}\nif that is wanted, `cargo xtask faults --overwrite-expected` accepts it"
+        );
+    }
+    Ok(())
+}

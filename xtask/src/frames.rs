@@ -1,0 +1,239 @@
+//! What each function of an image takes of the stack, what it calls, and which functions are called by their address.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use anyhow::{Context, Result, ensure};
+use object::{Object, ObjectSection};
+
+use crate::call_graph::{Flow, flow};
+use crate::image::Image;
+use crate::listing::{Function, Instruction, Listing};
+
+/// The function that starts the stack afresh.
+pub(crate) const FRESH: &str = "HardFault";
+
+/// One function.
+pub(crate) struct Node {
+    /// Its name.
+    pub(crate) name: String,
+    /// Bytes of the stack that it takes itself, at most.
+    pub(crate) bytes: u32,
+    /// The functions that it names in calls and jumps, by their first address.
+    pub(crate) calls: BTreeSet<u32>,
+    /// It also calls by an address that it is given.
+    pub(crate) is_indirect: bool,
+}
+
+/// All functions, by their first address.
+pub(crate) struct Frames {
+    /// The functions.
+    pub(crate) nodes: BTreeMap<u32, Node>,
+    /// Those whose address is somewhere in the image, other than in the vector table.
+    pub(crate) by_address: BTreeSet<u32>,
+    /// The vector table from the reset vector on: first addresses of functions.
+    pub(crate) vectors: Vec<u32>,
+}
+
+impl Frames {
+    /// Reads an image.
+    pub(crate) fn of(image: &Image) -> Result<Self> {
+        let listing = Listing::of(image)?;
+        let mut nodes = BTreeMap::new();
+        let mut pointers = BTreeSet::new();
+        for function in listing.functions() {
+            nodes.insert(function.range.start, node(&listing, function)?);
+            pointers.extend(pointers_in_code(function));
+        }
+        let file = object::File::parse(&*image.elf).context("the image is not an ELF file")?;
+        let words = |name: &str| -> Result<Vec<u32>> {
+            let section = file.section_by_name(name);
+            let section = section.with_context(|| format!("the image has no section {name}"))?;
+            let words = section.data()?.chunks_exact(4);
+            Ok(words
+                .map(|word| u32::from_le_bytes([word[0], word[1], word[2], word[3]]))
+                .collect())
+        };
+        pointers.extend(words(".rodata")?);
+        pointers.extend(words(".data")?);
+        // The first word is the stack's start.
+        let vectors = words(".vector_table")?.split_off(1);
+        let is_function = |pointer: &u32| pointer & 1 == 1 && nodes.contains_key(&(pointer & !1));
+        Ok(Self {
+            by_address: pointers
+                .into_iter()
+                .filter(is_function)
+                .map(|pointer| pointer & !1)
+                .collect(),
+            vectors: vectors
+                .into_iter()
+                .filter(is_function)
+                .map(|pointer| pointer & !1)
+                .collect(),
+            nodes,
+        })
+    }
+}
+
+fn node(listing: &Listing, function: &Function) -> Result<Node> {
+    let mut node = Node {
+        name: function.name.clone(),
+        bytes: 0,
+        calls: BTreeSet::new(),
+        is_indirect: false,
+    };
+    for (index, instruction) in function.instructions.iter().enumerate() {
+        let restarts = function.symbol == FRESH && instruction.mnemonic == "mov";
+        let bytes = if restarts {
+            Some(0)
+        } else {
+            taken(instruction)
+        };
+        node.bytes += bytes.with_context(|| {
+            format!(
+                "{} takes an unknown share of the stack at {:#x}: {} {}",
+                function.name, instruction.address, instruction.mnemonic, instruction.operands
+            )
+        })?;
+        match flow(function, index, instruction) {
+            Flow::To(target) if !function.range.contains(&target) => {
+                let callee = listing.at(target);
+                let callee = callee.with_context(|| format!("no function covers {target:#x}"))?;
+                node.calls.insert(callee.range.start);
+            }
+            Flow::Indirect => node.is_indirect = true,
+            Flow::Onward | Flow::To(_) => {}
+        }
+    }
+    ensure!(
+        node.bytes < 1 << 20,
+        "{} takes {} bytes of the stack",
+        node.name,
+        node.bytes
+    );
+    Ok(node)
+}
+
+/// Bytes by which an instruction lowers the stack pointer; none if that is not in the instruction. The sum over a
+/// function's instructions is no less than what it takes at any time.
+fn taken(instruction: &Instruction) -> Option<u32> {
+    let Instruction {
+        mnemonic, operands, ..
+    } = instruction;
+    let list = || {
+        let (_, list) = operands.split_once('{')?;
+        Some(registers(list.trim_end_matches('}')))
+    };
+    match mnemonic.as_str() {
+        "push" => Some(4 * list()?),
+        "stmdb" | "stmfd" if operands.starts_with("sp!") => Some(4 * list()?),
+        "vpush" | "vstmdb" if mnemonic == "vpush" || operands.starts_with("sp!") => {
+            let size = if operands.contains("{d") { 8 } else { 4 };
+            Some(size * list()?)
+        }
+        "sub" | "subw" | "subs" if operands.starts_with("sp,") => immediate(operands),
+        "str" | "strd" if operands.contains("[sp, #-") && operands.contains("]!") => {
+            let (_, offset) = operands.split_once("[sp, #-")?;
+            offset.split(']').next()?.parse().ok()
+        }
+        "mov" if operands.starts_with("sp,") => None,
+        _ => Some(0),
+    }
+}
+
+/// `sp, #4`, `sp, sp, #868 @ 0x364`
+fn immediate(operands: &str) -> Option<u32> {
+    let (_, value) = operands.split_once('#')?;
+    value.split_whitespace().next()?.parse().ok()
+}
+
+/// Registers in a list: `r4, r5, lr`, `r4-r7`, `d8-d15`.
+fn registers(list: &str) -> u32 {
+    let number = |name: &str| name.trim().get(1..).and_then(|n| n.parse::<u32>().ok());
+    list.split(',')
+        .map(|part| match part.split_once('-') {
+            Some((first, last)) => number(last)
+                .zip(number(first))
+                .map_or(16, |(last, first)| last - first + 1),
+            None => 1,
+        })
+        .sum()
+}
+
+/// What may be addresses in a function: words among its instructions, and constants made of two halves.
+fn pointers_in_code(function: &Function) -> Vec<u32> {
+    let mut pointers = Vec::new();
+    let mut halves: BTreeMap<&str, u32> = BTreeMap::new();
+    for instruction in &function.instructions {
+        let operands = instruction.operands.as_str();
+        let register = operands.split(',').next().unwrap_or_default();
+        match instruction.mnemonic.as_str() {
+            ".word" => {
+                let digits = operands.strip_prefix("0x");
+                pointers.extend(digits.and_then(|digits| u32::from_str_radix(digits, 16).ok()));
+            }
+            "movw" | "mov" => {
+                if let Some(low) = immediate(operands) {
+                    halves.insert(register, low);
+                }
+            }
+            "movt" => {
+                if let (Some(low), Some(high)) = (halves.get(register), immediate(operands)) {
+                    pointers.push(low & 0xFFFF | high << 16);
+                }
+            }
+            _ => {}
+        }
+    }
+    pointers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn bytes(mnemonic: &str, operands: &str) -> Option<u32> {
+        taken(&Instruction {
+            address: 0,
+            mnemonic: mnemonic.into(),
+            operands: operands.into(),
+        })
+    }
+
+    #[test]
+    fn what_lowers_the_stack_pointer_is_counted() {
+        assert_eq!(bytes("push", "{r4, r5, r6, r7, lr}"), Some(20));
+        assert_eq!(bytes("stmdb", "sp!, {r4-r11, lr}"), Some(36));
+        assert_eq!(bytes("vpush", "{d8-d15}"), Some(64));
+        assert_eq!(bytes("sub", "sp, #4"), Some(4));
+        assert_eq!(bytes("sub", "sp, sp, #868\t@ 0x364"), Some(868));
+        assert_eq!(bytes("str", "r0, [sp, #-16]!"), Some(16));
+        assert_eq!(bytes("str", "r0, [sp, #16]"), Some(0));
+        assert_eq!(bytes("add", "sp, #4"), Some(0));
+    }
+
+    #[test]
+    fn what_cannot_be_known_is_refused() {
+        assert_eq!(bytes("sub", "sp, sp, r4"), None);
+        assert_eq!(bytes("mov", "sp, r7"), None);
+    }
+
+    #[test]
+    fn addresses_in_two_halves_are_found() {
+        let instruction = |mnemonic: &str, operands: &str| Instruction {
+            address: 0,
+            mnemonic: mnemonic.into(),
+            operands: operands.into(),
+        };
+        let function = Function {
+            symbol: "f".into(),
+            name: "f".into(),
+            range: 0..12,
+            instructions: vec![
+                instruction("movw", "r0, #4661\t@ 0x1235"),
+                instruction("movt", "r0, #2048\t@ 0x800"),
+                instruction(".word", "0x08001237"),
+            ],
+        };
+        assert_eq!(pointers_in_code(&function), [0x0800_1235, 0x0800_1237]);
+    }
+}
