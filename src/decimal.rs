@@ -1,4 +1,4 @@
-//! Numbers in messages, as decimals of nine digits.
+//! Numbers in messages, as decimals of twelve digits.
 //!
 //! `core`'s shortest and exact decimals take 14 KB of a firmware's flash and 2 KB of its stack. A message needs neither:
 //! it shows a value that a person wrote, or a limit.
@@ -7,17 +7,20 @@ use core::fmt::{self, Write as _};
 
 use crate::rounding;
 
-/// A number to be shown: with up to nine significant digits, or with as many decimals as the format asks for
-/// (`{:.3}`), if that is not more than 15 digits in all. From 1e15 on and below 1e-9 it has an exponent.
+/// A number to be shown: with up to twelve significant digits, or with as many decimals as the format asks for
+/// (`{:.3}`), if that is not more than 15 digits in all. From 1e15 on and below 1e-7 it has an exponent.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decimal(pub f64);
 
-/// Significant digits.
-const DIGITS: i32 = 9;
+/// Significant digits: enough to tell a count of 2^32 from the next.
+const DIGITS: i32 = 12;
+/// The first digit's place from which on numbers are written with an exponent; with all digits, 10^18 is the unit then.
+const SMALL: i32 = -7;
 /// Numbers from here on are written with an exponent: 1e15.
 const LARGE: i32 = 15;
 
 /// 10 to a whole power, by multiplying: exact up to 22.
+#[inline(never)]
 fn power_of_ten(exponent: i32) -> f64 {
     let mut power = 1.0;
     for _ in 0..exponent.unsigned_abs().min(330) {
@@ -27,6 +30,7 @@ fn power_of_ten(exponent: i32) -> f64 {
 }
 
 /// `value * 10^exponent`.
+#[inline(never)]
 fn scaled(value: f64, exponent: i32) -> f64 {
     match exponent {
         // Nothing that is not 0 has a smaller power, and 10^330 is no number.
@@ -87,10 +91,10 @@ impl fmt::Display for Decimal {
         }
         if digits >= 10u64.pow(DIGITS as u32) {
             first += 1;
-            digits = (digits + 5) / 10;
+            digits = rounding::round(scaled(magnitude, DIGITS - 1 - first)) as u64;
         }
         let mut decimals = DIGITS - 1;
-        let exponent = !(-DIGITS..LARGE).contains(&first);
+        let exponent = !(SMALL..LARGE).contains(&first);
         if !exponent {
             decimals -= first;
         }

@@ -271,8 +271,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     ) {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         self.kind = kind;
-        self.level_gain = share(gains.level);
-        self.gms_gain = share(gains.gms);
+        (self.level_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
         self.viscous = friction.sliding.map(|model| {
             S::gain(
                 gains.viscous * model.viscous_v_s_per_mm,

@@ -222,6 +222,7 @@ fn print_command(command: Command) {
         Command::Jog(axis, _) => defmt::trace!("command: jog {=str}", axis.as_str()),
         Command::StartMove(axis) => defmt::trace!("command: move {=str}", axis.as_str()),
         Command::StartStream => defmt::trace!("command: start the stream"),
+        Command::StartInjection => defmt::trace!("command: start the injected voltage"),
     }
 }
 
@@ -322,6 +323,7 @@ const fn verb(mode: CourseMode) -> &'static str {
         CourseMode::Home => "homing",
         CourseMode::Stream => "following a stream",
         CourseMode::Stopping => "braking",
+        CourseMode::OpenLoop => "injected voltage in open loop",
     }
 }
 

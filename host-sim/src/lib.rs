@@ -21,7 +21,9 @@
 pub mod commission;
 pub mod console;
 pub mod design;
+#[cfg(unix)]
 pub mod emulated_machine;
+#[cfg(unix)]
 pub mod emulator;
 pub mod experiment;
 pub mod identify;

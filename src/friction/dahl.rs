@@ -76,6 +76,7 @@ pub struct Dahl<S: Scalar> {
 
 impl<S: Scalar> Dahl<S> {
     /// Makes the model from its parameters and its level in V, positive, for each sense of motion. Settings time only.
+    #[inline(never)]
     pub fn build(parameters: &DahlParameters, level_v: PerDirection<f64>) -> Self {
         let (forth, back) = (level_v.positive, level_v.negative);
         let widest = 1.0 + (forth / back).max(back / forth);

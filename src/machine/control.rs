@@ -44,6 +44,7 @@ pub struct Control<'q, 'a, S: Scalar> {
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// Ready for the first tick.
+    // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(
         axes: [&'a mut Axis<S>; 3],

@@ -164,11 +164,11 @@ impl<S: Scalar> Ramp<S> {
         let rate = scale.rate_hz;
         let acceleration = acceleration_mm_s2 * steps_per_mm(scale) / (rate * rate);
         let jerk = jerk_mm_s3 * steps_per_mm(scale) / (rate * rate * rate);
-        let jerk = jerk.min(acceleration).clamp(1.0, LARGEST as f64);
+        let jerk = rounding::clamp(jerk.min(acceleration), 1.0, LARGEST as f64);
         let jerk = rounding::floor(jerk);
         // T(levels) stays below the largest velocity.
         let most = libm::sqrt(LARGEST as f64 / jerk).min(f64::from(i32::MAX));
-        let levels = rounding::floor(acceleration / jerk).clamp(1.0, most.max(1.0));
+        let levels = rounding::clamp(rounding::floor(acceleration / jerk), 1.0, most.max(1.0));
         let unit_mm = scale.resolution_mm / POSITION_UNITS_PER_COUNT;
         let one = libm::scalbn(1.0, FRACTION_BITS as i32);
         Self {

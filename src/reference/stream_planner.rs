@@ -53,7 +53,9 @@ impl AxisPoint {
             position: sample.position,
             velocity: Velocity::from_mm_s(sample.velocity, scale),
             // `as` turns NaN into zero.
-            acceleration: Acceleration(rounding::round(acceleration).clamp(-most, most) as i64),
+            acceleration: Acceleration(
+                rounding::clamp(rounding::round(acceleration), -most, most) as i64
+            ),
         }
     }
 

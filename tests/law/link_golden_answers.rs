@@ -131,6 +131,16 @@ fn replies() -> Vec<(Result<Reply, LinkError>, &'static str)> {
             })),
             "0b0970080100000005040302",
         ),
+        (
+            Ok(Reply::Inject(InjectStatus {
+                next_sequence: 300,
+                free: 1440,
+                first_tick: Some(128),
+                done: 7,
+                ended: true,
+            })),
+            "0cac02a00b0180010701",
+        ),
         (Err(LinkError::Version { yours: 9, mine: 1 }), "000901"),
         (Err(LinkError::Undecodable), "01"),
         (Err(LinkError::NoHello), "02"),

@@ -1,5 +1,6 @@
 //! Every number out of its range is refused by name, with the value and what is allowed.
 
+use quadrant::decimal::Decimal;
 use quadrant::safety::AxisName;
 use quadrant::settings::{PlanSettings, Reason, SettingsError, StageSettings};
 
@@ -22,10 +23,11 @@ pub(crate) fn check_message(error: &SettingsError, axis: AxisName, field: &str) 
     assert_eq!((error.axis, error.field), (Some(axis), field));
     let text = error.to_string();
     assert!(
-        text.starts_with(&format!("{axis}.{field} = {}", error.value)),
+        text.starts_with(&format!("{axis}.{field} = {}", Decimal(error.value))),
         "{text}"
     );
     if let Reason::OutOfRange { least, most } = error.reason {
+        let (least, most) = (Decimal(least), Decimal(most));
         assert!(
             text.ends_with(&format!("is outside {least} to {most}")),
             "{text}"

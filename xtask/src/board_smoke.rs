@@ -6,12 +6,13 @@
 
 use std::path::PathBuf;
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
+use quadrant_sim::emulator::Program;
 
 use crate::command;
-use crate::gdb::{Debugger, PROGRAM_COUNTER};
+use crate::gdb::{Debugger, PROGRAM_COUNTER, STACK_POINTER};
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::toolchain::Toolchain;
 
@@ -26,18 +27,22 @@ const LOOKS: usize = 40;
 /// Control ticks to run, and how often the supervising task and the server run in them at least.
 const TICKS: u32 = 100;
 const POLLS: u32 = 9;
+/// How long the first tick may wait, in the host's time: settings are built before it, with interrupts masked.
+const PATIENCE: Duration = Duration::from_secs(30);
 /// NVIC_ISPR1, and TIM7 in it.
 const SET_PENDING: u32 = 0xE000_E204;
 const TIM7: u32 = 1 << (55 - 32);
 /// `str r0, [r1]` and a branch to itself, at the bottom of the stack, where nobody is.
 const PEND: [u8; 4] = [0x08, 0x60, 0xFE, 0xE7];
 const SCRATCH: u32 = 0x2000_0000;
-/// What the log must say: SPI was asked and answered zero, the flash was found empty, initialisation came to its end.
-const EXPECTED: [&str; 4] = [
+/// What the log must say: SPI was asked and answered zero, the flash was found empty, initialisation came to its end; and
+/// that a full stack ended it.
+const EXPECTED: [&str; 5] = [
     "the converter answers 0x0000 instead of 0x0004",
     "quadrant ",
     "no settings are stored",
     "10000 control ticks per second, outputs off",
+    "hard fault, outputs are off: the stack is full",
 ];
 /// What it must not say: the button reads as pressed here, but was never seen up.
 const FORBIDDEN: [&str; 2] = ["outputs enabled", "request refused"];
@@ -89,7 +94,7 @@ impl Machine {
     }
 }
 
-/// Builds the image, lets it start and tick, and checks what it logs.
+/// Builds the image, lets it start and tick, fills its stack, and checks what it logs.
 pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
     let image = image::build(
         toolchain,
@@ -107,6 +112,7 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
         tick(&mut debugger)?;
     }
     log.read(&mut debugger)?;
+    overflow(&mut debugger, &mut log)?;
     let ticked = debugger.word(image.variable("TICK")?)?;
     let polled = debugger.word(image.variable("POLLS")?)?;
     println!("{ticked} control ticks, {polled} polls of the server");
@@ -187,8 +193,8 @@ fn decode_load(first: u16, second: u16) -> Option<(usize, usize, i32)> {
     }
 }
 
-/// Makes the control interrupt pending, and lets it and what it spawns run.
-fn tick(debugger: &mut Debugger) -> Result<()> {
+/// Makes the control interrupt pending.
+fn pend(debugger: &mut Debugger) -> Result<()> {
     let before = [0, 1, PROGRAM_COUNTER].map(|number| (number, debugger.register(number)));
     debugger.set_register(0, TIM7)?;
     debugger.set_register(1, SET_PENDING)?;
@@ -197,13 +203,36 @@ fn tick(debugger: &mut Debugger) -> Result<()> {
     for (number, value) in before {
         debugger.set_register(number, value?)?;
     }
-    for _ in 0..LOOKS {
+    Ok(())
+}
+
+/// Lets the control interrupt and what it spawns run.
+fn tick(debugger: &mut Debugger) -> Result<()> {
+    pend(debugger)?;
+    let begun = Instant::now();
+    while begun.elapsed() < PATIENCE {
         debugger.run(Duration::from_millis(5))?;
         if debugger.word(SET_PENDING)? & TIM7 == 0 {
             return Ok(());
         }
     }
-    bail!("the control interrupt is not taken")
+    bail!("the control interrupt is not taken within {PATIENCE:?}")
+}
+
+/// Lets the control interrupt meet a stack that is full, until the fault's handler has spoken.
+fn overflow(debugger: &mut Debugger, log: &mut Log) -> Result<()> {
+    debugger.set_register(STACK_POINTER, SCRATCH + 16)?;
+    pend(debugger)?;
+    let begun = Instant::now();
+    while begun.elapsed() < PATIENCE {
+        debugger.run(Duration::from_millis(5))?;
+        let so_far = log.bytes.len();
+        log.read(debugger)?;
+        if log.bytes.len() > so_far {
+            return Ok(());
+        }
+    }
+    bail!("a full stack is no fault")
 }
 
 /// The log's ring in the image's RAM: SEGGER's RTT, one channel up.
@@ -241,7 +270,7 @@ impl Log {
 
     /// The lines, printed as well.
     fn lines(&self, image: &Image) -> Result<Vec<String>> {
-        let lines = image.program()?.decode_log(&self.bytes);
+        let lines = Program::read(&image.path)?.decode_log(&self.bytes);
         for line in &lines {
             println!("  firmware: {line}");
         }

@@ -3,19 +3,18 @@
 //! QEMU logs every instruction executed. These are instructions, not cycles.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::lockstep::{Job, Mode};
 use quadrant_sim::emulator::{Emulator, Memory};
 use serde::{Deserialize, Serialize};
 
+use crate::emulate;
+use crate::golden::Golden;
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::toolchain::Toolchain;
 use crate::trace::{Tick, Trace};
 use crate::twin::{self, SETTLING_TICKS, Twin};
-use crate::{command, emulate};
 
 /// How much more than expected is accepted, in percent.
 const TOLERANCE_PERCENT: f64 = 5.0;
@@ -38,8 +37,11 @@ struct Count {
     stages: BTreeMap<String, Figure>,
 }
 
-/// The committed figures, by number type, and law and feedforward if they are not the default's.
-type Expected = BTreeMap<String, Count>;
+/// What is expected.
+const GOLDEN: Golden = Golden {
+    file: "instructions.toml",
+    head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",
+};
 
 /// Counts the default job stage by stage, prints, and holds the figures against the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
@@ -62,7 +64,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: b
     }
     let key = image.target.scalar_name();
     if overwrite {
-        store([(key, count)])
+        GOLDEN.store([(key, count)])
     } else {
         compare(&key, &count)
     }
@@ -97,7 +99,7 @@ pub(crate) fn run_all(
         counts.push((format!("{}, {name}", image.target.scalar_name()), whole));
     }
     if overwrite {
-        return store(counts);
+        return GOLDEN.store(counts);
     }
     counts
         .iter()
@@ -166,38 +168,8 @@ fn summary(ticks: u32, closed: &[Tick]) -> Count {
     }
 }
 
-fn path() -> PathBuf {
-    command::root().join("xtask/golden/instructions.toml")
-}
-
-fn expected() -> Result<Expected> {
-    let path = path();
-    match fs::read_to_string(&path) {
-        Ok(text) => {
-            toml::from_str(&text).with_context(|| format!("{} does not parse", path.display()))
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Expected::new()),
-        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
-    }
-}
-
-fn store(counts: impl IntoIterator<Item = (String, Count)>) -> Result<()> {
-    let mut expected = expected()?;
-    expected.extend(counts);
-    let path = path();
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder)
-            .with_context(|| format!("cannot create {}", folder.display()))?;
-    }
-    let head = "# Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.\n\n";
-    fs::write(&path, format!("{head}{}", toml::to_string(&expected)?))
-        .with_context(|| format!("cannot write {}", path.display()))?;
-    println!("written to {}", path.display());
-    Ok(())
-}
-
 fn compare(key: &str, count: &Count) -> Result<()> {
-    let Some(expected) = expected()?.remove(key) else {
+    let Some(expected) = GOLDEN.read::<Count>()?.remove(key) else {
         bail!(
             "no figure is committed for {key}: `cargo xtask count --overwrite-expected` makes one"
         );

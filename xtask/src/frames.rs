@@ -57,18 +57,19 @@ impl Frames {
         pointers.extend(words(".data")?);
         // The first word is the stack's start.
         let vectors = words(".vector_table")?.split_off(1);
-        let is_function = |pointer: &u32| pointer & 1 == 1 && nodes.contains_key(&(pointer & !1));
+        let function = |pointer: u32| {
+            let start = pointer & !1;
+            (pointer & 1 == 1 && nodes.contains_key(&start)).then_some(start)
+        };
+        let vectors: Vec<_> = vectors.into_iter().filter_map(function).collect();
+        // The processor calls the vectors, and nobody else.
+        let by_address = pointers.into_iter().filter_map(function);
+        let by_address = by_address
+            .filter(|start| !vectors.contains(start))
+            .collect();
         Ok(Self {
-            by_address: pointers
-                .into_iter()
-                .filter(is_function)
-                .map(|pointer| pointer & !1)
-                .collect(),
-            vectors: vectors
-                .into_iter()
-                .filter(is_function)
-                .map(|pointer| pointer & !1)
-                .collect(),
+            by_address,
+            vectors,
             nodes,
         })
     }

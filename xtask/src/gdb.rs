@@ -14,6 +14,9 @@ const PATIENCE: Duration = Duration::from_secs(20);
 /// The number of the program counter among the registers r0 to r15.
 pub(crate) const PROGRAM_COUNTER: usize = 15;
 
+/// The number of the stack pointer.
+pub(crate) const STACK_POINTER: usize = 13;
+
 /// A stopped processor.
 pub(crate) struct Debugger {
     stream: UnixStream,

@@ -4,17 +4,14 @@
 //! that growing too far is a fault and nothing worse; and flashing an image never touches the sectors of the stored
 //! settings. The sizes are held against those committed in `golden/sizes.toml`.
 
-use std::collections::BTreeMap;
-use std::fs;
 use std::ops::Range;
-use std::path::PathBuf;
 
 use anyhow::{Context, Result, bail, ensure};
 use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSection, elf};
 use serde::{Deserialize, Serialize};
 
-use crate::command;
+use crate::golden::Golden;
 use crate::image::{Board, Image, Target};
 use crate::listing::{Instruction, Listing};
 
@@ -63,7 +60,7 @@ pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
         image.target, sizes.flash, sizes.variables, sizes.stack, sizes.stack_bound
     );
     if overwrite {
-        commit(image.target, sizes)
+        GOLDEN.store([(key(image.target), sizes)])
     } else {
         compare(image.target, sizes)
     }
@@ -151,42 +148,20 @@ fn leaves(instruction: &Instruction, symbol: &str) -> bool {
     }
 }
 
-type Golden = BTreeMap<String, Sizes>;
-
-fn path() -> PathBuf {
-    command::root().join("xtask/golden/sizes.toml")
-}
-
-fn golden() -> Result<Golden> {
-    let path = path();
-    let text =
-        fs::read_to_string(&path).with_context(|| format!("cannot read {}", path.display()))?;
-    toml::from_str(&text).with_context(|| format!("cannot understand {}", path.display()))
-}
+/// The committed sizes.
+const GOLDEN: Golden = Golden {
+    file: "sizes.toml",
+    head: "Bytes that the images take, written by `cargo xtask sizes --overwrite-expected`.",
+};
 
 fn key(target: Target) -> String {
     target.to_string().replace(' ', "-")
 }
 
-/// Writes the sizes of one image to the committed ones.
-fn commit(target: Target, sizes: Sizes) -> Result<()> {
-    let mut golden = if path().exists() {
-        golden()?
-    } else {
-        Golden::new()
-    };
-    golden.insert(key(target), sizes);
-    let text = format!(
-        "# Bytes that the images take, written by `cargo xtask sizes --overwrite-expected`.\n\n{}",
-        toml::to_string(&golden)?
-    );
-    fs::write(path(), text).with_context(|| format!("cannot write {}", path().display()))
-}
-
 /// Holds sizes against the committed ones: larger is a failure, smaller a reason to commit.
 fn compare(target: Target, sizes: Sizes) -> Result<()> {
     const REMEDY: &str = "if that is meant, run `cargo xtask sizes --overwrite-expected`";
-    let Some(expected) = golden()?.remove(&key(target)) else {
+    let Some(expected) = GOLDEN.read::<Sizes>()?.remove(&key(target)) else {
         bail!("{target} has no committed sizes; {REMEDY}");
     };
     for (name, size, expected) in [
@@ -219,7 +194,7 @@ mod tests {
             board: Board::NucleoF446re,
             scalar: Scalar::F32,
         };
-        let expected = golden().expect("sizes are committed")[&key(target)];
+        let expected = GOLDEN.read::<Sizes>().expect("sizes are committed")[&key(target)];
         let grown = |flash| Sizes { flash, ..expected };
         assert!(compare(target, grown(expected.flash + expected.flash / 100)).is_ok());
         let error = compare(target, grown(expected.flash + expected.flash / 10)).unwrap_err();
@@ -257,7 +232,7 @@ mod tests {
 
     #[test]
     fn every_image_has_committed_sizes() {
-        let golden = golden().expect("sizes are committed");
+        let golden = GOLDEN.read::<Sizes>().expect("sizes are committed");
         for target in Target::ALL {
             assert!(golden.contains_key(&key(target)), "{target}");
         }

@@ -1,5 +1,5 @@
-//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `faults`, `board-smoke`, `count`, `prove-no-panic`, `sizes`,
-//! `test`.
+//! The project's chores: `cargo xtask setup`, `build`, `emulate`, `faults`, `story`, `board-smoke`, `count`,
+//! `prove-no-panic`, `sizes`, `test`.
 #![forbid(unsafe_code)]
 
 mod attribution;
@@ -12,13 +12,16 @@ mod emulate;
 mod faults;
 mod frames;
 mod gdb;
+mod golden;
 mod image;
 mod layout;
 mod listing;
+mod modules;
 mod prove;
 mod setup;
 mod stack;
 mod stages;
+mod story;
 mod test;
 mod toolchain;
 mod trace;
@@ -72,6 +75,12 @@ enum Verb {
     ProveNoPanic(TargetArgs),
     /// Check where an image lies in the memories, and its sizes against the committed ones
     Sizes(SizeArgs),
+    /// Play a machine's whole story through the console, on the simulated machine and on the emulated image
+    Story {
+        /// Write what is printed to the files that later runs are held against
+        #[arg(long)]
+        overwrite_expected: bool,
+    },
     /// Set up, then run every check there is
     Test,
 }
@@ -104,6 +113,9 @@ struct SizeArgs {
     /// Write the sizes to the file that later runs are held against
     #[arg(long)]
     overwrite_expected: bool,
+    /// Print what takes how much of the flash, by module
+    #[arg(long)]
+    by_module: bool,
 }
 
 /// How to emulate.
@@ -222,8 +234,12 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::ProveNoPanic(args) => prove::run(toolchain()?, args.into())?,
         Verb::Sizes(args) => {
             let image = image::build(toolchain()?, args.target.into())?;
+            if args.by_module {
+                modules::print(&image)?;
+            }
             layout::check(&image, args.overwrite_expected)?;
         }
+        Verb::Story { overwrite_expected } => story::run(toolchain()?, overwrite_expected)?,
         Verb::Test => return test::run(cli.toolchain.unwrap_or(Choice::Auto)),
     }
     Ok(true)

@@ -8,7 +8,7 @@ use anyhow::Result;
 use crate::image::{self, Board, Scalar, Target};
 use crate::toolchain::{Choice, Toolchain};
 use crate::{
-    board_smoke, combinations, command, count, emulate, faults, layout, prove, setup, twin,
+    board_smoke, combinations, command, count, emulate, faults, layout, prove, setup, story, twin,
 };
 
 /// Ticks of the counting run.
@@ -137,8 +137,12 @@ fn firmware(report: &mut Report, toolchain: Toolchain) {
 
 /// What is emulated.
 fn emulated(report: &mut Report, toolchain: Toolchain) {
-    report.step("the reference board's image starts and ticks", || {
-        board_smoke::run(toolchain)
+    report.step(
+        "the reference board's image starts, ticks, and meets the end of its stack",
+        || board_smoke::run(toolchain),
+    );
+    report.step("a machine's story, through the console", || {
+        story::run(toolchain, false)
     });
     for scalar in [Scalar::F32, Scalar::Fixed] {
         let target = Target {
@@ -161,9 +165,6 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
         report.step(format!("every fault provoked, {target}"), || {
             faults::run(toolchain, scalar, None, false)
         });
-        report.step(format!("control under overload, {target}"), || {
-            faults::saturation::run(toolchain, scalar)
-        });
         report.step(format!("instructions per tick, {target}"), || {
             count::run(toolchain, scalar, COUNTED_TICKS, false)
         });
@@ -174,4 +175,7 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
             combinations::count(toolchain, scalar, TICKS_EACH, false)
         });
     }
+    report.step("control under overload, mps2 f32", || {
+        faults::saturation::run(toolchain, Scalar::F32)
+    });
 }

@@ -111,7 +111,8 @@ pub enum ClientError {
     },
     /// A latched fault ended what was waited for.
     #[error(
-        "{what}: fault {code} {name}{axis} at tick {tick}: {cause}; {remedy}, then `reset`",
+        "{what}: fault {code} {name}{axis} at tick {tick}: {cause}; {remedy}",
+        remedy = with_reset(.remedy),
         axis = .axis.map(|axis| format!(" of {axis}")).unwrap_or_default()
     )]
     Fault {
@@ -157,5 +158,25 @@ impl ClientError {
             attempts,
             remedy,
         }
+    }
+}
+
+/// What to do about a fault: most remedies leave unsaid that it is latched.
+pub fn with_reset(remedy: &str) -> String {
+    if remedy.contains("reset") {
+        remedy.to_owned()
+    } else {
+        format!("{remedy}, then `reset`")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_reset;
+
+    #[test]
+    fn a_reset_is_told_of_once() {
+        assert_eq!(with_reset("find the cause"), "find the cause, then `reset`");
+        assert_eq!(with_reset("reset, and enable"), "reset, and enable");
     }
 }

@@ -19,6 +19,7 @@
 
 mod client;
 pub mod columns;
+#[cfg(unix)]
 mod emulated;
 mod error;
 mod flash_file;
@@ -37,7 +38,8 @@ mod transport;
 mod tests;
 
 pub use client::Client;
+#[cfg(unix)]
 pub use emulated::EmulatedLink;
-pub use error::ClientError;
+pub use error::{ClientError, with_reset};
 pub use simulated::SimulatedLink;
 pub use transport::{BAUD, Exchange, InProcess, SerialTransport, TcpTransport, Transport};

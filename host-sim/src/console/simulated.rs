@@ -55,6 +55,10 @@ impl Exchange for SimulatedLink {
     fn exchange(&mut self, sent: &[u8]) -> io::Result<Vec<u8>> {
         self.machine.send(sent);
         self.machine.run(PERIOD_TICKS);
+        // An answer of the emulated board is seen a tick late. Hands are to act in the same tick on both.
+        while self.machine.tick() % PERIOD_TICKS != 1 {
+            self.machine.run(1);
+        }
         if let Some(file) = &mut self.flash {
             file.keep(self.machine.flash().bytes())?;
         }

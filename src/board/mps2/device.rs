@@ -24,7 +24,7 @@ pub(crate) enum Interrupt {
     /// The control tick: timer 0, or pended by software.
     CONTROL_TICK = 8,
     /// Timer 1 runs free: its interrupt has no handler.
-    UNUSED = 9,
+    WITHOUT_HANDLER = 9,
 }
 
 // SAFETY: every number is a line of the interrupt controller, and `number` is constant for a variant.

@@ -37,8 +37,8 @@ fn act() {
         }
         Some(Provocation::StrayInterrupt) => {
             // SAFETY: nothing relies on its being masked; `DefaultHandler` is its vector.
-            unsafe { NVIC::unmask(Interrupt::UNUSED) };
-            NVIC::pend(Interrupt::UNUSED);
+            unsafe { NVIC::unmask(Interrupt::WITHOUT_HANDLER) };
+            NVIC::pend(Interrupt::WITHOUT_HANDLER);
             cortex_m::asm::dsb();
             cortex_m::asm::isb();
         }

@@ -119,7 +119,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
 
 impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     /// A server that nobody has spoken to.
-    // In place: it is made once, and the stack has no room for two.
+    // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(parts: ServerParts<'q, 'a, S, F>) -> Self {
         let mut server = Self {

@@ -32,8 +32,6 @@ const PATIENCE: Duration = Duration::from_secs(120);
 const LOOKS: u32 = 1 << 8;
 /// Pauses between two looks at the clock.
 const PAUSES: u32 = 1 << 8;
-/// Rate of the emulated board's timers, Hz.
-const CYCLE_HZ: u32 = 25_000_000;
 /// Ticks until the firmware has looked at what was asked or has happened.
 pub(super) const A_WHILE: u32 = 40;
 
@@ -288,7 +286,8 @@ fn application(
         plan: &setup.job.plan,
         fault,
         board: "mps2",
-        cycle_hz: CYCLE_HZ,
+        // Nothing measures ticks in lockstep.
+        cycle_hz: 0,
         number,
     };
     let flash = setup.flash.clone();

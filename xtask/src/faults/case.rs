@@ -141,7 +141,11 @@ pub(super) fn of(code: FaultCode) -> Option<Case> {
                     axis: AxisName::X,
                     velocity_mm_s: 10.0,
                 })?;
-                bench.run(5_000)?;
+                for _ in 0..10 {
+                    bench.run(500)?;
+                    // A jog goes on only while its host asks something.
+                    bench.status()?;
+                }
                 Ok(broken(bench, frozen(true)))
             },
         },
@@ -170,13 +174,12 @@ pub(super) fn of(code: FaultCode) -> Option<Case> {
         }
         FaultCode::LinkLost => case(
             "the host falls silent; what it sent lasts for 1.5 s",
-            |bench| feeds::unfinished_stream(bench),
+            feeds::unfinished_stream,
         ),
-        FaultCode::StreamUnderrun => {
-            case("no more set points; from when the next is due", |bench| {
-                feeds::underrunning(bench)
-            })
-        }
+        FaultCode::StreamUnderrun => case(
+            "no more set points; from when the next is due",
+            feeds::underrunning,
+        ),
         FaultCode::HomeSwitchMissing => Case {
             how: "the home switch is 40 mm away, homing goes 3 mm; from its start",
             adjust: |setup| setup.marks.home_mm = -40.0,
@@ -208,11 +211,10 @@ pub(super) fn of(code: FaultCode) -> Option<Case> {
             adjust: |setup| setup.marks.index_count = -1_880,
             bring: homing,
         },
-        FaultCode::InjectionUnderrun => {
-            case("no more values; from when the next is due", |bench| {
-                feeds::injection_without_end(bench)
-            })
-        }
+        FaultCode::InjectionUnderrun => case(
+            "no more values; from when the next is due",
+            feeds::injection_without_end,
+        ),
         FaultCode::InjectionBounds => case(
             "1 V in open loop, 0.02 mm allowed; from its start",
             |bench| feeds::injecting(bench, 1.0, 0.02),

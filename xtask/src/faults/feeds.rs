@@ -17,7 +17,7 @@ const LONG_STREAM_TICKS: u16 = 1_000;
 /// Set points that a stream gets before it gets no more.
 const SET_POINTS: u32 = 15;
 /// Values that an injection gets before it gets no more: enough for it to begin.
-const VALUES: u16 = 384;
+const VALUES: u16 = 768;
 
 /// A stream whose set points last longer than the firmware's patience with a host that falls silent; gives the tick after
 /// the last request.

@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::net::UnixStream;
 use std::path::PathBuf;
 use std::process::Stdio;
+use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
 use quadrant::safety::Command;
@@ -19,6 +20,8 @@ use quadrant_sim::emulator::{self, Clock, Emulator};
 
 /// Ticks that are traced.
 const TICKS: u32 = 200;
+/// How long QEMU's monitor may take to answer.
+const PATIENCE: Duration = Duration::from_secs(20);
 /// What is not traced: initialisation and the idle loop, which masks nothing once ticks are due.
 const IDLE: &str = "main";
 
@@ -78,16 +81,25 @@ fn drive(mut bench: Bench, socket: &std::path::Path) -> Result<()> {
     bench.break_with(Box::new(|input, _, _| input.request = Some(Command::Run)));
     bench.run(100)?;
     let mut monitor = UnixStream::connect(socket).context("cannot reach QEMU's monitor")?;
+    monitor.set_read_timeout(Some(PATIENCE))?;
+    await_prompt(&mut monitor)?;
     monitor.write_all(b"log exec,nochain\n")?;
-    let mut answer = BufReader::new(monitor.try_clone()?);
-    let mut line = String::new();
-    // The greeting, and then the command that it has taken.
-    while !line.contains("log exec,nochain") {
-        line.clear();
-        answer.read_line(&mut line)?;
-    }
+    await_prompt(&mut monitor)?;
     bench.run(TICKS)?;
     bench.end().map(drop)
+}
+
+/// Reads until the monitor is ready for a command.
+fn await_prompt(monitor: &mut UnixStream) -> Result<()> {
+    let mut seen = Vec::new();
+    let mut byte = [0];
+    while !seen.ends_with(b"(qemu) ") {
+        monitor
+            .read_exact(&mut byte)
+            .context("QEMU's monitor does not answer")?;
+        seen.push(byte[0]);
+    }
+    Ok(())
 }
 
 /// Follows a trace.

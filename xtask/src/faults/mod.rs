@@ -11,17 +11,13 @@ mod port;
 pub(crate) mod saturation;
 mod starts;
 
-use std::collections::BTreeMap;
-use std::fs;
-use std::path::PathBuf;
-
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::safety::FaultCode;
 use serde::{Deserialize, Serialize};
 
 use self::bench::Bench;
 use self::finding::Finding;
-use crate::command;
+use crate::golden::Golden;
 use crate::image::{self, Board, Image, Scalar, Target};
 use crate::toolchain::Toolchain;
 
@@ -33,7 +29,10 @@ struct Table {
 }
 
 /// The committed tables, by number type.
-type Expected = BTreeMap<String, Table>;
+const GOLDEN: Golden = Golden {
+    file: "faults.toml",
+    head: "Written by `cargo xtask faults --overwrite-expected`; `cargo xtask faults` holds what it finds against this.",
+};
 
 /// Provokes every fault, prints the table, and holds it against the committed one.
 pub(crate) fn run(
@@ -86,7 +85,7 @@ pub(crate) fn run(
     starts::refused_job(&image).context("a job with settings that are refused")?;
     let key = image.target.scalar_name();
     if overwrite {
-        store(&key, table)
+        GOLDEN.store([(key, table)])
     } else {
         compare(&key, &table)
     }
@@ -122,34 +121,8 @@ fn provoke(image: &Image, code: FaultCode) -> Result<Vec<Finding>> {
     })
 }
 
-fn path() -> PathBuf {
-    command::root().join("xtask/golden/faults.toml")
-}
-
-fn expected() -> Result<Expected> {
-    let path = path();
-    match fs::read_to_string(&path) {
-        Ok(text) => {
-            toml::from_str(&text).with_context(|| format!("{} does not parse", path.display()))
-        }
-        Err(error) if error.kind() == std::io::ErrorKind::NotFound => Ok(Expected::new()),
-        Err(error) => Err(error).with_context(|| format!("cannot read {}", path.display())),
-    }
-}
-
-fn store(key: &str, table: Table) -> Result<()> {
-    let mut expected = expected()?;
-    expected.insert(key.to_owned(), table);
-    let path = path();
-    let head = "# Written by `cargo xtask faults --overwrite-expected`; `cargo xtask faults` holds what it finds against this.\n\n";
-    fs::write(&path, format!("{head}{}", toml::to_string(&expected)?))
-        .with_context(|| format!("cannot write {}", path.display()))?;
-    println!("written to {}", path.display());
-    Ok(())
-}
-
 fn compare(key: &str, table: &Table) -> Result<()> {
-    let Some(expected) = expected()?.remove(key) else {
+    let Some(expected) = GOLDEN.read::<Table>()?.remove(key) else {
         bail!(
             "no table is committed for {key}: `cargo xtask faults --overwrite-expected` makes one"
         );

@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 use anyhow::bail;
 use quadrant::link::message::{AxisSet, Body, Status};
 use quadrant::safety::AxisName;
-use quadrant_sim::console::{Client, settle};
+use quadrant_sim::console::{Client, settle, with_reset};
 use serde_json::json;
 
 use super::command::Command;
@@ -118,12 +118,12 @@ pub(super) fn fault(client: &mut Client) -> anyhow::Result<Answer> {
         ""
     };
     let text = format!(
-        "fault {code} {name}{axis} at tick {tick}\ncause: {cause}\nremedy: {remedy}; then `reset`{trace}",
+        "fault {code} {name}{axis} at tick {tick}\ncause: {cause}\nremedy: {remedy}{trace}",
         code = fault.code,
         name = fault.name,
         tick = fault.tick,
         cause = fault.cause,
-        remedy = fault.remedy,
+        remedy = with_reset(&fault.remedy),
     );
     Ok(Answer::new(text, json!(fault)))
 }

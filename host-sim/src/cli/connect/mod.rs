@@ -14,11 +14,11 @@ mod scope;
 mod script;
 mod settings;
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::Context;
 use clap::Args;
-use quadrant_sim::console::{Client, EmulatedLink, SerialTransport, SimulatedLink, TcpTransport};
+use quadrant_sim::console::{Client, SerialTransport, SimulatedLink, TcpTransport};
 
 use command::Command;
 use drive::Session;
@@ -120,7 +120,7 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
             })?;
             Client::open(socket)
         }
-        (_, _, Some(image), _) => Client::open(EmulatedLink::start(image, arguments.seed, flash)?),
+        (_, _, Some(image), _) => return emulated(image, arguments.seed, flash),
         (.., true) => Client::open(SimulatedLink::start(arguments.seed, flash)?),
         _ => anyhow::bail!(
             "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \
@@ -128,4 +128,17 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
         ),
     };
     Ok(client?)
+}
+
+#[cfg(unix)]
+fn emulated(image: &Path, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
+    let link = quadrant_sim::console::EmulatedLink::start(image, seed, flash)?;
+    Ok(Client::open(link)?)
+}
+
+#[cfg(not(unix))]
+fn emulated(_: &Path, _: u64, _: Option<&Path>) -> anyhow::Result<Client> {
+    anyhow::bail!(
+        "--emulated: QEMU shares memory through a file on Unix systems alone; --simulated works here"
+    )
 }
