@@ -24,10 +24,10 @@ use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 use crate::common::Noise;
 use crate::link_traffic::{arrival, framed};
 
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the law's tests use the rest")]
 #[path = "../../tests/law/common.rs"]
 mod common;
-#[allow(dead_code)]
+#[allow(dead_code, reason = "the law's tests use the rest")]
 #[path = "../../tests/law/link_traffic.rs"]
 mod link_traffic;
 
