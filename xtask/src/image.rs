@@ -93,13 +93,14 @@ impl Target {
     }
 
     /// Cargo's arguments to select the firmware of this target.
-    pub(crate) fn arguments(self) -> [String; 9] {
+    pub(crate) fn arguments(self) -> [String; 10] {
         [
             "--package".into(),
             "quadrant".into(),
             "--bin".into(),
             "quadrant-firmware".into(),
-            "--release".into(),
+            "--profile".into(),
+            "firmware".into(),
             "--target".into(),
             self.triple().into(),
             "--features".into(),
@@ -151,7 +152,7 @@ pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
     let built = command::root()
         .join("target/firmware")
         .join(target.triple())
-        .join("release/quadrant-firmware");
+        .join("firmware/quadrant-firmware");
     // Two boards share a triple: keep each image under a name of its own.
     let folder = command::root().join("target/images");
     std::fs::create_dir_all(&folder)
