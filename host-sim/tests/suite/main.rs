@@ -16,6 +16,7 @@ mod design_npid;
 mod design_pid;
 mod experiments;
 mod friction_models;
+mod hostile_link;
 mod identified_stage;
 mod identify_commands;
 mod identify_frf;
@@ -37,6 +38,8 @@ mod plant_unchanged;
 mod record_bad_input;
 mod record_emps;
 mod record_experiment;
+#[cfg(target_os = "linux")]
+mod record_large;
 mod record_refusals;
 mod record_trace;
 mod report_browser;
@@ -49,3 +52,11 @@ mod robustness;
 mod robustness_command;
 mod sample;
 mod simulated_machine;
+mod transcript;
+
+#[allow(dead_code, reason = "the law's tests use the rest")]
+#[path = "../../../tests/law/common.rs"]
+mod common;
+#[allow(dead_code, reason = "the law's tests use the rest")]
+#[path = "../../../tests/law/link_traffic.rs"]
+mod link_traffic;
