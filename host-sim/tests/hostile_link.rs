@@ -8,13 +8,13 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use quadrant::app::After;
 use quadrant::hal::Serial;
 use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};
 use quadrant::link::message::{
     AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
 };
 use quadrant::link::port::Port;
-use quadrant::machine::After;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant_sim::experiment::compensator::identified;

@@ -1,7 +1,7 @@
 //! What a coarser output costs: 16 bits, 12 bits, and 12 bits with the error of the past shaped away, on the thesis'
 //! sines.
 
-use quadrant::driver::noise_shaper::NoiseShaper;
+use quadrant::drivers::noise_shaper::NoiseShaper;
 use rayon::prelude::*;
 
 use super::comparison::{AMPLITUDE_MM, Bench, Configuration, Outcome, run_bench};

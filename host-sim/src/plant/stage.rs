@@ -1,6 +1,6 @@
 //! The simulated stage: three axes that share nothing but the clock.
 
-use quadrant::driver::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::link::lockstep::InputRecord;
 use quadrant::safety::{AxisName, Command, Switches};
 use quadrant::stage::Outputs;
