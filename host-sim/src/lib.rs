@@ -32,7 +32,7 @@ pub mod plant;
 pub mod presentation;
 pub mod program;
 pub mod record;
-pub mod report;
+pub use quadrant_report as report;
 pub mod report_parts;
 pub mod rig;
 pub mod scenario;

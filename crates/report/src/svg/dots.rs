@@ -2,8 +2,8 @@
 
 use super::frame::{ABOVE, BELOW, Frame, Span};
 use super::{Drawing, LABEL_SIZE, path, px, text_width};
-use crate::report::mark::Mark;
-use crate::report::{Dots, Scale, palette};
+use crate::mark::Mark;
+use crate::{Dots, Scale, palette};
 use maud::html;
 
 /// Height of a line of text, px.

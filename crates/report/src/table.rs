@@ -205,7 +205,7 @@ impl Table {
 #[cfg(test)]
 mod tests {
     use super::{Cell, Column, Table, shown_number};
-    use crate::report::ReportError;
+    use crate::ReportError;
 
     fn table() -> Table {
         Table {

@@ -1,6 +1,6 @@
 //! Where an axis has its ticks, and what they are called.
 
-use crate::report::Scale;
+use crate::Scale;
 
 /// A tick of an axis.
 #[derive(Debug, Clone, PartialEq)]
@@ -130,7 +130,7 @@ fn superscript(number: i32) -> String {
 #[cfg(test)]
 mod tests {
     use super::{superscript, ticks};
-    use crate::report::Scale;
+    use crate::Scale;
 
     fn names(scale: Scale, low: f64, high: f64) -> Vec<String> {
         ticks(scale, low, high, 6)

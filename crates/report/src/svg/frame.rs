@@ -2,8 +2,8 @@
 
 use super::ticks::{Tick, ticks};
 use super::{LABEL_SIZE, TICK_SIZE, WIDTH, px, text_width};
-use crate::report::figure::typeset;
-use crate::report::{Scale, palette};
+use crate::figure::typeset;
+use crate::{Scale, palette};
 use maud::{Markup, html};
 
 /// Room for ticks' names and the label below the drawing, px.

@@ -2,8 +2,8 @@
 
 use super::frame::{ABOVE, BELOW, Frame, Span};
 use super::{Drawing, TICK_SIZE, path, px};
-use crate::report::polar::{LABEL_ANGLE, division_label};
-use crate::report::{PolarDeviation, Scale, palette};
+use crate::polar::{LABEL_ANGLE, division_label};
+use crate::{PolarDeviation, Scale, palette};
 use maud::html;
 
 const HEIGHT: f64 = 580.0;

@@ -240,7 +240,7 @@ pub(super) fn layout() -> Layout {
 #[cfg(test)]
 mod tests {
     use super::{Dash, Figure, Plot, Style, typeset};
-    use crate::report::{Colour, Lines, ReportError, Series};
+    use crate::{Colour, Lines, ReportError, Series};
 
     fn figure(x: Vec<f64>, y: Vec<f64>) -> Figure {
         let series = vec![Series {

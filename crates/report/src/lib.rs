@@ -8,6 +8,7 @@
 //! - [`Page::write`] writes the page in the formats wanted: HTML, CSV, JSON, SVG; [`Table::to_text`] serves the terminal.
 //! - [`decimate()`] thins long traces in such a way that spikes, which are what this project is about, survive.
 //! - [`PolarDeviation`] draws a circle test as a ball-bar instrument would (ISO 230-4).
+#![forbid(unsafe_code)]
 
 mod decimate;
 mod dots;

@@ -229,7 +229,7 @@ impl Lines {
 #[cfg(test)]
 mod tests {
     use super::{Band, Lines, Series};
-    use crate::report::{Colour, Scale, Style};
+    use crate::{Colour, Scale, Style};
 
     fn json(lines: Lines) -> String {
         lines.decimated(100).to_plotly().to_json()

@@ -2,8 +2,8 @@
 
 use super::frame::{ABOVE, BELOW, Frame, Span};
 use super::{Drawing, path};
-use crate::report::mark::{BAND_OPACITY, Mark};
-use crate::report::{Dash, Lines, Scale};
+use crate::mark::{BAND_OPACITY, Mark};
+use crate::{Dash, Lines, Scale};
 use maud::html;
 
 const HEIGHT: f64 = 320.0;
