@@ -17,6 +17,8 @@
 //! - [`identify`]: from recordings to the parameters of an axis;
 //! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
+// A tool, not a library for others: a comment that only repeats a name is left out.
+#![allow(missing_docs)]
 
 pub mod commission;
 pub mod console;

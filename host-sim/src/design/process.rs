@@ -1,5 +1,5 @@
-//! What a controller is designed on: a model of the axis or its measured response, closed in continuous time or as it
-//! runs.
+//! Process that a controller is designed on: a model of the axis or its measured response, closed in continuous time or
+//! as it runs.
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
@@ -11,13 +11,12 @@ use num_complex::Complex64;
 /// The axis, as far as a design knows it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Process {
-    /// Its linear model.
     Model(PlantModel),
     /// Its measured frequency response.
     Measured(MeasuredResponse),
 }
 
-/// How the loop is closed.
+/// Form in which the loop is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
     /// By a PID in continuous time: the form that textbooks and the thesis print margins of.
