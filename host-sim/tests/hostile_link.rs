@@ -17,7 +17,7 @@ use quadrant::link::message::{
 use quadrant::link::port::Port;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
-use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::experiment::run_configuration::identified;
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 

@@ -3,14 +3,16 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use quadrant_sim::experiment::circle::run_circles;
-use quadrant_sim::experiment::comparison::{self, Configuration, Outcome, VELOCITIES_MM_S, find};
-use quadrant_sim::experiment::compensator::{Knowledge, Setup};
-use quadrant_sim::presentation::{comparison_page, comparison_tables, provenance};
+use quadrant_sim::circle::run_circles;
+use quadrant_sim::command::output::{Output, progress};
+use quadrant_sim::compare::page::{comparison_page, comparison_tables};
+use quadrant_sim::compare::sine;
+use quadrant_sim::compare::sine::{Outcome, VELOCITIES_MM_S, find};
+use quadrant_sim::experiment::configuration::Configuration;
+use quadrant_sim::experiment::run_configuration::{Knowledge, Setup};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::record::write_trace;
 use quadrant_sim::settings_file::SettingsFile;
-
-use super::output::{Output, progress};
 
 /// Options of `quadrant compare`.
 #[derive(Clone, Debug, Default, Args)]
@@ -30,9 +32,9 @@ const PERIOD_S: f64 = 1e-4;
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let setups = setups(arguments.settings.as_deref())?;
-    let runs = comparison::RUNS * setups.len() as u64 + 1;
+    let runs = sine::RUNS * setups.len() as u64 + 1;
     let bar = progress(runs, "comparing on the simulated stage");
-    let outcomes = comparison::run_all::<f32>(&setups, output.seed, &bar)?;
+    let outcomes = sine::run_all::<f32>(&setups, output.seed, &bar)?;
     let [_, virtual_machine] = &setups;
     let circles = run_circles::<f32>(&Configuration::all(), virtual_machine, output.seed)?;
     bar.inc(1);

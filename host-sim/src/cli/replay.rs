@@ -4,13 +4,15 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use clap::Args;
-use quadrant_sim::experiment::compensator::Setup;
-use quadrant_sim::experiment::recorded::{self, RecordedAxis};
-use quadrant_sim::presentation::{provenance, recorded_page, recorded_table};
+use quadrant_sim::command::output::{Output, progress};
+use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Record;
+use quadrant_sim::replay::recorded;
+use quadrant_sim::replay::recorded::RecordedAxis;
+use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
 use quadrant_sim::settings_file::SettingsFile;
 
-use super::output::{Output, progress};
 use super::replay_program::{self, ProgramOptions};
 
 /// Options of `quadrant replay`.

@@ -98,7 +98,7 @@ pub fn largest_integral_gain(
 ///
 /// ```
 /// # use quadrant::control::{plant_model::PlantModel, popov::PidGains};
-/// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
+/// # use crate::design::{Form, Process, largest_integral_gain_where};
 /// # let plant = PlantModel {
 /// #     gain_mm_per_v_s2: 69390.0, damping_per_s: 144.8, stiffness_per_s2: 166.6, delay_s: 1.2e-3,
 /// # };
@@ -112,7 +112,7 @@ pub fn largest_integral_gain(
 ///         && (with.phase_margin_deg - without.phase_margin_deg).abs() <= 0.05
 /// });
 /// assert_eq!(ki, Some(8.0));
-/// # Ok::<(), quadrant_sim::design::MarginError>(())
+/// # Ok::<(), crate::design::MarginError>(())
 /// ```
 pub fn largest_integral_gain_where(
     process: &Process,

@@ -11,6 +11,7 @@ pub mod loop_shape;
 pub mod margins;
 pub mod measured;
 pub mod npid;
+pub mod pages;
 pub mod pid;
 pub mod process;
 pub mod robustness;

@@ -21,12 +21,7 @@ pub struct AxisTrace {
 
 impl AxisTrace {
     /// Adds a tick: what the law says of it, and where the axis truly was, mm. `resolution_mm` is the encoder's.
-    pub(super) fn push<S: Scalar>(
-        &mut self,
-        seen: &AxisTelemetry<S>,
-        resolution_mm: f64,
-        place_mm: f64,
-    ) {
+    pub fn push<S: Scalar>(&mut self, seen: &AxisTelemetry<S>, resolution_mm: f64, place_mm: f64) {
         let reference = seen.reference.to_mm(resolution_mm);
         self.reference_mm.push(reference);
         self.error_mm.push(reference - place_mm);

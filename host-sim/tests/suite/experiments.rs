@@ -2,17 +2,19 @@
 
 use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
+use quadrant::app::supervisor::Event;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{Command, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant_sim::experiment::circle::run_circles;
-use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
-use quadrant_sim::experiment::compensator::Setup;
-use quadrant_sim::experiment::recorded::{RecordedAxis, replay};
+use quadrant_sim::circle::run_circles;
+use quadrant_sim::compare::sine::run_configuration;
+use quadrant_sim::experiment::configuration::Configuration;
+use quadrant_sim::experiment::run_configuration::Setup;
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::record::Record;
+use quadrant_sim::replay::recorded::{RecordedAxis, replay};
 
 #[test]
 fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_an_identified_model() {

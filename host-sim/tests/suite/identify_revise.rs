@@ -1,7 +1,7 @@
 //! The linear model revised for explicit friction, on the simulated x axis at rest.
 
 use quadrant::settings::AxisSettings;
-use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::experiment::run_configuration::identified;
 use quadrant_sim::identify::at_rest::AtRest;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::response::FrequencyResponse;
