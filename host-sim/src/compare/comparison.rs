@@ -23,7 +23,6 @@ const SECONDS_PER_MM: f64 = 0.009;
 /// What one configuration did on one sine.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// Who ran.
     pub configuration: Configuration,
     /// What the compensator knew.
     pub knowledge: Knowledge,
@@ -49,7 +48,6 @@ impl Entry {
 pub struct Request<'a> {
     /// The stages, each with the settings of its law.
     pub setups: &'a [Setup],
-    /// Who runs.
     pub configurations: &'a [Configuration],
     /// Amplitudes of the sines, mm.
     pub amplitudes_mm: &'a [f64],

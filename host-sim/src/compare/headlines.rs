@@ -6,22 +6,17 @@
 pub struct Headline {
     /// What changed against what.
     pub comparison: &'static str,
-    /// Which metric.
     pub metric: Metric,
     /// Change, %.
     pub change_percent: f64,
-    /// From which configuration.
     pub from: crate::experiment::configuration::Configuration,
-    /// To which configuration.
     pub to: crate::experiment::configuration::Configuration,
 }
 
 /// A metric of the comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Metric {
-    /// Largest tracking error.
     TrackingError,
-    /// Quadrant glitch.
     Glitch,
 }
 

@@ -147,7 +147,6 @@ fn headline_table(outcomes: &[Outcome]) -> Table {
     }
 }
 
-/// The comparison's page.
 pub fn comparison_page(
     outcomes: &[Outcome],
     circles: &[CircleOutcome],

@@ -90,7 +90,6 @@ impl MeasuredResponse {
         (first / TAU, last / TAU)
     }
 
-    /// Number of lines.
     pub fn lines(&self) -> usize {
         self.omega_rad_s.len()
     }

@@ -50,9 +50,7 @@ impl Knowledge {
 pub struct Setup {
     /// What the settings know of the stage.
     pub knowledge: Knowledge,
-    /// The settings.
     pub stage: StageSettings,
-    /// The stage.
     pub truth: StageTruth,
 }
 

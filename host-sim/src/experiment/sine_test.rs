@@ -19,7 +19,7 @@ pub struct Trial {
     pub velocity_mm_s: f64,
 }
 
-/// What a trial showed.
+/// Result of a sine test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TrialOutcome {
     /// Tracking error and glitch.

@@ -7,24 +7,20 @@ use quadrant::reference::{Plane, Sense};
 use crate::gcode::error::ProgramError;
 use crate::gcode::segment::{Element, Vector};
 
-/// What a line says of an arc.
+/// Words of a line that describe an arc.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ArcWords {
-    /// Its plane.
     pub(super) plane: Plane,
     /// G2 or G3.
     pub(super) sense: Sense,
-    /// Where it starts.
     pub(super) from: Vector,
-    /// Where it ends.
     pub(super) to: Vector,
-    /// How its circle is given.
+    /// Words that give its circle.
     pub(super) circle: CircleWords,
-    /// Its line.
     pub(super) line: usize,
 }
 
-/// How an arc's circle is given.
+/// Words that give an arc's circle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CircleWords {
     /// By I, J, K: the centre on the plane's first and second axis, mm.

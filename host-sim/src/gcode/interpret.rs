@@ -11,7 +11,6 @@ use crate::gcode::segment::{Element, Vector};
 /// A piece of the path, and how fast it is to be run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Move {
-    /// Where it leads.
     pub element: Element,
     /// Feed along the path, mm/s; `None` for a rapid move.
     pub feed_mm_s: Option<f64>,

@@ -11,9 +11,7 @@ use crate::gcode::error::ProgramError;
 /// A letter with its number.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Word {
-    /// Upper case.
     pub(super) letter: char,
-    /// Its number.
     pub(super) value: f64,
     /// As it is written, without spaces.
     pub(super) text: String,
@@ -174,7 +172,7 @@ impl ProgramVisitor for Reader<'_> {
 /// A block, or a command with its arguments.
 struct Part<'r, 's> {
     reader: &'r mut Reader<'s>,
-    /// Where the command's code stands among the words.
+    /// Index of the command's code among the words.
     code: Option<usize>,
 }
 

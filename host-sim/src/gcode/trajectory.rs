@@ -12,7 +12,6 @@ const MOST_S: f64 = 600.0;
 /// Moves before and after the present one on which the nearest point is looked for.
 const NEIGHBOURS: usize = 2;
 
-/// A program's motion.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     moves: Vec<Move>,
@@ -30,9 +29,9 @@ struct TimedPhase {
 /// A place on the path at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Which of the [`Trajectory::moves`].
+    /// Index in [`Trajectory::moves`].
     pub index: usize,
-    /// How far along it, mm.
+    /// Distance along it, mm.
     pub along_mm: f64,
     /// Speed along the path, mm/s.
     pub speed_mm_s: f64,
@@ -82,7 +81,7 @@ impl Trajectory {
         &self.moves
     }
 
-    /// How long it takes, s.
+    /// Duration, s.
     pub fn duration_s(&self) -> f64 {
         self.duration_s
     }

@@ -20,14 +20,14 @@ pub(super) struct Pace {
 /// A stretch of constant jerk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Phase {
-    /// Where it begins, mm along the element.
+    /// Beginning, mm along the element.
     along_mm: f64,
     /// Speed there, mm/s.
     speed_mm_s: f64,
     /// Acceleration there, mm/s^2.
     acceleration_mm_s2: f64,
     jerk_mm_s3: f64,
-    /// How long it takes, s.
+    /// Duration, s.
     pub(super) duration_s: f64,
 }
 
@@ -147,7 +147,7 @@ mod tests {
         jerk_mm_s3: 20_000.0,
     };
 
-    /// Where the last phase ends, and how fast.
+    /// Returns the end of the last phase and the speed there.
     fn end(phases: &[Phase]) -> (f64, f64) {
         phases
             .last()

@@ -65,7 +65,6 @@ pub struct Measurement<'a> {
 /// A linear model revised for one kind of explicit friction.
 #[derive(Clone, Debug)]
 pub struct Revision {
-    /// Friction beside it.
     pub friction: ExplicitFriction,
     pub plant: PlantModel,
     /// A, B, C as fitted; standard errors are those of the lines' scatter about the model.

@@ -6,6 +6,5 @@
 pub struct SettingError {
     pub field: &'static str,
     pub value: f64,
-    /// Values allowed.
     pub expected: &'static str,
 }

@@ -27,12 +27,10 @@ pub const TRIALS: [Trial; 3] = [
     },
 ];
 
-/// What one law did, with one feedforward.
+/// Result of one law with one feedforward.
 #[derive(Clone, Debug)]
 pub struct LawOutcome {
-    /// The law.
     pub law: LawKind,
-    /// The feedforward.
     pub feedforward: FeedforwardKind,
     /// One a seed, and in it one a trial.
     pub outcomes: Vec<[TrialOutcome; 3]>,

@@ -43,7 +43,7 @@ impl Key {
         })
     }
 
-    /// What in another key is not as here; the first of it.
+    /// Returns the first field of another key that differs.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let differs = [
             ("another form of this file", self.form != other.form),
@@ -92,11 +92,9 @@ struct Read {
     sections: Vec<Section>,
 }
 
-/// What a part's file holds.
+/// Content of a part's file.
 pub(super) enum Stored {
-    /// There is none.
     Missing,
-    /// The part.
     Sections(Vec<Section>),
     /// Nothing of use; the reason names the file.
     Unusable(String),

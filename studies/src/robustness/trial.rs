@@ -16,14 +16,13 @@ use quadrant_sim::plant::{AxisTruth, SimulatedAxis};
 
 use crate::robustness::RobustnessError;
 
-/// What an axis is asked to do.
+/// Task of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
     /// The comparison's sine of 30 mm at 10 mm/s; its last two cycles are scored.
     Sine,
     /// A move of 10 mm at 2 mm/s, scored from its start to its end.
     SlowFeed,
-    /// To stay.
     Hold {
         /// For how long, s.
         seconds: f64,
@@ -122,15 +121,15 @@ pub(super) struct Trial<'a> {
     pub(super) seed: u64,
 }
 
-/// How a run ended.
+/// End of a run.
 pub(super) struct Ended {
     /// Its score, or what switched the stage off.
     pub(super) score: Result<Score, Fault>,
-    /// What it did where it is worth showing, if it ended well.
+    /// Trace, where it is worth showing, if the run ended well.
     pub(super) trace: Option<AxisTrace>,
 }
 
-/// Why a run has no result.
+/// Reasons for which a run has no result.
 pub(super) enum Stopped {
     Settings(SettingsError),
     Endless(usize),

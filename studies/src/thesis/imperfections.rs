@@ -25,9 +25,7 @@ const FINER_ENCODER: f64 = 10.0;
 /// A virtual machine that lacks one imperfection, or whose law knows one thing better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing is changed.
     AsItIs,
-    /// No encoder noise.
     NoNoise,
     /// No offset of converter and amplifier.
     NoOffset,
@@ -145,7 +143,6 @@ pub enum StudyError {
     /// The run of the slow sine.
     #[error("GMS elements: {0}")]
     Rig(#[from] RigError),
-    /// Its identification.
     #[error("GMS elements: {0}")]
     Identification(#[from] VirginCurveError),
     /// Settings without a model.
@@ -200,7 +197,6 @@ fn identify_elements(setup: &mut Setup, count: usize, seed: u64) -> Result<(), S
 /// What a changed virtual machine did.
 #[derive(Debug)]
 pub struct Finding {
-    /// What was changed.
     pub change: Change,
     /// What PID and the best configuration did, or why what was to be changed could not be identified.
     pub outcome: Result<Comparison, StudyError>,

@@ -48,19 +48,15 @@ pub const DRAWS: usize = 8;
 /// Largest gain of the cautious N-PID's sector.
 const CAUTIOUS_SECTOR: f64 = 2.0;
 
-/// Who competes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Competitor {
-    /// The tuned PID.
     Pid,
-    /// The tuned N-PID.
     NPid,
     /// N-PID within the bounds at every gain of its sector.
     CautiousNPid,
 }
 
 impl Competitor {
-    /// All of them.
     pub const ALL: [Self; 3] = [Self::Pid, Self::NPid, Self::CautiousNPid];
 
     /// Its name in tables.
@@ -73,7 +69,7 @@ impl Competitor {
     }
 }
 
-/// How the model is wrong.
+/// Error of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wrong {
     /// There is no feedforward.
@@ -83,22 +79,15 @@ pub enum Wrong {
     /// Its pre-sliding range is off by this factor.
     Range(f64),
     /// Every parameter is off by this share, in the signs of this draw.
-    Everything {
-        /// The share.
-        share: f64,
-        /// The draw.
-        draw: usize,
-    },
+    Everything { share: f64, draw: usize },
 }
 
-/// What a competitor did with a model.
+/// Result of a competitor with a model.
 #[derive(Clone, Copy, Debug)]
 pub struct WrongOutcome {
-    /// Who.
     pub competitor: Competitor,
-    /// With which model.
     pub wrong: Wrong,
-    /// What it scored, mean over the trials.
+    /// Score, mean over the sine tests.
     pub mean: TrialOutcome,
 }
 

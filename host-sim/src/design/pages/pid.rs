@@ -1,4 +1,4 @@
-//! What a person reads of a PID's design.
+//! Page of a PID's design.
 
 use quadrant::control::popov::PidGains;
 
@@ -109,12 +109,11 @@ pub fn step_table(responses: &[(String, StepProperties)]) -> Table {
     }
 }
 
-/// What a page of a PID's design shows.
+/// Content of a page of a PID's design.
 #[derive(Clone, Debug)]
 pub struct PidPage<'a> {
-    /// What it is designed on.
+    /// Process that it is designed on.
     pub subject: String,
-    /// The gains.
     pub gains: PidGains,
     /// The loop in its forms, the one designed on first, each with its margins.
     pub forms: Vec<(String, AnyLoop<'a>, Result<Margins, MarginError>)>,
@@ -139,7 +138,6 @@ impl PidPage<'_> {
         tables
     }
 
-    /// The page.
     pub fn page(&self, provenance: Provenance) -> Page {
         let colours = [Colour::Blue, Colour::Vermillion];
         let loops: Vec<DrawnLoop<'_, AnyLoop<'_>>> = self

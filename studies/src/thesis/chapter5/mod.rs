@@ -35,10 +35,9 @@ pub(super) const GLITCH: Measure = Measure {
     name: "Glitch",
     read: |score| score.glitch_mm,
 };
-/// The tracking error.
 const TRACKING: [Measure; 2] = [LARGEST, RMS];
 
-/// What the tables and figures are drawn from.
+/// Data of the tables and figures.
 struct Chapter<'a>(&'a Comparison);
 
 impl<'a> Chapter<'a> {
