@@ -2,7 +2,6 @@
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
-mod browser;
 mod chapter5;
 mod circle;
 mod command;
@@ -39,13 +38,9 @@ mod record_emps;
 mod record_experiment;
 mod record_refusals;
 mod record_trace;
-mod report_browser;
 mod report_command;
-mod report_formats;
-mod report_page;
 mod report_parts;
 mod rig;
 mod robustness;
 mod robustness_command;
-mod sample;
 mod simulated_machine;
