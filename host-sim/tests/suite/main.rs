@@ -2,7 +2,6 @@
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
-mod browser;
 mod circle;
 mod command;
 mod commission;
@@ -36,9 +35,5 @@ mod record_emps;
 mod record_experiment;
 mod record_refusals;
 mod record_trace;
-mod report_browser;
-mod report_formats;
-mod report_page;
 mod rig;
-mod sample;
 mod simulated_machine;

@@ -6,13 +6,13 @@
   for (const drawing of document.querySelectorAll(".drawing")) {
     drawing.scrollIntoView({ behavior: "instant", block: "center" });
     for (let waited = 0; !drawing.dataset.drawn && waited < 5000; waited += 20) await wait(20);
-    const traces = [...drawing.querySelectorAll(".scatterlayer .trace")];
+    const traces = [...drawing.querySelectorAll("svg.chart .curve")];
     figures.push({
       id: drawing.dataset.figure,
       curves: drawing.parentElement.querySelectorAll(".legend button").length,
       traces: traces.filter((trace) => [...trace.querySelectorAll("path")].some((path) => path.getAttribute("d")?.length > 8)).length,
-      labels: [...drawing.querySelectorAll(".xtitle, .ytitle")].map((label) => label.textContent),
-      ink: getComputedStyle(drawing.querySelector(".xtitle") ?? drawing).fill,
+      labels: [...drawing.querySelectorAll(".x-label, .y-label")].map((label) => label.textContent),
+      ink: getComputedStyle(drawing.querySelector(".x-label") ?? drawing).fill,
     });
   }
   const links = [...document.querySelectorAll('a[href^="#"]')];

@@ -1,6 +1,6 @@
 //! Pages that have everything a page can have.
 
-use quadrant_sim::report::{
+use quadrant_report::{
     Band, Block, Cell, Colour, Column, DeviationTrace, DotSeries, Dots, Figure, Lines, Page, Plot,
     PolarDeviation, Provenance, Scale, Section, Series, Spread, Style, Table,
 };

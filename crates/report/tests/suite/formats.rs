@@ -4,7 +4,7 @@ use crate::sample;
 use std::collections::BTreeSet;
 
 use crate::sample::{circle, dots, full, lines, page, response};
-use quadrant_sim::report::{Block, Figure, Format, Page, Plot, ReportError, Spread};
+use quadrant_report::{Block, Figure, Format, Page, Plot, ReportError, Spread};
 
 const ALL: [Format; 4] = [Format::Html, Format::Csv, Format::Json, Format::Svg];
 
@@ -100,7 +100,7 @@ fn what_is_no_page_is_refused_with_the_reason() {
 #[test]
 fn numbers_that_json_has_not_survive() {
     let mut table = sample::table("limits");
-    table.rows[0][1] = quadrant_sim::report::Cell::number(f64::INFINITY, 1);
+    table.rows[0][1] = quadrant_report::Cell::number(f64::INFINITY, 1);
     let page = page(vec![Block::Table(table), Block::Figure(dots())]);
     let json = page.to_json().unwrap();
     assert!(
@@ -170,7 +170,7 @@ fn texts(svg: &str) -> Vec<String> {
         let (text, markup) = rest.split_once('<').expect("an element follows every text");
         assert!(!text.contains('>'), "{text}");
         if !text.trim().is_empty() {
-            texts.push(text.to_owned());
+            texts.push(text.trim().to_owned());
         }
         let (element, after) = markup.split_once('>').expect("elements are closed");
         assert_eq!(
@@ -180,6 +180,7 @@ fn texts(svg: &str) -> Vec<String> {
         );
         match element.strip_prefix('/') {
             Some(name) => assert_eq!(open.pop(), Some(name), "elements are nested"),
+            None if element.ends_with('/') => {}
             None => open.push(element.split_whitespace().next().unwrap()),
         }
         rest = after;
@@ -241,26 +242,22 @@ fn images_are_well_formed_and_say_everything_in_text() {
 fn everything_in_the_data_is_drawn_in_its_colour() {
     let svg = lines("error", 8, 3000).to_svg().unwrap();
     for colour in [
-        "#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9",
+        "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
     ] {
-        // Once as a curve and once in the legend; blue and vermillion come back dashed.
-        let expected = if ["#0072b2", "#d55e00"].contains(&colour) {
-            4
+        let drawn = svg.matches(&format!("stroke=\"{colour}\"")).count();
+        // Once as a curve and once in the legend; blue and vermillion come back dashed, a line for each dash.
+        if ["#0072B2", "#D55E00"].contains(&colour) {
+            assert!(drawn > 4 + 10, "{colour}: {drawn}");
         } else {
-            2
-        };
-        assert_eq!(
-            svg.matches(&format!("stroke=\"{colour}\"")).count(),
-            expected,
-            "{colour}"
-        );
+            assert_eq!(drawn, 2, "{colour}");
+        }
     }
     let svg = response().to_svg().unwrap();
     // The legend's sample, and the band in two parts.
-    assert_eq!(svg.matches("fill-opacity").count(), 3);
+    assert_eq!(svg.matches("opacity=\"0.22\"").count(), 3);
     let svg = dots().to_svg().unwrap();
-    // Two bars of each series; the run that is missing has none.
-    assert_eq!(svg.matches("stroke=\"#0072b2\"").count(), 2);
+    // Two bars of each series, each with two ends; the run that is missing has none.
+    assert_eq!(svg.matches("stroke=\"#0072B2\"").count(), 6);
 }
 
 #[test]
