@@ -39,6 +39,10 @@ fn width(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         axis,

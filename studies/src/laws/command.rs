@@ -33,6 +33,10 @@ pub struct Arguments {
 /// Steps of the progress bar.
 const STEPS: u64 = 1_000_000;
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, axis, .. } = arguments;
     let stage = match &arguments.settings {

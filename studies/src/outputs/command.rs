@@ -14,6 +14,10 @@ pub struct Arguments {
     output: Output,
 }
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let setup = Setup::virtual_machine(identified()?.stage);

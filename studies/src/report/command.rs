@@ -34,6 +34,10 @@ pub struct Arguments {
 /// The part that is shown in the terminal when all are asked for.
 const SHOWN: &str = "headline";
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, only, .. } = arguments;
     let context = Context::new(output.seed, arguments.seeds, arguments.settings.clone())?;

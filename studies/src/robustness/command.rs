@@ -47,6 +47,10 @@ pub struct Arguments {
 const FORCE_PERIOD_S: f64 = 2e-4;
 const FORCE_SAMPLES: usize = 1000;
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { axis, output, .. } = arguments;
     if !(0.0..=1000.0).contains(&arguments.backlash_um) {
