@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::circle::roundness::{Both, both};
 use crate::circle::turn::{CircleRefusal, NominalCircle, Turn, run_path};
 use crate::experiment::configuration::Configuration;
-use crate::experiment::run_configuration::Setup;
+use crate::experiment::run_configuration::RunConfiguration;
 
 /// Which circles are to be run.
 #[derive(Clone, Debug, PartialEq)]
@@ -122,7 +122,7 @@ impl CircleRequest {
 /// `progress` advances by one a case.
 pub fn run_circle_tests(
     request: &CircleRequest,
-    setup: &Setup,
+    setup: &RunConfiguration,
     progress: &ProgressBar,
 ) -> Vec<CircleResult> {
     request
@@ -136,7 +136,7 @@ pub fn run_circle_tests(
         .collect()
 }
 
-fn run_case(case: &CircleCase, setup: &Setup) -> Result<CircleTest, CircleRefusal> {
+fn run_case(case: &CircleCase, setup: &RunConfiguration) -> Result<CircleTest, CircleRefusal> {
     let nominal = |sense| NominalCircle {
         plane: case.plane,
         sense,

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, progress};
-use quadrant_sim::experiment::run_configuration::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
@@ -52,7 +52,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let stage = match settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
     let mut axis_settings = stage.axes[axis.index()].clone();
     if let Some(width) = width {

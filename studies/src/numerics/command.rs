@@ -2,7 +2,7 @@
 
 use clap::Args;
 use quadrant_sim::command::output::{Output, progress};
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 
 use crate::numerics;
 use crate::numerics::page::numerics_table;
@@ -21,7 +21,11 @@ pub struct Arguments {
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let bar = progress(numerics::RUNS, "comparing number types");
-    let numerics = numerics::run_all(&Setup::both()?, output.seed, &bar)?;
+    let numerics = numerics::run_all(
+        &RunConfiguration::both(&identified_settings()?.stage),
+        output.seed,
+        &bar,
+    )?;
     bar.finish_and_clear();
     output.tables(
         "What the number type costs",

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, progress};
-use quadrant_sim::experiment::run_configuration::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::record::{ForceRecord, write_trace};
@@ -61,7 +61,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let stage = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
     let request = StudyRequest {
         stage,
