@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use crate::circle::roundness::{Both, both};
 use crate::circle::turn::{CircleRefusal, NominalCircle, Turn, run_path};
 use crate::experiment::configuration::Configuration;
-use crate::experiment::run_configuration::Setup;
+use crate::experiment::run_configuration::RunConfiguration;
 
 /// Request for circle tests: radii, feeds, planes, competitors.
 #[derive(Clone, Debug, PartialEq)]
@@ -116,7 +116,7 @@ impl CircleRequest {
 /// `progress` advances by one a case.
 pub fn run_circle_tests(
     request: &CircleRequest,
-    setup: &Setup,
+    setup: &RunConfiguration,
     progress: &ProgressBar,
 ) -> Vec<CircleResult> {
     request
@@ -130,7 +130,7 @@ pub fn run_circle_tests(
         .collect()
 }
 
-fn run_case(case: &CircleCase, setup: &Setup) -> Result<CircleTest, CircleRefusal> {
+fn run_case(case: &CircleCase, setup: &RunConfiguration) -> Result<CircleTest, CircleRefusal> {
     let nominal = |sense| NominalCircle {
         plane: case.plane,
         sense,

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 
 use crate::circle::turn::{CircleRefusal, NominalCircle, run_turn};
 use crate::experiment::configuration::Configuration;
-use crate::experiment::run_configuration::Setup;
+use crate::experiment::run_configuration::RunConfiguration;
 
 /// Radius, mm.
 pub const RADIUS_MM: f64 = 30.0;
@@ -31,7 +31,7 @@ pub struct CircleOutcome {
 /// Refused settings or a fault.
 pub fn run_circles<S: Scalar>(
     configurations: &[Configuration],
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
 ) -> Result<Vec<CircleOutcome>, CircleRefusal> {
     let nominal = NominalCircle {

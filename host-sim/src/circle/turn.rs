@@ -12,7 +12,7 @@ use crate::circle::roundness::{LeastSquares, range};
 use crate::circle::spikes::Spikes;
 use crate::experiment::configuration::{Configuration, ELEMENTS};
 use crate::experiment::run::{RunError, run};
-use crate::experiment::run_configuration::Setup;
+use crate::experiment::run_configuration::RunConfiguration;
 use crate::machine::Machine;
 use crate::plant::SimulatedStage;
 use crate::report::decimate;
@@ -80,7 +80,7 @@ pub struct Turn {
 pub fn run_path<S: Scalar>(
     nominal: NominalCircle,
     configuration: Configuration,
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
 ) -> Result<Vec<Point>, CircleRefusal> {
     let turn_s = TAU * nominal.radius_mm / nominal.feed_mm_s;
@@ -166,7 +166,7 @@ impl Turn {
 pub fn run_turn<S: Scalar>(
     nominal: NominalCircle,
     configuration: Configuration,
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
 ) -> Result<Turn, CircleRefusal> {
     let path = run_path::<S>(nominal, configuration, setup, seed)?;

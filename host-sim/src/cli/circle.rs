@@ -9,7 +9,7 @@ use quadrant_sim::circle::page::{circle_page, circle_tables};
 use quadrant_sim::circle::{CircleRequest, run_circle_tests};
 use quadrant_sim::command::output::{Output, command_line, progress};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{Setup, identified};
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
@@ -75,9 +75,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let stage = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
-    let setup = Setup::virtual_machine(stage);
+    let setup = RunConfiguration::identified(stage);
     let last_seed = output.seed.checked_add(arguments.seeds - 1);
     let last_seed =
         last_seed.context("--seed plus --seeds is beyond 2^64; choose a smaller one")?;

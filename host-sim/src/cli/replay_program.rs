@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use quadrant_sim::command::output::{Output, command_line, progress};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::write_trace;
@@ -40,7 +40,7 @@ const TRACE_TICKS: usize = 10;
 pub(super) fn run(
     path: &Path,
     options: &ProgramOptions,
-    setup: &Setup,
+    setup: &RunConfiguration,
     output: &Output,
 ) -> anyhow::Result<()> {
     let program = Program::read(path)?;

@@ -1,17 +1,17 @@
-//! The runs behind the thesis' chapter 5: every configuration, matched and as a virtual machine, at both amplitudes and
-//! all velocities, repeated with several seeds of the noise.
+//! The runs of the comparison: configurations, with the exact and with the identified model, on sines, repeated with
+//! several seeds of the noise.
 //!
-//! A matched run has no noise and starts at rest at the origin: a second one would repeat the first to the bit. It is run
-//! once, and its scores have no spread. A virtual machine is run once for each seed.
+//! A run with the exact model has no noise and starts at rest at the origin: a second one would repeat the first to the
+//! bit. It is run once, and its scores have no spread. One with the identified model is run once for each seed.
 
 use quadrant::scalar::Scalar;
 use rayon::prelude::*;
 
 use crate::compare::sine::{Outcome, run_at_amplitude};
 use crate::experiment::configuration::Configuration;
-use crate::experiment::metrics::Score;
+use crate::experiment::metrics::{Metric, Score, change_percent};
 use crate::experiment::run::{AxisTrace, RunError};
-use crate::experiment::run_configuration::{Knowledge, Setup};
+use crate::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use crate::experiment::statistic::Statistic;
 
 /// Amplitudes of the sine, mm: that of most of the chapter, and that of Tables 5.21 and 5.22.
@@ -25,7 +25,7 @@ const SECONDS_PER_MM: f64 = 0.009;
 pub struct Entry {
     pub configuration: Configuration,
     /// What the compensator knew.
-    pub knowledge: Knowledge,
+    pub knowledge: ModelKnowledge,
     /// Amplitude of the sine, mm.
     pub amplitude_mm: f64,
     /// Largest velocity of the sine, mm/s.
@@ -47,7 +47,8 @@ impl Entry {
 #[derive(Clone, Debug)]
 pub struct Request<'a> {
     /// The stages, each with the settings of its law.
-    pub setups: &'a [Setup],
+    pub setups: &'a [RunConfiguration],
+    /// Who runs.
     pub configurations: &'a [Configuration],
     /// Amplitudes of the sines, mm.
     pub amplitudes_mm: &'a [f64],
@@ -59,7 +60,7 @@ pub struct Request<'a> {
 
 /// One run of a request.
 struct Run<'a> {
-    setup: &'a Setup,
+    setup: &'a RunConfiguration,
     amplitude_mm: f64,
     configuration: Configuration,
     seed: u64,
@@ -67,10 +68,10 @@ struct Run<'a> {
 
 impl Request<'_> {
     /// Seeds that a kind of knowledge is run with: a run without noise is run once.
-    fn seeds_of(&self, knowledge: Knowledge) -> u64 {
+    fn seeds_of(&self, knowledge: ModelKnowledge) -> u64 {
         match knowledge {
-            Knowledge::Matched => 1,
-            Knowledge::VirtualMachine => self.seeds.max(1),
+            ModelKnowledge::Exact => 1,
+            ModelKnowledge::Identified => self.seeds.max(1),
         }
     }
 
@@ -178,7 +179,7 @@ impl Comparison {
     fn place(
         &self,
         configuration: Configuration,
-        knowledge: Knowledge,
+        knowledge: ModelKnowledge,
         amplitude_mm: f64,
         velocity_mm_s: f64,
     ) -> Option<usize> {
@@ -194,12 +195,38 @@ impl Comparison {
     pub fn find(
         &self,
         configuration: Configuration,
-        knowledge: Knowledge,
+        knowledge: ModelKnowledge,
         amplitude_mm: f64,
         velocity_mm_s: f64,
     ) -> Option<&Entry> {
         self.place(configuration, knowledge, amplitude_mm, velocity_mm_s)
             .map(|place| &self.entries[place])
+    }
+
+    /// The changes of a metric from one configuration to another on sines of the first amplitude, %: run by run with the
+    /// same noise, mean over the velocities; nothing if one of them was not run.
+    pub fn changes_percent(
+        &self,
+        knowledge: ModelKnowledge,
+        metric: Metric,
+        [from, to]: [Configuration; 2],
+        velocities_mm_s: &[f64],
+    ) -> Option<Statistic> {
+        let mut of_seeds: Vec<f64> = Vec::new();
+        for &velocity in velocities_mm_s {
+            let find =
+                |configuration| self.find(configuration, knowledge, AMPLITUDES_MM[0], velocity);
+            let (before, after) = (find(from)?, find(to)?);
+            of_seeds.resize(before.scores.len(), 0.0);
+            for ((sum, before), after) in of_seeds.iter_mut().zip(&before.scores).zip(&after.scores)
+            {
+                *sum += change_percent((metric.read)(before), (metric.read)(after));
+            }
+        }
+        for sum in &mut of_seeds {
+            *sum /= velocities_mm_s.len() as f64;
+        }
+        (!of_seeds.is_empty()).then(|| Statistic::of(&of_seeds))
     }
 
     /// Everything that was run.
@@ -211,10 +238,11 @@ impl Comparison {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::experiment::run_configuration::identified_settings;
 
     #[test]
-    fn a_matched_run_is_not_repeated_and_every_entry_has_its_seeds() {
-        let setups = Setup::both().unwrap();
+    fn a_run_with_the_exact_model_is_not_repeated_and_every_entry_has_its_seeds() {
+        let setups = RunConfiguration::both(&identified_settings().unwrap().stage);
         let configurations = [Configuration::all()[0], Configuration::all()[7]];
         let request = Request {
             setups: &setups,
@@ -231,8 +259,8 @@ mod tests {
         assert_eq!(comparison.entries().len(), 2 * 2 * 2 * 3);
         for entry in comparison.entries() {
             let seeds = match entry.knowledge {
-                Knowledge::Matched => 1,
-                Knowledge::VirtualMachine => 2,
+                ModelKnowledge::Exact => 1,
+                ModelKnowledge::Identified => 2,
             };
             assert_eq!(entry.scores.len(), seeds);
             assert!(!entry.last_cycle.error_mm.is_empty());

@@ -1,15 +1,13 @@
 //! The comparison's tables and page.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-
 use crate::circle::CircleOutcome;
 use crate::circle::single_page::{circle_figures, circle_table};
-use crate::compare::headlines::HEADLINES;
-use crate::compare::sine::{AMPLITUDE_MM, Outcome, VELOCITIES_MM_S, find, mean_change_percent};
+use crate::compare::comparison::Comparison;
+use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
+use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::{GLITCH_WINDOW, Score};
-use crate::experiment::run_configuration::Knowledge;
+use crate::experiment::run_configuration::ModelKnowledge;
 use crate::pages::{UM_PER_MM, error_curve};
 use crate::report::{
     Block, Cell, Column, Figure, Lines, Page, Plot, Provenance, Section, Style, Table,
@@ -43,63 +41,52 @@ const READINGS: [Reading; 3] = [
     },
 ];
 
-/// PID without feedforward: what all changes are counted from.
-const BASELINE: Configuration = Configuration {
-    controller: LawKind::Pid,
-    feedforward: FeedforwardKind::None,
-};
-
 /// The comparison's tables: one for each score, the headlines, the circles.
-pub fn comparison_tables(outcomes: &[Outcome], circles: &[CircleOutcome]) -> Vec<Table> {
+pub fn comparison_tables(comparison: &Comparison, circles: &[CircleOutcome]) -> Vec<Table> {
     READINGS
         .iter()
-        .map(|reading| score_table(reading, outcomes))
-        .chain([headline_table(outcomes), circle_table(circles)])
+        .map(|reading| score_table(reading, comparison))
+        .chain([headline_table(comparison), circle_table(circles)])
         .collect()
 }
 
-/// A name that fits a column's head.
-fn short(knowledge: Knowledge) -> &'static str {
-    match knowledge {
-        Knowledge::Matched => "matched",
-        Knowledge::VirtualMachine => "virtual",
-    }
-}
-
-fn score_table(reading: &Reading, outcomes: &[Outcome]) -> Table {
+fn score_table(reading: &Reading, comparison: &Comparison) -> Table {
     let mut columns = vec![Column::new("Configuration")];
-    for knowledge in Knowledge::ALL {
+    for knowledge in ModelKnowledge::ALL {
         for velocity in VELOCITIES_MM_S {
-            let heading = format!("{} {velocity} mm/s", short(knowledge));
+            let heading = format!("{} {velocity} mm/s", knowledge.short());
             columns.push(Column::with_unit(heading, "um"));
         }
-        let heading = format!("{} mean change", short(knowledge));
+        let heading = format!("{} mean change", knowledge.short());
         columns.push(Column::with_unit(heading, "%"));
     }
     let value = |configuration, knowledge, velocity| {
-        find(outcomes, configuration, knowledge, velocity)
-            .map(|outcome| (reading.read)(&outcome.score) * UM_PER_MM)
+        comparison
+            .find(configuration, knowledge, AMPLITUDE_MM, velocity)
+            .map(|entry| entry.statistic(reading.read).mean * UM_PER_MM)
     };
     let rows = Configuration::all()
         .into_iter()
         .map(|configuration| {
             let mut row = vec![Cell::text(configuration.name())];
-            for knowledge in Knowledge::ALL {
+            for knowledge in ModelKnowledge::ALL {
                 let mut changes = Vec::new();
                 for velocity in VELOCITIES_MM_S {
                     let own = value(configuration, knowledge, velocity);
-                    let baseline = value(BASELINE, knowledge, velocity);
+                    let baseline = value(Configuration::PID, knowledge, velocity);
                     row.push(own.map_or(Cell::Missing, |um| Cell::number(um, 2)));
                     changes.extend(
                         own.zip(baseline)
                             .map(|(own, from)| (own / from - 1.0) * 100.0),
                     );
                 }
-                row.push(if configuration == BASELINE || changes.is_empty() {
-                    Cell::Missing
-                } else {
-                    Cell::number(changes.iter().sum::<f64>() / changes.len() as f64, 1)
-                });
+                row.push(
+                    if configuration == Configuration::PID || changes.is_empty() {
+                        Cell::Missing
+                    } else {
+                        Cell::number(changes.iter().sum::<f64>() / changes.len() as f64, 1)
+                    },
+                );
             }
             row
         })
@@ -112,47 +99,13 @@ fn score_table(reading: &Reading, outcomes: &[Outcome]) -> Table {
     }
 }
 
-fn headline_table(outcomes: &[Outcome]) -> Table {
-    let rows = HEADLINES
-        .iter()
-        .map(|headline| {
-            let ours = |knowledge| {
-                let (from, to) = (headline.from, headline.to);
-                mean_change_percent(outcomes, knowledge, headline.metric, from, to)
-                    .map_or(Cell::Missing, |change| Cell::number(change, 1))
-            };
-            vec![
-                Cell::text(headline.comparison),
-                Cell::text(headline.metric.name()),
-                Cell::number(headline.change_percent, 1),
-                ours(Knowledge::Matched),
-                ours(Knowledge::VirtualMachine),
-            ]
-        })
-        .collect();
-    Table {
-        id: "headlines".to_owned(),
-        caption: "The thesis' headline changes beside ours. The thesis measured its own stage; ours are simulated on \
-                  ours, mean over the three velocities, tracking error as largest magnitude. Nothing was tuned to \
-                  meet them"
-            .to_owned(),
-        columns: vec![
-            Column::new("Comparison"),
-            Column::new("Metric"),
-            Column::with_unit("Thesis", "%"),
-            Column::with_unit("Ours, matched", "%"),
-            Column::with_unit("Ours, virtual machine", "%"),
-        ],
-        rows,
-    }
-}
-
+/// The comparison's page.
 pub fn comparison_page(
-    outcomes: &[Outcome],
+    comparison: &Comparison,
     circles: &[CircleOutcome],
     provenance: Provenance,
 ) -> Page {
-    let mut tables = comparison_tables(outcomes, circles).into_iter();
+    let mut tables = comparison_tables(comparison, circles).into_iter();
     let mut next_tables = |count| {
         tables
             .by_ref()
@@ -163,10 +116,10 @@ pub fn comparison_page(
     let scores = next_tables(READINGS.len());
     let headlines = next_tables(1);
     let circle_tables = next_tables(1);
-    let errors = |knowledge: Knowledge| {
+    let errors = |knowledge: ModelKnowledge| {
         VELOCITIES_MM_S
             .iter()
-            .map(|&velocity| Block::Figure(error_figure(outcomes, knowledge, velocity)))
+            .map(|&velocity| Block::Figure(error_figure(comparison, knowledge, velocity)))
             .collect::<Vec<_>>()
     };
     Page {
@@ -179,29 +132,29 @@ pub fn comparison_page(
                 provenance: None,
                 id: "summary".to_owned(),
                 heading: "The thesis' headlines".to_owned(),
-                prose: vec![experiment_prose()],
+                prose: vec![HEADLINE_PROSE.to_owned(), experiment_prose()],
                 blocks: headlines,
             },
             Section {
                 provenance: None,
                 id: "scores".to_owned(),
                 heading: "Tracking error and quadrant glitch".to_owned(),
-                prose: vec![metric_prose(), knowledge_prose()],
+                prose: vec![metric_prose()],
                 blocks: scores,
             },
             Section {
                 provenance: None,
-                id: "matched".to_owned(),
-                heading: "Error over time, matched".to_owned(),
+                id: "exact-model".to_owned(),
+                heading: "Error over time, exact model".to_owned(),
                 prose: vec![],
-                blocks: errors(Knowledge::Matched),
+                blocks: errors(ModelKnowledge::Exact),
             },
             Section {
                 provenance: None,
-                id: "virtual-machine".to_owned(),
-                heading: "Error over time, virtual machine".to_owned(),
+                id: "identified-model".to_owned(),
+                heading: "Error over time, identified model".to_owned(),
                 prose: vec![],
-                blocks: errors(Knowledge::VirtualMachine),
+                blocks: errors(ModelKnowledge::Identified),
             },
             Section {
                 provenance: None,
@@ -220,8 +173,8 @@ pub fn comparison_page(
 fn experiment_prose() -> String {
     format!(
         "The x axis follows a sine of {AMPLITUDE_MM} mm amplitude whose largest velocity is 5, 10 or 15 mm/s. The \
-         control law is the firmware's, in f32, at 10 kHz; the stage is simulated. PID gains have the thesis' gain and \
-         phase margins on the axis' linear model; neither gains nor plant were tuned to the thesis' percentages."
+         control law is the firmware's, in f32, at 10 kHz; the stage is simulated. The controllers are those that \
+         commissioning the simulated stage designed."
     )
 }
 
@@ -234,20 +187,13 @@ fn metric_prose() -> String {
     )
 }
 
-fn knowledge_prose() -> String {
-    "Matched: the compensator has the plant's own friction parameters, and the plant no imperfections but quantisation. \
-     Virtual machine: the plant adds encoder noise, offset and ripple, and everything that the law knows of it, gains \
-     included, is what commissioning the simulated axes found, with the eight GMS elements that the firmware has room for."
-        .to_owned()
-}
-
-fn error_figure(outcomes: &[Outcome], knowledge: Knowledge, velocity_mm_s: f64) -> Figure {
+fn error_figure(comparison: &Comparison, knowledge: ModelKnowledge, velocity_mm_s: f64) -> Figure {
     let series = Configuration::all()
         .into_iter()
         .enumerate()
         .filter_map(|(index, configuration)| {
-            let outcome = find(outcomes, configuration, knowledge, velocity_mm_s)?;
-            let error = &outcome.last_cycle.error_mm;
+            let entry = comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)?;
+            let error = &entry.last_cycle.error_mm;
             Some(error_curve(
                 configuration.name(),
                 error,

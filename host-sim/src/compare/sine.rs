@@ -1,18 +1,14 @@
-//! The thesis' comparison: {PID, N-PID} x {no, static, GMS, combined feedforward} on a sine, of 30 mm unless another
-//! amplitude is asked for, at three velocities.
+//! One configuration on sines of three velocities, of 30 mm unless another amplitude is asked for.
 
-use indicatif::ProgressBar;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::scalar::Scalar;
 use quadrant::settings::PlanSettings;
-use rayon::prelude::*;
 
-use crate::compare::headlines::Metric;
 use crate::experiment::configuration::{Configuration, ELEMENTS};
-use crate::experiment::metrics::{Score, change_percent, score};
+use crate::experiment::metrics::{Score, score};
 use crate::experiment::run::{AxisTrace, RunError, run};
-use crate::experiment::run_configuration::{Knowledge, Setup};
+use crate::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use crate::machine::{Machine, Operator};
 use crate::plant::{SimulatedStage, StageTruth};
 
@@ -31,7 +27,7 @@ const LEAD_S: f64 = 0.5;
 pub struct Outcome {
     pub configuration: Configuration,
     /// What the compensator knew.
-    pub knowledge: Knowledge,
+    pub knowledge: ModelKnowledge,
     /// Amplitude of the sine, mm.
     pub amplitude_mm: f64,
     /// Largest velocity of the sine, mm/s.
@@ -42,7 +38,7 @@ pub struct Outcome {
 }
 
 /// The x axis three times, one for each velocity, and the sines they run.
-fn job(configuration: Configuration, setup: &Setup, amplitude_mm: f64) -> Job {
+fn job(configuration: Configuration, setup: &RunConfiguration, amplitude_mm: f64) -> Job {
     let mut stage = setup.stage.clone();
     let x = stage.axes[0].clone();
     stage.axes = [x.clone(), x.clone(), x];
@@ -80,7 +76,12 @@ pub struct Bench {
 
 impl Bench {
     /// The x axis three times, on its job.
-    pub fn new(configuration: Configuration, setup: &Setup, amplitude_mm: f64, seed: u64) -> Self {
+    pub fn new(
+        configuration: Configuration,
+        setup: &RunConfiguration,
+        amplitude_mm: f64,
+        seed: u64,
+    ) -> Self {
         let job = job(configuration, setup, amplitude_mm);
         let [x, ..] = &setup.truth.axes;
         let truth = StageTruth {
@@ -103,7 +104,7 @@ impl Bench {
 /// Refused settings or a fault.
 pub fn run_configuration<S: Scalar>(
     configuration: Configuration,
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
     run_at_amplitude::<S>(configuration, setup, AMPLITUDE_MM, seed)
@@ -115,7 +116,7 @@ pub fn run_configuration<S: Scalar>(
 /// Refused settings or a fault.
 pub fn run_at_amplitude<S: Scalar>(
     configuration: Configuration,
-    setup: &Setup,
+    setup: &RunConfiguration,
     amplitude_mm: f64,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
@@ -127,7 +128,7 @@ pub fn run_at_amplitude<S: Scalar>(
 pub fn run_bench<S: Scalar>(
     mut bench: Bench,
     configuration: Configuration,
-    setup: &Setup,
+    setup: &RunConfiguration,
     amplitude_mm: f64,
 ) -> Result<[Outcome; 3], RunError> {
     let rate_hz = bench.job.stage.rate_hz;
@@ -161,67 +162,4 @@ pub fn run_bench<S: Scalar>(
             last_cycle: scored.slice((SCORED_CYCLES - 1) * cycle..SCORED_CYCLES * cycle),
         }
     }))
-}
-
-/// Number of runs in [`run_all`] of a setup.
-pub const RUNS: u64 = 8;
-
-/// The whole comparison, in parallel; the same seed gives the same outcomes. `progress` advances by one a run.
-///
-/// # Errors
-/// The first refused setting or fault.
-pub fn run_all<S: Scalar>(
-    setups: &[Setup],
-    seed: u64,
-    progress: &ProgressBar,
-) -> Result<Vec<Outcome>, RunError> {
-    let runs: Vec<_> = setups
-        .iter()
-        .flat_map(|setup| Configuration::all().into_iter().map(move |c| (c, setup)))
-        .collect();
-    let outcomes: Result<Vec<_>, _> = runs
-        .into_par_iter()
-        .map(|(configuration, setup)| {
-            let outcomes = run_configuration::<S>(configuration, setup, seed);
-            progress.inc(1);
-            outcomes
-        })
-        .collect();
-    Ok(outcomes?.into_iter().flatten().collect())
-}
-
-/// The score of a configuration at a velocity.
-pub fn find(
-    outcomes: &[Outcome],
-    configuration: Configuration,
-    knowledge: Knowledge,
-    velocity_mm_s: f64,
-) -> Option<&Outcome> {
-    outcomes.iter().find(|outcome| {
-        outcome.configuration == configuration
-            && outcome.knowledge == knowledge
-            && outcome.velocity_mm_s == velocity_mm_s
-    })
-}
-
-/// The change of a metric from one configuration to another, mean over the velocities, %.
-pub fn mean_change_percent(
-    outcomes: &[Outcome],
-    knowledge: Knowledge,
-    metric: Metric,
-    from: Configuration,
-    to: Configuration,
-) -> Option<f64> {
-    let value = |configuration, velocity| {
-        find(outcomes, configuration, knowledge, velocity).map(|outcome| match metric {
-            Metric::TrackingError => outcome.score.largest_mm,
-            Metric::Glitch => outcome.score.glitch_mm,
-        })
-    };
-    let changes: Option<Vec<f64>> = VELOCITIES_MM_S
-        .into_iter()
-        .map(|velocity| Some(change_percent(value(from, velocity)?, value(to, velocity)?)))
-        .collect();
-    let changes = changes?;
-    Some(changes.iter().sum::<f64>() / changes.len() as f64)
 }

@@ -6,8 +6,9 @@
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
+use super::form::Form;
 use super::margins::{Margins, bisect};
-use super::process::{Form, Process};
+use super::process::Process;
 
 /// A figure as a publication prints it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,7 +99,7 @@ pub fn largest_integral_gain(
 ///
 /// ```
 /// # use quadrant::control::{plant_model::PlantModel, popov::PidGains};
-/// # use crate::design::{Form, Process, largest_integral_gain_where};
+/// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
 /// # let plant = PlantModel {
 /// #     gain_mm_per_v_s2: 69390.0, damping_per_s: 144.8, stiffness_per_s2: 166.6, delay_s: 1.2e-3,
 /// # };

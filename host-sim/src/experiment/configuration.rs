@@ -4,7 +4,7 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::StageSettings;
 
-/// Room for GMS elements: the matched compensator has the plant's ten.
+/// Room for GMS elements: the exact model has the plant's ten.
 pub const ELEMENTS: usize = 10;
 
 /// Feedback and feedforward together.

@@ -76,6 +76,35 @@ pub fn change_percent(before: f64, after: f64) -> f64 {
     (after / before - 1.0) * 100.0
 }
 
+/// One number of a score.
+#[derive(Clone, Copy, Debug)]
+pub struct Metric {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// Reads it, mm.
+    pub read: fn(&Score) -> f64,
+}
+
+impl Metric {
+    /// Largest magnitude of the tracking error.
+    pub const LARGEST: Self = Self {
+        name: "Largest",
+        read: |score| score.largest_mm,
+    };
+    /// RMS of the tracking error.
+    pub const RMS: Self = Self {
+        name: "RMS",
+        read: |score| score.rms_mm,
+    };
+    /// Quadrant glitch.
+    pub const GLITCH: Self = Self {
+        name: "Glitch",
+        read: |score| score.glitch_mm,
+    };
+    /// The tracking error.
+    pub const TRACKING: [Self; 2] = [Self::LARGEST, Self::RMS];
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::TAU;

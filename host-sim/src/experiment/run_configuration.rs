@@ -1,7 +1,12 @@
-//! What the control law is told about the simulated axes.
+//! Stage and settings of a run: what the law knows of the plant.
 //!
-//! *Matched*: the plant's own parameters, as in the thesis' simulation. *Virtual machine*: the truth is hidden, and the
-//! law has the settings that a commissioning of the stage found, axis by axis, as in the thesis' experiment.
+//! *Exact model*: the plant without noise, offset and ripple; the feedforward has the plant's own friction: the thesis'
+//! simulation. *Identified model*: the plant with all its imperfections; the law knows no more than a commissioning of it
+//! found: the thesis' experiment.
+//!
+//! Both run the same controllers, those that the commissioning designed by its one criterion. Between the two only the
+//! model and the imperfections differ, and between two configurations only the law and its feedforward: no change is the
+//! effect of a gain that one side was denied.
 
 use std::path::Path;
 
@@ -19,78 +24,96 @@ const IDENTIFIED: &str = include_str!("../../data/identified-stage.toml");
 ///
 /// # Errors
 /// Settings that this version refuses.
-pub fn identified() -> Result<SettingsFile, SettingsFileError> {
+pub fn identified_settings() -> Result<SettingsFile, SettingsFileError> {
     SettingsFile::parse(IDENTIFIED, Path::new("host-sim/data/identified-stage.toml"))
 }
 
-/// Which knowledge the compensator has.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Knowledge {
-    /// The plant's own parameters.
-    Matched,
-    /// Identified ones, and an imperfect plant.
-    VirtualMachine,
+/// The law's knowledge of the plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ModelKnowledge {
+    /// The plant's own friction, on a plant without imperfections.
+    Exact,
+    /// Identified parameters, on a plant with all its imperfections.
+    Identified,
 }
 
-impl Knowledge {
+impl ModelKnowledge {
     /// Both, simulation first.
-    pub const ALL: [Self; 2] = [Self::Matched, Self::VirtualMachine];
+    pub const ALL: [Self; 2] = [Self::Exact, Self::Identified];
+
+    /// Its name in a column's head.
+    pub const fn short(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Identified => "identified",
+        }
+    }
 
     /// Its name in tables.
     pub const fn name(self) -> &'static str {
         match self {
-            Self::Matched => "matched",
-            Self::VirtualMachine => "virtual machine",
+            Self::Exact => "exact model",
+            Self::Identified => "identified model",
         }
     }
 }
 
 /// A simulated stage, and the settings of the law that runs on it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Setup {
+pub struct RunConfiguration {
     /// What the settings know of the stage.
-    pub knowledge: Knowledge,
+    pub knowledge: ModelKnowledge,
+    /// The settings.
     pub stage: StageSettings,
     pub truth: StageTruth,
 }
 
-impl Setup {
-    /// The ideal stage, and the default settings with its own friction.
-    pub fn matched() -> Self {
-        Self::matched_under(StageSettings::default())
-    }
-
-    /// The ideal stage, and these settings with its own friction: the simulation beside an experiment with the same
-    /// controllers.
-    pub fn matched_under(mut stage: StageSettings) -> Self {
-        for (axis, truth) in stage.axes.iter_mut().zip(&StageTruth::real().axes) {
-            axis.friction = with_all_models(
-                truth.friction.map(|model| with_total_damping(model, truth)),
-                truth.gms.clone(),
-            );
-        }
+impl RunConfiguration {
+    /// The stage without imperfections, and these settings with its own friction.
+    pub fn exact(mut stage: StageSettings) -> Self {
+        let truth = StageTruth::ideal();
+        set_exact_friction(&mut stage, &truth);
         Self {
-            knowledge: Knowledge::Matched,
+            knowledge: ModelKnowledge::Exact,
             stage,
-            truth: StageTruth::ideal(),
+            truth,
         }
     }
 
-    /// The stage with everything a real one has, and settings that were made without knowing it.
-    pub fn virtual_machine(stage: StageSettings) -> Self {
+    /// The stage with everything a real one has, and these settings as they are.
+    pub fn identified(stage: StageSettings) -> Self {
         Self {
-            knowledge: Knowledge::VirtualMachine,
+            knowledge: ModelKnowledge::Identified,
             stage,
             truth: StageTruth::real(),
         }
     }
 
-    /// Both, the virtual machine with the settings that its commissioning found.
-    ///
-    /// # Errors
-    /// Settings that this version refuses.
-    pub fn both() -> Result<[Self; 2], SettingsFileError> {
-        Ok([Self::matched(), Self::virtual_machine(identified()?.stage)])
+    /// Both, with the controllers of these settings.
+    pub fn both(stage: &StageSettings) -> [Self; 2] {
+        [Self::exact(stage.clone()), Self::identified(stage.clone())]
+    }
+
+    /// The one of the two that a person names.
+    pub fn new(knowledge: ModelKnowledge, stage: StageSettings) -> Self {
+        match knowledge {
+            ModelKnowledge::Exact => Self::exact(stage),
+            ModelKnowledge::Identified => Self::identified(stage),
+        }
+    }
+
+    /// Gives the law the plant's own friction.
+    pub fn know_friction(&mut self) {
+        set_exact_friction(&mut self.stage, &self.truth);
+    }
+}
+
+fn set_exact_friction(stage: &mut StageSettings, truth: &StageTruth) {
+    for (axis, truth) in stage.axes.iter_mut().zip(&truth.axes) {
+        axis.friction = with_all_models(
+            truth.friction.map(|model| with_total_damping(model, truth)),
+            truth.gms.clone(),
+        );
     }
 }
 

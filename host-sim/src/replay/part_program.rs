@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use crate::experiment::configuration::{Configuration, ELEMENTS};
 use crate::experiment::metrics::{largest, rms};
 use crate::experiment::run::{AxisTrace, RunError, run};
-use crate::experiment::run_configuration::Setup;
+use crate::experiment::run_configuration::RunConfiguration;
 use crate::gcode::{Place, Trajectory, Vector};
 use crate::machine::Machine;
 use crate::plant::SimulatedStage;
@@ -87,7 +87,7 @@ pub fn run_program<S: Scalar>(
     trajectory: &Trajectory,
     tables: &ProgramTables,
     configurations: &[Configuration],
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
     progress: &ProgressBar,
 ) -> Result<Vec<ProgramOutcome>, RunError> {
@@ -105,7 +105,7 @@ fn run_one<S: Scalar>(
     trajectory: &Trajectory,
     tables: &ProgramTables,
     configuration: Configuration,
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
 ) -> Result<ProgramOutcome, RunError> {
     let mut stage = setup.stage.clone();

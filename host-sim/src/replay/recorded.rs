@@ -20,7 +20,7 @@ use crate::design::{Form, Process, ShapingError, shape_to_margins};
 use crate::experiment::configuration::{Configuration, ELEMENTS};
 use crate::experiment::metrics::{largest, rms};
 use crate::experiment::run::{RunError, run};
-use crate::experiment::run_configuration::Setup;
+use crate::experiment::run_configuration::RunConfiguration;
 use crate::identify::single_state::with_all_models;
 use crate::machine::Machine;
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
@@ -87,7 +87,7 @@ struct Axis {
 }
 
 impl RecordedAxis {
-    fn build(self, setup: &Setup) -> Result<Axis, ShapingError> {
+    fn build(self, setup: &RunConfiguration) -> Result<Axis, ShapingError> {
         let simulated = |index: usize| Axis {
             settings: setup.stage.axes[index].clone(),
             truth: setup.truth.axes[index].clone(),
@@ -242,7 +242,7 @@ pub const RUNS: u64 = 8;
 pub fn replay<S: Scalar>(
     record: &Record,
     axis: RecordedAxis,
-    setup: &Setup,
+    setup: &RunConfiguration,
     seed: u64,
     progress: &ProgressBar,
 ) -> Result<Vec<RecordedOutcome>, ReplayError> {

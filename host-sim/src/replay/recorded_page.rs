@@ -117,7 +117,7 @@ pub fn recorded_page(
             id: "result".to_owned(),
             heading: "Tracking error".to_owned(),
             prose: vec![
-                "The axis' model is the compensator's own (matched), so these errors are what the method can reach on \
+                "The law has the axis' exact model, so these errors are what the method can reach on \
                  this reference, not what the machine would show. Errors are drawn from the end of the settling time."
                     .to_owned(),
             ],

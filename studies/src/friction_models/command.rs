@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, progress};
-use quadrant_sim::experiment::run_configuration::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
@@ -39,6 +39,10 @@ fn width(text: &str) -> Result<f64, String> {
     }
 }
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         axis,
@@ -48,7 +52,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let stage = match settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
     let mut axis_settings = stage.axes[axis.index()].clone();
     if let Some(width) = width {

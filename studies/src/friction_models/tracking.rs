@@ -9,7 +9,7 @@ use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::{Setup, identified};
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::identify::single_state::with_all_models;
 use quadrant_sim::plant::{AxisTruth, FrictionTruth, StageTruth};
 use quadrant_sim::settings_file::SettingsFileError;
@@ -77,7 +77,7 @@ pub fn track(
     seed: u64,
     bar: &ProgressBar,
 ) -> Result<Vec<Tracked>, TrackingError> {
-    let mut stage = identified()?.stage;
+    let mut stage = identified_settings()?.stage;
     // The comparison runs on the first axis.
     stage.axes[0] = settings.clone();
     let axis = &StageTruth::real().axes[index];
@@ -87,7 +87,7 @@ pub fn track(
         .collect();
     runs.into_par_iter()
         .map(|(truth, kind)| {
-            let mut setup = Setup::virtual_machine(stage.clone());
+            let mut setup = RunConfiguration::identified(stage.clone());
             setup.truth.axes[0] = with_model(axis, truth).ok_or(TrackingError::NotFitted)?;
             let configuration = Configuration {
                 controller: LawKind::NPid,

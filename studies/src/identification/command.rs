@@ -16,6 +16,10 @@ pub struct Arguments {
     output: Output,
 }
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let runs = 3 * NOISE_LEVELS.len() as u64 * arguments.seeds;
     let bar = progress(runs, "commissioning axes whose truth is hidden");

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, share};
-use quadrant_sim::experiment::run_configuration::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, Page};
 use quadrant_sim::settings_file::SettingsFile;
@@ -33,11 +33,15 @@ pub struct Arguments {
 /// Steps of the progress bar.
 const STEPS: u64 = 1_000_000;
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, axis, .. } = arguments;
     let stage = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
     let bar = share("tuning and running the laws");
     bar.set_length(STEPS);

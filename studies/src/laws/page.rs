@@ -103,7 +103,7 @@ pub fn laws_table(outcomes: &[LawOutcome]) -> Table {
     Table {
         id: "laws".to_owned(),
         caption: format!(
-            "The tuned laws on the simulated axis, virtual machine: sines of 30 mm at 5, 10 and 15 mm/s, mean over the three; ± is the \
+            "The tuned laws on the simulated axis, identified model: sines of 30 mm at 5, 10 and 15 mm/s, mean over the three; ± is the \
              standard deviation over {} noise seeds. Chatter is the RMS change of the output from tick to tick",
             outcomes.first().map_or(0, |outcome| outcome.outcomes.len())
         ),

@@ -2,7 +2,7 @@
 
 use clap::Args;
 use quadrant_sim::command::output::{Output, progress};
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 
 use crate::numerics;
 use crate::numerics::page::numerics_table;
@@ -14,10 +14,18 @@ pub struct Arguments {
     output: Output,
 }
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let bar = progress(numerics::RUNS, "comparing number types");
-    let numerics = numerics::run_all(&Setup::both()?, output.seed, &bar)?;
+    let numerics = numerics::run_all(
+        &RunConfiguration::both(&identified_settings()?.stage),
+        output.seed,
+        &bar,
+    )?;
     bar.finish_and_clear();
     output.tables(
         "What the number type costs",

@@ -13,7 +13,7 @@ use quadrant::scalar::{Fixed, Scalar};
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_configuration};
 use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::machine::Machine;
 use rayon::prelude::*;
 
@@ -61,7 +61,7 @@ pub const RUNS: u64 = 8;
 /// # Errors
 /// The first refused setting or fault.
 pub fn run_all(
-    setups: &[Setup],
+    setups: &[RunConfiguration],
     seed: u64,
     progress: &ProgressBar,
 ) -> Result<Vec<Numerics>, RunError> {
@@ -88,7 +88,7 @@ pub fn run_all(
 }
 
 /// Lets the `f64` law drive the stage, and the others compute from the same counts.
-fn shadow(numerics: &mut Numerics, setup: &Setup, seed: u64) -> Result<(), RunError> {
+fn shadow(numerics: &mut Numerics, setup: &RunConfiguration, seed: u64) -> Result<(), RunError> {
     let Bench {
         job,
         mut plant,

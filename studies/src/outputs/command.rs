@@ -2,7 +2,7 @@
 
 use clap::Args;
 use quadrant_sim::command::output::Output;
-use quadrant_sim::experiment::run_configuration::{Setup, identified};
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 
 use crate::outputs;
 use crate::outputs::page::outputs_table;
@@ -14,9 +14,13 @@ pub struct Arguments {
     output: Output,
 }
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
-    let setup = Setup::virtual_machine(identified()?.stage);
+    let setup = RunConfiguration::identified(identified_settings()?.stage);
     let runs = outputs::run_all(&setup, output.seed)?;
     output.tables(
         "What a coarser output costs",

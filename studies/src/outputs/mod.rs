@@ -8,7 +8,7 @@ use quadrant::drivers::noise_shaper::NoiseShaper;
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_bench};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use rayon::prelude::*;
 
 /// Conversion of codes to volts.
@@ -52,7 +52,7 @@ pub struct OutputRun {
 ///
 /// # Errors
 /// The first refused setting or fault.
-pub fn run_all(setup: &Setup, seed: u64) -> Result<Vec<OutputRun>, RunError> {
+pub fn run_all(setup: &RunConfiguration, seed: u64) -> Result<Vec<OutputRun>, RunError> {
     let runs: Vec<_> = Configuration::EXTREMES
         .into_iter()
         .flat_map(|configuration| Output::ALL.map(|output| (configuration, output)))

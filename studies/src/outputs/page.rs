@@ -14,7 +14,7 @@ pub fn outputs_table(runs: &[OutputRun]) -> Table {
     });
     Table {
         id: "outputs".to_owned(),
-        caption: "Tracking error of the virtual machine behind 16-bit and 12-bit outputs of +-10 V, at 10 kHz".to_owned(),
+        caption: "Tracking error with the identified model behind 16-bit and 12-bit outputs of +-10 V, at 10 kHz".to_owned(),
         columns: [Column::new("Configuration"), Column::new("Output")]
             .into_iter()
             .chain(velocities)

@@ -17,9 +17,9 @@ const IDENTIFICATIONS_S: f64 = 6.0;
 
 /// Time of the study.
 pub(super) fn headline_s(context: &Context) -> f64 {
-    let [_, virtual_machine] = context.setups();
+    let [_, identified] = context.setups();
     let one = Request {
-        setups: &[virtual_machine],
+        setups: &[identified],
         configurations: &Configuration::EXTREMES,
         amplitudes_mm: &[AMPLITUDE_MM],
         seed: context.seed,
@@ -32,9 +32,9 @@ pub(super) fn headline(context: &Context, progress: &Progress) -> anyhow::Result
     let (comparison_s, study_s) = (context.comparison_s(), headline_s(context));
     let share = comparison_s / (comparison_s + study_s);
     let comparison = context.comparison(&|done| progress.advance(share * done))?;
-    let [_, virtual_machine] = context.setups();
+    let [_, identified] = context.setups();
     let findings = study::<f32>(
-        &virtual_machine,
+        &identified,
         &Change::ALL,
         context.seed,
         context.seeds.min(STUDY_SEEDS),

@@ -21,10 +21,11 @@ pub struct Arguments {
     /// Compute everything, also what an earlier report left in the folder.
     #[arg(long)]
     fresh: bool,
-    /// Runs of each configuration on the virtual machine, with consecutive seeds: means are shown with one standard deviation.
+    /// Runs of each configuration with the identified model, with consecutive seeds: means are shown with one standard deviation.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Settings of the virtual machine's control law, as `quadrant commission` leaves them.
+    /// Settings of the control law, as `quadrant commission` leaves them; without them, those that commissioning the
+    /// simulated stage gave.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     #[command(flatten)]
@@ -34,6 +35,10 @@ pub struct Arguments {
 /// The part that is shown in the terminal when all are asked for.
 const SHOWN: &str = "headline";
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, only, .. } = arguments;
     let context = Context::new(output.seed, arguments.seeds, arguments.settings.clone())?;

@@ -5,7 +5,7 @@ use indicatif::ProgressBar;
 use quadrant_sim::circle::page::circle_sections;
 use quadrant_sim::circle::{CircleRequest, run_circle_tests};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::report::Section;
 
 use crate::friction_models::page::friction_models_sections;
@@ -71,7 +71,7 @@ pub(super) fn circles(context: &Context, _: &Progress) -> anyhow::Result<Vec<Sec
         seeds: vec![context.seed],
         ..CircleRequest::default()
     };
-    let setup = Setup::virtual_machine(context.settings.stage.clone());
+    let setup = RunConfiguration::identified(context.settings.stage.clone());
     let results = run_circle_tests(&request, &setup, &ProgressBar::hidden());
     Ok(circle_sections(&results))
 }

@@ -5,7 +5,7 @@ use std::sync::OnceLock;
 
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{Setup, identified};
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Provenance;
 use quadrant_sim::settings_file::SettingsFile;
@@ -14,9 +14,9 @@ use quadrant_sim::settings_file::SettingsFile;
 pub struct Context {
     /// Seed of the simulated noise; of repeated runs the first, which the others follow.
     pub seed: u64,
-    /// Runs of each configuration on the virtual machine.
+    /// Runs of each configuration with the identified model.
     pub seeds: u64,
-    /// The virtual machine's settings.
+    /// The settings.
     pub settings: SettingsFile,
     /// The file they came from; the built-in ones came from none.
     pub settings_path: Option<PathBuf>,
@@ -32,7 +32,7 @@ impl Context {
     pub fn new(seed: u64, seeds: u64, settings_path: Option<PathBuf>) -> anyhow::Result<Self> {
         let settings = match &settings_path {
             Some(path) => SettingsFile::read(path)?,
-            None => identified()?,
+            None => identified_settings()?,
         };
         Ok(Self {
             seed,
@@ -43,14 +43,10 @@ impl Context {
         })
     }
 
-    /// Matched, and the virtual machine; both with the controllers of the settings, as the thesis simulated and
+    /// With the exact and with the identified model; both with the controllers of the settings, as the thesis simulated and
     /// measured with the same ones.
-    pub fn setups(&self) -> [Setup; 2] {
-        let stage = &self.settings.stage;
-        [
-            Setup::matched_under(stage.clone()),
-            Setup::virtual_machine(stage.clone()),
-        ]
+    pub fn setups(&self) -> [RunConfiguration; 2] {
+        RunConfiguration::both(&self.settings.stage)
     }
 
     /// Runs the comparison of chapter 5, unless a part before did. `advance` is told shares of the whole.
@@ -78,7 +74,11 @@ impl Context {
         self.request(&setups, &configurations).expected_s()
     }
 
-    fn request<'a>(&self, setups: &'a [Setup], configurations: &'a [Configuration]) -> Request<'a> {
+    fn request<'a>(
+        &self,
+        setups: &'a [RunConfiguration],
+        configurations: &'a [Configuration],
+    ) -> Request<'a> {
         Request {
             setups,
             configurations,

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, progress};
-use quadrant_sim::experiment::run_configuration::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::record::{ForceRecord, write_trace};
@@ -47,6 +47,10 @@ pub struct Arguments {
 const FORCE_PERIOD_S: f64 = 2e-4;
 const FORCE_SAMPLES: usize = 1000;
 
+/// Runs the study, prints its tables and writes its page.
+///
+/// # Errors
+/// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { axis, output, .. } = arguments;
     if !(0.0..=1000.0).contains(&arguments.backlash_um) {
@@ -57,7 +61,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let stage = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
     let request = StudyRequest {
         stage,

@@ -50,7 +50,7 @@ pub fn chapter4_sections(
     sections
 }
 
-/// What the data of the simulation (matched) and of the experiment (virtual machine) are: rates, resolutions, cycles.
+/// What the data of the simulation (exact model) and of the experiment (identified model) are: rates, resolutions, cycles.
 pub fn data_section(stage: &StageSettings, truth: &AxisTruth, seeds: u64) -> Section {
     let [x, ..] = &stage.axes;
     Section {
@@ -64,8 +64,8 @@ pub fn data_section(stage: &StageSettings, truth: &AxisTruth, seeds: u64) -> Sec
             columns: columns(&[
                 ("Quantity", ""),
                 ("Unit", ""),
-                ("Simulation (matched)", ""),
-                ("Experiment (virtual machine)", ""),
+                ("Simulation (exact model)", ""),
+                ("Experiment (identified model)", ""),
             ]),
             rows: data_rows(stage.rate_hz, x, truth, seeds),
         })],

@@ -1,47 +1,24 @@
-//! The thesis' headline figures beside ours, and what in the virtual machine costs how much of them.
+//! The thesis' headline figures beside ours, and the share of each imperfection in what they lack.
 
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison};
-use quadrant_sim::compare::headlines::{HEADLINES, Metric};
+use quadrant_sim::compare::headlines::{HEADLINE_PROSE, headline_table};
 use quadrant_sim::compare::sine::VELOCITIES_MM_S;
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::change_percent;
-use quadrant_sim::experiment::run_configuration::Knowledge;
+use quadrant_sim::experiment::metrics::Metric;
+use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::experiment::statistic::Statistic;
 use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
 use quadrant_sim::report::{Block, Cell, Column, Section, Table};
 
-use crate::thesis::chapter5::{GLITCH, LARGEST, Measure, RMS};
 use crate::thesis::imperfections::{Change, Finding};
 
 /// The measures of the best configuration, with the thesis' figure for each, %. It does not say whether its tracking error is a
 /// largest or an RMS value: it is set beside both.
-const BEST_MEASURES: [(Measure, f64); 3] = [(LARGEST, -96.5), (RMS, -96.5), (GLITCH, -50.0)];
-
-/// The changes that one measure makes from one configuration to another, %: run by run with the same noise, mean over the
-/// velocities.
-fn changes_percent(
-    comparison: &Comparison,
-    knowledge: Knowledge,
-    measure: Measure,
-    from: Configuration,
-    to: Configuration,
-    velocities_mm_s: &[f64],
-) -> Option<Statistic> {
-    let mut of_seeds: Vec<f64> = Vec::new();
-    for &velocity in velocities_mm_s {
-        let find =
-            |configuration| comparison.find(configuration, knowledge, AMPLITUDES_MM[0], velocity);
-        let (before, after) = (find(from)?, find(to)?);
-        of_seeds.resize(before.scores.len(), 0.0);
-        for ((sum, before), after) in of_seeds.iter_mut().zip(&before.scores).zip(&after.scores) {
-            *sum += change_percent((measure.read)(before), (measure.read)(after));
-        }
-    }
-    for sum in &mut of_seeds {
-        *sum /= velocities_mm_s.len() as f64;
-    }
-    (!of_seeds.is_empty()).then(|| Statistic::of(&of_seeds))
-}
+const BEST_MEASURES: [(Metric, f64); 3] = [
+    (Metric::LARGEST, -96.5),
+    (Metric::RMS, -96.5),
+    (Metric::GLITCH, -50.0),
+];
 
 /// The headlines, and the best configuration by velocity.
 pub fn headline_section(comparison: &Comparison) -> Section {
@@ -49,69 +26,11 @@ pub fn headline_section(comparison: &Comparison) -> Section {
         id: "headline".to_owned(),
         heading: "The thesis' headlines".to_owned(),
         provenance: None,
-        prose: vec![
-            "The thesis measured its own stage; ours are simulated on ours, sine of 30 mm, mean over the three velocities. \
-             Matched: the feedforward has the plant's own friction. Virtual machine: it has what commissioning found; ± is \
-             one standard deviation over the seeds of the noise. The controllers are the same. Neither plant nor gains were tuned to meet the figures."
-                .to_owned(),
-        ],
+        prose: vec![HEADLINE_PROSE.to_owned()],
         blocks: vec![
             Block::Table(headline_table(comparison)),
             Block::Table(best_table(comparison)),
         ],
-    }
-}
-
-fn headline_table(comparison: &Comparison) -> Table {
-    let rows = HEADLINES
-        .iter()
-        .map(|headline| {
-            let cells = |knowledge, measure| {
-                let (from, to) = (headline.from, headline.to);
-                statistic_cells(
-                    changes_percent(comparison, knowledge, measure, from, to, &VELOCITIES_MM_S),
-                    1.0,
-                    1,
-                )
-            };
-            let (first, second) = match headline.metric {
-                Metric::TrackingError => (LARGEST, Some(RMS)),
-                Metric::Glitch => (GLITCH, None),
-            };
-            let mut row = vec![
-                Cell::text(headline.comparison),
-                Cell::text(headline.metric.name()),
-                Cell::number(headline.change_percent, 1),
-            ];
-            let [matched, _] = cells(Knowledge::Matched, first);
-            row.push(matched);
-            row.extend(cells(Knowledge::VirtualMachine, first));
-            match second {
-                Some(measure) => {
-                    let [matched, _] = cells(Knowledge::Matched, measure);
-                    row.push(matched);
-                    row.extend(cells(Knowledge::VirtualMachine, measure));
-                }
-                None => row.extend([Cell::Missing, Cell::Missing, Cell::Missing]),
-            }
-            row
-        })
-        .collect();
-    Table {
-        id: "headline-changes".to_owned(),
-        caption: "The thesis' headline changes beside ours; tracking error as largest magnitude, and again as RMS".to_owned(),
-        columns: vec![
-            Column::new("Comparison"),
-            Column::new("Metric"),
-            Column::with_unit("Thesis", "%"),
-            Column::with_unit("Matched", "%"),
-            Column::with_unit("Virtual machine", "%"),
-            Column::with_unit("±", "%"),
-            Column::with_unit("RMS, matched", "%"),
-            Column::with_unit("RMS, virtual machine", "%"),
-            Column::with_unit("±", "%"),
-        ],
-        rows,
     }
 }
 
@@ -124,7 +43,7 @@ fn best_table(comparison: &Comparison) -> Table {
                 Cell::number(velocity, 0),
                 Cell::number(thesis_percent, 1),
             ];
-            for knowledge in Knowledge::ALL {
+            for knowledge in ModelKnowledge::ALL {
                 for configuration in Configuration::EXTREMES {
                     let entry =
                         comparison.find(configuration, knowledge, AMPLITUDES_MM[0], velocity);
@@ -132,17 +51,15 @@ fn best_table(comparison: &Comparison) -> Table {
                         Cell::number(UM_PER_MM * entry.statistic(measure.read).mean, 2)
                     }));
                 }
-                let changes = changes_percent(
-                    comparison,
+                let changes = comparison.changes_percent(
                     knowledge,
                     measure,
-                    Configuration::PID,
-                    Configuration::BEST,
+                    Configuration::EXTREMES,
                     &[velocity],
                 );
                 let [change, deviation] = statistic_cells(changes, 1.0, 2);
                 row.push(change);
-                if knowledge == Knowledge::VirtualMachine {
+                if knowledge == ModelKnowledge::Identified {
                     row.push(deviation);
                 }
             }
@@ -154,7 +71,7 @@ fn best_table(comparison: &Comparison) -> Table {
         Column::with_unit("Velocity", "mm/s"),
         Column::with_unit("Thesis", "%"),
     ];
-    for name in ["matched", "virtual"] {
+    for name in ModelKnowledge::ALL.map(ModelKnowledge::short) {
         columns.push(Column::with_unit(format!("PID, {name}"), "um"));
         columns.push(Column::with_unit(format!("Best, {name}"), "um"));
         columns.push(Column::with_unit(format!("Change, {name}"), "%"));
@@ -169,7 +86,7 @@ fn best_table(comparison: &Comparison) -> Table {
     }
 }
 
-/// What each imperfection of the virtual machine costs.
+/// The cost of each imperfection of the plant and of the identified model.
 pub fn study_section(findings: &[Finding]) -> Section {
     let rows = findings
         .iter()
@@ -191,7 +108,7 @@ pub fn study_section(findings: &[Finding]) -> Section {
             row
         })
         .collect();
-    let mut columns = vec![Column::new("Virtual machine")];
+    let mut columns = vec![Column::new("Change")];
     for (measure, _) in BEST_MEASURES {
         for velocity in VELOCITIES_MM_S {
             columns.push(Column::with_unit(
@@ -202,9 +119,9 @@ pub fn study_section(findings: &[Finding]) -> Section {
         columns.push(Column::with_unit(format!("{}, mean", measure.name), "%"));
     }
     let mut prose = vec![
-        "The virtual machine again, with one imperfection of the plant switched off or one thing known better by the law, \
+        "The identified model again, with one imperfection of the plant switched off or one thing known better by the law, \
          and nothing else changed: the change from PID alone to N-PID with static and GMS feedforward, both on the changed \
-         machine, mean over the seeds."
+         plant, mean over the seeds."
             .to_owned(),
     ];
     prose.extend(
@@ -218,7 +135,7 @@ pub fn study_section(findings: &[Finding]) -> Section {
     }));
     Section {
         id: "headline-imperfections".to_owned(),
-        heading: "What keeps the virtual machine from more".to_owned(),
+        heading: "What keeps the identified model from more".to_owned(),
         provenance: None,
         prose,
         blocks: vec![Block::Table(Table {
@@ -231,24 +148,22 @@ pub fn study_section(findings: &[Finding]) -> Section {
     }
 }
 
-/// The change from PID to the best configuration on a changed virtual machine, %; nothing if it could not be run.
+/// The change from PID to the best configuration on a changed run, %; nothing if it could not be run.
 fn change_percent_of(
     finding: &Finding,
-    measure: Measure,
+    measure: Metric,
     velocities_mm_s: &[f64],
 ) -> Option<Statistic> {
-    changes_percent(
-        finding.outcome.as_ref().ok()?,
-        Knowledge::VirtualMachine,
+    finding.outcome.as_ref().ok()?.changes_percent(
+        ModelKnowledge::Identified,
         measure,
-        Configuration::PID,
-        Configuration::BEST,
+        Configuration::EXTREMES,
         velocities_mm_s,
     )
 }
 
 /// A sentence on one measure: whether the thesis' figure is met, and which single change helps most.
-fn conclusion(findings: &[Finding], measure: Measure, thesis_percent: f64) -> Option<String> {
+fn conclusion(findings: &[Finding], measure: Metric, thesis_percent: f64) -> Option<String> {
     let mean = |finding: &Finding| {
         change_percent_of(finding, measure, &VELOCITIES_MM_S)
             .map(|spread| (finding.change, spread.mean))

@@ -1,4 +1,4 @@
-//! Which imperfection of the virtual machine costs how much: each is switched off by itself, and the comparison of the
+//! The cost of each imperfection: each is switched off by itself, and the comparison of the
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
@@ -9,7 +9,7 @@ use quadrant_sim::compare::comparison::{Comparison, Request};
 use quadrant_sim::compare::sine::AMPLITUDE_MM;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::run_configuration::Setup;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::identify::virgin_curve;
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveError, VirginCurveSettings};
 use quadrant_sim::plant::Imperfections;
@@ -22,7 +22,7 @@ const ELEMENTS: [usize; 3] = [4, 6, FIRMWARE_ELEMENTS];
 /// How much finer the finer encoder is.
 const FINER_ENCODER: f64 = 10.0;
 
-/// A virtual machine that lacks one imperfection, or whose law knows one thing better.
+/// A run with the identified model on a plant that lacks one imperfection, or whose law knows one thing better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
     AsItIs,
@@ -99,7 +99,11 @@ impl Change {
     ///
     /// # Errors
     /// A new identification that fails.
-    pub fn apply(self, setup: &Setup, seed: u64) -> Result<Setup, StudyError> {
+    pub fn apply(
+        self,
+        setup: &RunConfiguration,
+        seed: u64,
+    ) -> Result<RunConfiguration, StudyError> {
         let mut changed = setup.clone();
         match self {
             Self::AsItIs => {}
@@ -117,7 +121,7 @@ impl Change {
                     axis.friction.gms = truth.gms.clone();
                 }
             }
-            Self::TrueFriction => know_friction(&mut changed),
+            Self::TrueFriction => changed.know_friction(),
             Self::Preview(periods) => {
                 let further_s = f64::from(periods) / changed.stage.rate_hz;
                 for axis in &mut changed.stage.axes {
@@ -127,7 +131,7 @@ impl Change {
             Self::NoImperfections => each(&mut changed, |all| *all = Imperfections::default()),
             Self::NothingUnknown => {
                 each(&mut changed, |all| *all = Imperfections::default());
-                know_friction(&mut changed);
+                changed.know_friction();
             }
         }
         Ok(changed)
@@ -153,30 +157,26 @@ pub enum StudyError {
 }
 
 /// Changes the imperfections of all axes.
-fn each(setup: &mut Setup, change: impl Fn(&mut Imperfections)) {
+fn each(setup: &mut RunConfiguration, change: impl Fn(&mut Imperfections)) {
     for axis in &mut setup.truth.axes {
         change(&mut axis.imperfections);
     }
 }
 
 /// Gives stage and law encoders of smaller counts.
-fn refine_encoder(setup: &mut Setup) {
+fn refine_encoder(setup: &mut RunConfiguration) {
     for (axis, truth) in setup.stage.axes.iter_mut().zip(&mut setup.truth.axes) {
         axis.encoder.resolution_mm /= FINER_ENCODER;
         truth.resolution_mm /= FINER_ENCODER;
     }
 }
 
-/// Gives the law the friction of the matched setup.
-fn know_friction(setup: &mut Setup) {
-    let known = Setup::matched().stage.axes;
-    for (axis, known) in setup.stage.axes.iter_mut().zip(known) {
-        axis.friction = known.friction;
-    }
-}
-
 /// Measures the slow sine on the x axis as a commissioning does, and identifies `count` elements from it.
-fn identify_elements(setup: &mut Setup, count: usize, seed: u64) -> Result<(), StudyError> {
+fn identify_elements(
+    setup: &mut RunConfiguration,
+    count: usize,
+    seed: u64,
+) -> Result<(), StudyError> {
     let rate_hz = setup.stage.rate_hz;
     let x = &mut setup.stage.axes[0];
     let plant = x.plant.ok_or(StudyError::NoModel)?;
@@ -194,7 +194,7 @@ fn identify_elements(setup: &mut Setup, count: usize, seed: u64) -> Result<(), S
     Ok(())
 }
 
-/// What a changed virtual machine did.
+/// The outcome of a change.
 #[derive(Debug)]
 pub struct Finding {
     pub change: Change,
@@ -202,20 +202,20 @@ pub struct Finding {
     pub outcome: Result<Comparison, StudyError>,
 }
 
-/// Runs PID and the best configuration on every changed virtual machine, with `seeds` seeds from `seed` on. `advance` is told
+/// Runs PID and the best configuration on every changed plant, with `seeds` seeds from `seed` on. `advance` is told
 /// the share of the whole that was done since it was last told.
 ///
 /// # Errors
 /// The first run that fails. An identification that does is told in its finding: it is an answer, too.
 pub fn study<S: Scalar>(
-    setup: &Setup,
+    setup: &RunConfiguration,
     changes: &[Change],
     seed: u64,
     seeds: u64,
     advance: &(dyn Fn(f64) + Sync),
 ) -> Result<Vec<Finding>, RunError> {
     // The identifications run on one core each, so all at once; the runs of a comparison fill the cores by themselves.
-    let changed: Vec<Result<Setup, StudyError>> = changes
+    let changed: Vec<Result<RunConfiguration, StudyError>> = changes
         .par_iter()
         .map(|change| change.apply(setup, seed))
         .collect();

@@ -65,7 +65,7 @@ fn shares_table(outcomes: &[WrongOutcome], (id, name, read): Reading) -> Table {
         caption: format!(
             "{name} with combined feedforward whose every parameter (levels, Stribeck velocity, viscous friction, stiffnesses, weights, \
              attraction, inertia, preview) is off by a share, up or down at random: mean and worst of eight draws. Sines of 15 mm at 5, \
-             10 and 15 mm/s, mean of the three; simulated, virtual machine"
+             10 and 15 mm/s, mean of the three; simulated, identified model"
         ),
         columns: heads,
         rows: rows.into(),

@@ -7,7 +7,9 @@ use quadrant_sim::compare::sine::VELOCITIES_MM_S;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run::AxisTrace;
-use quadrant_sim::experiment::run_configuration::{Knowledge, Setup};
+use quadrant_sim::experiment::run_configuration::{
+    ModelKnowledge, RunConfiguration, identified_settings,
+};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, Cell, Page, Section, Table};
 use quadrant_studies::thesis::chapter5::chapter5_sections;
@@ -18,7 +20,7 @@ use quadrant_studies::thesis::imperfections::{Change, study};
 /// was there with each further feedforward; two seeds, 1 % apart.
 fn made_up() -> Comparison {
     let mut entries = Vec::new();
-    for knowledge in Knowledge::ALL {
+    for knowledge in ModelKnowledge::ALL {
         for amplitude_mm in AMPLITUDES_MM {
             for (index, configuration) in Configuration::all().into_iter().enumerate() {
                 for velocity_mm_s in VELOCITIES_MM_S {
@@ -153,16 +155,16 @@ fn the_headline_table_sets_ours_beside_the_thesis() {
     };
     let close = |value: f64, expected: f64| assert!((value - expected).abs() < 1e-6, "{value}");
     close(number(changes, 0, "Thesis"), -25.0);
-    close(number(changes, 0, "Virtual machine"), -50.0);
+    close(number(changes, 0, "Identified model"), -50.0);
     close(number(changes, 0, "±"), 0.0);
-    close(number(changes, 5, "Matched"), 100.0 * (0.5e-3 - 1.0));
+    close(number(changes, 5, "Exact model"), 100.0 * (0.5e-3 - 1.0));
     assert_eq!(best.rows.len(), 9);
-    close(number(best, 0, "Best, virtual"), 0.05);
+    close(number(best, 0, "Best, identified"), 0.05);
 }
 
 #[test]
 fn the_same_runs_on_one_thread_and_on_three_give_the_same_scores() {
-    let setups = Setup::both().unwrap();
+    let setups = RunConfiguration::both(&identified_settings().unwrap().stage);
     let request = Request {
         setups: &setups,
         configurations: &Configuration::EXTREMES,
@@ -191,7 +193,7 @@ fn the_same_runs_on_one_thread_and_on_three_give_the_same_scores() {
 
 #[test]
 fn switching_an_imperfection_off_changes_that_and_nothing_else() {
-    let [_, setup] = Setup::both().unwrap();
+    let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
     let quiet = Change::NoNoise.apply(&setup, 1).unwrap();
     assert_eq!(quiet.stage, setup.stage);
     for (quiet, axis) in quiet.truth.axes.iter().zip(&setup.truth.axes) {
@@ -204,7 +206,7 @@ fn switching_an_imperfection_off_changes_that_and_nothing_else() {
     assert_eq!(known.truth, setup.truth);
     assert_eq!(
         known.stage.axes[0].friction,
-        Setup::matched().stage.axes[0].friction
+        RunConfiguration::exact(setup.stage.clone()).stage.axes[0].friction
     );
     assert_eq!(known.stage.axes[0].feedback, setup.stage.axes[0].feedback);
     let finer = Change::Elements(6).apply(&setup, 1).unwrap();
@@ -218,7 +220,7 @@ fn switching_an_imperfection_off_changes_that_and_nothing_else() {
 
 #[test]
 fn an_identification_that_fails_is_told_and_the_others_are_shown() {
-    let [_, setup] = Setup::both().unwrap();
+    let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
     let findings = study::<f32>(
         &setup,
         &[Change::AsItIs, Change::Elements(11)],

@@ -3,7 +3,7 @@
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::design::{Form, Process};
-use quadrant_sim::experiment::run_configuration::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::identify::characteristic::{CharacteristicSettings, measure};
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::rig::SimulatedRig;
@@ -12,7 +12,7 @@ use quadrant_studies::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, Tuned
 use quadrant_studies::wrong_model::{Competitor, Wrong, feedback, with_wrong_model};
 
 fn tuned() -> (quadrant::settings::AxisSettings, Vec<TunedLaw>) {
-    let settings = identified().unwrap().stage.axes[0].clone();
+    let settings = identified_settings().unwrap().stage.axes[0].clone();
     let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
     let characteristic =
         measure(&mut rig, &CharacteristicSettings::default(), &mut |_| {}).unwrap();
@@ -94,7 +94,7 @@ fn every_law_is_tuned_at_equal_robustness_and_runs() {
 
 #[test]
 fn a_model_that_is_not_wrong_is_the_identified_one() {
-    let settings = identified().unwrap().stage.axes[0].clone();
+    let settings = identified_settings().unwrap().stage.axes[0].clone();
     let right = with_wrong_model(
         &settings,
         Wrong::Everything {

@@ -6,7 +6,7 @@ use quadrant::safety::FaultCode;
 use quadrant::settings::StageSettings;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{Setup, identified};
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
 use quadrant_sim::plant::{NEWTONS_PER_VOLT, StageTruth};
@@ -20,7 +20,7 @@ use quadrant_studies::robustness::{
 };
 
 fn stage() -> StageSettings {
-    identified().unwrap().stage
+    identified_settings().unwrap().stage
 }
 
 /// The scenarios of these names on x, under the usual laws.
@@ -50,7 +50,7 @@ fn largest_um(outcomes: &[RobustnessOutcome], scenario: &str, competitor: &str) 
 fn the_nominal_sine_is_the_comparison_s_run_to_the_last_bit() {
     // The comparison's second axis, at 10 mm/s, has the noise of three times its seed and one.
     let outcomes = run(&request(&["nominal"], 4, 1));
-    let setup = Setup::virtual_machine(stage());
+    let setup = RunConfiguration::identified(stage());
     for configuration in [Configuration::all()[0], Configuration::all()[7]] {
         let compared = run_configuration::<f32>(configuration, &setup, 1).unwrap();
         let own = find(&outcomes, "nominal", &configuration.name()).unwrap();

@@ -3,13 +3,13 @@
 use std::f64::consts::TAU;
 
 use FeedforwardKind::{Combined, None as Without};
-use Knowledge::VirtualMachine;
+use ModelKnowledge::Identified;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
 use quadrant_sim::compare::sine::{VELOCITIES_MM_S, cycle_s};
 use quadrant_sim::experiment::metrics::GLITCH_WINDOW;
-use quadrant_sim::experiment::run_configuration::Knowledge;
+use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::pages::UM_PER_MM;
 use quadrant_sim::report::{Block, Figure, Lines, Plot, Series, Style, decimate};
 
@@ -131,13 +131,13 @@ impl Chapter<'_> {
         let reach = reach_um(
             CONTROLLERS
                 .into_iter()
-                .flat_map(|controller| Knowledge::ALL.map(|knowledge| (controller, knowledge)))
+                .flat_map(|controller| ModelKnowledge::ALL.map(|knowledge| (controller, knowledge)))
                 .flat_map(|(controller, knowledge)| alone(controller, knowledge)),
         );
         let mut blocks = Vec::new();
         let pairs = CONTROLLERS
             .into_iter()
-            .flat_map(|controller| Knowledge::ALL.map(|knowledge| (controller, knowledge)));
+            .flat_map(|controller| ModelKnowledge::ALL.map(|knowledge| (controller, knowledge)));
         for ((controller, knowledge), number) in pairs.zip(1..) {
             let series = alone(controller, knowledge)
                 .enumerate()
@@ -159,23 +159,21 @@ impl Chapter<'_> {
                 reach,
             ));
         }
-        let measured = CONTROLLERS
-            .into_iter()
-            .flat_map(|c| alone(c, VirtualMachine));
+        let measured = CONTROLLERS.into_iter().flat_map(|c| alone(c, Identified));
         let reach = reach_um(measured);
         for (velocity, part) in VELOCITIES_MM_S.into_iter().zip(["a", "b", "c"]) {
             let series = CONTROLLERS
                 .into_iter()
                 .enumerate()
                 .filter_map(|(index, controller)| {
-                    let entry = self.entry(controller, Without, VirtualMachine, velocity)?;
+                    let entry = self.entry(controller, Without, Identified, velocity)?;
                     let name = controller.name().to_owned();
                     Some(error_series(name, entry, Over::Reversal, Style::nth(index)))
                 })
                 .collect();
             let caption = format!(
                 "Quadrant glitch with PID and with N-PID at {velocity} mm/s, {}",
-                knowledge_name(VirtualMachine)
+                knowledge_name(Identified)
             );
             let label = "time from the reversal (s)";
             blocks.push(figure((5, part), caption, label, series, reach));
@@ -186,7 +184,7 @@ impl Chapter<'_> {
     /// Figures 5.6 to 5.11 with PID, 5.12 to 5.17 with N-PID: reference velocity, and the error with each feedforward.
     pub(super) fn feedforward_figures(&self, controller: LawKind, first: usize) -> Vec<Block> {
         let all = CONTROLLERS.into_iter().flat_map(|controller| {
-            Knowledge::ALL.into_iter().flat_map(move |knowledge| {
+            ModelKnowledge::ALL.into_iter().flat_map(move |knowledge| {
                 VELOCITIES_MM_S.into_iter().filter_map(move |velocity| {
                     self.entry(controller, Without, knowledge, velocity)
                 })
@@ -194,7 +192,7 @@ impl Chapter<'_> {
         });
         let reach = reach_um(all);
         let mut blocks = Vec::new();
-        let panels = Knowledge::ALL
+        let panels = ModelKnowledge::ALL
             .into_iter()
             .flat_map(|knowledge| VELOCITIES_MM_S.map(|velocity| (knowledge, velocity)));
         for ((knowledge, velocity), number) in panels.zip(first..) {
@@ -225,13 +223,7 @@ impl Chapter<'_> {
             .flat_map(|amplitude| [Without, Combined].map(|feedforward| (amplitude, feedforward)))
             .filter_map(|(amplitude, feedforward)| {
                 let velocity = AMPLITUDE_VELOCITY_MM_S;
-                self.at(
-                    amplitude,
-                    LawKind::NPid,
-                    feedforward,
-                    VirtualMachine,
-                    velocity,
-                )
+                self.at(amplitude, LawKind::NPid, feedforward, Identified, velocity)
             })
             .collect();
         let reach = reach_um(entries.iter().copied());
@@ -247,7 +239,7 @@ impl Chapter<'_> {
         let caption = format!(
             "Tracking error with N-PID at both amplitudes and {AMPLITUDE_VELOCITY_MM_S} mm/s, without feedforward and with \
              static and GMS feedforward, {}",
-            knowledge_name(VirtualMachine)
+            knowledge_name(Identified)
         );
         figure((18, ""), caption, "time (cycles)", series, reach)
     }

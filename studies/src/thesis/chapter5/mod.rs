@@ -1,5 +1,5 @@
-//! The tables and figures of the thesis' chapter 5, under its numbers and in our words. What it simulated is matched here,
-//! what it measured is the virtual machine.
+//! The tables and figures of the thesis' chapter 5, under its numbers and in our words. What it simulated is run
+//! here with the exact model, what it measured with the identified one.
 
 mod figures;
 mod tables;
@@ -9,35 +9,14 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Entry};
 use quadrant_sim::compare::sine::VELOCITIES_MM_S;
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::metrics::{GLITCH_WINDOW, Score};
-use quadrant_sim::experiment::run_configuration::Knowledge;
+use quadrant_sim::experiment::metrics::GLITCH_WINDOW;
+use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::report::Section;
 
 /// Controllers in the order of the chapter.
 const CONTROLLERS: [LawKind; 2] = [LawKind::Pid, LawKind::NPid];
 
-/// One number of a score.
-#[derive(Clone, Copy)]
-pub(super) struct Measure {
-    pub(super) name: &'static str,
-    pub(super) read: fn(&Score) -> f64,
-}
-
-pub(super) const LARGEST: Measure = Measure {
-    name: "Largest",
-    read: |score| score.largest_mm,
-};
-pub(super) const RMS: Measure = Measure {
-    name: "RMS",
-    read: |score| score.rms_mm,
-};
-pub(super) const GLITCH: Measure = Measure {
-    name: "Glitch",
-    read: |score| score.glitch_mm,
-};
-const TRACKING: [Measure; 2] = [LARGEST, RMS];
-
-/// Data of the tables and figures.
+/// What the tables and figures are drawn from.
 struct Chapter<'a>(&'a Comparison);
 
 impl<'a> Chapter<'a> {
@@ -45,7 +24,7 @@ impl<'a> Chapter<'a> {
         &self,
         controller: LawKind,
         feedforward: FeedforwardKind,
-        knowledge: Knowledge,
+        knowledge: ModelKnowledge,
         velocity_mm_s: f64,
     ) -> Option<&'a Entry> {
         self.at(
@@ -62,7 +41,7 @@ impl<'a> Chapter<'a> {
         amplitude_mm: f64,
         controller: LawKind,
         feedforward: FeedforwardKind,
-        knowledge: Knowledge,
+        knowledge: ModelKnowledge,
         velocity_mm_s: f64,
     ) -> Option<&'a Entry> {
         let configuration = Configuration {
@@ -75,10 +54,10 @@ impl<'a> Chapter<'a> {
 }
 
 /// What the thesis calls it, and what ours is.
-const fn knowledge_name(knowledge: Knowledge) -> &'static str {
+const fn knowledge_name(knowledge: ModelKnowledge) -> &'static str {
     match knowledge {
-        Knowledge::Matched => "simulation (matched)",
-        Knowledge::VirtualMachine => "experiment (virtual machine)",
+        ModelKnowledge::Exact => "simulation (exact model)",
+        ModelKnowledge::Identified => "experiment (identified model)",
     }
 }
 
@@ -162,8 +141,8 @@ fn runs_prose(comparison: &Comparison) -> String {
         .max()
         .unwrap_or_default();
     format!(
-        "Both use the same controllers. What the thesis simulated is matched here: the feedforward has the plant's own \
-         friction, and nothing in the run is random, so it is run once and has no spread. What the thesis measured is the virtual machine here: the plant \
+        "Both use the same controllers. What the thesis simulated is run here with the exact model: the feedforward has the plant's own \
+         friction, and nothing in the run is random, so it is run once and has no spread. What the thesis measured is run here with the identified model: the plant \
          has noise, offset and ripple, and the law has what commissioning it found; means of {seeds} runs, ± is one \
          standard deviation of a run. Both are simulated; nothing here is measured on a machine."
     )

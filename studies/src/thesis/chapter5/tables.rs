@@ -1,19 +1,17 @@
 //! Tables 5.1 to 5.22.
 
 use FeedforwardKind::{Combined, None as Without};
-use Knowledge::{Matched, VirtualMachine};
+use ModelKnowledge::{Exact, Identified};
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
 use quadrant_sim::compare::sine::VELOCITIES_MM_S;
-use quadrant_sim::experiment::metrics::change_percent;
-use quadrant_sim::experiment::run_configuration::Knowledge;
+use quadrant_sim::experiment::metrics::{Metric, change_percent};
+use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
 use quadrant_sim::report::{Block, Cell, Column, Table};
 
-use crate::thesis::chapter5::{
-    CONTROLLERS, Chapter, GLITCH, LARGEST, Measure, TRACKING, knowledge_name,
-};
+use crate::thesis::chapter5::{CONTROLLERS, Chapter, knowledge_name};
 
 /// One side of a comparison: the heading of its columns, and whether its runs are repeated.
 struct Side {
@@ -22,14 +20,14 @@ struct Side {
 }
 
 impl Side {
-    fn new(heading: &str, knowledge: Knowledge) -> Self {
+    fn new(heading: &str, knowledge: ModelKnowledge) -> Self {
         Self {
             heading: heading.to_owned(),
-            repeated: knowledge == VirtualMachine,
+            repeated: knowledge == Identified,
         }
     }
 
-    fn columns(&self, measure: &Measure) -> Vec<Column> {
+    fn columns(&self, measure: &Metric) -> Vec<Column> {
         let heading = format!("{} {}", measure.name, self.heading);
         let mut columns = vec![Column::with_unit(heading.trim(), "um")];
         if self.repeated {
@@ -38,7 +36,7 @@ impl Side {
         columns
     }
 
-    fn cells(&self, entry: Option<&Entry>, measure: &Measure) -> Vec<Cell> {
+    fn cells(&self, entry: Option<&Entry>, measure: &Metric) -> Vec<Cell> {
         let statistic = entry.map(|entry| entry.statistic(measure.read));
         let [mean, deviation] = statistic_cells(statistic, UM_PER_MM, 2);
         if self.repeated {
@@ -50,7 +48,7 @@ impl Side {
 }
 
 /// The change between two entries' means, %.
-fn change(from: Option<&Entry>, to: Option<&Entry>, measure: &Measure) -> Cell {
+fn change(from: Option<&Entry>, to: Option<&Entry>, measure: &Metric) -> Cell {
     let mean = |entry: &Entry| entry.statistic(measure.read).mean;
     match (from, to) {
         (Some(from), Some(to)) => Cell::number(change_percent(mean(from), mean(to)), 1),
@@ -70,7 +68,7 @@ fn pair_table(
     caption: &str,
     labels: Vec<Column>,
     sides: [Side; 2],
-    measures: &[Measure],
+    measures: &[Metric],
     rows: Vec<Pair<'_>>,
 ) -> Block {
     let mut columns = labels;
@@ -124,26 +122,26 @@ impl Chapter<'_> {
             let name = controller.name();
             pair_table(
                 number,
-                &format!("Tracking error with {name}, simulated and on the virtual machine, by velocity"),
+                &format!("Tracking error with {name}, with the exact and the identified model, by velocity"),
                 vec![velocity_column()],
-                [Side::new("matched", Matched), Side::new("virtual", VirtualMachine)],
-                &TRACKING,
+                [Side::new("exact", Exact), Side::new("identified", Identified)],
+                &Metric::TRACKING,
                 self.by_velocity(|velocity| {
-                    [Matched, VirtualMachine]
+                    [Exact, Identified]
                         .map(|knowledge| self.entry(controller, Without, knowledge, velocity))
                 }),
             )
         });
-        let against = |number, caption: &str, measures: &[Measure]| {
+        let against = |number, caption: &str, measures: &[Metric]| {
             pair_table(
                 number,
                 caption,
                 vec![velocity_column()],
-                ["PID", "N-PID"].map(|name| Side::new(name, VirtualMachine)),
+                ["PID", "N-PID"].map(|name| Side::new(name, Identified)),
                 measures,
                 self.by_velocity(|velocity| {
                     CONTROLLERS
-                        .map(|controller| self.entry(controller, Without, VirtualMachine, velocity))
+                        .map(|controller| self.entry(controller, Without, Identified, velocity))
                 }),
             )
         };
@@ -151,13 +149,13 @@ impl Chapter<'_> {
             .chain([
                 against(
                     3,
-                    "Tracking error with PID and with N-PID on the virtual machine, by velocity",
-                    &TRACKING,
+                    "Tracking error with PID and with N-PID, identified model, by velocity",
+                    &Metric::TRACKING,
                 ),
                 against(
                     4,
-                    "Quadrant glitch with PID and with N-PID on the virtual machine, by velocity",
-                    &[GLITCH],
+                    "Quadrant glitch with PID and with N-PID, identified model, by velocity",
+                    &[Metric::GLITCH],
                 ),
             ])
             .collect()
@@ -176,7 +174,7 @@ impl Chapter<'_> {
     /// Tables 5.5 to 5.9 with PID, 5.10 to 5.14 with N-PID: each feedforward.
     pub(super) fn feedforward_tables(&self, controller: LawKind, first: usize) -> Vec<Block> {
         let name = controller.name();
-        let tracking = [Matched, VirtualMachine].into_iter().zip(first..).map(|(knowledge, number)| {
+        let tracking = [Exact, Identified].into_iter().zip(first..).map(|(knowledge, number)| {
             self.feedforward_table(
                 number,
                 &format!(
@@ -185,7 +183,7 @@ impl Chapter<'_> {
                 ),
                 controller,
                 knowledge,
-                &TRACKING,
+                &Metric::TRACKING,
                 &VELOCITIES_MM_S,
             )
         });
@@ -194,11 +192,11 @@ impl Chapter<'_> {
                 number,
                 &format!(
                     "Quadrant glitch with {name} and each feedforward at {velocity} mm/s, {}; change against {name} alone",
-                    knowledge_name(VirtualMachine)
+                    knowledge_name(Identified)
                 ),
                 controller,
-                VirtualMachine,
-                &[GLITCH],
+                Identified,
+                &[Metric::GLITCH],
                 std::slice::from_ref(velocity),
             )
         });
@@ -210,8 +208,8 @@ impl Chapter<'_> {
         number: usize,
         caption: &str,
         controller: LawKind,
-        knowledge: Knowledge,
-        measures: &[Measure],
+        knowledge: ModelKnowledge,
+        measures: &[Metric],
         velocities_mm_s: &[f64],
     ) -> Block {
         let side = Side::new("", knowledge);
@@ -242,22 +240,22 @@ impl Chapter<'_> {
 
     /// Tables 5.15 to 5.20: both controllers with each feedforward.
     pub(super) fn side_by_side_tables(&self) -> Vec<Block> {
-        let one = |number, what: &str, measures: &[Measure], velocity: f64| {
+        let one = |number, what: &str, measures: &[Metric], velocity: f64| {
             pair_table(
                 number,
                 &format!(
                     "{what} with PID and with N-PID and each feedforward at {velocity} mm/s, {}",
-                    knowledge_name(VirtualMachine)
+                    knowledge_name(Identified)
                 ),
                 vec![Column::new("Feedforward")],
-                ["PID", "N-PID"].map(|name| Side::new(name, VirtualMachine)),
+                ["PID", "N-PID"].map(|name| Side::new(name, Identified)),
                 measures,
                 FeedforwardKind::THESIS
                     .into_iter()
                     .map(|feedforward| Pair {
                         labels: vec![Cell::text(feedforward.name())],
                         entries: CONTROLLERS.map(|controller| {
-                            self.entry(controller, feedforward, VirtualMachine, velocity)
+                            self.entry(controller, feedforward, Identified, velocity)
                         }),
                     })
                     .collect(),
@@ -266,16 +264,16 @@ impl Chapter<'_> {
         let glitches = VELOCITIES_MM_S.into_iter().zip(15..);
         let errors = VELOCITIES_MM_S.into_iter().zip(18..);
         glitches
-            .map(|(velocity, number)| one(number, "Quadrant glitch", &[GLITCH], velocity))
-            .chain(
-                errors.map(|(velocity, number)| one(number, "Tracking error", &TRACKING, velocity)),
-            )
+            .map(|(velocity, number)| one(number, "Quadrant glitch", &[Metric::GLITCH], velocity))
+            .chain(errors.map(|(velocity, number)| {
+                one(number, "Tracking error", &Metric::TRACKING, velocity)
+            }))
             .collect()
     }
 
     /// Tables 5.21 and 5.22: both amplitudes, without and with combined feedforward.
     pub(super) fn amplitude_tables(&self) -> Vec<Block> {
-        let one = |number, what: &str, measures: &[Measure]| {
+        let one = |number, what: &str, measures: &[Metric]| {
             let mut rows = Vec::new();
             for controller in CONTROLLERS {
                 for amplitude in AMPLITUDES_MM.into_iter().rev() {
@@ -287,13 +285,7 @@ impl Chapter<'_> {
                                 velocity_cell(velocity),
                             ],
                             entries: [Without, Combined].map(|feedforward| {
-                                self.at(
-                                    amplitude,
-                                    controller,
-                                    feedforward,
-                                    VirtualMachine,
-                                    velocity,
-                                )
+                                self.at(amplitude, controller, feedforward, Identified, velocity)
                             }),
                         });
                     }
@@ -303,21 +295,21 @@ impl Chapter<'_> {
                 number,
                 &format!(
                     "{what} without feedforward and with static and GMS feedforward at both amplitudes, {}",
-                    knowledge_name(VirtualMachine)
+                    knowledge_name(Identified)
                 ),
                 vec![
                     Column::new("Controller"),
                     Column::with_unit("Amplitude", "mm"),
                     velocity_column(),
                 ],
-                ["without", "with"].map(|name| Side::new(name, VirtualMachine)),
+                ["without", "with"].map(|name| Side::new(name, Identified)),
                 measures,
                 rows,
             )
         };
         vec![
-            one(21, "Tracking error", &[LARGEST]),
-            one(22, "Quadrant glitch", &[GLITCH]),
+            one(21, "Tracking error", &[Metric::LARGEST]),
+            one(22, "Quadrant glitch", &[Metric::GLITCH]),
         ]
     }
 }
