@@ -2,7 +2,6 @@
 
 use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
-use quadrant::app::supervisor::Event;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{Command, FaultCode, SafetyState};

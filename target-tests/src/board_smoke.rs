@@ -4,17 +4,16 @@
 //! those read as zero. Two things are done for it from the debugger's port: flags that the clock set-up waits for read as
 //! ones, and the control interrupt is made pending as TIM7 would.
 
-use std::path::PathBuf;
-use std::process::{Child, Command, Stdio};
+use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant_sim::emulator::Program;
 
-use crate::command;
-use crate::gdb::{Debugger, PROGRAM_COUNTER, STACK_POINTER};
-use crate::image::{self, Board, Image, Scalar, Target};
-use crate::toolchain::Toolchain;
+use crate::gdb::{Debugger, PROGRAM_COUNTER, Port, STACK_POINTER};
+use xtask::command;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 /// QEMU's machine with an STM32F405.
 const MACHINE: &str = "netduinoplus2";
@@ -28,7 +27,7 @@ const LOOKS: usize = 40;
 const TICKS: u32 = 100;
 const POLLS: u32 = 9;
 /// How long the first tick may wait, in the host's time: settings are built before it, with interrupts masked.
-const PATIENCE: Duration = Duration::from_secs(30);
+const TIMEOUT: Duration = Duration::from_secs(30);
 /// NVIC_ISPR1, and TIM7 in it.
 const SET_PENDING: u32 = 0xE000_E204;
 const TIM7: u32 = 1 << (55 - 32);
@@ -47,51 +46,32 @@ const EXPECTED: [&str; 5] = [
 /// What it must not say: the button reads as pressed here, but was never seen up.
 const FORBIDDEN: [&str; 2] = ["outputs enabled", "request refused"];
 
-/// QEMU, ended with its socket when dropped.
-struct Machine {
-    child: Child,
-    socket: PathBuf,
-}
+/// QEMU, ended when dropped.
+struct Machine(Child);
 
 impl Drop for Machine {
     fn drop(&mut self) {
-        // It may have ended by itself, and the socket may never have been there.
-        let _ = self.child.kill();
-        let _ = self.child.wait();
-        let _ = std::fs::remove_file(&self.socket);
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
     }
 }
 
-impl Machine {
-    /// Loads the image and stops before its first instruction.
-    fn start(image: &Image) -> Result<(Self, Debugger)> {
-        let name = format!("quadrant-debugger-{}", std::process::id());
-        let socket = std::env::temp_dir().join(name);
-        let mut qemu: Command = command::command("qemu-system-arm");
-        qemu.args(["-machine", MACHINE, "-nographic", "-S"]);
-        qemu.args([
-            "-monitor",
-            "none",
-            "-serial",
-            "none",
-            "-gdb",
-            "chardev:port",
-        ]);
-        let port = format!(
-            "socket,id=port,path={},server=on,wait=off",
-            socket.display()
-        );
-        qemu.args(["-chardev", &port])
-            .arg("-kernel")
-            .arg(&image.path);
-        let child = qemu
-            .stdout(Stdio::null())
-            .spawn()
-            .context("cannot start qemu-system-arm: `cargo xtask setup` installs it")?;
-        let machine = Self { child, socket };
-        let debugger = Debugger::connect(&machine.socket)?;
-        Ok((machine, debugger))
-    }
+/// Loads the image and stops before its first instruction.
+fn start(image: &Image) -> Result<(Machine, Debugger)> {
+    let mut qemu = command::command("qemu-system-arm");
+    qemu.args(["-machine", MACHINE, "-nographic"]);
+    qemu.args(["-monitor", "none", "-serial", "none"]);
+    let port = Port::new();
+    port.add_to(&mut qemu);
+    qemu.arg("-kernel").arg(&image.path);
+    let child = qemu
+        .stdout(Stdio::null())
+        .spawn()
+        .context("cannot start qemu-system-arm: `cargo xtask setup` installs it")?;
+    let machine = Machine(child);
+    let debugger = port.connect()?;
+    Ok((machine, debugger))
 }
 
 /// Builds the image, lets it start and tick, fills its stack, and checks what it logs.
@@ -103,7 +83,7 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
             scalar: Scalar::F32,
         },
     )?;
-    let (_machine, mut debugger) = Machine::start(&image)?;
+    let (_machine, mut debugger) = start(&image)?;
     pass_clock_setup(&mut debugger)?;
     let mut log = Log::of(&image)?;
     log.read(&mut debugger)?;
@@ -210,13 +190,13 @@ fn pend(debugger: &mut Debugger) -> Result<()> {
 fn tick(debugger: &mut Debugger) -> Result<()> {
     pend(debugger)?;
     let begun = Instant::now();
-    while begun.elapsed() < PATIENCE {
+    while begun.elapsed() < TIMEOUT {
         debugger.run(Duration::from_millis(5))?;
         if debugger.word(SET_PENDING)? & TIM7 == 0 {
             return Ok(());
         }
     }
-    bail!("the control interrupt is not taken within {PATIENCE:?}")
+    bail!("the control interrupt is not taken within {TIMEOUT:?}")
 }
 
 /// Lets the control interrupt meet a stack that is full, until the fault's handler has spoken.
@@ -224,7 +204,7 @@ fn overflow(debugger: &mut Debugger, log: &mut Log) -> Result<()> {
     debugger.set_register(STACK_POINTER, SCRATCH + 16)?;
     pend(debugger)?;
     let begun = Instant::now();
-    while begun.elapsed() < PATIENCE {
+    while begun.elapsed() < TIMEOUT {
         debugger.run(Duration::from_millis(5))?;
         let so_far = log.bytes.len();
         log.read(debugger)?;

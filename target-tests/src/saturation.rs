@@ -7,13 +7,14 @@ use quadrant::link::message::{Body, Request, TelemetryRequest};
 use quadrant::safety::{AxisName, Command};
 use quadrant::telemetry::{AxisSignal, Channel, MAX_CHANNELS};
 
-use super::bench::Bench;
-use super::case::{moving, setup};
-use super::masking;
-use crate::image::{self, Board, Image, Scalar, Target};
-use crate::toolchain::Toolchain;
-use crate::trace::Trace;
-use quadrant_sim::emulator::Emulator;
+use crate::faults::case::{configuration, moving};
+use crate::faults::fixture::Fixture;
+use crate::interrupt_latency;
+use crate::trace::{Trace, Tracer};
+use quadrant_sim::emulator::{Emulator, Memory};
+use std::process::ChildStderr;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 /// Tick at which the motion is under way and the load has reached its height.
 const FROM: u32 = 1_600;
@@ -31,7 +32,7 @@ struct Load {
     /// Telemetry of as many channels as there may be, at every tick.
     telemetry: bool,
     /// Nobody takes what the firmware sends: its queue of samples is full.
-    is_deaf: bool,
+    stops_reading: bool,
     /// Status requests and garbage, as fast as the port takes them.
     flood: bool,
     /// A request of the operator in every tick, all of them refused and logged: their queue is full, and so is the log's.
@@ -51,7 +52,7 @@ const LOADS: [(&str, Load, usize); 6] = [
         "in quiet",
         Load {
             telemetry: false,
-            is_deaf: false,
+            stops_reading: false,
             flood: false,
             requests: false,
         },
@@ -61,7 +62,7 @@ const LOADS: [(&str, Load, usize); 6] = [
         "frames and garbage without a pause",
         Load {
             telemetry: false,
-            is_deaf: false,
+            stops_reading: false,
             flood: true,
             requests: false,
         },
@@ -71,7 +72,7 @@ const LOADS: [(&str, Load, usize); 6] = [
         "a request in every tick, refused and logged",
         Load {
             telemetry: false,
-            is_deaf: false,
+            stops_reading: false,
             flood: false,
             requests: true,
         },
@@ -81,7 +82,7 @@ const LOADS: [(&str, Load, usize); 6] = [
         "telemetry of 8 channels in every tick",
         Load {
             telemetry: true,
-            is_deaf: false,
+            stops_reading: false,
             flood: false,
             requests: false,
         },
@@ -91,7 +92,7 @@ const LOADS: [(&str, Load, usize); 6] = [
         "the same, and nobody takes it",
         Load {
             telemetry: true,
-            is_deaf: true,
+            stops_reading: true,
             flood: false,
             requests: false,
         },
@@ -101,7 +102,7 @@ const LOADS: [(&str, Load, usize); 6] = [
         "all of it at once",
         Load {
             telemetry: true,
-            is_deaf: true,
+            stops_reading: true,
             flood: true,
             requests: true,
         },
@@ -148,7 +149,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
     println!(
         "longest stretches with interrupts masked, in instructions, with a line for the log in every millisecond:"
     );
-    for (place, length) in masking::longest(&image)? {
+    for (place, length) in interrupt_latency::longest(&image)? {
         println!("  {length:>6}  {place}");
     }
     Ok(())
@@ -156,35 +157,47 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
 
 /// The instructions of each tick under a load.
 fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
+    let trace = Trace::of(image)?;
+    let ticks = traced(
+        image,
+        |memory| trace.start(image, memory),
+        |fixture, tracer| drive(fixture, tracer, load),
+        |lines| trace.read(image, lines),
+    )?;
+    let counted = ticks
+        .get(..TICKS as usize)
+        .context("the trace ends too early")?;
+    Ok(counted.iter().map(|tick| tick.values().sum()).collect())
+}
+
+/// Runs a fixture while its trace is read.
+pub(crate) fn traced<T: Send>(
+    image: &Image,
+    start: impl FnOnce(&Memory) -> Result<(Emulator, Tracer)>,
+    drive: impl FnOnce(Fixture, &mut Tracer) -> Result<()>,
+    read: impl FnOnce(ChildStderr) -> Result<T> + Send,
+) -> Result<T> {
     std::thread::scope(|scope| {
-        let mut reader = None;
-        let bench = Bench::start_with(image, setup(), |memory| {
-            let trace = Trace::of(image)?;
-            let mut emulator = Emulator::spawn(
-                trace.command_line(image, memory)?,
-                &image.program()?,
-                |_| {},
-            )?;
+        let mut begun = None;
+        let fixture = Fixture::start_with(image, configuration(), |memory| {
+            let (mut emulator, mut tracer) = start(memory)?;
             let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
-            reader = Some(scope.spawn(move || trace.read(image, lines)));
+            tracer.run()?;
+            begun = Some((tracer, scope.spawn(move || read(lines))));
             Ok(emulator)
         })?;
-        drive(bench, load)?;
-        let reader = reader.context("it was started")?;
-        let Ok(ticks) = reader.join() else {
-            return Err(anyhow!("the thread that reads the trace panicked"));
-        };
-        let ticks = ticks?;
-        let counted = ticks
-            .get(FROM as usize..(FROM + TICKS) as usize)
-            .context("the trace ends too early")?;
-        Ok(counted.iter().map(|tick| tick.values().sum()).collect())
+        let (mut tracer, reader) = begun.context("it was started")?;
+        drive(fixture, &mut tracer)?;
+        match reader.join() {
+            Ok(read) => read,
+            Err(_) => Err(anyhow!("the thread that reads the trace panicked")),
+        }
     })
 }
 
 /// Runs the motion, and the load from [`LOADED`] on.
-fn drive(mut bench: Bench, load: Load) -> Result<()> {
-    moving(&mut bench, 1.0)?;
+fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
+    moving(&mut fixture, 1.0)?;
     if load.telemetry {
         let signals = [AxisSignal::Error, AxisSignal::Output, AxisSignal::Position];
         let channels = signals
@@ -192,26 +205,29 @@ fn drive(mut bench: Bench, load: Load) -> Result<()> {
             .flat_map(|signal| AxisName::ALL.map(|axis| Channel::Axis(axis, signal)))
             .take(MAX_CHANNELS)
             .collect();
-        bench.done(Body::Telemetry(TelemetryRequest::Select {
+        fixture.done(Body::Telemetry(TelemetryRequest::Select {
             channels,
             decimation: 1,
         }))?;
     }
-    if load.is_deaf {
-        bench.grow_deaf();
+    if load.stops_reading {
+        fixture.stop_reading();
     }
     if load.requests {
-        bench.break_with(Box::new(|input, _, _| input.request = Some(Command::Run)));
+        fixture.inject(Box::new(|input, _, _| input.request = Some(Command::Run)));
     }
-    ensure!(bench.tick() < LOADED, "tick {} already", bench.tick());
-    while bench.tick() < FROM + TICKS + 1 {
-        while load.flood && bench.unsent() < 2 * FRAME_BYTES {
-            let flood = flood(bench.tick())?;
-            bench.send_bytes(&flood);
+    ensure!(fixture.tick() < LOADED, "tick {} already", fixture.tick());
+    while fixture.tick() < FROM + TICKS + 1 {
+        if fixture.tick() == FROM {
+            tracer.trace()?;
         }
-        bench.run(1)?;
+        while load.flood && fixture.unsent() < 2 * FRAME_BYTES {
+            let flood = flood(fixture.tick())?;
+            fixture.send_bytes(&flood);
+        }
+        fixture.run(1)?;
     }
-    bench.end().map(drop)
+    fixture.end().map(drop)
 }
 
 /// A few requests and some garbage, which depends on the tick.

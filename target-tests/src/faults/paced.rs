@@ -8,11 +8,11 @@ use quadrant::link::lockstep::{
 use quadrant::safety::FaultCode;
 use quadrant::stage::Outputs;
 
-use super::finding::{Finding, are_off, said};
-use crate::emulate;
-use crate::image::Image;
-use crate::twin::{self, SETTLING_TICKS, Twin};
+use super::finding::{Finding, are_off, log_contains};
+use crate::lockstep;
+use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
 use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use xtask::image::Image;
 
 /// Ticks of the runs.
 const TICKS: u32 = SETTLING_TICKS + 250;
@@ -33,15 +33,20 @@ impl Run {
         adjust: impl FnOnce(&mut [InputRecord]),
         prepare: impl FnOnce(&Memory) -> Result<()>,
     ) -> Result<Self> {
-        let twin = Twin::of(image.target.scalar, twin::job())?;
-        let job = twin.job().clone();
-        let (mut inputs, expected) = twin.rehearse(TICKS);
+        let model = ReferenceModel::of(image.target.scalar, reference_model::job())?;
+        let job = model.job().clone();
+        let (mut inputs, expected) = model.run_alone(TICKS);
         adjust(&mut inputs);
         let memory = Memory::create()?;
-        emulate::load(&memory, Mode::Paced, &job, &inputs)?;
+        lockstep::load(&memory, Mode::Paced, &job, &inputs)?;
         prepare(&memory)?;
-        let log =
-            Emulator::start(&image.program()?, &memory, Clock::Instructions, |_| {})?.wait()?;
+        let log = Emulator::start(
+            &reference_model::program(image)?,
+            &memory,
+            Clock::Instructions,
+            |_| {},
+        )?
+        .wait()?;
         Ok(Self {
             expected,
             memory,
@@ -63,7 +68,7 @@ impl Run {
 }
 
 /// An encoder interface that takes a whole control period to be read, once.
-pub(super) fn deadline_missed(image: &Image) -> Result<Finding> {
+pub(crate) fn deadline_missed(image: &Image) -> Result<Finding> {
     let slow = SETTLING_TICKS as usize;
     let run = Run::of(image, |inputs| inputs[slow].slow = true, |_| Ok(()))?;
     let outputs = run.outputs(0)?;
@@ -76,17 +81,17 @@ pub(super) fn deadline_missed(image: &Image) -> Result<Finding> {
     let (before, after) = outputs.split_at(found);
     ensure!(
         before == &run.expected[..found],
-        "the outputs before the fault are not the twin's"
+        "the outputs before the fault are not the reference model's"
     );
     ensure!(are_off(after), "the outputs were enabled again");
-    said(
+    log_contains(
         &run.log,
         &format!(
             "fault {} on the stage at tick {found}",
             FaultCode::DeadlineMissed.number()
         ),
     )?;
-    said(&run.log, " 1 overruns")?;
+    log_contains(&run.log, " 1 overruns")?;
     let how = "reading the encoders takes a control period, once, 15 mm/s";
     Ok(Finding {
         ticks: Some(u32::try_from(found - slow)? + 1),
@@ -96,7 +101,7 @@ pub(super) fn deadline_missed(image: &Image) -> Result<Finding> {
 }
 
 /// An idle loop that masks all interrupts and does nothing any more; gives the time to the reset in control periods, too.
-pub(super) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
+pub(crate) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
     let run = Run::of(
         image,
         |_| {},
@@ -110,7 +115,7 @@ pub(super) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
     let first = run.outputs(0)?;
     ensure!(
         first[..hung] == run.expected[..hung] && first[hung - 1].enabled,
-        "the outputs before the fault are not the twin's"
+        "the outputs before the fault are not the reference model's"
     );
     ensure!(
         are_off(&first[hung..]),
@@ -119,14 +124,14 @@ pub(super) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
     let second = run.outputs(1)?;
     // The same requests to enable and to run as before.
     ensure!(are_off(&second), "the next firmware could be enabled");
-    said(
+    log_contains(
         &run.log,
         &format!(
             "fault {} on the stage at tick 0",
             FaultCode::WatchdogReset.number()
         ),
     )?;
-    said(&run.log, &format!("finished: {TICKS} ticks"))?;
+    log_contains(&run.log, &format!("finished: {TICKS} ticks"))?;
     let cycles = run
         .memory
         .word(HANGS_FROM)?

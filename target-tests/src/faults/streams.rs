@@ -7,8 +7,8 @@ use quadrant::link::message::{
 use quadrant::safety::AxisName;
 use quadrant::units::DacCode;
 
-use super::bench::Bench;
 use super::case::{LONGEST, enabled};
+use super::fixture::Fixture;
 
 /// Ticks from a set point of a stream to the next.
 const STREAM_TICKS: u16 = 100;
@@ -21,29 +21,29 @@ const VALUES: u16 = 768;
 
 /// A stream whose set points last longer than the firmware's patience with a host that falls silent; gives the tick after
 /// the last request.
-pub(super) fn unfinished_stream(bench: &mut Bench) -> Result<u32> {
-    streaming(bench, LONG_STREAM_TICKS)
+pub(crate) fn unfinished_stream(fixture: &mut Fixture) -> Result<u32> {
+    streaming(fixture, LONG_STREAM_TICKS)
 }
 
 /// A small voltage that nobody goes on with; gives the tick in which the next value is due.
-pub(super) fn injection_without_end(bench: &mut Bench) -> Result<u32> {
-    let started = injecting(bench, 0.1, 10.0)?;
+pub(crate) fn injection_without_end(fixture: &mut Fixture) -> Result<u32> {
+    let started = injecting(fixture, 0.1, 10.0)?;
     Ok(started + u32::from(VALUES))
 }
 
 /// A stream in which x goes faster and faster, with all the set points there is room for; gives the tick after the last
 /// request.
-fn streaming(bench: &mut Bench, period_ticks: u16) -> Result<u32> {
-    enabled(bench)?;
-    bench.done(Body::Stream(StreamRequest::Open { period_ticks }))?;
+fn streaming(fixture: &mut Fixture, period_ticks: u16) -> Result<u32> {
+    enabled(fixture)?;
+    fixture.done(Body::Stream(StreamRequest::Open { period_ticks }))?;
     let mut sequence = 0;
-    let mut asked = bench.tick();
+    let mut asked = fixture.tick();
     while sequence < SET_POINTS {
         let points = (sequence..(sequence + 5).min(SET_POINTS))
             .map(|number| set_point(number + 1, period_ticks))
             .collect();
-        asked = bench.tick();
-        let reply = bench.reply(Body::Stream(StreamRequest::Points {
+        asked = fixture.tick();
+        let reply = fixture.reply(Body::Stream(StreamRequest::Points {
             sequence,
             points,
             last: false,
@@ -70,21 +70,21 @@ fn set_point(number: u32, period_ticks: u16) -> SetPoint {
 }
 
 /// A stream without a host that goes on with it; gives the tick in which the next set point is due.
-pub(super) fn underrunning(bench: &mut Bench) -> Result<u32> {
-    streaming(bench, STREAM_TICKS)?;
-    if bench.streams_since().is_none() {
-        bench.run_until(LONGEST, "the stream's start", |bench| {
-            bench.streams_since().is_some()
+pub(crate) fn underrunning(fixture: &mut Fixture) -> Result<u32> {
+    streaming(fixture, STREAM_TICKS)?;
+    if fixture.streams_since().is_none() {
+        fixture.run_until(LONGEST, "the stream's start", |fixture| {
+            fixture.streams_since().is_some()
         })?;
     }
-    let started = bench.streams_since().context("it has started")?;
+    let started = fixture.streams_since().context("it has started")?;
     Ok(started + SET_POINTS * u32::from(STREAM_TICKS))
 }
 
 /// A voltage on x in open loop, with few values; gives the tick of the first.
-pub(super) fn injecting(bench: &mut Bench, voltage_v: f64, travel_mm: f64) -> Result<u32> {
-    enabled(bench)?;
-    bench.reply(Body::Inject(InjectRequest::Open {
+pub(crate) fn injecting(fixture: &mut Fixture, voltage_v: f64, travel_mm: f64) -> Result<u32> {
+    enabled(fixture)?;
+    fixture.reply(Body::Inject(InjectRequest::Open {
         axis: AxisName::X,
         open_loop: true,
         with_plan: false,
@@ -96,7 +96,7 @@ pub(super) fn injecting(bench: &mut Bench, voltage_v: f64, travel_mm: f64) -> Re
     let mut status = InjectStatus::default();
     while status.next_sequence < VALUES.into() {
         let rest = usize::from(VALUES) - status.next_sequence as usize;
-        let reply = bench.reply(Body::Inject(InjectRequest::Values {
+        let reply = fixture.reply(Body::Inject(InjectRequest::Values {
             sequence: status.next_sequence,
             values: Voltages::new(std::iter::repeat_n(code, rest.min(INJECT_VALUES))),
             last: false,
@@ -112,7 +112,7 @@ pub(super) fn injecting(bench: &mut Bench, voltage_v: f64, travel_mm: f64) -> Re
             values: Voltages::default(),
             last: false,
         };
-        if let Reply::Inject(now) = bench.reply(Body::Inject(ask))? {
+        if let Reply::Inject(now) = fixture.reply(Body::Inject(ask))? {
             status = now;
         }
     }

@@ -1,25 +1,23 @@
-//! `cargo xtask faults`: every fault provoked from outside in the emulated firmware, with its twin in this process beside
+//! `cargo xtask faults`: every fault injected from outside in the emulated firmware, with the reference model in this process beside
 //! it, and what was found held against the committed table.
 
-mod bench;
-mod case;
-mod feeds;
+mod at_start;
+pub(crate) mod case;
 mod finding;
-mod masking;
+pub(crate) mod fixture;
 mod paced;
-mod port;
-pub(crate) mod saturation;
-mod starts;
+mod serial_ring;
+mod streams;
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::safety::FaultCode;
 use serde::{Deserialize, Serialize};
 
-use self::bench::Bench;
 use self::finding::Finding;
-use crate::golden::Golden;
-use crate::image::{self, Board, Image, Scalar, Target};
-use crate::toolchain::Toolchain;
+use self::fixture::Fixture;
+use xtask::golden::Golden;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 /// What was found, in order of the faults' numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -30,11 +28,11 @@ struct Table {
 
 /// The committed tables, by number type.
 const GOLDEN: Golden = Golden {
-    file: "faults.toml",
+    path: "target-tests/golden/faults.toml",
     head: "Written by `cargo xtask faults --overwrite-expected`; `cargo xtask faults` holds what it finds against this.",
 };
 
-/// Provokes every fault, prints the table, and holds it against the committed one.
+/// Injects every fault, prints the table, and holds it against the committed one.
 pub(crate) fn run(
     toolchain: Toolchain,
     scalar: Scalar,
@@ -56,16 +54,16 @@ pub(crate) fn run(
         only.unwrap_or("")
     );
     println!(
-        "| no. | fault | provoked by | found on | reaction | ticks | outputs in that tick | ticks until off | trace |"
+        "| no. | fault | injected by | found on | reaction | ticks | outputs in that tick | ticks until off | trace |"
     );
     println!("|---|---|---|---|---|---|---|---|---|");
     let mut table = Table::default();
     let mut compared = (0, 0);
     for code in codes {
         let findings =
-            provoke(&image, code).with_context(|| format!("{} was provoked", code.name()))?;
-        // A fault without a provocation must not look like one that was found.
-        ensure!(!findings.is_empty(), "{} is not provoked", code.name());
+            inject(&image, code).with_context(|| format!("{} was injected", code.name()))?;
+        // A fault that nothing injects must not look like one that was found.
+        ensure!(!findings.is_empty(), "{} is not injected", code.name());
         for finding in findings {
             println!("{}", finding.row(code));
             compared.0 += finding.compared.0;
@@ -74,7 +72,7 @@ pub(crate) fn run(
         }
     }
     println!(
-        "{} provocations, all found; {} converter words and {} bytes of the link compared with the twin's, 0 differ",
+        "{} fault injections, all found; {} converter words and {} bytes of the link compared with the reference model's, 0 differ",
         table.finding.len(),
         compared.0,
         compared.1
@@ -82,25 +80,26 @@ pub(crate) fn run(
     if only.is_some() {
         return Ok(());
     }
-    starts::refused_job(&image).context("a job with settings that are refused")?;
+    at_start::refused_job(&image).context("a job with settings that are refused")?;
     let key = image.target.scalar_name();
     if overwrite {
-        GOLDEN.store([(key, table)])
+        // Found ticks and words depend on no compiler.
+        GOLDEN.store(None, [(key, table)])
     } else {
         compare(&key, &table)
     }
 }
 
-/// All ways to provoke a fault.
-fn provoke(image: &Image, code: FaultCode) -> Result<Vec<Finding>> {
+/// All ways to inject a fault.
+fn inject(image: &Image, code: FaultCode) -> Result<Vec<Finding>> {
     if let Some(case) = case::of(code) {
-        let mut setup = case::setup();
-        (case.adjust)(&mut setup);
-        let mut bench = Bench::start(image, setup)?;
-        let finding = finding::provoke(&mut bench, code, &case);
-        let log = bench.end()?;
+        let mut configuration = case::configuration();
+        (case.adjust)(&mut configuration);
+        let mut fixture = Fixture::start(image, configuration)?;
+        let finding = finding::inject(&mut fixture, code, &case);
+        let log = fixture.end()?;
         let finding = finding.with_context(|| format!("the log:\n{}", log.join("\n")))?;
-        finding::said(
+        finding::log_contains(
             &log,
             &format!("fault {} on {} at tick", code.number(), finding.axis),
         )?;
@@ -115,21 +114,21 @@ fn provoke(image: &Image, code: FaultCode) -> Result<Vec<Finding>> {
             );
             vec![finding]
         }
-        FaultCode::Panic | FaultCode::HardFault => starts::deaths(image, code)?,
-        FaultCode::SettingsInvalid => vec![starts::refused_settings(image)?],
+        FaultCode::Panic | FaultCode::HardFault => at_start::resets(image, code)?,
+        FaultCode::SettingsInvalid => vec![at_start::refused_settings(image)?],
         _ => Vec::new(),
     })
 }
 
 fn compare(key: &str, table: &Table) -> Result<()> {
-    let Some(expected) = GOLDEN.read::<Table>()?.remove(key) else {
+    let Some(expected) = GOLDEN.read::<Table>()?.tables.remove(key) else {
         bail!(
             "no table is committed for {key}: `cargo xtask faults --overwrite-expected` makes one"
         );
     };
     ensure!(
         expected.finding.len() == table.finding.len(),
-        "{} provocations instead of {}; if that is wanted, `cargo xtask faults --overwrite-expected` accepts it",
+        "{} fault injections instead of {}; if that is wanted, `cargo xtask faults --overwrite-expected` accepts it",
         table.finding.len(),
         expected.finding.len()
     );

@@ -1,12 +1,12 @@
-//! `cargo xtask story`: a machine's whole story, told by the emulated image through the console alone.
+//! `cargo xtask transcript`: a session through the console, end to end, on the emulated image.
 
 use anyhow::Result;
 
-use crate::command;
-use crate::image::{self, Board, Scalar, Target};
-use crate::toolchain::Toolchain;
+use xtask::command;
+use xtask::image::{self, Board, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
-/// Builds the image and runs the test that plays the story on it (`host-sim/tests/story.rs`).
+/// Builds the image and runs the tests that play the session on it (`host-sim/tests/suite/transcript.rs`).
 pub(crate) fn run(toolchain: Toolchain, overwrite_expected: bool) -> Result<()> {
     let target = Target {
         board: Board::Mps2,
@@ -15,15 +15,9 @@ pub(crate) fn run(toolchain: Toolchain, overwrite_expected: bool) -> Result<()> 
     let image = image::build(toolchain, target)?;
     let mut test = command::command("cargo");
     // Of the whole workspace, so that nothing is built with other features than the other tests.
-    test.args([
-        "test",
-        "--workspace",
-        "--test",
-        "story",
-        "--",
-        "--include-ignored",
-    ])
-    .env("QUADRANT_EMULATED_IMAGE", &image.path);
+    test.args(["test", "--workspace", "--test", "suite"])
+        .args(["--", "--include-ignored", "transcript::"])
+        .env("QUADRANT_EMULATED_IMAGE", &image.path);
     if overwrite_expected {
         test.env("QUADRANT_OVERWRITE_EXPECTED", "1");
     }

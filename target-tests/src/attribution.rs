@@ -5,8 +5,8 @@ use std::collections::HashMap;
 use addr2line::Loader;
 use anyhow::{Result, anyhow};
 
-use crate::image::Image;
 use crate::stages;
+use xtask::image::Image;
 
 /// Looks up instructions, each once.
 pub(crate) struct Attribution {

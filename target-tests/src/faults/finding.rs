@@ -1,4 +1,4 @@
-//! What came of a provocation.
+//! The outcome of a fault injection.
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::message::{Body, FaultReport};
@@ -6,8 +6,8 @@ use quadrant::safety::{FaultCode, Reaction};
 use quadrant::stage::Outputs;
 use serde::{Deserialize, Serialize};
 
-use super::bench::{A_WHILE, Bench};
 use super::case::Case;
+use super::fixture::{A_WHILE, Fixture};
 
 /// Ticks within which everything is found and has come to an end.
 const LONGEST: u32 = 40_000;
@@ -16,31 +16,31 @@ const CAPTURE_TICKS: u32 = 300;
 
 /// How a fault was found.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub(super) struct Finding {
+pub(crate) struct Finding {
     /// The fault.
-    pub(super) fault: String,
+    pub(crate) fault: String,
     /// What was done.
-    pub(super) how: String,
+    pub(crate) how: String,
     /// The axis that the firmware named, or the stage.
-    pub(super) axis: String,
+    pub(crate) axis: String,
     /// Ticks from the first whose inputs show the cause, which is 1, to the one that found it; none: when the firmware
     /// started.
-    pub(super) ticks: Option<u32>,
+    pub(crate) ticks: Option<u32>,
     /// The converters' words in that tick.
-    pub(super) codes: [i16; 3],
+    pub(crate) codes: [i16; 3],
     /// Whether the amplifiers were enabled in it.
-    pub(super) enabled: bool,
+    pub(crate) enabled: bool,
     /// Ticks from there to the first with the amplifiers disabled.
-    pub(super) ticks_until_off: u32,
+    pub(crate) ticks_until_off: u32,
     /// Whether its trace was captured.
-    pub(super) captured: bool,
-    /// Converter words and bytes of the link that were compared with the twin's.
-    pub(super) compared: (u64, u64),
+    pub(crate) captured: bool,
+    /// Converter words and bytes of the link that were compared with the reference model's.
+    pub(crate) compared: (u64, u64),
 }
 
 impl Finding {
     /// One at the start of a firmware.
-    pub(super) fn at_start(how: &str, code: FaultCode) -> Self {
+    pub(crate) fn at_start(how: &str, code: FaultCode) -> Self {
         Self {
             fault: code.name().into(),
             how: how.into(),
@@ -55,7 +55,7 @@ impl Finding {
     }
 
     /// A row of the table in `docs/safety.md`.
-    pub(super) fn row(&self, code: FaultCode) -> String {
+    pub(crate) fn row(&self, code: FaultCode) -> String {
         let [x, y, z] = self.codes;
         let reaction = match code.reaction() {
             Reaction::Off => "Off",
@@ -78,33 +78,33 @@ impl Finding {
     }
 }
 
-/// Provokes a fault of the running machine.
-pub(super) fn provoke(bench: &mut Bench, code: FaultCode, case: &Case) -> Result<Finding> {
-    let from = (case.bring)(bench)?;
+/// Injects a fault into the running machine.
+pub(crate) fn inject(fixture: &mut Fixture, code: FaultCode, case: &Case) -> Result<Finding> {
+    let from = (case.bring)(fixture)?;
     // It may be due only.
-    bench.run(from.saturating_sub(bench.tick()))?;
-    let first = |bench: &Bench, enabled: bool, from: u32| {
-        (from..bench.tick()).find(|tick| {
-            bench
+    fixture.run(from.saturating_sub(fixture.tick()))?;
+    let first = |fixture: &Fixture, enabled: bool, from: u32| {
+        (from..fixture.tick()).find(|tick| {
+            fixture
                 .outputs(*tick)
                 .is_some_and(|outputs| outputs.enabled == enabled)
         })
     };
-    let before = from.checked_sub(1).and_then(|tick| bench.outputs(tick));
+    let before = from.checked_sub(1).and_then(|tick| fixture.outputs(tick));
     ensure!(
         before.is_some_and(|outputs| outputs.enabled),
         "the outputs were not enabled when it began"
     );
-    bench.run_until(LONGEST, "the outputs off", |bench| {
-        first(bench, false, from).is_some()
+    fixture.run_until(LONGEST, "the outputs off", |fixture| {
+        first(fixture, false, from).is_some()
     })?;
-    bench.run(CAPTURE_TICKS)?;
-    let report = latched(bench, code)?;
+    fixture.run(CAPTURE_TICKS)?;
+    let report = latched(fixture, code)?;
     let found = report.tick;
-    let outputs = bench.outputs(found).context("a tick that has been")?;
-    let off = first(bench, false, from).context("it is off")?;
+    let outputs = fixture.outputs(found).context("a tick that has been")?;
+    let off = first(fixture, false, from).context("it is off")?;
     ensure!(
-        first(bench, true, off).is_none(),
+        first(fixture, true, off).is_none(),
         "the outputs were enabled again"
     );
     Ok(Finding {
@@ -115,14 +115,14 @@ pub(super) fn provoke(bench: &mut Bench, code: FaultCode, case: &Case) -> Result
         // A converter that is not to be trusted is disabled by its board, a tick before the control law knows.
         ticks_until_off: off.saturating_sub(found),
         captured: report.captured,
-        compared: bench.compared,
+        compared: fixture.compared,
         ..Finding::at_start(case.how, code)
     })
 }
 
 /// The fault that the firmware says is latched, which must be this one, and keep the outputs off.
-pub(super) fn latched(bench: &mut Bench, code: FaultCode) -> Result<FaultReport> {
-    let Some(report) = bench.fault()? else {
+pub(crate) fn latched(fixture: &mut Fixture, code: FaultCode) -> Result<FaultReport> {
+    let Some(report) = fixture.fault()? else {
         bail!("no fault is latched")
     };
     ensure!(
@@ -136,15 +136,15 @@ pub(super) fn latched(bench: &mut Bench, code: FaultCode) -> Result<FaultReport>
         "the report says something else: {report:?}"
     );
     ensure!(
-        bench.ask(Body::Enable)?.is_err(),
+        fixture.ask(Body::Enable)?.is_err(),
         "outputs could be enabled while the fault is latched"
     );
-    bench.run(A_WHILE)?;
+    fixture.run(A_WHILE)?;
     Ok(report)
 }
 
 /// Whether the log has a line with these words.
-pub(super) fn said(log: &[String], words: &str) -> Result<()> {
+pub(crate) fn log_contains(log: &[String], words: &str) -> Result<()> {
     ensure!(
         log.iter().any(|line| line.contains(words)),
         "the log does not say `{words}`:\n{}",
@@ -154,6 +154,6 @@ pub(super) fn said(log: &[String], words: &str) -> Result<()> {
 }
 
 /// That all outputs are off.
-pub(super) fn are_off(outputs: &[Outputs]) -> bool {
+pub(crate) fn are_off(outputs: &[Outputs]) -> bool {
     outputs.iter().all(|outputs| *outputs == Outputs::default())
 }

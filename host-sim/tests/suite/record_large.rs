@@ -1,9 +1,7 @@
 //! A recording of ten million rows, a quarter of an hour at 10 kHz: time and memory of its identification.
 //!
-//! Ignored by default, because the file takes 0.7 GB of disk: `cargo test -p quadrant-sim --test record_large -- --ignored
+//! Ignored by default, because the file takes 0.7 GB of disk: `cargo test -p quadrant-sim --test suite record_large -- --ignored
 //! --nocapture`.
-#![cfg(target_os = "linux")]
-
 use std::fs;
 use std::io::{BufWriter, Write};
 use std::path::Path;

@@ -6,10 +6,10 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::link::lockstep::Job;
 
-use crate::image::{self, Board, Scalar, Target};
-use crate::toolchain::Toolchain;
-use crate::twin::{self, Twin};
-use crate::{count, emulate};
+use crate::reference_model::{self, ReferenceModel};
+use crate::{count, lockstep};
+use xtask::image::{self, Board, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 /// A law and a feedforward.
 type Combination = (LawKind, FeedforwardKind);
@@ -25,7 +25,7 @@ fn all() -> Vec<Combination> {
 
 /// The job of an emulated run, each axis with a combination of its own.
 fn job(axes: [Combination; 3]) -> Job {
-    let mut job = twin::job();
+    let mut job = reference_model::job();
     for (axis, (law, kind)) in job.stage.axes.iter_mut().zip(axes) {
         axis.feedback.law = law;
         axis.feedforward.kind = kind;
@@ -47,10 +47,11 @@ pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
     for three in combinations.chunks(3) {
         // A short chunk runs its last combination again.
         let axes = [0, 1, 2].map(|index: usize| three[index.min(three.len() - 1)]);
-        let tally = emulate::lockstep(&image, Twin::of(scalar, job(axes))?, TICKS)?.tally;
-        if let Some((tick, twin, firmware)) = &tally.first {
+        let tally =
+            lockstep::lockstep(&image, ReferenceModel::of(scalar, job(axes))?, TICKS)?.tally;
+        if let Some((tick, model, firmware)) = &tally.first {
             println!(
-                "{axes:?}: first difference at tick {tick}: {twin:?} here, {firmware:?} in the firmware"
+                "{axes:?}: first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware"
             );
         }
         ensure!(tally.differ == 0, "{axes:?}: {} words differ", tally.differ);

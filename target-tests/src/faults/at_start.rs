@@ -9,15 +9,15 @@ use quadrant::stage::Outputs;
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
 use quadrant_sim::simulated_machine::MemoryFlash;
 
-use super::bench::Bench;
-use super::case::{moving, setup};
-use super::finding::{Finding, latched, said};
-use crate::image::Image;
-use crate::twin;
+use super::case::{configuration, moving};
+use super::finding::{Finding, latched, log_contains};
+use super::fixture::Fixture;
+use crate::reference_model;
 use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use xtask::image::Image;
 
 /// What ends a firmware, what the next one finds, and what it says of it.
-const DEATHS: [(&str, Provocation, FaultCode, &str); 5] = [
+const RESETS: [(&str, Provocation, FaultCode, &str); 5] = [
     (
         "a panic of the idle loop, 30 mm/s",
         Provocation::Panic,
@@ -51,22 +51,22 @@ const DEATHS: [(&str, Provocation, FaultCode, &str); 5] = [
 ];
 
 /// Ends the firmware in motion, in every way that leads to a fault.
-pub(super) fn deaths(image: &Image, fault: FaultCode) -> Result<Vec<Finding>> {
-    DEATHS
+pub(crate) fn resets(image: &Image, fault: FaultCode) -> Result<Vec<Finding>> {
+    RESETS
         .into_iter()
         .filter(|(_, _, code, _)| *code == fault)
         .map(|(how, what, code, words)| {
-            let mut bench = Bench::start(image, setup())?;
-            moving(&mut bench, 1.0)?;
-            let at = bench.tick();
-            let left = bench.provoke(what, code)?;
+            let mut fixture = Fixture::start(image, configuration())?;
+            moving(&mut fixture, 1.0)?;
+            let at = fixture.tick();
+            let left = fixture.inject_fault(what, code)?;
             ensure!(
                 left == Outputs::default(),
                 "{how}: {left:?} was left at the outputs"
             );
-            let finding = at_start(bench, how, code, |log| {
-                said(log, words)?;
-                said(log, &format!("ended in tick {at} "))
+            let finding = at_start(fixture, how, code, |log| {
+                log_contains(log, words)?;
+                log_contains(log, &format!("ended in tick {at} "))
             })?;
             Ok(finding)
         })
@@ -75,14 +75,19 @@ pub(super) fn deaths(image: &Image, fault: FaultCode) -> Result<Vec<Finding>> {
 
 /// A job whose settings are refused: the firmware panics before its first tick, outputs first, and names the field. No
 /// firmware could do better with that job, so that this one ends.
-pub(super) fn refused_job(image: &Image) -> Result<()> {
+pub(crate) fn refused_job(image: &Image) -> Result<()> {
     let memory = Memory::create()?;
-    let mut job = twin::job();
+    let mut job = reference_model::job();
     job.stage.axes[1].feedback.pid.kp_v_per_mm = f64::NAN;
-    memory.prepare(Mode::Lockstep, 0, &twin::encode(&job)?)?;
+    memory.prepare(Mode::Lockstep, 0, &reference_model::encode(&job)?)?;
     memory.write(OUTPUT, &[0xFF; OutputRecord::BYTES])?;
-    let (succeeded, log) =
-        Emulator::start(&image.program()?, &memory, Clock::Host, |_| {})?.end()?;
+    let (succeeded, log) = Emulator::start(
+        &reference_model::program(image)?,
+        &memory,
+        Clock::Host,
+        |_| {},
+    )?
+    .end()?;
     ensure!(
         !succeeded,
         "the firmware took settings that must be refused"
@@ -93,14 +98,14 @@ pub(super) fn refused_job(image: &Image) -> Result<()> {
         left == [0; OutputRecord::BYTES],
         "the panic left {left:?} at the outputs"
     );
-    said(
+    log_contains(
         &log,
         "y.feedback.pid.kp_v_per_mm = NaN is not a finite number",
     )
 }
 
 /// Starts on a set that a firmware with room for more elements has stored.
-pub(super) fn refused_settings(image: &Image) -> Result<Finding> {
+pub(crate) fn refused_settings(image: &Image) -> Result<Finding> {
     let mut settings = StageSettings::default();
     let more = FIRMWARE_ELEMENTS + 1;
     let element = GmsElement {
@@ -112,31 +117,31 @@ pub(super) fn refused_settings(image: &Image) -> Result<Finding> {
     store
         .save(&settings, more, &Provenance::new(), &mut [0; BUFFER_BYTES])
         .map_err(|error| anyhow!("the set was not stored: {error}"))?;
-    let mut setup = setup();
-    setup.flash = store.into_flash();
+    let mut configuration = configuration();
+    configuration.flash = store.into_flash();
     let how = "a stored set with more GMS elements than the firmware has room for";
-    let bench = Bench::start(image, setup)?;
-    at_start(bench, how, FaultCode::SettingsInvalid, |log| {
-        said(log, "stored settings refused: ")
+    let fixture = Fixture::start(image, configuration)?;
+    at_start(fixture, how, FaultCode::SettingsInvalid, |log| {
+        log_contains(log, "stored settings refused: ")
     })
 }
 
 /// What a firmware that starts with a fault says and does.
 fn at_start(
-    mut bench: Bench,
+    mut fixture: Fixture,
     how: &str,
     code: FaultCode,
     check: impl FnOnce(&[String]) -> Result<()>,
 ) -> Result<Finding> {
-    let report = latched(&mut bench, code)?;
+    let report = latched(&mut fixture, code)?;
     ensure!(report.tick == 0, "not at the start: {report:?}");
-    let compared = bench.compared;
-    let outputs = (0..bench.tick()).filter_map(|tick| bench.outputs(tick));
+    let compared = fixture.compared;
+    let outputs = (0..fixture.tick()).filter_map(|tick| fixture.outputs(tick));
     ensure!(
         { outputs }.all(|outputs| outputs == Outputs::default()),
         "outputs are not off after the start"
     );
-    check(&bench.end()?)?;
+    check(&fixture.end()?)?;
     Ok(Finding {
         compared,
         ..Finding::at_start(how, code)

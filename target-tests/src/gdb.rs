@@ -2,20 +2,53 @@
 
 use std::io::{Read, Write};
 use std::os::unix::net::UnixStream;
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
 /// How long QEMU may take to open its port, and to answer.
-const PATIENCE: Duration = Duration::from_secs(20);
+const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The number of the program counter among the registers r0 to r15.
 pub(crate) const PROGRAM_COUNTER: usize = 15;
 
 /// The number of the stack pointer.
 pub(crate) const STACK_POINTER: usize = 13;
+
+/// The path of a socket for the port, removed when dropped.
+pub(crate) struct Port(PathBuf);
+
+impl Port {
+    pub(crate) fn new() -> Self {
+        static NUMBER: AtomicU32 = AtomicU32::new(0);
+        let number = NUMBER.fetch_add(1, Ordering::Relaxed);
+        let name = format!("quadrant-debugger-{}-{number}", std::process::id());
+        Self(std::env::temp_dir().join(name))
+    }
+
+    /// Lets QEMU open the port, and stop before the first instruction.
+    pub(crate) fn add_to(&self, qemu: &mut Command) {
+        let port = self.0.display();
+        qemu.args(["-S", "-gdb", "chardev:port", "-chardev"])
+            .arg(format!("socket,id=port,path={port},server=on,wait=off"));
+    }
+
+    /// Connects to it.
+    pub(crate) fn connect(&self) -> Result<Debugger> {
+        Debugger::connect(&self.0)
+    }
+}
+
+impl Drop for Port {
+    fn drop(&mut self) {
+        // It may never have been there.
+        let _ = std::fs::remove_file(&self.0);
+    }
+}
 
 /// A stopped processor.
 pub(crate) struct Debugger {
@@ -25,18 +58,18 @@ pub(crate) struct Debugger {
 
 impl Debugger {
     /// Connects to the port, which QEMU opens a moment after its start.
-    pub(crate) fn connect(path: &Path) -> Result<Self> {
+    fn connect(path: &Path) -> Result<Self> {
         let begun = Instant::now();
         let stream = loop {
             match UnixStream::connect(path) {
                 Ok(stream) => break stream,
-                Err(_) if begun.elapsed() < PATIENCE => thread::sleep(Duration::from_millis(20)),
+                Err(_) if begun.elapsed() < TIMEOUT => thread::sleep(Duration::from_millis(20)),
                 Err(error) => {
                     return Err(error).context("QEMU has not opened its debugger port");
                 }
             }
         };
-        stream.set_read_timeout(Some(PATIENCE))?;
+        stream.set_read_timeout(Some(TIMEOUT))?;
         let mut debugger = Self {
             stream,
             received: Vec::new(),
@@ -93,8 +126,33 @@ impl Debugger {
     pub(crate) fn run(&mut self, time: Duration) -> Result<()> {
         self.send("c")?;
         thread::sleep(time);
+        self.stop()
+    }
+
+    /// Runs until an instruction is about to be executed.
+    pub(crate) fn run_to(&mut self, address: u32) -> Result<()> {
+        self.order(&format!("Z0,{address:x},2"))?;
+        self.ask("c")?;
+        self.order(&format!("z0,{address:x},2"))
+    }
+
+    /// Runs on.
+    pub(crate) fn resume(&mut self) -> Result<()> {
+        self.send("c")
+    }
+
+    /// Stops.
+    pub(crate) fn stop(&mut self) -> Result<()> {
         self.stream.write_all(&[3])?;
         self.answer().map(drop)
+    }
+
+    /// Gives a command to QEMU's monitor; one that it does not know does nothing.
+    pub(crate) fn monitor(&mut self, command: &str) -> Result<()> {
+        self.send(&format!("qRcmd,{}", hex(command.as_bytes())))?;
+        // What the monitor prints comes in packets of its own.
+        while self.answer()? != "OK" {}
+        Ok(())
     }
 
     fn order(&mut self, packet: &str) -> Result<()> {

@@ -1,13 +1,13 @@
-//! A machine's whole story, driven through the console alone, and what a person sees of it, to the last character: on the
-//! simulated machine, and with the firmware's image in QEMU (`cargo xtask story`, which also rewrites what is expected).
+//! A session from an empty flash to a fault and back, end to end, driven through the console alone, and what a person sees of it, to the last character: on the
+//! simulated machine, and with the firmware's image in QEMU (`cargo xtask transcript`, which also rewrites what is expected).
 
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
 
-const SCRIPT: &str = include_str!("story/script.txt");
-const SETTINGS: &str = include_str!("../data/identified-stage.toml");
+const SCRIPT: &str = include_str!("../transcript/script.txt");
+const SETTINGS: &str = include_str!("../../data/identified-stage.toml");
 /// Before the firmware's log, in the transcript of the emulated board.
 const LOG: &str = "> log\n";
 
@@ -43,7 +43,7 @@ fn play(place: &[&str], script: &str) -> Told {
 
 fn golden(name: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("tests/story")
+        .join("tests/transcript")
         .join(name)
 }
 
@@ -61,14 +61,14 @@ fn compare(name: &str, transcript: &str) {
         assert_eq!(
             told,
             expected,
-            "{} line {number}; `cargo xtask story --overwrite-expected` takes the new one",
+            "{} line {number}; `cargo xtask transcript --overwrite-expected` takes the new one",
             path.display()
         );
     }
     assert_eq!(lines.next(), None, "more than {} says", path.display());
 }
 
-/// A column of a file that the story has left.
+/// A column of a file that the session has left.
 fn column(told: &Told, file: &str, column: usize) -> Vec<f64> {
     let text = fs::read_to_string(told.folder.path().join(file)).unwrap();
     let values = text.lines().skip(1).map(|line| line.split(',').nth(column));
@@ -91,7 +91,7 @@ fn number(lines: &[&str], words: &str, before: &str) -> f64 {
     word.trim_end_matches(',').parse().unwrap()
 }
 
-/// What must be true of a story whatever its numbers are.
+/// Checks what must be true of a session whatever its numbers are.
 fn check(told: &Told) {
     let lines: Vec<&str> = told.transcript.lines().collect();
     // Bumpless: from tick to tick, the output steps no further than it did before the change.
@@ -123,7 +123,7 @@ fn check(told: &Told) {
 }
 
 #[test]
-fn the_simulated_machine_tells_the_committed_story() {
+fn the_simulated_machine_prints_the_committed_transcript() {
     let told = play(&["--simulated"], SCRIPT);
     check(&told);
     compare("simulated.txt", &told.transcript);
@@ -136,7 +136,7 @@ fn emulated() -> String {
 }
 
 #[test]
-#[ignore = "needs QEMU and the firmware's image: `cargo xtask story`"]
+#[ignore = "needs QEMU and the firmware's image: `cargo xtask transcript`"]
 fn a_restart_and_a_flash_file_are_the_same_on_the_emulated_board() {
     const STORE: &str =
         "set x/feedback/pid/kp_v_per_mm 0.8\napply\nstore 'a test'\nreboot\nwait 0.1\nstatus\n";
@@ -156,8 +156,8 @@ fn a_restart_and_a_flash_file_are_the_same_on_the_emulated_board() {
 }
 
 #[test]
-#[ignore = "needs QEMU and the firmware's image: `cargo xtask story`"]
-fn the_emulated_board_tells_the_committed_story() {
+#[ignore = "needs QEMU and the firmware's image: `cargo xtask transcript`"]
+fn the_emulated_board_prints_the_committed_transcript() {
     let told = play(&[&emulated()], &format!("{SCRIPT}log\n"));
     check(&told);
     compare("emulated.txt", &told.transcript);

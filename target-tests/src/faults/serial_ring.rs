@@ -1,11 +1,11 @@
-//! The twin's end of the link's port: what the emulated board does with its two rings.
+//! The reference model's end of the link's port: what the emulated board does with its two rings.
 
 use quadrant::hal::Serial;
 use quadrant::link::lockstep::LINK_BYTES;
 
 /// A port between whose ends bytes change hands once a tick.
 #[derive(Debug, Default)]
-pub(super) struct Port {
+pub(crate) struct SerialRing {
     /// Bytes of the host that may be read.
     arrived: std::collections::VecDeque<u8>,
     /// Bytes written and not shown.
@@ -14,9 +14,9 @@ pub(super) struct Port {
     on_their_way: usize,
 }
 
-impl Port {
+impl SerialRing {
     /// Takes what the host has written by now, and how much of what it was shown it has taken; gives what it is shown now.
-    pub(super) fn exchange(&mut self, arriving: &[u8], taken: usize) -> Vec<u8> {
+    pub(crate) fn exchange(&mut self, arriving: &[u8], taken: usize) -> Vec<u8> {
         self.arrived.extend(arriving);
         let shown = std::mem::take(&mut self.written);
         self.on_their_way = self.on_their_way + shown.len() - taken;
@@ -24,7 +24,7 @@ impl Port {
     }
 }
 
-impl Serial for Port {
+impl Serial for SerialRing {
     fn read(&mut self, into: &mut [u8]) -> usize {
         let count = into.len().min(self.arrived.len());
         for (place, byte) in into.iter_mut().zip(self.arrived.drain(..count)) {

@@ -24,13 +24,6 @@ use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 use crate::common::Noise;
 use crate::link_traffic::{arrival, framed};
 
-#[allow(dead_code, reason = "the law's tests use the rest")]
-#[path = "../../tests/law/common.rs"]
-mod common;
-#[allow(dead_code, reason = "the law's tests use the rest")]
-#[path = "../../tests/law/link_traffic.rs"]
-mod link_traffic;
-
 /// Bytes that may wait before the machine runs on.
 const BACKLOG: usize = 1_000;
 /// Requests to start afresh of which one is sent: each start takes memory for good.
@@ -382,7 +375,7 @@ fn a_hostile_line_neither_enables_nor_moves_the_machine() {
     check(1, 30_000);
 }
 
-/// `cargo test -p quadrant-sim --test hostile_link ten_million -- --ignored --nocapture`
+/// `cargo test -p quadrant-sim --test suite ten_million -- --ignored --nocapture`
 #[test]
 #[ignore = "ten million frames take long"]
 fn ten_million_frames_of_a_hostile_line() {

@@ -2,17 +2,19 @@
 
 use std::collections::BTreeMap;
 use std::io::{BufRead, BufReader, Read};
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 use anyhow::{Context, Result};
-use quadrant_sim::emulator::{self, Clock, Memory};
+use quadrant_sim::emulator::{self, Clock, Emulator, Memory};
 
 use crate::attribution::Attribution;
-use crate::call_graph::CallGraph;
-use crate::image::Image;
-use crate::listing::Listing;
-use crate::prove::ROOT;
+use crate::gdb::{Debugger, Port};
+use crate::reference_model;
 use crate::stages;
+use xtask::call_graph::CallGraph;
+use xtask::image::Image;
+use xtask::listing::Listing;
+use xtask::prove::ROOT;
 
 /// What is to be seen of an image.
 pub(crate) struct Trace {
@@ -36,24 +38,25 @@ impl Trace {
         })
     }
 
-    /// QEMU's command line, with the trace at standard error.
-    pub(crate) fn command_line(&self, image: &Image, memory: &Memory) -> Result<Command> {
-        let mut qemu = emulator::command_line(&image.program()?, memory, Clock::Host);
-        qemu.args(["-singlestep", "-d", "exec,nochain"])
-            .args(["-dfilter", &self.filter(image)?])
-            .stderr(Stdio::piped());
-        Ok(qemu)
+    /// Starts the image, stopped before its first instruction.
+    pub(crate) fn start(&self, image: &Image, memory: &Memory) -> Result<(Emulator, Tracer)> {
+        start(image, memory, &self.filter(image)?)
+    }
+
+    /// The first instruction of a control tick.
+    pub(crate) fn root(&self) -> u32 {
+        self.root
     }
 
     /// Reads a trace to its end: the control ticks, the first being number 1.
-    pub(crate) fn read(self, image: &Image, trace: impl Read) -> Result<Vec<Tick>> {
+    pub(crate) fn read(&self, image: &Image, trace: impl Read) -> Result<Vec<Tick>> {
         let Self {
             root,
             listing,
             reached,
         } = self;
         let tally = Tally {
-            root,
+            root: *root,
             inside: Box::new(|address| {
                 let start = listing.at(address)?.range.start;
                 reached.binary_search(&start).is_ok().then_some(start)
@@ -75,6 +78,51 @@ impl Trace {
         let ranges = starts.iter().filter_map(|start| self.listing.at(*start));
         let ranges = ranges.map(|f| format!("{:#x}..{:#x}", f.range.start, f.range.end - 1));
         Ok(ranges.collect::<Vec<_>>().join(","))
+    }
+}
+
+/// Starts an image, stopped before its first instruction, whose trace in some ranges of addresses comes at standard error.
+pub(crate) fn start(image: &Image, memory: &Memory, filter: &str) -> Result<(Emulator, Tracer)> {
+    let program = reference_model::program(image)?;
+    let port = Port::new();
+    let mut qemu = emulator::command_line(&program, memory, Clock::Host);
+    qemu.args(["-dfilter", filter]).stderr(Stdio::piped());
+    port.add_to(&mut qemu);
+    let emulator = Emulator::spawn(qemu, &program, |_| {})?;
+    let debugger = port.connect()?;
+    Ok((emulator, Tracer { debugger }))
+}
+
+/// The switch of a trace. Single instructions take hundreds of times as long as translated code: what comes before those
+/// that count, such as the building of tables, runs without.
+pub(crate) struct Tracer {
+    debugger: Debugger,
+}
+
+impl Tracer {
+    /// Runs without a trace.
+    pub(crate) fn run(&mut self) -> Result<()> {
+        self.debugger.resume()
+    }
+
+    /// Runs without a trace to an instruction, and with a trace from there on.
+    pub(crate) fn trace_from(&mut self, address: u32) -> Result<()> {
+        self.debugger.run_to(address)?;
+        self.switch_on()
+    }
+
+    /// Traces from now on.
+    pub(crate) fn trace(&mut self) -> Result<()> {
+        self.debugger.stop()?;
+        self.switch_on()
+    }
+
+    fn switch_on(&mut self) -> Result<()> {
+        // Its name until QEMU 8.0, and since.
+        self.debugger.monitor("singlestep on")?;
+        self.debugger.monitor("one-insn-per-tb on")?;
+        self.debugger.monitor("log exec,nochain")?;
+        self.debugger.resume()
     }
 }
 

@@ -1,7 +1,7 @@
-//! The emulated firmware on the simulated stage beside its twin in this process, with a host at its link and somebody who
+//! The emulated firmware on the simulated stage beside the reference model in this process, with a host at its link and somebody who
 //! breaks things.
 
-mod talk;
+mod link;
 
 use std::time::{Duration, Instant};
 
@@ -19,34 +19,34 @@ use quadrant_sim::emulator::{Clock, Emulator, Memory};
 use quadrant_sim::plant::{MarkTruth, SimulatedStage, StageTruth};
 use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 
-use self::talk::Talk;
-use super::port::Port;
-use crate::image::{self, Image};
-use crate::twin;
+use self::link::HostLink;
+use super::serial_ring::SerialRing;
+use crate::reference_model;
+use xtask::image::{self, Image};
 
 /// Seed of the simulated stage's noise.
 const SEED: u64 = 1;
 /// How long the firmware may take to answer, in the host's time: when it is traced, its start takes longest.
-const PATIENCE: Duration = Duration::from_secs(120);
+const TIMEOUT: Duration = Duration::from_secs(120);
 /// Looks at the answer between two pauses.
 const LOOKS: u32 = 1 << 8;
 /// Pauses between two looks at the clock.
 const PAUSES: u32 = 1 << 8;
 /// Ticks until the firmware has looked at what was asked or has happened.
-pub(super) const A_WHILE: u32 = 40;
+pub(crate) const A_WHILE: u32 = 40;
 
 /// What goes wrong: changes what the firmware reads, or the stage itself, given the ticks since it began to.
-pub(super) type Cause = Box<dyn FnMut(&mut InputRecord, &mut SimulatedStage, u32)>;
+pub(crate) type InputFault = Box<dyn FnMut(&mut InputRecord, &mut SimulatedStage, u32)>;
 
 /// An application of either number type.
 trait Application {
-    fn tick(&mut self, input: &InputRecord, port: &mut Port) -> Outputs;
+    fn tick(&mut self, input: &InputRecord, serial: &mut SerialRing) -> Outputs;
     fn mode_of_x(&self) -> CourseMode;
 }
 
 impl<S: Scalar> Application for Running<S> {
-    fn tick(&mut self, input: &InputRecord, port: &mut Port) -> Outputs {
-        Running::tick(self, input, port).0
+    fn tick(&mut self, input: &InputRecord, serial: &mut SerialRing) -> Outputs {
+        Running::tick(self, input, serial).0
     }
 
     fn mode_of_x(&self) -> CourseMode {
@@ -54,44 +54,44 @@ impl<S: Scalar> Application for Running<S> {
     }
 }
 
-/// What firmware and twin start with.
-pub(super) struct Setup {
+/// What firmware and reference model start with.
+pub(crate) struct Configuration {
     /// Settings of a machine whose flash is empty, and motions.
-    pub(super) job: Job,
+    pub(crate) job: Job,
     /// Where the stage's marks are.
-    pub(super) marks: MarkTruth,
+    pub(crate) marks: MarkTruth,
     /// The flash for settings.
-    pub(super) flash: MemoryFlash,
+    pub(crate) flash: MemoryFlash,
 }
 
-/// Firmware and twin.
-pub(super) struct Bench {
+/// Firmware and reference model.
+pub(crate) struct Fixture {
     memory: Memory,
     emulator: Emulator,
     scalar: image::Scalar,
-    setup: Setup,
-    twin: Box<dyn Application>,
-    port: Port,
+    configuration: Configuration,
+    model: Box<dyn Application>,
+    serial: SerialRing,
     plant: SimulatedStage,
-    cause: Option<(u32, Cause)>,
+    cause: Option<(u32, InputFault)>,
     /// Ticks since the firmware's start.
     tick: u32,
     /// The outputs of each.
     outputs: Vec<Outputs>,
-    talk: Talk,
+    host: HostLink,
     mismatches: [bool; 3],
     streams_since: Option<u32>,
     starts: u32,
     /// Converter words and bytes of the link that were compared.
-    pub(super) compared: (u64, u64),
+    pub(crate) compared: (u64, u64),
 }
 
-impl Bench {
+impl Fixture {
     /// Starts both.
-    pub(super) fn start(image: &Image, setup: Setup) -> Result<Self> {
-        Self::start_with(image, setup, |memory| {
+    pub(crate) fn start(image: &Image, configuration: Configuration) -> Result<Self> {
+        Self::start_with(image, configuration, |memory| {
             Ok(Emulator::start(
-                &image.program()?,
+                &reference_model::program(image)?,
                 memory,
                 Clock::Host,
                 |_| {},
@@ -100,39 +100,49 @@ impl Bench {
     }
 
     /// The same with an emulator of one's own.
-    pub(super) fn start_with(
+    pub(crate) fn start_with(
         image: &Image,
-        setup: Setup,
+        configuration: Configuration,
         emulator: impl FnOnce(&Memory) -> Result<Emulator>,
     ) -> Result<Self> {
         let memory = Memory::create()?;
-        memory.prepare(Mode::Lockstep, 0, &twin::encode(&setup.job)?)?;
-        let flash: Vec<u8> = setup.flash.bytes().iter().map(|byte| !byte).collect();
+        memory.prepare(
+            Mode::Lockstep,
+            0,
+            &reference_model::encode(&configuration.job)?,
+        )?;
+        let flash: Vec<u8> = configuration
+            .flash
+            .bytes()
+            .iter()
+            .map(|byte| !byte)
+            .collect();
         memory.write(FLASH, &flash)?;
-        let mut plant = SimulatedStage::new(&StageTruth::real(), setup.job.stage.rate_hz, SEED);
-        plant.set_marks([setup.marks; 3]);
+        let mut plant =
+            SimulatedStage::new(&StageTruth::real(), configuration.job.stage.rate_hz, SEED);
+        plant.set_marks([configuration.marks; 3]);
         let scalar = image.target.scalar;
-        let mut bench = Self {
+        let mut fixture = Self {
             emulator: emulator(&memory)?,
             memory,
             scalar,
-            twin: application(scalar, &setup, None)?,
-            setup,
-            port: Port::default(),
+            model: application(scalar, &configuration, None)?,
+            configuration,
+            serial: SerialRing::default(),
             plant,
             cause: None,
             tick: 0,
             outputs: Vec::new(),
-            talk: Talk::default(),
+            host: HostLink::default(),
             mismatches: [false; 3],
             streams_since: None,
             starts: 0,
             compared: (0, 0),
         };
-        bench.await_start()?;
-        bench.run(A_WHILE)?;
-        bench.done(Body::Hello)?;
-        Ok(bench)
+        fixture.await_start()?;
+        fixture.run(A_WHILE)?;
+        fixture.done(Body::Hello)?;
+        Ok(fixture)
     }
 
     /// Waits until the firmware has started once more.
@@ -142,37 +152,37 @@ impl Bench {
     }
 
     /// Ticks since the firmware's start.
-    pub(super) fn tick(&self) -> u32 {
+    pub(crate) fn tick(&self) -> u32 {
         self.tick
     }
 
     /// The stage.
-    pub(super) fn plant(&self) -> &SimulatedStage {
+    pub(crate) fn plant(&self) -> &SimulatedStage {
         &self.plant
     }
 
     /// The first tick in which x followed a stream.
-    pub(super) fn streams_since(&self) -> Option<u32> {
+    pub(crate) fn streams_since(&self) -> Option<u32> {
         self.streams_since
     }
 
     /// The outputs of a tick; ticks count from zero.
-    pub(super) fn outputs(&self, tick: u32) -> Option<Outputs> {
+    pub(crate) fn outputs(&self, tick: u32) -> Option<Outputs> {
         self.outputs.get(tick as usize).copied()
     }
 
     /// Lets something go wrong from the next tick on.
-    pub(super) fn break_with(&mut self, cause: Cause) {
+    pub(crate) fn inject(&mut self, cause: InputFault) {
         self.cause = Some((0, cause));
     }
 
     /// Runs some ticks.
-    pub(super) fn run(&mut self, ticks: u32) -> Result<()> {
+    pub(crate) fn run(&mut self, ticks: u32) -> Result<()> {
         (0..ticks).try_for_each(|_| self.step().map(drop))
     }
 
     /// Runs until something is so, for `ticks` ticks at most.
-    pub(super) fn run_until(
+    pub(crate) fn run_until(
         &mut self,
         ticks: u32,
         what: &str,
@@ -197,8 +207,8 @@ impl Bench {
         let arriving = self.send()?;
         self.memory.write(INPUT, &input.encode())?;
         self.memory.set_word(INPUT_SEQUENCE, self.tick + 1)?;
-        // The twin computes while the firmware does.
-        let shown = self.port.exchange(&arriving, self.talk.freed());
+        // The reference model computes while the firmware does.
+        let shown = self.serial.exchange(&arriving, self.host.freed());
         let expected = self.compute(input);
         wait_for(
             &self.memory,
@@ -222,7 +232,7 @@ impl Bench {
         Ok(found)
     }
 
-    /// The twin's answer, behind converters that hold what the firmware's do and are read back as those are.
+    /// The reference model's answer, behind converters that hold what the firmware's do and are read back as those are.
     fn compute(&mut self, mut input: InputRecord) -> Outputs {
         for (axis, differs) in AxisName::ALL.into_iter().zip(self.mismatches) {
             if differs {
@@ -230,8 +240,8 @@ impl Bench {
                 input.switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
             }
         }
-        let told = self.twin.tick(&input, &mut self.port);
-        if self.twin.mode_of_x() == CourseMode::Stream {
+        let told = self.model.tick(&input, &mut self.serial);
+        if self.model.mode_of_x() == CourseMode::Stream {
             self.streams_since.get_or_insert(self.tick);
         }
         let codes = held(told.codes, input.stuck);
@@ -243,8 +253,8 @@ impl Bench {
     }
 
     /// Makes the idle loop of the firmware do something instead of the next tick, and waits until the firmware has started
-    /// again. Gives what the firmware has left at the outputs; the twin starts with the fault that it is to find.
-    pub(super) fn provoke(&mut self, what: Provocation, finds: FaultCode) -> Result<Outputs> {
+    /// again. Gives what the firmware has left at the outputs; the reference model starts with the fault that it is to find.
+    pub(crate) fn inject_fault(&mut self, what: Provocation, finds: FaultCode) -> Result<Outputs> {
         self.memory.set_word(RESETS_LEFT, 1)?;
         self.memory.set_word(PROVOCATION_TICK, self.tick + 1)?;
         self.memory.set_word(PROVOCATION, what as u32)?;
@@ -256,20 +266,20 @@ impl Bench {
         Ok(OutputRecord::decode(&bytes).outputs)
     }
 
-    /// The twin after a reset, at which the stage stays where it is.
+    /// The reference model after a reset, at which the stage stays where it is.
     fn begin_again(&mut self, finds: FaultCode) -> Result<()> {
-        self.twin = application(self.scalar, &self.setup, Some(finds))?;
-        self.port = Port::default();
+        self.model = application(self.scalar, &self.configuration, Some(finds))?;
+        self.serial = SerialRing::default();
         self.mismatches = [false; 3];
         self.tick = 0;
         self.outputs.clear();
-        self.talk = Talk::default();
+        self.host = HostLink::default();
         self.run(A_WHILE)?;
         self.done(Body::Hello)
     }
 
     /// Ends the run; gives the firmware's log.
-    pub(super) fn end(self) -> Result<Vec<String>> {
+    pub(crate) fn end(self) -> Result<Vec<String>> {
         self.memory.set_word(INPUT_SEQUENCE, END_OF_RUN)?;
         Ok(self.emulator.wait()?)
     }
@@ -278,19 +288,19 @@ impl Bench {
 /// The application with the number type of an image.
 fn application(
     scalar: image::Scalar,
-    setup: &Setup,
+    configuration: &Configuration,
     fault: Option<FaultCode>,
 ) -> Result<Box<dyn Application>> {
     let start = |number| Start {
-        defaults: &setup.job.stage,
-        plan: &setup.job.plan,
+        defaults: &configuration.job.stage,
+        plan: &configuration.job.plan,
         fault,
         board: "mps2",
         // Nothing measures ticks in lockstep.
         cycle_hz: 0,
         number,
     };
-    let flash = setup.flash.clone();
+    let flash = configuration.flash.clone();
     Ok(match scalar {
         image::Scalar::F32 => Box::new(Running::<f32>::start(start(NumberType::F32), flash)?),
         image::Scalar::Fixed => Box::new(Running::<Fixed>::start(start(NumberType::Fixed), flash)?),
@@ -321,8 +331,8 @@ fn wait_for(memory: &Memory, emulator: &mut Emulator, word: usize, value: u32) -
             bail!("the emulator ended ({status}) before it {what} {value}");
         }
         ensure!(
-            since.elapsed() < PATIENCE,
-            "the firmware has not {what} {value} within {PATIENCE:?}"
+            since.elapsed() < TIMEOUT,
+            "the firmware has not {what} {value} within {TIMEOUT:?}"
         );
     }
 }

@@ -1,4 +1,4 @@
-//! `cargo xtask emulate`: the image in QEMU against the simulated stage, word by word beside its twin in this process.
+//! `cargo xtask emulate`: the image in QEMU against the simulated stage, word by word beside the reference model in this process.
 
 use std::time::{Duration, Instant};
 
@@ -9,9 +9,9 @@ use quadrant::link::lockstep::{
 };
 use quadrant_sim::emulator::{Clock, Emulator, Lockstep, Memory};
 
-use crate::image::{self, Board, Image, Scalar, Target};
-use crate::toolchain::Toolchain;
-use crate::twin::{self, Tally, Twin};
+use crate::reference_model::{self, ReferenceModel, Tally};
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 /// Control ticks per second of the firmware's time.
 const RATE_HZ: f64 = 10_000.0;
@@ -50,14 +50,14 @@ pub(crate) fn run(
         },
     )?;
     println!("{}", image.footprint()?);
-    let twin = Twin::of(scalar, job)?;
+    let model = ReferenceModel::of(scalar, job)?;
     let Run { tally, elapsed, .. } = if paced {
-        recorded(&image, twin, ticks)?
+        recorded(&image, model, ticks)?
     } else {
-        lockstep(&image, twin, ticks)?
+        lockstep(&image, model, ticks)?
     };
-    if let Some((tick, twin, firmware)) = &tally.first {
-        println!("first difference at tick {tick}: {twin:?} here, {firmware:?} in the firmware");
+    if let Some((tick, model, firmware)) = &tally.first {
+        println!("first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware");
     }
     let rate = f64::from(ticks) / elapsed.as_secs_f64();
     println!(
@@ -77,23 +77,23 @@ pub(crate) fn run(
 }
 
 /// Exchanges with the firmware tick by tick. The time starts with the first answer: compiling tables is not a tick.
-pub(crate) fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<Run> {
+pub(crate) fn lockstep(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
-    memory.prepare(Mode::Lockstep, 0, &twin::encode(twin.job())?)?;
-    let mut firmware = Lockstep::start(image.program()?, memory, show)?;
+    memory.prepare(Mode::Lockstep, 0, &reference_model::encode(model.job())?)?;
+    let mut firmware = Lockstep::start(reference_model::program(image)?, memory, show)?;
     let bar = progress(ticks);
     let mut started = None;
     for tick in 1..=ticks {
-        let input = twin.input();
+        let input = model.input();
         firmware.ask(&input)?;
-        // The twin computes while the firmware does.
-        twin.compute(&input);
+        // The reference model computes while the firmware does.
+        model.compute(&input);
         let answer = firmware
             .answer()?
             .with_context(|| format!("the firmware ended before it answered tick {tick}"))?;
         started.get_or_insert_with(Instant::now);
-        twin.compare(answer);
-        twin.step(&answer);
+        model.compare(answer);
+        model.step(&answer);
         if tick % PROGRESS_TICKS == 0 {
             bar.inc(1);
             firmware.new_lines()?;
@@ -103,7 +103,7 @@ pub(crate) fn lockstep(image: &Image, mut twin: Twin, ticks: u32) -> Result<Run>
     bar.finish_and_clear();
     firmware.finish()?;
     Ok(Run {
-        tally: *twin.tally(),
+        tally: *model.tally(),
         elapsed,
     })
 }
@@ -122,13 +122,19 @@ fn progress(ticks: u32) -> ProgressBar {
 }
 
 /// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
-fn recorded(image: &Image, twin: Twin, ticks: u32) -> Result<Run> {
+fn recorded(image: &Image, model: ReferenceModel, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
-    let job = twin.job().clone();
-    let (inputs, expected) = twin.rehearse(ticks);
+    let job = model.job().clone();
+    let (inputs, expected) = model.run_alone(ticks);
     load(&memory, Mode::Paced, &job, &inputs)?;
     let started = Instant::now();
-    let log = Emulator::start(&image.program()?, &memory, Clock::Instructions, show)?.wait()?;
+    let log = Emulator::start(
+        &reference_model::program(image)?,
+        &memory,
+        Clock::Instructions,
+        show,
+    )?
+    .wait()?;
     let elapsed = started.elapsed();
     check_paced(&log, ticks)?;
     let mut bytes = vec![0; inputs.len() * OutputRecord::BYTES];
@@ -151,7 +157,7 @@ pub(crate) fn load(memory: &Memory, mode: Mode, job: &Job, inputs: &[InputRecord
     let ticks = u32::try_from(inputs.len())?;
     let bytes: Vec<u8> = inputs.iter().flat_map(InputRecord::encode).collect();
     memory.write(RECORDED_INPUTS, &bytes)?;
-    Ok(memory.prepare(mode, ticks, &twin::encode(job)?)?)
+    Ok(memory.prepare(mode, ticks, &reference_model::encode(job)?)?)
 }
 
 /// Checks what the firmware says of a paced run: all ticks, no overrun, and the time they should take.

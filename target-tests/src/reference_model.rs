@@ -1,19 +1,20 @@
-//! The emulated firmware's twin: the same job in this process, on the simulated stage.
+//! The reference model of the emulated firmware: the same job in this process, on the simulated stage.
 
 use std::marker::PhantomData;
 use std::path::Path;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
+use quadrant_sim::emulator::Program;
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::scenario::circle_and_sine;
 use quadrant_sim::settings_file::SettingsFile;
 
-use crate::image;
+use xtask::image::{self, Image};
 
 /// Seed of the simulated stage's noise.
 const SEED: u64 = 1;
@@ -36,6 +37,16 @@ pub(crate) fn job_with(settings: &Path) -> Result<Job> {
     })
 }
 
+/// An image as the emulator takes it.
+pub(crate) fn program(image: &Image) -> Result<Program> {
+    ensure!(
+        image.target.board == image::Board::Mps2,
+        "{} is a real board: it is not emulated",
+        image.target
+    );
+    Ok(Program::read(&image.path)?)
+}
+
 /// A job as the firmware reads it.
 pub(crate) fn encode(job: &Job) -> Result<Vec<u8>> {
     postcard::to_allocvec(job).context("cannot encode the job")
@@ -53,7 +64,7 @@ impl<S: Scalar> Law for Machine<S, FIRMWARE_ELEMENTS> {
     }
 }
 
-/// How the firmware's words compare with the twin's.
+/// How the firmware's words compare with the reference model's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
     /// Converter words compared.
@@ -64,12 +75,12 @@ pub(crate) struct Tally {
     pub(crate) moving: u64,
     /// Ticks with the outputs enabled.
     pub(crate) enabled: u64,
-    /// The first difference: tick, the twin's outputs, the firmware's.
+    /// The first difference: tick, the reference model's outputs, the firmware's.
     pub(crate) first: Option<(u32, Outputs, Outputs)>,
 }
 
 /// Law and stage in this process.
-pub(crate) struct Twin {
+pub(crate) struct ReferenceModel {
     job: Job,
     law: Box<dyn Law>,
     plant: SimulatedStage,
@@ -79,8 +90,8 @@ pub(crate) struct Twin {
     tally: Tally,
 }
 
-impl Twin {
-    /// The twin of a firmware of a number type that runs a job.
+impl ReferenceModel {
+    /// the reference model of a firmware of a number type that runs a job.
     pub(crate) fn of(scalar: image::Scalar, job: Job) -> Result<Self> {
         fn law<S: Scalar>(job: &Job, _: PhantomData<S>) -> Result<Box<dyn Law>> {
             Ok(Box::new(Machine::<S, FIRMWARE_ELEMENTS>::new(job)?))
@@ -104,13 +115,13 @@ impl Twin {
         &self.job
     }
 
-    /// What firmware and twin read in the next tick.
+    /// What firmware and reference model read in the next tick.
     pub(crate) fn input(&mut self) -> InputRecord {
         let counts = self.plant.read_counters();
         InputRecord::of_counts(counts, self.operator.request(self.tick))
     }
 
-    /// The twin's own answer.
+    /// The reference model's own answer.
     pub(crate) fn compute(&mut self, input: &InputRecord) -> Outputs {
         self.expected = self.law.tick(input);
         self.tick += 1;
@@ -122,7 +133,7 @@ impl Twin {
         self.plant.step(outputs);
     }
 
-    /// Compares an answer of the firmware with the twin's last.
+    /// Compares an answer of the firmware with the reference model's last.
     pub(crate) fn compare(&mut self, firmware: Outputs) {
         self.tally.add(self.tick, self.expected, firmware);
     }
@@ -132,8 +143,8 @@ impl Twin {
         &self.tally
     }
 
-    /// The twin alone in closed loop, for `ticks` ticks: what it read and what it answered.
-    pub(crate) fn rehearse(mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
+    /// The reference model alone in closed loop, for `ticks` ticks: what it read and what it answered.
+    pub(crate) fn run_alone(mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
         (0..ticks)
             .map(|_| {
                 let input = self.input();

@@ -6,15 +6,15 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::lockstep::{Job, Mode};
-use quadrant_sim::emulator::{Emulator, Memory};
+use quadrant_sim::emulator::Memory;
 use serde::{Deserialize, Serialize};
 
-use crate::emulate;
-use crate::golden::Golden;
-use crate::image::{self, Board, Image, Scalar, Target};
-use crate::toolchain::Toolchain;
+use crate::lockstep;
+use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
 use crate::trace::{Tick, Trace};
-use crate::twin::{self, SETTLING_TICKS, Twin};
+use xtask::golden::Golden;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
 
 /// How much more than expected is accepted, in percent.
 const TOLERANCE_PERCENT: f64 = 5.0;
@@ -39,14 +39,14 @@ struct Count {
 
 /// What is expected.
 const GOLDEN: Golden = Golden {
-    file: "instructions.toml",
+    path: "target-tests/golden/instructions.toml",
     head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",
 };
 
 /// Counts the default job stage by stage, prints, and holds the figures against the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
     let image = emulated(toolchain, scalar)?;
-    let count = count(&image, twin::job(), ticks)?;
+    let count = count(&image, reference_model::job(), ticks)?;
     println!(
         "{}: instructions per control tick over {ticks} ticks",
         image.target
@@ -64,9 +64,9 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: b
     }
     let key = image.target.scalar_name();
     if overwrite {
-        GOLDEN.store([(key, count)])
+        GOLDEN.store(Some(&image.compiler), [(key, count)])
     } else {
-        compare(&key, &count)
+        compare(&key, &count, &image.compiler)
     }
 }
 
@@ -99,11 +99,11 @@ pub(crate) fn run_all(
         counts.push((format!("{}, {name}", image.target.scalar_name()), whole));
     }
     if overwrite {
-        return GOLDEN.store(counts);
+        return GOLDEN.store(Some(&image.compiler), counts);
     }
     counts
         .iter()
-        .try_for_each(|(key, count)| compare(key, count))
+        .try_for_each(|(key, count)| compare(key, count, &image.compiler))
 }
 
 /// The image that is emulated.
@@ -120,11 +120,12 @@ fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
     let trace = Trace::of(image)?;
     let memory = Memory::create()?;
     // The rehearsal's beginning is spent at rest and is not counted.
-    let (inputs, _) = Twin::of(image.target.scalar, job.clone())?.rehearse(SETTLING_TICKS + ticks);
-    emulate::load(&memory, Mode::Unpaced, &job, &inputs)?;
-    let program = image.program()?;
-    let mut emulator = Emulator::spawn(trace.command_line(image, &memory)?, &program, |_| {})?;
+    let (inputs, _) =
+        ReferenceModel::of(image.target.scalar, job.clone())?.run_alone(SETTLING_TICKS + ticks);
+    lockstep::load(&memory, Mode::Unpaced, &job, &inputs)?;
+    let (mut emulator, mut tracer) = trace.start(image, &memory)?;
     let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
+    tracer.trace_from(trace.root())?;
     let closed = trace.read(image, lines)?;
     emulator.wait()?;
     let Some(counted) = closed.get(SETTLING_TICKS as usize..) else {
@@ -168,8 +169,8 @@ fn summary(ticks: u32, closed: &[Tick]) -> Count {
     }
 }
 
-fn compare(key: &str, count: &Count) -> Result<()> {
-    let Some(expected) = GOLDEN.read::<Count>()?.remove(key) else {
+fn compare(key: &str, count: &Count, compiler: &str) -> Result<()> {
+    let Some((expected, difference)) = GOLDEN.read::<Count>()?.table(key, compiler) else {
         bail!(
             "no figure is committed for {key}: `cargo xtask count --overwrite-expected` makes one"
         );
@@ -181,11 +182,12 @@ fn compare(key: &str, count: &Count) -> Result<()> {
     for (name, counted, expected) in pairs {
         let growth = 100.0 * (counted / expected - 1.0);
         println!("  {key}: {name} {counted} against {expected} expected, {growth:+.1} %");
-        ensure!(
-            growth <= TOLERANCE_PERCENT,
-            "{key}: the {name} has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
-             `cargo xtask count --overwrite-expected` accepts it"
-        );
+        difference.ensure(growth <= TOLERANCE_PERCENT, || {
+            format!(
+                "{key}: the {name} has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
+                 `cargo xtask count --overwrite-expected` accepts it"
+            )
+        })?;
     }
     Ok(())
 }

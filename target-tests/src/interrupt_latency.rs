@@ -2,26 +2,20 @@
 //! seen while every tick brings a line for the log.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::{BufRead, BufReader, Read, Write};
-use std::os::unix::net::UnixStream;
-use std::path::PathBuf;
-use std::process::Stdio;
-use std::time::Duration;
+use std::io::{BufRead, BufReader, Read};
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result};
 use quadrant::safety::Command;
 
-use super::bench::Bench;
-use super::case::{moving, setup};
-use crate::image::Image;
-use crate::listing::Listing;
-use crate::trace::{Traced, traced};
-use quadrant_sim::emulator::{self, Clock, Emulator};
+use crate::faults::case::moving;
+use crate::faults::fixture::Fixture;
+use crate::saturation;
+use crate::trace::{self, Traced, Tracer, traced};
+use xtask::image::Image;
+use xtask::listing::Listing;
 
 /// Ticks that are traced.
 const TICKS: u32 = 200;
-/// How long QEMU's monitor may take to answer.
-const PATIENCE: Duration = Duration::from_secs(20);
 /// What is not traced: initialisation and the idle loop, which masks nothing once ticks are due.
 const IDLE: &str = "main";
 
@@ -34,7 +28,7 @@ enum Effect {
 }
 
 /// The longest stretch with interrupts masked, by the function that it is spent in.
-pub(super) fn longest(image: &Image) -> Result<BTreeMap<String, u32>> {
+pub(crate) fn longest(image: &Image) -> Result<BTreeMap<String, u32>> {
     let listing = Listing::of(image)?;
     let idle = image.function(IDLE)?;
     let ranges: Vec<String> = listing
@@ -45,61 +39,22 @@ pub(super) fn longest(image: &Image) -> Result<BTreeMap<String, u32>> {
             format!("{:#x}..{:#x}", range.start, range.end - 1)
         })
         .collect();
-    let socket = monitor_path();
-    let stretches = std::thread::scope(|scope| {
-        let mut reader = None;
-        let listing = &listing;
-        let bench = Bench::start_with(image, setup(), |memory| {
-            let mut qemu = emulator::command_line(&image.program()?, memory, Clock::Host);
-            let monitor = format!("unix:{},server=on,wait=off", socket.display());
-            qemu.args(["-singlestep", "-d", "nochain", "-monitor", &monitor])
-                .args(["-dfilter", &ranges.join(",")])
-                .stderr(Stdio::piped());
-            let mut emulator = Emulator::spawn(qemu, &image.program()?, |_| {})?;
-            let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
-            reader = Some(scope.spawn(move || Stretches::of(listing).read(lines)));
-            Ok(emulator)
-        })?;
-        drive(bench, &socket)?;
-        match reader.context("it was started")?.join() {
-            Ok(stretches) => stretches,
-            Err(_) => Err(anyhow!("the thread that reads the trace panicked")),
-        }
-    });
-    // It may never have come to be.
-    let _ = std::fs::remove_file(&socket);
-    stretches
-}
-
-fn monitor_path() -> PathBuf {
-    std::env::temp_dir().join(format!("quadrant-monitor-{}", std::process::id()))
+    saturation::traced(
+        image,
+        |memory| trace::start(image, memory, &ranges.join(",")),
+        drive,
+        |lines| Stretches::of(&listing).read(lines),
+    )
 }
 
 /// A motion with a refused request in every tick, traced from then on.
-fn drive(mut bench: Bench, socket: &std::path::Path) -> Result<()> {
-    moving(&mut bench, 1.0)?;
-    bench.break_with(Box::new(|input, _, _| input.request = Some(Command::Run)));
-    bench.run(100)?;
-    let mut monitor = UnixStream::connect(socket).context("cannot reach QEMU's monitor")?;
-    monitor.set_read_timeout(Some(PATIENCE))?;
-    await_prompt(&mut monitor)?;
-    monitor.write_all(b"log exec,nochain\n")?;
-    await_prompt(&mut monitor)?;
-    bench.run(TICKS)?;
-    bench.end().map(drop)
-}
-
-/// Reads until the monitor is ready for a command.
-fn await_prompt(monitor: &mut UnixStream) -> Result<()> {
-    let mut seen = Vec::new();
-    let mut byte = [0];
-    while !seen.ends_with(b"(qemu) ") {
-        monitor
-            .read_exact(&mut byte)
-            .context("QEMU's monitor does not answer")?;
-        seen.push(byte[0]);
-    }
-    Ok(())
+fn drive(mut fixture: Fixture, tracer: &mut Tracer) -> Result<()> {
+    moving(&mut fixture, 1.0)?;
+    fixture.inject(Box::new(|input, _, _| input.request = Some(Command::Run)));
+    fixture.run(100)?;
+    tracer.trace()?;
+    fixture.run(TICKS)?;
+    fixture.end().map(drop)
 }
 
 /// Follows a trace.
