@@ -50,13 +50,13 @@ mod app {
     use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
-    use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
-    use quadrant::link::message::NumberType;
-    use quadrant::machine::{
+    use quadrant::app::supervisor::Event;
+    use quadrant::app::{
         After, Control, ControlInputs, Liveness, Meters, Server, Snapshot, Supervision,
     };
+    use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
+    use quadrant::link::message::NumberType;
     use quadrant::safety::{AxisName, AxisSwitches, Command};
-    use quadrant::supervisor::Event;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,

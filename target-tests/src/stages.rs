@@ -4,22 +4,22 @@
 /// one found here decides: friction evaluated for the feedforward is feedforward.
 const STAGES: [(&str, &str); 11] = [
     ("quadrant_firmware::board::", "inputs and outputs"),
-    ("quadrant::encoder::", "encoders"),
-    ("quadrant::reference::", "reference"),
-    ("quadrant::control::", "feedback"),
-    ("quadrant::feedforward::", "feedforward"),
-    ("quadrant::friction::", "friction"),
-    ("quadrant::safety::", "safety"),
-    ("quadrant::telemetry::", "telemetry"),
-    ("quadrant::units::", "units"),
+    ("quadrant::law::encoder::", "encoders"),
+    ("quadrant::law::reference::", "reference"),
+    ("quadrant::law::control::", "feedback"),
+    ("quadrant::law::feedforward::", "feedforward"),
+    ("quadrant::law::friction::", "friction"),
+    ("quadrant::law::safety::", "safety"),
+    ("quadrant::law::telemetry::", "telemetry"),
+    ("quadrant::law::units::", "units"),
     ("heapless::", "queues"),
     ("quadrant_firmware::app::__rtic_internal_", "spawning"),
 ];
 
 /// What holds the stages together, innermost first; it counts only where no stage does.
 const FRAMES: [(&str, &str); 4] = [
-    ("quadrant::axis::", "axis"),
-    ("quadrant::stage::", "stage"),
+    ("quadrant::law::axis::", "axis"),
+    ("quadrant::law::stage::", "stage"),
     ("quadrant_firmware::", "interrupt"),
     ("rtic::", "interrupt"),
 ];
@@ -44,7 +44,7 @@ pub(crate) fn of<'a>(functions: impl Iterator<Item = &'a str> + Clone) -> Option
     stage.or_else(frame).map(|(_, name)| *name)
 }
 
-/// `<quadrant::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
+/// `<quadrant::law::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
 fn path(function: &str) -> &str {
     function.trim_start_matches(['<', '&', '[', '('])
 }
@@ -57,15 +57,15 @@ mod tests {
     fn the_outermost_stage_decides() {
         let frames = [
             "CONTROL_TICK",
-            "<quadrant::axis::Axis<f32>>::tick",
-            "quadrant::feedforward::f",
-            "quadrant::friction::g",
+            "<quadrant::law::axis::Axis<f32>>::tick",
+            "quadrant::law::feedforward::f",
+            "quadrant::law::friction::g",
         ];
         assert_eq!(of(frames.into_iter()), Some("feedforward"));
         assert_eq!(of(frames[..2].iter().copied()), Some("axis"));
         let frames = [
             "quadrant_firmware::app::control",
-            "quadrant::axis::Axis::drive",
+            "quadrant::law::axis::Axis::drive",
         ];
         assert_eq!(of(frames.into_iter()), Some("axis"));
         assert_eq!(of(["core::ptr::read"].into_iter()), None);

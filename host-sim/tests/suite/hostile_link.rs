@@ -8,16 +8,16 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
+use quadrant::app::After;
 use quadrant::hal::Serial;
 use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};
 use quadrant::link::message::{
     AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
 };
 use quadrant::link::port::Port;
-use quadrant::machine::After;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
-use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 
@@ -109,7 +109,7 @@ fn starts_a_motion(body: &Body) -> bool {
 
 impl Bench {
     fn new() -> Self {
-        let mut settings = identified().expect("the committed settings").stage;
+        let mut settings = identified_settings().expect("the committed settings").stage;
         for (axis, default) in settings.axes.iter_mut().zip(StageSettings::default().axes) {
             axis.homing = default.homing;
             axis.limits.travel_mm = default.limits.travel_mm;
