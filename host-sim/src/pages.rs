@@ -6,7 +6,7 @@ use crate::report::{Cell, Column, Figure, Lines, Plot, Provenance, Series, Sprea
 /// mm to um.
 pub const UM_PER_MM: f64 = 1e3;
 
-/// How a page came about: the command line as a reader would repeat it, the seed, this program's version.
+/// Provenance of a page: the command line as a reader would repeat it, the seed, this program's version.
 pub fn provenance(command: &str, seed: u64) -> Provenance {
     Provenance {
         command: command.to_owned(),

@@ -9,7 +9,7 @@ use crate::circle::turn::{CircleRefusal, NominalCircle, Turn, run_path};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::run_configuration::RunConfiguration;
 
-/// Which circles are to be run.
+/// Circles to be run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CircleRequest {
     /// Planes.
@@ -18,7 +18,7 @@ pub struct CircleRequest {
     pub radii_mm: Vec<f64>,
     /// Feeds along the path, mm/min; above zero.
     pub feeds_mm_min: Vec<f64>,
-    /// Who runs.
+    /// The configurations.
     pub configurations: Vec<Configuration>,
     /// Seeds of the simulated noise; every circle runs once with each.
     pub seeds: Vec<u64>,
@@ -46,13 +46,13 @@ pub struct CircleCase {
     pub radius_mm: f64,
     /// Feed along the path, mm/min.
     pub feed_mm_min: f64,
-    /// Who ran.
+    /// The configuration.
     pub configuration: Configuration,
     /// Seed of the noise.
     pub seed: u64,
 }
 
-/// What a circle showed in both senses.
+/// Result of a circle in both senses.
 #[derive(Clone, Debug)]
 pub struct CircleTest {
     /// G2.
@@ -88,9 +88,9 @@ impl CircleTest {
 /// A case and what came of it.
 #[derive(Clone, Debug)]
 pub struct CircleResult {
-    /// Which circle.
+    /// The circle.
     pub case: CircleCase,
-    /// What it showed, or why it was not run to its end.
+    /// Its result, or the reason that it was not run to its end.
     pub outcome: Result<CircleTest, CircleRefusal>,
 }
 

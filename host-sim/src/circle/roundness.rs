@@ -65,7 +65,7 @@ impl LeastSquares {
     }
 }
 
-/// What the two senses show together; mm.
+/// Result of the two senses together; mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Both {
     /// Bi-directional circular deviation G(b).

@@ -41,7 +41,7 @@ pub struct NominalCircle {
     pub feed_mm_s: f64,
 }
 
-/// Why a circle was not run to its end.
+/// Reason that a circle was not run to its end.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum CircleRefusal {
     /// It would take too long.
@@ -60,7 +60,7 @@ pub enum CircleRefusal {
     Run(#[from] RunError),
 }
 
-/// What one turn showed; mm.
+/// Result of one turn; mm.
 #[derive(Clone, Debug)]
 pub struct Turn {
     /// Circular deviation G.

@@ -1,4 +1,4 @@
-//! Where results go: tables to the terminal, pages into files.
+//! Output of results: tables to the terminal, pages into files.
 
 use std::path::{Path, PathBuf};
 

@@ -23,10 +23,10 @@ use crate::identify::static_friction::{
 use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveError, VirginCurveSettings};
 use crate::rig::{Recording, Rig, approach};
 
-/// What a commissioning is asked for.
+/// Request for a commissioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommissionSettings {
-    /// What the PID is designed for, on the continuous loop.
+    /// Target of the PID's design, on the continuous loop.
     pub target: Target,
     /// Share of the Popov bound that the nonlinear gain may take, 0 to 1.
     pub sector_share: f64,
@@ -74,7 +74,7 @@ pub struct Commissioned {
     pub sector_bound: f64,
     /// The finished settings.
     pub settings: AxisSettings,
-    /// What they achieve on the axis.
+    /// Their scores on the axis.
     pub verdicts: Vec<Verdict>,
 }
 
@@ -88,9 +88,9 @@ const STEPS: [(&str, f64); 6] = [
     ("verdict", 0.14),
 ];
 
-/// Where the experiments begin, mm: where the axis stood when it was switched on, in the middle of its travel.
+/// Start of the experiments, mm: the position at switch-on, in the middle of the travel.
 const HOME_MM: f64 = 0.0;
-/// How often the excitation is halved before the response is given up.
+/// Number of times that the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
 /// Elements that find their own knots.
 const FEW_ELEMENTS: usize = 4;

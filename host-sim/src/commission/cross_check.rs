@@ -1,4 +1,4 @@
-//! What a finished commissioning is held against: the response at rest, which friction bends, and an ordinary motion.
+//! Cross-checks of a finished commissioning: the response at rest, which friction bends, and an ordinary motion.
 
 use quadrant::settings::AxisSettings;
 
@@ -11,7 +11,7 @@ use crate::identify::response::FrequencyResponse;
 use crate::identify::revise::{ReviseError, Revision};
 use crate::rig::{Recording, Rig, approach};
 
-/// What the checks found.
+/// Result of the checks.
 #[derive(Clone, Debug)]
 pub struct CrossCheck {
     /// The response at rest.

@@ -1,4 +1,4 @@
-//! Why a commissioning ends early.
+//! Reason that a commissioning ended early.
 
 use quadrant::settings::SettingsError;
 
@@ -13,7 +13,7 @@ use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
 use crate::rig::RigError;
 
-/// Why a commissioning ends early.
+/// Reason that a commissioning ended early.
 #[derive(Debug, thiserror::Error)]
 pub enum CommissionError {
     /// Settings that the firmware refuses.

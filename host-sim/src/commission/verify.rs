@@ -1,4 +1,4 @@
-//! What the commissioned settings achieve on the axis itself, by its own encoder.
+//! Verification of the commissioned settings on the axis itself, by its own encoder.
 
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -27,7 +27,7 @@ impl Default for Trial {
     }
 }
 
-/// What one law scored.
+/// Scores of one law.
 #[derive(Clone, Debug)]
 pub struct Verdict {
     /// The law.
@@ -45,7 +45,7 @@ const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-/// Why a verdict cannot be had.
+/// Reason that the verification failed.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The settings are refused.

@@ -27,7 +27,7 @@ impl Configuration {
         controller: LawKind::NPid,
         feedforward: FeedforwardKind::Combined,
     };
-    /// What most studies compare.
+    /// The two that most studies compare.
     pub const EXTREMES: [Self; 2] = [Self::PID, Self::BEST];
 
     /// All eight, in the order of the thesis' tables.

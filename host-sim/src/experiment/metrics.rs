@@ -10,7 +10,7 @@
 /// Half the width of the window around a reversal, and the width of each shoulder, as a fraction of the cycle.
 pub const GLITCH_WINDOW: f64 = 0.02;
 
-/// What a run of whole cycles scores; mm.
+/// Scores of a run of whole cycles; mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
     /// Largest |e|.

@@ -1,6 +1,6 @@
-//! Why a part program is refused.
+//! Errors in a part program.
 
-/// What is wrong with a part program, with the line it stands in (from 1).
+/// An error in a part program, with its line (from 1).
 #[derive(Debug, thiserror::Error)]
 pub enum ProgramError {
     /// The file cannot be read.
@@ -8,7 +8,7 @@ pub enum ProgramError {
     Read {
         /// The file.
         path: std::path::PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// The file is too large.
@@ -24,27 +24,27 @@ pub enum ProgramError {
     /// Not G-code.
     #[error("line {line}: {text:?} is not understood: {detail}")]
     Syntax {
-        /// Where.
+        /// Line, from 1.
         line: usize,
-        /// What stands there.
+        /// Text found.
         text: String,
-        /// What should.
+        /// Text expected.
         detail: String,
     },
     /// G-code that this program does not know.
     #[error("line {line}: {word} is not supported; supported are {supported}")]
     Unsupported {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// The code or word.
         word: String,
-        /// What could stand there.
+        /// Texts allowed.
         supported: &'static str,
     },
     /// A word stands twice, or two codes exclude each other.
     #[error("line {line}: {word} contradicts {other} in the same line; keep one of them")]
     Contradiction {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// The later.
         word: String,
@@ -54,7 +54,7 @@ pub enum ProgramError {
     /// Coordinates, and nothing says what to do with them.
     #[error("line {line}: {word} has no motion code; write G0, G1, G2 or G3 before it")]
     NoMotion {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// The first coordinate.
         word: String,
@@ -64,7 +64,7 @@ pub enum ProgramError {
         "line {line}: {word} has no feed; write F, in mm/min (inch/min after G20), in this line or before it"
     )]
     NoFeed {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// The motion code.
         word: &'static str,
@@ -72,7 +72,7 @@ pub enum ProgramError {
     /// A number beyond its limits.
     #[error("line {line}: {word} must be within {least} and {most}")]
     OutOfRange {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// The word.
         word: String,
@@ -84,11 +84,11 @@ pub enum ProgramError {
     /// An arc without a centre, with one in another plane, or with two.
     #[error("line {line}: the arc {what}; {remedy}")]
     Arc {
-        /// Where.
+        /// Line, from 1.
         line: usize,
-        /// What is wrong.
+        /// The error.
         what: String,
-        /// What to do about it.
+        /// The remedy.
         remedy: &'static str,
     },
     /// An arc whose ends are at different distances from its centre.
@@ -97,7 +97,7 @@ pub enum ProgramError {
          {most_mm:.4} mm; correct the centre or the end, or write more decimals"
     )]
     ArcRadius {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// Radius at the start.
         start_mm: f64,
@@ -112,11 +112,11 @@ pub enum ProgramError {
          move the program's origin"
     )]
     Travel {
-        /// Where.
+        /// Line, from 1.
         line: usize,
         /// The axis.
         axis: &'static str,
-        /// Where it would go.
+        /// Its end, mm.
         reaches_mm: f64,
         /// The travel's lower end.
         low_mm: f64,
@@ -141,7 +141,7 @@ pub enum ProgramError {
     /// A limit of the motion that cannot be kept.
     #[error("{what} is {value}, but must be within {least} and {most}")]
     Limit {
-        /// Which.
+        /// The axis.
         what: &'static str,
         /// Its value.
         value: f64,

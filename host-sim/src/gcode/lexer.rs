@@ -174,7 +174,7 @@ impl ProgramVisitor for Reader<'_> {
 /// A block, or a command with its arguments.
 struct Part<'r, 's> {
     reader: &'r mut Reader<'s>,
-    /// Where the command's code stands among the words.
+    /// Index of the command's code among the words.
     code: Option<usize>,
 }
 

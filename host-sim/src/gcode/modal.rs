@@ -5,7 +5,7 @@ use quadrant::reference::{Plane, Sense};
 use crate::gcode::error::ProgramError;
 use crate::gcode::lexer::Word;
 
-/// How the coordinates of a line are moved to.
+/// Motion to the coordinates of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Motion {
     /// G0.
@@ -28,7 +28,7 @@ impl Motion {
     }
 }
 
-/// What codes have set.
+/// State that codes have set.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Modes {
     /// Group 1; nothing before the first motion code.
@@ -58,11 +58,11 @@ impl Default for Modes {
     }
 }
 
-/// What is named in the error about a code that is not.
+/// Codes named in the error about an unknown one.
 const SUPPORTED: &str =
     "G0-G3, G17-G21, G40, G49, G54, G61, G80, G90, G91, G90.1, G91.1, G94, M2 and M30";
 
-/// What a code is good for.
+/// Effect of a code.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Effect {
     /// It has set a mode.

@@ -19,7 +19,7 @@ use crate::plant::SimulatedStage;
 /// The program's motion, sampled at the control rate.
 #[derive(Clone, Debug)]
 pub struct ProgramTables {
-    /// Where the path is at every control period.
+    /// Path, a point each control period.
     pub places: Vec<Place>,
     /// The references of x, y and z at the same times, mm, from the program's origin.
     pub reference_mm: [Vec<f64>; 3],
@@ -60,10 +60,10 @@ impl ProgramTables {
     }
 }
 
-/// What one configuration did on a program.
+/// Result of one configuration on a program.
 #[derive(Clone, Debug)]
 pub struct ProgramOutcome {
-    /// Who ran.
+    /// The configuration.
     pub configuration: Configuration,
     /// Largest distance of the true path from the programmed one, mm.
     pub contour_largest_mm: f64,

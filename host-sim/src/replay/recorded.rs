@@ -80,7 +80,7 @@ const MARGINS: (f64, f64) = (9.9, 54.2);
 /// Integral gain over proportional gain, 1/s: that of the x axis.
 const INTEGRAL_RATIO_PER_S: f64 = 0.66;
 
-/// What runs and on what.
+/// Machine and plant of a run.
 struct Axis {
     settings: AxisSettings,
     truth: AxisTruth,
@@ -100,7 +100,7 @@ impl RecordedAxis {
         })
     }
 
-    /// What a record for this axis may ask for.
+    /// Limits of a record for this axis.
     pub fn limits(self) -> AxisLimits {
         let (travel_mm, resolution_mm) = match self {
             Self::Emps => (emps::TRAVEL_MM, emps::RESOLUTION_MM),
@@ -194,10 +194,10 @@ fn settled(mut error_mm: Vec<f64>, period_s: f64) -> Vec<f64> {
     error_mm
 }
 
-/// What one configuration did on the record.
+/// Result of one configuration on the record.
 #[derive(Clone, Debug)]
 pub struct RecordedOutcome {
-    /// Who ran; `None` for the recorded machine itself.
+    /// The configuration; `None` for the recorded machine itself.
     pub configuration: Option<Configuration>,
     /// Largest |e|, mm.
     pub largest_mm: f64,
@@ -209,7 +209,7 @@ pub struct RecordedOutcome {
     pub period_s: f64,
 }
 
-/// Why a record cannot be replayed.
+/// Reason that a record cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
     /// The run failed.

@@ -13,7 +13,7 @@ impl RecordedOutcome {
             .map_or_else(|| "recorded machine".to_owned(), |ours| ours.name())
     }
 
-    /// Where the numbers come from.
+    /// Source of the numbers.
     fn source(&self) -> &'static str {
         if self.configuration.is_some() {
             "simulated"

@@ -76,7 +76,7 @@ pub struct Parameters {
     pub gain_mm_per_v_s2: f64,
 }
 
-/// Why an axis' settings do not do.
+/// Reason that an axis' settings cannot be used.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParametersError {
     /// No linear model.
@@ -174,7 +174,7 @@ pub struct Lag {
     pub width_v: f64,
 }
 
-/// What one model did.
+/// Result of one model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Behaviour {
     /// The model.

@@ -13,7 +13,7 @@ use crate::friction_models::{Behaviour, Curve, LAG_FREQUENCIES_HZ, Model, Parame
 /// Largest closing error of a small loop that counts as closed, of the breakaway level.
 const CLOSES: f64 = 0.05;
 
-/// What each model has and what it costs in truth (simulated).
+/// Properties of each model (simulated).
 pub fn friction_models_table(behaviours: &[Behaviour]) -> Table {
     let lag_heads = LAG_FREQUENCIES_HZ.map(|hertz| format!("lag at {hertz} Hz"));
     let mut heads = vec![
@@ -135,7 +135,7 @@ pub fn friction_parameters_table(parameters: &Parameters) -> Table {
     }
 }
 
-/// What each kind of feedforward leaves on axes that follow one model or another: RMS error and glitch.
+/// RMS error and glitch with each kind of feedforward on axes that follow one model or another.
 pub fn tracking_table(tracked: &[Tracked]) -> Table {
     let heads: Vec<String> = TRUTHS
         .iter()

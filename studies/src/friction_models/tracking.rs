@@ -1,4 +1,4 @@
-//! What each model is worth as feedforward: the comparison's sine under N-PID, on axes whose friction really follows one
+//! Each model as feedforward: the comparison's sine under N-PID, on axes whose friction really follows one
 //! model or another.
 
 use indicatif::ProgressBar;
@@ -26,9 +26,9 @@ pub const RUNS: u64 = (TRUTHS.len() * FeedforwardKind::ALL.len()) as u64;
 /// Mean scores over the comparison's velocities, of one kind of feedforward on one truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
-    /// What the axis' friction follows.
+    /// Model of the axis' friction.
     pub truth: Model,
-    /// What is fed forward.
+    /// Model that is fed forward.
     pub kind: FeedforwardKind,
     /// RMS tracking error, mm.
     pub rms_mm: f64,
@@ -36,7 +36,7 @@ pub struct Tracked {
     pub glitch_mm: f64,
 }
 
-/// Why there is no comparison.
+/// Reason that there is no comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum TrackingError {
     /// The settings of the stage that the axis is put into.

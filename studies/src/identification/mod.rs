@@ -70,7 +70,7 @@ impl Judged {
 /// One estimate beside the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// What.
+    /// Its name.
     pub judged: Judged,
     /// As identified.
     pub found: f64,
@@ -86,7 +86,7 @@ impl Estimate {
         100.0 * (self.found / self.truth - 1.0)
     }
 
-    /// Whether the truth lies within two standard deviations.
+    /// True if the plant's value lies within two standard deviations.
     pub fn is_honest(&self) -> bool {
         (self.found - self.truth).abs() <= 2.0 * self.standard_error
     }

@@ -2,7 +2,7 @@
 
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant_sim::experiment::sine_test::TrialOutcome;
+use quadrant_sim::experiment::sine_test::SineTestOutcome;
 use quadrant_sim::pages::{UM_PER_MM, columns, dot, lines, series, statistic_cells};
 use quadrant_sim::report;
 use quadrant_sim::report::{
@@ -12,7 +12,7 @@ use quadrant_sim::report::{
 use crate::laws::comparison::LawOutcome;
 use crate::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw};
 
-/// How each law was tuned.
+/// The tuning of each law.
 pub fn tuning_table(laws: &[TunedLaw]) -> Table {
     let rows = laws.iter().map(|tuned| {
         let best = tuned
@@ -70,7 +70,7 @@ pub fn tuning_table(laws: &[TunedLaw]) -> Table {
     }
 }
 
-/// What each law did.
+/// The result of each law.
 pub fn laws_table(outcomes: &[LawOutcome]) -> Table {
     let um = UM_PER_MM;
     let rows = outcomes.iter().map(|outcome| {
@@ -203,13 +203,13 @@ pub fn laws_section(laws: &[TunedLaw], outcomes: &[LawOutcome]) -> Section {
     }
 }
 
-/// How far apart the laws are, with and without feedforward.
+/// The distance between the laws, with and without feedforward.
 fn closeness(outcomes: &[LawOutcome]) -> String {
     let range = |kind: FeedforwardKind| {
         let of = outcomes
             .iter()
             .filter(|outcome| outcome.feedforward == kind);
-        of.map(|outcome| outcome.statistic(|o: &TrialOutcome| o.score.rms_mm).mean * UM_PER_MM)
+        of.map(|outcome| outcome.statistic(|o: &SineTestOutcome| o.score.rms_mm).mean * UM_PER_MM)
             .fold((f64::INFINITY, 0.0f64), |(low, high), rms| {
                 (low.min(rms), high.max(rms))
             })

@@ -20,18 +20,18 @@ const TUNING_SHARE: f64 = 0.3;
 /// Laws that are tuned.
 const LAWS: u64 = 7;
 
-/// What the study left.
+/// Result of the study.
 #[derive(Clone, Debug)]
 pub struct LawsStudy {
     /// The laws as tuned.
     pub laws: Vec<TunedLaw>,
-    /// What they did on the axis.
+    /// Their results on the axis.
     pub outcomes: Vec<LawOutcome>,
-    /// What competitors did with models that are wrong on purpose.
+    /// Results of the competitors with models that are wrong on purpose.
     pub wrong: Vec<WrongOutcome>,
 }
 
-/// Why there is no study.
+/// Reason that the study failed.
 #[derive(Debug, thiserror::Error)]
 pub enum LawsError {
     /// The trajectory that NCTF follows cannot be measured.

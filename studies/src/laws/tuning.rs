@@ -14,7 +14,7 @@ use quadrant_sim::design::{
     DesignError, Form, Margins, PidDesign, PidRequest, Process, Target, design_pid,
 };
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::sine_test::{Trial, try_three};
+use quadrant_sim::experiment::sine_test::{SineTest, run_sine_tests};
 use quadrant_sim::identify::characteristic::Characteristic;
 use quadrant_sim::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ pub const SENSITIVITY_PEAK: f64 = 1.7;
 pub const COMPLEMENTARY_PEAK: f64 = 1.3;
 
 /// The sine that knobs are chosen on.
-const TRAINING: Trial = Trial {
+const TRAINING: SineTest = SineTest {
     amplitude_mm: 5.0,
     velocity_mm_s: 10.0,
 };
@@ -50,7 +50,7 @@ const MOST_SHARE: f64 = 30.0;
 pub struct TunedLaw {
     /// The law.
     pub law: LawKind,
-    /// What was tried: the knob, with its unit.
+    /// The knob of the grid, with its unit.
     pub knob: &'static str,
     /// Its best value.
     pub value: f64,
@@ -62,7 +62,7 @@ pub struct TunedLaw {
     pub margins: Margins,
 }
 
-/// Why a law cannot be tuned.
+/// Reason that a law cannot be tuned.
 #[derive(Debug, thiserror::Error)]
 pub enum TuningError {
     /// The settings have no linear model.
@@ -78,7 +78,7 @@ pub enum TuningError {
     Margins {
         /// The law.
         law: &'static str,
-        /// Why.
+        /// Cause.
         source: quadrant_sim::design::MarginError,
     },
     /// No candidate is left.
@@ -114,7 +114,7 @@ pub fn twin(axis: &AxisSettings) -> Option<AxisTruth> {
     })
 }
 
-/// What tuning works with.
+/// Input of the tuning.
 struct Bench<'a> {
     axis: &'a AxisSettings,
     twin: AxisTruth,
@@ -334,7 +334,7 @@ impl Bench<'_> {
                 let of = |index: usize| &chunk[index.min(chunk.len() - 1)].1;
                 let settings = [0, 1, 2].map(|index| self.training(of(index)));
                 let outcomes =
-                    try_three(settings, &self.twin, [TRAINING; 3], self.rate_hz, self.seed)?;
+                    run_sine_tests(settings, &self.twin, [TRAINING; 3], self.rate_hz, self.seed)?;
                 Ok(outcomes.map(|outcome| outcome.score.rms_mm))
             })
             .collect::<Result<_, RunError>>()?;

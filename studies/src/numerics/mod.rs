@@ -1,4 +1,4 @@
-//! What the number type costs: `f32` and fixed point against `f64`, over the whole comparison.
+//! The cost of the number type: `f32` and fixed point against `f64`, over the whole comparison.
 //!
 //! *Output*: all three laws read the same counts, those of the stage under the `f64` law, so the difference is the
 //! arithmetic's alone. *Tracking error*: each law runs its own stage in closed loop with the same noise, and what is
@@ -17,7 +17,7 @@ use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::machine::Machine;
 use rayon::prelude::*;
 
-/// How far a number type strays from `f64`: the worst over all velocities and both kinds of knowledge.
+/// Deviation of a number type from `f64`: the worst over all velocities and both kinds of model knowledge.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Deviation {
     /// Output on the same counts, V.
@@ -47,7 +47,7 @@ impl Deviation {
 /// Deviations of the number types under one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numerics {
-    /// Who ran.
+    /// The configuration.
     pub configuration: Configuration,
     /// `f32`.
     pub single: Deviation,

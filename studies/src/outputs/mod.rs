@@ -1,4 +1,4 @@
-//! What a coarser output costs: 16 bits, 12 bits, and 12 bits with the error of the past shaped away, on the thesis'
+//! The cost of a coarser output: 16 bits, 12 bits, and 12 bits with the error of the past shaped away, on the thesis'
 //! sines.
 
 pub mod command;
@@ -11,7 +11,7 @@ use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use rayon::prelude::*;
 
-/// How codes become volts.
+/// Conversion from codes to volts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
     /// The external converter: every bit of the code.
@@ -40,10 +40,10 @@ impl Output {
     }
 }
 
-/// What one output did.
+/// Results of one output.
 #[derive(Clone, Debug)]
 pub struct OutputRun {
-    /// Which.
+    /// The output.
     pub output: Output,
     /// One outcome for each velocity of the comparison.
     pub outcomes: [Outcome; 3],

@@ -1,4 +1,4 @@
-//! What the thesis names beside its own method: other laws, other friction models, other disturbances and drives; and the
+//! The comparative studies: other laws, other friction models, other disturbances and drives; and the
 //! circle as machine builders know it.
 
 use indicatif::ProgressBar;

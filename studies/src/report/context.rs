@@ -1,4 +1,4 @@
-//! What the parts of a report work on.
+//! Input of the parts of a report.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -10,7 +10,7 @@ use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
-/// What the parts of a report work on.
+/// Input of the parts of a report.
 pub struct Context {
     /// Seed of the simulated noise; of repeated runs the first, which the others follow.
     pub seed: u64,

@@ -1,4 +1,4 @@
-//! What `quadrant-studies report` computes: parts, each a few sections of one page, kept in files so that an interrupted report
+//! Parts of `quadrant-studies report`, each a few sections of one page, kept in files so that an interrupted report
 //! goes on where it stopped.
 //!
 //! A new part is a function from [`Context`] to sections and one line in [`PARTS`].
@@ -24,11 +24,11 @@ use store::{Key, Store, Stored};
 pub struct Part {
     /// Its name on the command line and of its file: lower-case letters, digits and hyphens.
     pub id: &'static str,
-    /// What it shows.
+    /// Its content, in a line.
     pub title: &'static str,
     /// About how long it takes on two cores, s, without the runs of chapter 5: its share of the progress bar.
     pub expected_s: fn(&Context) -> f64,
-    /// Whether it needs [`Context::comparison`], the runs of chapter 5, which parts of one report share.
+    /// True if it needs [`Context::comparison`], the runs of chapter 5, which parts of one report share.
     pub needs_comparison: bool,
     /// Computes it. The same context must give the same sections, whatever the number of threads.
     pub run: fn(&Context, &Progress) -> anyhow::Result<Vec<Section>>,
@@ -94,21 +94,21 @@ pub const PARTS: &[Part] = &[
     },
 ];
 
-/// What a report is asked for.
+/// Request for a report.
 pub struct Request<'a> {
     /// The parts, in the order of the page.
     pub parts: &'a [Part],
-    /// What they work on.
+    /// Their input.
     pub context: &'a Context,
     /// Folder of the parts' files; made if it is missing.
     pub folder: PathBuf,
-    /// Whether files of earlier reports are left unread.
+    /// True if files of earlier reports are left unread.
     pub fresh: bool,
 }
 
 /// A part that is done.
 pub struct Done {
-    /// Which.
+    /// The part.
     pub part: Part,
     /// Its sections.
     pub sections: Vec<Section>,

@@ -1,4 +1,4 @@
-//! How far a report is.
+//! Progress of a report.
 
 use indicatif::ProgressBar;
 
@@ -9,7 +9,7 @@ const STEPS: f64 = 1e6;
 pub struct Progress {
     bar: ProgressBar,
     steps_per_s: f64,
-    /// Where the part begins and how long it is, in steps.
+    /// Start and length of the part, in steps.
     part: (f64, f64),
 }
 

@@ -43,7 +43,7 @@ impl Key {
         })
     }
 
-    /// What in another key is not as here; the first of it.
+    /// First difference to another key.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let differs = [
             ("another form of this file", self.form != other.form),
@@ -92,7 +92,7 @@ struct Read {
     sections: Vec<Section>,
 }
 
-/// What a part's file holds.
+/// Content of a part's file.
 pub(super) enum Stored {
     /// There is none.
     Missing,

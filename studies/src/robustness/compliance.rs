@@ -1,4 +1,4 @@
-//! How far a sinusoidal load moves the axis at rest: what the loop's linear model says, and what the simulated axis does.
+//! Amplitude of the axis at rest under a sinusoidal load, by the loop's linear model and on the simulated axis.
 
 use std::f64::consts::TAU;
 
@@ -77,7 +77,7 @@ pub fn pid_alone(settings: &StageSettings) -> StageSettings {
     settings
 }
 
-/// What a law's axis does under [`LOAD_V`] at every one of [`FREQUENCIES_HZ`]; the axis under test is the first of the stage.
+/// Amplitude of a law's axis under [`LOAD_V`] at every one of [`FREQUENCIES_HZ`]; the axis under test is the first of the stage.
 ///
 /// # Errors
 /// Settings that are refused.

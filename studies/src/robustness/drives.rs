@@ -13,7 +13,7 @@ use crate::robustness::Scenario;
 pub struct DriveCase {
     /// Its name in tables.
     pub name: String,
-    /// What it is, with its numbers.
+    /// Description, with its numbers.
     pub what: String,
     /// The axis on it.
     pub truth: AxisTruth,

@@ -1,4 +1,4 @@
-//! What becomes of tracking when the axis is no longer what it was commissioned as: named scenarios, and the laws that
+//! Tracking of an axis that has changed since it was commissioned: named scenarios, and the laws that
 //! compete in them.
 //!
 //! The settings of the competitors are those of the axis as it was commissioned and stay as they are while mass, friction,
@@ -28,7 +28,7 @@ pub use scenario::{Scenario, scenarios};
 pub use trial::Task;
 use trial::{Ended, Trial};
 
-/// What is to be run.
+/// Runs to be made.
 #[derive(Clone, Debug)]
 pub struct RobustnessRequest {
     /// The laws: name, and settings of the stage they were commissioned on.
@@ -43,12 +43,12 @@ pub struct RobustnessRequest {
     pub seeds: u64,
 }
 
-/// What one competitor did in one scenario.
+/// Result of one competitor in one scenario.
 #[derive(Clone, Debug)]
 pub struct RobustnessOutcome {
     /// The scenario's name.
     pub scenario: String,
-    /// What the axis was asked to do in it.
+    /// The axis' task in it.
     pub task: Task,
     /// The competitor's name.
     pub competitor: String,
@@ -77,7 +77,7 @@ impl RobustnessOutcome {
     }
 }
 
-/// Why a competitor cannot run.
+/// Reason that a competitor cannot run.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RobustnessError {
     /// Its settings are refused.
@@ -87,7 +87,7 @@ pub enum RobustnessError {
         competitor: String,
         /// The scenario.
         scenario: String,
-        /// Why.
+        /// Cause.
         source: SettingsError,
     },
     /// A motion did not end.
@@ -99,7 +99,7 @@ pub enum RobustnessError {
         competitor: String,
         /// The scenario.
         scenario: String,
-        /// How long it was waited for.
+        /// Time that it was waited for.
         ticks: usize,
     },
 }
@@ -207,7 +207,7 @@ pub fn find<'a>(
         .find(|outcome| outcome.scenario == scenario && outcome.competitor == competitor)
 }
 
-/// What changes of an outcome are counted from: the same competitor in the first scenario with the same task.
+/// Baseline of an outcome's changes: the same competitor in the first scenario with the same task.
 pub fn baseline<'a>(
     outcomes: &'a [RobustnessOutcome],
     outcome: &RobustnessOutcome,

@@ -14,17 +14,17 @@ use crate::robustness::Task;
 pub struct Scenario {
     /// Its name in tables.
     pub name: String,
-    /// What is different, with its numbers.
+    /// The difference, with its numbers.
     pub what: String,
     /// The axis as it then is.
     pub truth: AxisTruth,
-    /// What pushes on it.
+    /// Load on the axis.
     pub load: Load,
-    /// What it is asked to do.
+    /// The axis' task.
     pub task: Task,
-    /// What commissioning found on this axis, where it is another machine; otherwise the settings stay as they were.
+    /// Settings from commissioning this axis, if it is another machine; otherwise the settings stay as they were.
     pub commissioned: Option<AxisSettings>,
-    /// Whether the error over time is kept.
+    /// True if the error over time is kept.
     pub keeps_trace: bool,
 }
 
@@ -61,7 +61,7 @@ const HOLD: Task = Task::Hold {
     seconds: 4.0,
     scored_from: 0.0,
 };
-/// When the tool is in the material, s: during a hold and a slow move, and from start to end of a sine.
+/// Times of the cut, s: during a hold and a slow move, and from start to end of a sine.
 const ENGAGED_S: (f64, f64) = (1.0, 3.0);
 const ALWAYS_S: (f64, f64) = (0.0, 1e3);
 

@@ -13,7 +13,7 @@ use crate::robustness::{
     usual_competitors,
 };
 
-/// What is to be studied.
+/// Request for the study.
 pub struct StudyRequest {
     /// Settings that the axis was commissioned with.
     pub stage: StageSettings,
@@ -31,12 +31,12 @@ pub struct StudyRequest {
     pub seeds: u64,
 }
 
-/// What the study left.
+/// Result of the study.
 #[derive(Debug)]
 pub struct RobustnessReport {
     /// The scenarios, in the order of the tables.
     pub scenarios: Vec<Scenario>,
-    /// What the competitors did in them.
+    /// Results of the competitors in them.
     pub outcomes: Vec<RobustnessOutcome>,
     /// Drives on which no controller could be commissioned, and why.
     pub refused: Vec<Refused>,
@@ -44,7 +44,7 @@ pub struct RobustnessReport {
     pub compliances: Vec<Compliance>,
 }
 
-/// Why there is no study.
+/// Reason that the study failed.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// No scenario has such a name.

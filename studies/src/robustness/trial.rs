@@ -16,7 +16,7 @@ use quadrant_sim::plant::{AxisTruth, SimulatedAxis};
 
 use crate::robustness::RobustnessError;
 
-/// What an axis is asked to do.
+/// Task of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Task {
     /// The comparison's sine of 30 mm at 10 mm/s; its last two cycles are scored.
@@ -122,15 +122,15 @@ pub(super) struct Trial<'a> {
     pub(super) seed: u64,
 }
 
-/// How a run ended.
+/// End of a run.
 pub(super) struct Ended {
     /// Its score, or what switched the stage off.
     pub(super) score: Result<Score, Fault>,
-    /// What it did where it is worth showing, if it ended well.
+    /// Its trace, if it is shown and the run ended well.
     pub(super) trace: Option<AxisTrace>,
 }
 
-/// Why a run has no result.
+/// Reason that a run has no result.
 pub(super) enum Stopped {
     Settings(SettingsError),
     Endless(usize),

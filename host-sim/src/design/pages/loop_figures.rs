@@ -15,7 +15,7 @@ pub(super) struct DrawnLoop<'a, L: OpenLoop> {
     pub(super) name: &'a str,
     /// The loop.
     pub(super) open_loop: &'a L,
-    /// How it is drawn.
+    /// Style.
     pub(super) style: Style,
 }
 
@@ -23,7 +23,7 @@ pub(super) struct DrawnLoop<'a, L: OpenLoop> {
 const POINTS: usize = 600;
 /// The frequencies drawn, if the loop's band reaches so far, Hz.
 const DRAWN_HZ: (f64, f64) = (1.0, 1000.0);
-/// How many of the longest settling time a step response is drawn for.
+/// Duration of a drawn step response, in the longest settling times.
 const DRAWN_SETTLINGS: f64 = 3.0;
 /// Half of the Nyquist plot's width: what lies beyond concerns nobody.
 const NYQUIST_REACH: f64 = 2.5;

@@ -1,4 +1,4 @@
-//! What a person reads of a nonlinear gain's design.
+//! Page of a nonlinear gain's design.
 
 use std::f64::consts::TAU;
 
@@ -18,7 +18,7 @@ use crate::report::{Block, Cell, Colour, Page, Provenance, Section, Style, Table
 /// Everything a nonlinear gain's design found.
 #[derive(Clone, Debug)]
 pub struct NonlinearPage {
-    /// What it is designed on.
+    /// Process of the design.
     pub subject: String,
     /// The model, its hold included in the delay as the proof counts it.
     pub plant: PlantModel,

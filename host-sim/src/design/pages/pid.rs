@@ -1,4 +1,4 @@
-//! What a person reads of a PID's design.
+//! Page of a PID's design.
 
 use quadrant::control::popov::PidGains;
 
@@ -109,10 +109,10 @@ pub fn step_table(responses: &[(String, StepProperties)]) -> Table {
     }
 }
 
-/// What a page of a PID's design shows.
+/// Content of the page of a PID's design.
 #[derive(Clone, Debug)]
 pub struct PidPage<'a> {
-    /// What it is designed on.
+    /// Process of the design.
     pub subject: String,
     /// The gains.
     pub gains: PidGains,

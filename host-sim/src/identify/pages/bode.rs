@@ -9,7 +9,7 @@ pub(super) struct Curve<'a> {
     pub(super) name: String,
     /// The response.
     pub(super) response: &'a FrequencyResponse,
-    /// How it is drawn.
+    /// Style.
     pub(super) style: Style,
 }
 

@@ -1,10 +1,10 @@
-//! What a person reads of the inertia and friction of a motion record.
+//! Page of the inertia and friction of a motion record.
 
 use crate::identify::motion::{Candidate, MotionModel, Replayed};
 use crate::pages::{UM_PER_MM, columns, lines, series};
 use crate::report::{Block, Cell, Colour, Page, Provenance, Section, Style, Table};
 
-/// How a model does when it is run over its record.
+/// Result of a model that is run over its record.
 #[derive(Clone, Debug)]
 pub struct Reruns {
     /// Driven by the recorded voltage.
