@@ -141,7 +141,7 @@ pub enum ProgramError {
     /// A limit of the motion that cannot be kept.
     #[error("{what} is {value}, but must be within {least} and {most}")]
     Limit {
-        /// The axis.
+        /// Name of the limit.
         what: &'static str,
         /// Its value.
         value: f64,

@@ -183,7 +183,7 @@ fn what_the_stage_does_not_have_is_noted_and_the_end_ends() {
 fn the_deviation_from_the_path_is_measured_across_it() {
     let trajectory = plan("G1 X20 F600\nG3 X20 Y20 R10\nG1 X0");
     for place in trajectory.places(200.0) {
-        let element = &trajectory.moves()[place.index].segment;
+        let segment = &trajectory.moves()[place.index].segment;
         let tangent = element.tangent(place.along_mm);
         let across = Vector::new(-tangent.y, tangent.x, 0.0);
         // 0.02 mm beside the path and 0.03 mm late: only the first is a contour error.

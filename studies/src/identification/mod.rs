@@ -70,7 +70,7 @@ impl Judged {
 /// One estimate beside the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// Its name.
+    /// The parameter.
     pub judged: Judged,
     /// As identified.
     pub found: f64,
