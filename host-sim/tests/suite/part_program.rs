@@ -184,7 +184,7 @@ fn the_deviation_from_the_path_is_measured_across_it() {
     let trajectory = plan("G1 X20 F600\nG3 X20 Y20 R10\nG1 X0");
     for place in trajectory.places(200.0) {
         let segment = &trajectory.moves()[place.index].segment;
-        let tangent = element.tangent(place.along_mm);
+        let tangent = segment.tangent(place.along_mm);
         let across = Vector::new(-tangent.y, tangent.x, 0.0);
         // 0.02 mm beside the path and 0.03 mm late: only the first is a contour error.
         let point = trajectory.point(&place) + across * 0.02 - tangent * 0.03;
