@@ -3,13 +3,13 @@
 use core::mem::MaybeUninit;
 
 use embedded_storage::nor_flash::NorFlash;
+use quadrant::app::last_words::Death;
+use quadrant::app::{Axis, Control, ControlEnds, Queues, Server, ServerParts};
 use quadrant::capture::CAPTURE_WORDS;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::ResetCause;
-use quadrant::last_words::Death;
 use quadrant::link::lockstep::Job;
 use quadrant::link::message::{NumberType, Provenance};
-use quadrant::machine::{Axis, Control, ControlEnds, Queues, Server, ServerParts};
 use quadrant::safety::{AxisName, FaultCode, StreamLoss};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};

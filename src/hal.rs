@@ -4,9 +4,9 @@
 //! traits are ours, and this is their only place. They speak in raw words: what a word means is
 //! [`settings`](crate::settings). Flash for stored settings is `embedded_storage::nor_flash::NorFlash`.
 
-use crate::encoder::EncoderReading;
-use crate::safety;
-use crate::units::DacCode;
+use crate::law::encoder::EncoderReading;
+use crate::law::safety;
+use crate::law::units::DacCode;
 
 /// The three axes' encoders.
 pub trait Encoders {

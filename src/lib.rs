@@ -56,30 +56,16 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
-pub mod axis;
-pub mod capture;
-pub mod control;
-mod course;
-pub mod decimal;
-pub mod driver;
-pub mod encoder;
-pub mod feedforward;
-pub mod friction;
+pub mod app;
+pub mod drivers;
 pub mod hal;
-pub mod homing;
-pub mod injection;
-pub mod last_words;
+pub mod law;
 pub mod link;
-pub mod machine;
-pub mod rate_limiter;
-pub mod reference;
-mod rounding;
-pub mod safety;
-pub mod scalar;
 pub mod settings;
-pub mod stage;
 pub mod store;
-pub mod supervisor;
-pub mod table;
-pub mod telemetry;
-pub mod units;
+
+#[doc(inline)]
+pub use law::{
+    axis, capture, control, decimal, encoder, feedforward, friction, homing, injection, reference,
+    safety, scalar, stage, table, telemetry, units,
+};

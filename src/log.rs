@@ -6,14 +6,14 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embedded_storage::nor_flash::NorFlash;
+use quadrant::app::rate_limiter::RateLimiter;
+use quadrant::app::supervisor::Event;
+use quadrant::app::{Journal, Meters, News, Server, Snapshot};
 use quadrant::axis::CourseMode;
 use quadrant::hal::ResetCause;
-use quadrant::machine::{Journal, Meters, News, Server, Snapshot};
-use quadrant::rate_limiter::RateLimiter;
 use quadrant::safety::{AxisName, Command, Fault};
 use quadrant::scalar::{Quantity, Scalar};
 use quadrant::settings::StageSettings;
-use quadrant::supervisor::Event;
 
 use crate::board;
 

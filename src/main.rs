@@ -50,13 +50,13 @@ mod app {
     use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
-    use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
-    use quadrant::link::message::NumberType;
-    use quadrant::machine::{
+    use quadrant::app::supervisor::Event;
+    use quadrant::app::{
         After, Control, ControlInputs, Liveness, Meters, Server, Snapshot, Supervision,
     };
+    use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
+    use quadrant::link::message::NumberType;
     use quadrant::safety::{AxisName, AxisSwitches, Command};
-    use quadrant::supervisor::Event;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
@@ -336,7 +336,7 @@ fn main() {
          Build it:   cargo xtask build --board nucleo-f446re    (or --board mps2)\n\
          Emulate it: cargo xtask emulate\n\
          By hand it takes a target and the feature of a board:\n\
-         cargo build --release --target thumbv7em-none-eabihf --features board-nucleo-f446re"
+         cargo build --profile firmware --target thumbv7em-none-eabihf --features board-nucleo-f446re"
     );
     std::process::exit(2);
 }

@@ -6,6 +6,7 @@
 
 use std::collections::VecDeque;
 
+use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::link::lockstep::{
     FLASH, FLASH_BYTES, InputRecord, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT,
     LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
@@ -13,7 +14,6 @@ use quadrant::link::lockstep::{
 use quadrant::safety::Switches;
 use quadrant::settings::StageSettings;
 use quadrant::stage::Outputs;
-use quadrant::supervisor::PERIOD_TICKS;
 
 use crate::emulator::{EmulatorError, Lockstep, Memory, Program};
 use crate::plant::{SimulatedStage, StageTruth};

@@ -20,6 +20,8 @@
 //! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have;
 //! - [`command`]: options that the commands of this package and of the studies share.
 #![forbid(unsafe_code)]
+// A tool, not a library for others: a comment that only repeats a name is left out.
+#![allow(missing_docs)]
 
 pub mod circle;
 pub mod command;
@@ -39,7 +41,7 @@ pub mod pages;
 pub mod plant;
 pub mod record;
 pub mod replay;
-pub mod report;
+pub use quadrant_report as report;
 pub mod rig;
 pub mod scenario;
 pub mod settings_file;

@@ -2,13 +2,13 @@
 
 use std::collections::VecDeque;
 
+use quadrant::app::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
 use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
 use quadrant::safety::{AxisName, Command};
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
-use quadrant::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
 
 /// Control law, supervisor, and what passes between them.
 #[derive(Clone, Debug)]

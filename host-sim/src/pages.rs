@@ -3,10 +3,9 @@
 use crate::experiment::statistic::Statistic;
 use crate::report::{Cell, Column, Figure, Lines, Plot, Provenance, Series, Spread, Style};
 
-/// mm to um.
 pub const UM_PER_MM: f64 = 1e3;
 
-/// Provenance of a page: the command line as a reader would repeat it, the seed, this program's version.
+/// Returns the provenance of a page: the command line as a reader would repeat it, the seed, this program's version.
 pub fn provenance(command: &str, seed: u64) -> Provenance {
     Provenance {
         command: command.to_owned(),
@@ -71,7 +70,6 @@ pub fn lines(id: &str, caption: &str, labels: (&str, &str), series: Vec<Series>)
     }
 }
 
-/// One curve.
 pub fn series(name: &str, x: Vec<f64>, y: Vec<f64>, style: Style) -> Series {
     Series {
         name: name.to_owned(),

@@ -9,7 +9,7 @@ use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m_rt::exception;
-use quadrant::last_words::{Death, LastWords};
+use quadrant::app::last_words::{Death, LastWords};
 
 use super::{Outcome, halt, outputs_off, remains, stack};
 use crate::app::TICK;

@@ -3,7 +3,7 @@
 use core::cell::UnsafeCell;
 use core::mem::MaybeUninit;
 
-use quadrant::last_words::LastWords;
+use quadrant::app::last_words::LastWords;
 
 struct Remains(UnsafeCell<MaybeUninit<[u8; LastWords::BYTES]>>);
 

@@ -7,11 +7,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::encoder::EncoderReading;
-use crate::safety::{Command, Switches};
+use crate::law::encoder::EncoderReading;
+use crate::law::safety::{Command, Switches};
+use crate::law::stage::{Inputs, Outputs};
+use crate::law::units::DacCode;
 use crate::settings::{PlanSettings, StageSettings};
-use crate::stage::{Inputs, Outputs};
-use crate::units::DacCode;
 
 /// Size of the memory.
 pub const MEMORY_BYTES: usize = 16 << 20;

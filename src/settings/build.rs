@@ -3,17 +3,17 @@
 use super::{
     AmplifierSettings, AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings,
 };
-use crate::axis::{Amplifier, Axis};
-use crate::course::Course;
-use crate::encoder::Encoder;
-use crate::reference::{Motion, MotionScale, Ramp, Stream, Velocity};
-use crate::rounding;
-use crate::safety::AxisName;
-use crate::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
-use crate::safety::travel::Travel;
-use crate::scalar::{Quantity, Scalar};
-use crate::stage::{Plan, Stage};
-use crate::units::{DacCode, POSITION_UNITS_PER_COUNT, Position};
+use crate::law::axis::{Amplifier, Axis};
+use crate::law::course::Course;
+use crate::law::encoder::Encoder;
+use crate::law::reference::{Motion, MotionScale, Ramp, Stream, Velocity};
+use crate::law::rounding;
+use crate::law::safety::AxisName;
+use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
+use crate::law::safety::travel::Travel;
+use crate::law::scalar::{Quantity, Scalar};
+use crate::law::stage::{Plan, Stage};
+use crate::law::units::{DacCode, POSITION_UNITS_PER_COUNT, Position};
 
 impl StageSettings {
     /// Checks the settings and builds the stage, with room for `N` GMS elements. Slow: tables are filled and the
@@ -30,7 +30,7 @@ impl StageSettings {
     }
 
     /// Builds one axis of settings that [`validate`](Self::validate) has accepted, to be put in the place of another in a
-    /// [`StageRef`](crate::stage::StageRef). How long an axis waits at the start of a motion depends on the longest preview
+    /// [`StageRef`](crate::law::stage::StageRef). How long an axis waits at the start of a motion depends on the longest preview
     /// of all: a change of that concerns every axis. Slow, as the build of the stage.
     pub fn build_axis<S: Scalar, const N: usize>(&self, axis: AxisName) -> Axis<S, N> {
         let mut built = Axis::blank();

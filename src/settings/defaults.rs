@@ -8,16 +8,16 @@ use super::{
     FrictionSettings, HomeSwitch, HomingSettings, LimitSettings, StageSettings, StreamingSettings,
     TravelSettings,
 };
-use crate::control::npid::NonlinearGain;
-use crate::control::plant_model::PlantModel;
-use crate::control::popov::PidGains;
-use crate::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::friction::dahl::DahlParameters;
-use crate::friction::gms::{GmsElement, GmsParameters};
-use crate::friction::lugre::LugreParameters;
-use crate::friction::smoothed_gms::SmoothedGmsParameters;
-use crate::friction::stribeck::{StaticFriction, StribeckCurve};
-use crate::friction::{Direction, PerDirection};
+use crate::law::control::npid::NonlinearGain;
+use crate::law::control::plant_model::PlantModel;
+use crate::law::control::popov::PidGains;
+use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
+use crate::law::friction::dahl::DahlParameters;
+use crate::law::friction::gms::{GmsElement, GmsParameters};
+use crate::law::friction::lugre::LugreParameters;
+use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
+use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
+use crate::law::friction::{Direction, PerDirection};
 
 /// What tells one default axis from another.
 struct Character {

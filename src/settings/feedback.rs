@@ -3,16 +3,16 @@
 use heapless::Vec;
 
 use super::FeedbackSettings;
-use crate::control::cascade::{Cascade, CascadeGains};
-use crate::control::feedback::{Feedback, LawKind};
-use crate::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
-use crate::control::npid::{NonlinearGain, NonlinearGainTable};
-use crate::control::pid::Pid;
-use crate::control::popov::PidGains;
-use crate::control::schedule::{MAX_POINTS, SchedulePoint, ScheduledPid};
-use crate::control::sliding_mode::{SlidingMode, SlidingModeGains};
-use crate::control::surface::SurfaceGains;
-use crate::scalar::Scalar;
+use crate::law::control::cascade::{Cascade, CascadeGains};
+use crate::law::control::feedback::{Feedback, LawKind};
+use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
+use crate::law::control::npid::{NonlinearGain, NonlinearGainTable};
+use crate::law::control::pid::Pid;
+use crate::law::control::popov::PidGains;
+use crate::law::control::schedule::{MAX_POINTS, SchedulePoint, ScheduledPid};
+use crate::law::control::sliding_mode::{SlidingMode, SlidingModeGains};
+use crate::law::control::surface::SurfaceGains;
+use crate::law::scalar::Scalar;
 
 /// Output of sliding mode before anybody has chosen it, V: several times the friction of the axes this was written for.
 const SWITCHING_V: f64 = 1.0;

@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
 use super::AxisSettings;
-use crate::friction::Direction;
-use crate::homing::Homing;
-use crate::reference::{Approach, MotionScale, Velocity};
-use crate::rounding;
-use crate::safety::AxisSwitches;
-use crate::scalar::Scalar;
-use crate::units::{POSITION_UNITS_PER_COUNT, Position};
+use crate::law::friction::Direction;
+use crate::law::homing::Homing;
+use crate::law::reference::{Approach, MotionScale, Velocity};
+use crate::law::rounding;
+use crate::law::safety::AxisSwitches;
+use crate::law::scalar::Scalar;
+use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// The switch that homing looks for.
 #[derive(

@@ -1,10 +1,10 @@
 //! What a request to inject a voltage comes to under the settings. For the slow half.
 
 use super::{Reason, SettingsError, StageSettings};
-use crate::injection::Injection;
-use crate::safety::AxisName;
-use crate::scalar::{Quantity, Scalar};
-use crate::units::{DacCode, Position};
+use crate::law::injection::Injection;
+use crate::law::safety::AxisName;
+use crate::law::scalar::{Quantity, Scalar};
+use crate::law::units::{DacCode, Position};
 
 /// What is to be injected, and within which bounds.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,7 +4,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use crate::safety::{Reaction, StreamLoss};
+use crate::law::safety::{Reaction, StreamLoss};
 
 /// What an axis may do.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]

@@ -29,22 +29,22 @@ pub use value::MAX_VALUE_BYTES;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use crate::control::cascade::CascadeGains;
-use crate::control::feedback::LawKind;
-use crate::control::nctf::NctfGains;
-use crate::control::npid::NonlinearGain;
-use crate::control::plant_model::PlantModel;
-use crate::control::popov::PidGains;
-use crate::control::schedule::GainSchedule;
-use crate::control::sliding_mode::SlidingModeGains;
-use crate::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::friction::PerDirection;
-use crate::friction::dahl::DahlParameters;
-use crate::friction::gms::GmsParameters;
-use crate::friction::lugre::LugreParameters;
-use crate::friction::smoothed_gms::SmoothedGmsParameters;
-use crate::friction::stribeck::StaticFriction;
-use crate::reference::MotionSettings;
+use crate::law::control::cascade::CascadeGains;
+use crate::law::control::feedback::LawKind;
+use crate::law::control::nctf::NctfGains;
+use crate::law::control::npid::NonlinearGain;
+use crate::law::control::plant_model::PlantModel;
+use crate::law::control::popov::PidGains;
+use crate::law::control::schedule::GainSchedule;
+use crate::law::control::sliding_mode::SlidingModeGains;
+use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
+use crate::law::friction::PerDirection;
+use crate::law::friction::dahl::DahlParameters;
+use crate::law::friction::gms::GmsParameters;
+use crate::law::friction::lugre::LugreParameters;
+use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
+use crate::law::friction::stribeck::StaticFriction;
+use crate::law::reference::MotionSettings;
 
 /// Everything the stage's control law is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]

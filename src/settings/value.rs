@@ -5,12 +5,12 @@
 
 use core::any::Any;
 
-use crate::control::feedback::LawKind;
-use crate::control::nctf::Characteristic;
-use crate::control::schedule::GainSchedule;
-use crate::feedforward::FeedforwardKind;
-use crate::friction::Direction;
-use crate::friction::gms::GmsElements;
+use crate::law::control::feedback::LawKind;
+use crate::law::control::nctf::Characteristic;
+use crate::law::control::schedule::GainSchedule;
+use crate::law::feedforward::FeedforwardKind;
+use crate::law::friction::Direction;
+use crate::law::friction::gms::GmsElements;
 use crate::settings::{HomeSwitch, LossReaction};
 
 /// The longest value in bytes: a list of 16 points of two numbers takes 257.

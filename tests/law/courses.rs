@@ -1,5 +1,6 @@
 //! What the axes follow when asked: stops, single moves and streams through the whole tick.
 
+use quadrant::app::supervisor::{Event, Refusal, StageView, Supervisor};
 use quadrant::axis::CourseMode;
 use quadrant::reference::{
     AxisPoint, HarmonicSettings, MotionSettings, PointToPointSettings, ReferenceSample, Segment,
@@ -7,7 +8,6 @@ use quadrant::reference::{
 };
 use quadrant::safety::{AxisName, Command, FaultCode, Reaction, SafetyState};
 use quadrant::settings::{LossReaction, PlanSettings, StageSettings};
-use quadrant::supervisor::{Event, Refusal, StageView, Supervisor};
 use quadrant::units::Position;
 
 use crate::common::Rig;

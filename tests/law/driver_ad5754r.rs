@@ -6,7 +6,7 @@ use std::rc::Rc;
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as Level};
 use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction};
-use quadrant::driver::ad5754r::{self, ALL_ZERO, Ad5754r, Clock, Error, Item, Pins, SelectClock};
+use quadrant::drivers::ad5754r::{self, ALL_ZERO, Ad5754r, Clock, Error, Item, Pins, SelectClock};
 
 use embedded_hal::spi::{ErrorKind, ErrorType, SpiBus};
 

@@ -1,7 +1,7 @@
 //! The dead man's switch.
 
 use proptest::prelude::*;
-use quadrant::driver::hold_button::{DEBOUNCE_TICKS, HoldButton};
+use quadrant::drivers::hold_button::{DEBOUNCE_TICKS, HoldButton};
 use quadrant::safety::Command;
 
 const LONG: usize = DEBOUNCE_TICKS as usize;

@@ -1,7 +1,7 @@
 //! The 12-bit output: exact in the mean, bounded, never out of range.
 
 use proptest::prelude::*;
-use quadrant::driver::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::units::DacCode;
 
 const ALL: [NoiseShaper; 3] = [

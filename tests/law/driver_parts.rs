@@ -1,9 +1,9 @@
 //! Counters, input filters and DMA rings.
 
 use proptest::prelude::*;
-use quadrant::driver::counter::ExtendedCounter;
-use quadrant::driver::dma_ring::DmaRing;
-use quadrant::driver::input_filter::{InputFilter, shortest_level_ns};
+use quadrant::drivers::counter::ExtendedCounter;
+use quadrant::drivers::dma_ring::DmaRing;
+use quadrant::drivers::input_filter::{InputFilter, shortest_level_ns};
 
 proptest! {
     /// A 16-bit counter read often enough is the low half of a 32-bit one.

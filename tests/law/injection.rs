@@ -1,6 +1,7 @@
 //! A host's voltage through the whole tick: what it adds up to, and when it is taken.
 
 use proptest::prelude::*;
+use quadrant::app::supervisor::{Refusal, StageView, refusal};
 use quadrant::axis::CourseMode;
 use quadrant::injection::Injection;
 use quadrant::reference::Velocity;
@@ -8,7 +9,6 @@ use quadrant::safety::{AxisName, Command, FaultCode};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{InjectionSettings, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
-use quadrant::supervisor::{Refusal, StageView, refusal};
 
 use crate::common::{Rig, any_f32, repeatable, sine_on_x};
 

@@ -1,9 +1,9 @@
 //! What the board's own log finds worth telling.
 
+use quadrant::app::supervisor::StageView;
+use quadrant::app::{Journal, MOST_NEWS, Meters, News, Vitals};
 use quadrant::axis::CourseMode;
-use quadrant::machine::{Journal, MOST_NEWS, Meters, News, Vitals};
 use quadrant::safety::AxisName;
-use quadrant::supervisor::StageView;
 
 /// A machine that somebody else changes between looks.
 #[derive(Default)]

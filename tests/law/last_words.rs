@@ -1,7 +1,7 @@
 //! The record that outlives a reset.
 
 use proptest::prelude::*;
-use quadrant::last_words::{Death, LastWords, TEXT_BYTES};
+use quadrant::app::last_words::{Death, LastWords, TEXT_BYTES};
 
 #[test]
 fn last_words_survive() {

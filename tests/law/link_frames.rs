@@ -1,6 +1,7 @@
 //! Frames, and the port's manners.
 
 use heapless::Vec as Bounded;
+use quadrant::app::supervisor;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{
     self, DecodeError, EncodeError, FRAME_BYTES, FrameCounters, PAYLOAD_BYTES, Receiver,
@@ -11,7 +12,6 @@ use quadrant::link::message::{
 };
 use quadrant::link::port::Port;
 use quadrant::safety::{AxisName, FaultCode};
-use quadrant::supervisor;
 
 use crate::link_traffic::framed;
 

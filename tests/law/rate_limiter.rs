@@ -1,7 +1,7 @@
 //! The log's rate limiter.
 
 use proptest::prelude::*;
-use quadrant::rate_limiter::RateLimiter;
+use quadrant::app::rate_limiter::RateLimiter;
 
 const WINDOW: u32 = 100;
 const LINES: u16 = 3;

@@ -1,8 +1,8 @@
 //! What the supervising task lets through, and what it tells.
 
+use quadrant::app::supervisor::{Decision, Event, Refusal, StageView, Supervisor};
 use quadrant::axis::CourseMode;
 use quadrant::safety::{AxisName, Command, Fault, FaultCode, Obstacle, SafetyState};
-use quadrant::supervisor::{Decision, Event, Refusal, StageView, Supervisor};
 
 const FAULT: Fault = Fault {
     code: FaultCode::DeadlineMissed,

@@ -60,7 +60,6 @@ impl Circle<'_> {
     }
 }
 
-/// Bi-directional circular deviation.
 pub(super) fn deviation_mm(test: &CircleTest) -> f64 {
     test.both.circular_deviation_mm
 }

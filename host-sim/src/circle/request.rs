@@ -9,16 +9,14 @@ use crate::circle::turn::{CircleRefusal, NominalCircle, Turn, run_path};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::run_configuration::RunConfiguration;
 
-/// Circles to be run.
+/// Request for circle tests: radii, feeds, planes, competitors.
 #[derive(Clone, Debug, PartialEq)]
 pub struct CircleRequest {
-    /// Planes.
     pub planes: Vec<Plane>,
     /// Radii, mm; above zero.
     pub radii_mm: Vec<f64>,
     /// Feeds along the path, mm/min; above zero.
     pub feeds_mm_min: Vec<f64>,
-    /// The configurations.
     pub configurations: Vec<Configuration>,
     /// Seeds of the simulated noise; every circle runs once with each.
     pub seeds: Vec<u64>,
@@ -40,13 +38,11 @@ impl Default for CircleRequest {
 /// One circle of a request.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CircleCase {
-    /// The plane.
     pub plane: Plane,
     /// Radius, mm.
     pub radius_mm: f64,
     /// Feed along the path, mm/min.
     pub feed_mm_min: f64,
-    /// The configuration.
     pub configuration: Configuration,
     /// Seed of the noise.
     pub seed: u64,
@@ -59,7 +55,6 @@ pub struct CircleTest {
     pub clockwise: Turn,
     /// G3.
     pub counter_clockwise: Turn,
-    /// Both together.
     pub both: Both,
 }
 
@@ -88,9 +83,8 @@ impl CircleTest {
 /// A case and what came of it.
 #[derive(Clone, Debug)]
 pub struct CircleResult {
-    /// The circle.
     pub case: CircleCase,
-    /// Its result, or the reason that it was not run to its end.
+    /// Result, or the reason that it was not run to its end.
     pub outcome: Result<CircleTest, CircleRefusal>,
 }
 

@@ -17,7 +17,6 @@ pub(super) fn range(values: impl Iterator<Item = f64>) -> (f64, f64) {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct LeastSquares {
     centre: Point,
-    /// Its radius.
     pub(super) radius_mm: f64,
 }
 
@@ -65,12 +64,11 @@ impl LeastSquares {
     }
 }
 
-/// Result of the two senses together; mm.
+/// Result of both senses together; mm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Both {
     /// Bi-directional circular deviation G(b).
     pub circular_deviation_mm: f64,
-    /// Circular hysteresis H.
     pub hysteresis_mm: f64,
     /// Mean bi-directional radial deviation D.
     pub mean_radial_mm: f64,

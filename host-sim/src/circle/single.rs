@@ -16,7 +16,6 @@ pub const FEED_MM_S: f64 = 15.0;
 /// One turn of a circle.
 #[derive(Clone, Debug)]
 pub struct CircleOutcome {
-    /// The configuration.
     pub configuration: Configuration,
     /// Angle of the true path, rad, and its deviation from the radius, mm.
     pub path: Vec<(f64, f64)>,

@@ -33,7 +33,6 @@ const DRAWN_POINTS: usize = 4000;
 pub struct NominalCircle {
     /// The plane of its two axes.
     pub plane: Plane,
-    /// Its sense.
     pub sense: Sense,
     /// Radius, mm; above zero.
     pub radius_mm: f64,
@@ -41,7 +40,7 @@ pub struct NominalCircle {
     pub feed_mm_s: f64,
 }
 
-/// Reason that a circle was not run to its end.
+/// Reasons for which a circle was not run to its end.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum CircleRefusal {
     /// It would take too long.
@@ -63,7 +62,6 @@ pub enum CircleRefusal {
 /// Result of one turn; mm.
 #[derive(Clone, Debug)]
 pub struct Turn {
-    /// Circular deviation G.
     pub circular_deviation_mm: f64,
     /// Largest radial deviation, Fmax.
     pub radial_max_mm: f64,

@@ -8,11 +8,8 @@ use crate::rig::SimulatedRig;
 /// An axis of the simulated stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Axis {
-    /// The first.
     X,
-    /// The second: heavier.
     Y,
-    /// The third: vertical.
     Z,
 }
 
@@ -22,7 +19,6 @@ impl Axis {
         self as usize
     }
 
-    /// Its name.
     pub const fn name(self) -> &'static str {
         ["x", "y", "z"][self as usize]
     }

@@ -1,4 +1,4 @@
-//! Output of results: tables to the terminal, pages into files.
+//! Output of the commands: results to the terminal, pages into files.
 
 use std::path::{Path, PathBuf};
 

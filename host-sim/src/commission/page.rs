@@ -59,7 +59,7 @@ pub fn gains_table(found: &Commissioned) -> Table {
     }
 }
 
-/// Scores of each law on the axis, by its own encoder.
+/// Returns the table of each law's sine tests on the axis, by its own encoder.
 pub fn verdict_table(verdicts: &[Verdict]) -> Table {
     let baseline = verdicts.first().map(|verdict| verdict.score);
     Table {

@@ -23,7 +23,6 @@ const SECONDS_PER_MM: f64 = 0.009;
 /// Result of one configuration on one sine.
 #[derive(Clone, Debug)]
 pub struct Entry {
-    /// The configuration.
     pub configuration: Configuration,
     /// The law's knowledge of the plant.
     pub knowledge: ModelKnowledge,

@@ -18,7 +18,6 @@ pub const AMPLITUDE_MM: f64 = 30.0;
 pub const VELOCITIES_MM_S: [f64; 3] = [5.0, 10.0, 15.0];
 /// Cycles at full speed, of which the last whole ones count.
 pub const CYCLES: f64 = 2.25;
-/// Cycles that count.
 pub const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
@@ -26,7 +25,6 @@ const LEAD_S: f64 = 0.5;
 /// Result of one configuration at one velocity.
 #[derive(Clone, Debug)]
 pub struct Outcome {
-    /// The configuration.
     pub configuration: Configuration,
     /// The law's knowledge of the plant.
     pub knowledge: ModelKnowledge,
@@ -34,7 +32,6 @@ pub struct Outcome {
     pub amplitude_mm: f64,
     /// Largest velocity of the sine, mm/s.
     pub velocity_mm_s: f64,
-    /// Its scores.
     pub score: Score,
     /// The last scored cycle.
     pub last_cycle: AxisTrace,
@@ -72,7 +69,6 @@ pub struct Bench {
     pub job: Job,
     /// The stage it runs on.
     pub plant: SimulatedStage,
-    /// Operator that starts it.
     pub operator: Operator,
     /// Ticks after which the slowest sine has ended.
     pub most_ticks: usize,

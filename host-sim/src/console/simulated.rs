@@ -4,10 +4,10 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
+use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::link::lockstep::FLASH_BYTES;
 use quadrant::safety::Switches;
 use quadrant::settings::StageSettings;
-use quadrant::supervisor::PERIOD_TICKS;
 
 use super::flash_file::FlashFile;
 use super::hands::Hands;

@@ -21,14 +21,14 @@ pub(super) struct PeakBounds {
 }
 
 impl PeakBounds {
-    /// By which factor the worse of the two is exceeded; one and less is within.
+    /// Returns the factor by which the worse of the two is exceeded; 1 and less is within.
     fn excess(&self, margins: &Margins) -> f64 {
         (margins.sensitivity_peak / self.sensitivity)
             .max(margins.complementary_peak / self.complementary)
     }
 }
 
-/// Why there is no such loop.
+/// Reasons for which no such loop exists.
 pub(super) enum NoLoop {
     /// The process turns too little.
     Shaping(ShapingError),

@@ -1,5 +1,5 @@
-//! What a controller is designed on: a model of the axis or its measured response, closed in continuous time or as it
-//! runs.
+//! Process that a controller is designed on: a model of the axis or its measured response, closed in continuous time or
+//! as it runs.
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
@@ -12,7 +12,6 @@ use num_complex::Complex64;
 /// The axis, as far as a design knows it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Process {
-    /// Its linear model.
     Model(PlantModel),
     /// Its measured frequency response.
     Measured(MeasuredResponse),

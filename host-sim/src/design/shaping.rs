@@ -11,7 +11,7 @@ use super::loop_shape::OpenLoop;
 use super::margins::{MarginError, bisect, falling_phase_crossover};
 use super::process::Process;
 
-/// Why no gains have the margins asked for.
+/// Reasons for which no gains have the margins asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShapingError {
     /// The phase of the process never reaches -180 degrees, so that no gain margin is finite.

@@ -10,14 +10,11 @@ pub const ELEMENTS: usize = 10;
 /// Feedback and feedforward together.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Configuration {
-    /// Feedback.
     pub controller: LawKind,
-    /// Feedforward.
     pub feedforward: FeedforwardKind,
 }
 
 impl Configuration {
-    /// PID alone.
     pub const PID: Self = Self {
         controller: LawKind::Pid,
         feedforward: FeedforwardKind::None,
@@ -27,7 +24,7 @@ impl Configuration {
         controller: LawKind::NPid,
         feedforward: FeedforwardKind::Combined,
     };
-    /// The two that most studies compare.
+    /// The two configurations that most studies compare.
     pub const EXTREMES: [Self; 2] = [Self::PID, Self::BEST];
 
     /// All eight, in the order of the thesis' tables.

@@ -10,12 +10,10 @@
 /// Half the width of the window around a reversal, and the width of each shoulder, as a fraction of the cycle.
 pub const GLITCH_WINDOW: f64 = 0.02;
 
-/// Scores of a run of whole cycles; mm.
+/// Score of a run of whole cycles; mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
-    /// Largest |e|.
     pub largest_mm: f64,
-    /// RMS of e.
     pub rms_mm: f64,
     /// Mean glitch over the reversals; NaN without a reversal.
     pub glitch_mm: f64,

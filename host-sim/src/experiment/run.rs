@@ -8,7 +8,7 @@ use quadrant::telemetry::AxisTelemetry;
 use crate::machine::{Machine, Operator};
 use crate::plant::SimulatedStage;
 
-/// Signals of one axis, a sample a control period from the start of the motion.
+/// Trace of one axis, a sample a control period from the start of the motion.
 #[derive(Clone, Debug, Default)]
 pub struct AxisTrace {
     /// Reference, mm.
@@ -39,7 +39,7 @@ impl AxisTrace {
     }
 }
 
-/// Reason that a run gives no traces.
+/// Reasons for which a run gives no traces.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RunError {
     /// The settings are refused.

@@ -65,7 +65,6 @@ pub struct RunConfiguration {
     pub knowledge: ModelKnowledge,
     /// The settings.
     pub stage: StageSettings,
-    /// The stage.
     pub truth: StageTruth,
 }
 

@@ -19,7 +19,7 @@ pub struct SineTest {
     pub velocity_mm_s: f64,
 }
 
-/// The result of a sine test.
+/// Result of a sine test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct SineTestOutcome {
     /// Tracking error and glitch.

@@ -7,24 +7,20 @@ use quadrant::reference::{Plane, Sense};
 use crate::gcode::error::ProgramError;
 use crate::gcode::segment::{Segment, Vector};
 
-/// An arc as a line gives it.
+/// Words of a line that describe an arc.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct ArcWords {
-    /// Its plane.
     pub(super) plane: Plane,
     /// G2 or G3.
     pub(super) sense: Sense,
-    /// Start.
     pub(super) from: Vector,
-    /// End.
     pub(super) to: Vector,
-    /// Its circle.
+    /// Words that give its circle.
     pub(super) circle: CircleWords,
-    /// Its line.
     pub(super) line: usize,
 }
 
-/// Form in which an arc's circle is given.
+/// Words that give an arc's circle.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum CircleWords {
     /// By I, J, K: the centre on the plane's first and second axis, mm.

@@ -6,7 +6,7 @@ use crate::gcode::speeds::TANGENT_RAD;
 
 /// Sharper turns than this, rad (175 degrees), are no corners but ways back: they are stopped at.
 const MOST_TURN_RAD: f64 = 175.0 / 180.0 * std::f64::consts::PI;
-/// Shortest rest of a line between two rounded corners that is kept, mm.
+/// Shortest rest of a line between two rounded corners, mm; below this it counts as nothing.
 const LEAST_LINE_MM: f64 = 1e-9;
 
 /// An arc in the place of a corner.

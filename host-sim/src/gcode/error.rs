@@ -1,94 +1,65 @@
-//! Errors in a part program.
+//! Errors of a part program.
 
-/// An error in a part program, with its line (from 1).
+/// Error of a part program, with the line it stands in (from 1).
 #[derive(Debug, thiserror::Error)]
 pub enum ProgramError {
     /// The file cannot be read.
     #[error("cannot read {path}: {source}", path = .path.display())]
     Read {
-        /// The file.
         path: std::path::PathBuf,
-        /// Cause.
         source: std::io::Error,
     },
     /// The file is too large.
     #[error("{path} has {bytes} bytes, more than {most}; split the program", path = .path.display())]
     TooLarge {
-        /// The file.
         path: std::path::PathBuf,
-        /// Its length.
         bytes: u64,
-        /// The limit.
         most: u64,
     },
-    /// Not G-code.
     #[error("line {line}: {text:?} is not understood: {detail}")]
     Syntax {
-        /// Line, from 1.
         line: usize,
-        /// Text found.
         text: String,
-        /// Text expected.
         detail: String,
     },
     /// G-code that this program does not know.
     #[error("line {line}: {word} is not supported; supported are {supported}")]
     Unsupported {
-        /// Line, from 1.
         line: usize,
         /// The code or word.
         word: String,
-        /// Texts allowed.
+        /// Values that could stand there.
         supported: &'static str,
     },
     /// A word stands twice, or two codes exclude each other.
     #[error("line {line}: {word} contradicts {other} in the same line; keep one of them")]
     Contradiction {
-        /// Line, from 1.
         line: usize,
-        /// The later.
         word: String,
-        /// The earlier.
         other: String,
     },
     /// Coordinates, and nothing says what to do with them.
     #[error("line {line}: {word} has no motion code; write G0, G1, G2 or G3 before it")]
-    NoMotion {
-        /// Line, from 1.
-        line: usize,
-        /// The first coordinate.
-        word: String,
-    },
+    NoMotion { line: usize, word: String },
     /// A cutting move without a feed.
     #[error(
         "line {line}: {word} has no feed; write F, in mm/min (inch/min after G20), in this line or before it"
     )]
-    NoFeed {
-        /// Line, from 1.
-        line: usize,
-        /// The motion code.
-        word: &'static str,
-    },
+    NoFeed { line: usize, word: &'static str },
     /// A number beyond its limits.
     #[error("line {line}: {word} must be within {least} and {most}")]
     OutOfRange {
-        /// Line, from 1.
         line: usize,
-        /// The word.
         word: String,
-        /// Its least value.
         least: f64,
-        /// Its largest.
         most: f64,
     },
     /// An arc without a centre, with one in another plane, or with two.
     #[error("line {line}: the arc {what}; {remedy}")]
     Arc {
-        /// Line, from 1.
         line: usize,
-        /// The error.
         what: String,
-        /// The remedy.
+        /// Remedy.
         remedy: &'static str,
     },
     /// An arc whose ends are at different distances from its centre.
@@ -97,13 +68,11 @@ pub enum ProgramError {
          {most_mm:.4} mm; correct the centre or the end, or write more decimals"
     )]
     ArcRadius {
-        /// Line, from 1.
         line: usize,
         /// Radius at the start.
         start_mm: f64,
         /// Radius at the end.
         end_mm: f64,
-        /// The limit.
         most_mm: f64,
     },
     /// A move leaves the axis' travel.
@@ -112,18 +81,14 @@ pub enum ProgramError {
          move the program's origin"
     )]
     Travel {
-        /// Line, from 1.
         line: usize,
-        /// The axis.
         axis: &'static str,
-        /// Its end, mm.
+        /// Position that it would reach, mm.
         reaches_mm: f64,
         /// The travel's lower end.
         low_mm: f64,
-        /// Its upper end.
         high_mm: f64,
     },
-    /// Nothing moves.
     #[error(
         "the program has no move; write at least one line with G0, G1, G2 or G3 and a coordinate"
     )]
@@ -132,22 +97,13 @@ pub enum ProgramError {
     #[error(
         "the program takes {duration_s:.0} s, more than {most_s} s; raise its feeds or split it"
     )]
-    TooLong {
-        /// Its duration.
-        duration_s: f64,
-        /// The limit.
-        most_s: f64,
-    },
+    TooLong { duration_s: f64, most_s: f64 },
     /// A limit of the motion that cannot be kept.
     #[error("{what} is {value}, but must be within {least} and {most}")]
     Limit {
-        /// Name of the limit.
         what: &'static str,
-        /// Its value.
         value: f64,
-        /// Its least value.
         least: f64,
-        /// Its largest.
         most: f64,
     },
 }

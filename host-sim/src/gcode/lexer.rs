@@ -11,9 +11,7 @@ use crate::gcode::error::ProgramError;
 /// A letter with its number.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Word {
-    /// Upper case.
     pub(super) letter: char,
-    /// Its number.
     pub(super) value: f64,
     /// As it is written, without spaces.
     pub(super) text: String,

@@ -5,7 +5,7 @@ use quadrant::reference::{Plane, Sense};
 use crate::gcode::error::ProgramError;
 use crate::gcode::lexer::Word;
 
-/// Motion to the coordinates of a line.
+/// Kind of motion to the coordinates of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Motion {
     /// G0.
@@ -17,7 +17,6 @@ pub(super) enum Motion {
 }
 
 impl Motion {
-    /// Its code.
     pub(super) const fn code(self) -> &'static str {
         match self {
             Self::Rapid => "G0",
@@ -28,7 +27,7 @@ impl Motion {
     }
 }
 
-/// State that codes have set.
+/// Modal state set by codes.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Modes {
     /// Group 1; nothing before the first motion code.
@@ -58,7 +57,7 @@ impl Default for Modes {
     }
 }
 
-/// Codes named in the error about an unknown one.
+/// Codes named in the error about a code that is not supported.
 const SUPPORTED: &str =
     "G0-G3, G17-G21, G40, G49, G54, G61, G80, G90, G91, G90.1, G91.1, G94, M2 and M30";
 

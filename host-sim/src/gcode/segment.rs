@@ -16,7 +16,6 @@ pub struct Segment {
 enum Shape {
     Line {
         from: Vector,
-        /// Unit length.
         direction: Vector,
     },
     /// `centre + radius (first cos a + second sin a) + rise a / sweep`, for `a` from 0 to `sweep`.

@@ -1,4 +1,4 @@
-//! Speed limits of a path, from each segment and each joint between two segments.
+//! Speed limits of a path: of each element, and of each joint between two elements.
 
 use quadrant::settings::StageSettings;
 
@@ -6,11 +6,11 @@ use crate::gcode::error::ProgramError;
 use crate::gcode::interpret::Move;
 use crate::gcode::velocity_profile::Pace;
 
-/// Limits of the motion, of the axes and of the path.
+/// Limits of the motion along a path, of the axes and of the path.
 ///
-/// Each axis' acceleration limit is shared out, so that the sampled motion keeps it whatever comes together: 0.88 of it for
-/// curves and changes of speed, 0.1 for the small corner at a joint that is tangent only within tolerance, taken in one control
-/// period, and the rest for an arc's allowed mismatch.
+/// Each axis' acceleration limit is shared out, so that the sampled motion keeps it whatever comes together: 0.88 of it
+/// for curves and changes of speed, 0.1 for the small corner at a joint that is tangent only within tolerance, taken in
+/// one control period, and the rest for an arc's allowed mismatch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Largest velocity of each axis, mm/s.
@@ -21,7 +21,7 @@ pub struct Limits {
     pub path_acceleration_mm_s2: f64,
     /// Largest jerk along the path, mm/s^3; 10 to 1e9.
     pub path_jerk_mm_s3: f64,
-    /// Largest distance from the path to a corner between straight lines, mm; zero stops there exactly. 0 to 10.
+    /// Largest deviation of the path at a corner between straight lines, mm; zero stops there exactly. 0 to 10.
     pub corner_deviation_mm: f64,
     /// Travel of each axis, mm from the program's origin, its lower and upper end.
     pub travel_mm: [(f64, f64); 3],

@@ -12,7 +12,6 @@ const MOST_S: f64 = 600.0;
 /// Moves before and after the present one on which the nearest point is looked for.
 const NEIGHBOURS: usize = 2;
 
-/// A program's motion.
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     moves: Vec<Move>,
@@ -30,7 +29,7 @@ struct TimedPhase {
 /// A place on the path at one moment.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Index into [`Trajectory::moves`].
+    /// Index in [`Trajectory::moves`].
     pub index: usize,
     /// Distance along it, mm.
     pub along_mm: f64,

@@ -20,7 +20,7 @@ pub(super) struct Pace {
 /// A stretch of constant jerk.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Phase {
-    /// Start, mm along the segment.
+    /// Beginning, mm along the element.
     along_mm: f64,
     /// Speed there, mm/s.
     speed_mm_s: f64,
@@ -147,7 +147,7 @@ mod tests {
         jerk_mm_s3: 20_000.0,
     };
 
-    /// Place and speed at the end of the last phase.
+    /// Returns the end of the last phase and the speed there.
     fn end(phases: &[Phase]) -> (f64, f64) {
         phases
             .last()

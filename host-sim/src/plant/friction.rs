@@ -10,14 +10,12 @@ use quadrant::friction::stribeck::SlidingTable;
 
 use super::{AxisTruth, TRUTH_ELEMENTS};
 
-/// Which model the friction of a simulated axis follows. The levels are those of its static friction, the elements those
-/// of its GMS parameters.
+/// Friction model of a simulated axis. The levels are those of its static friction, the elements those of its GMS
+/// parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrictionTruth {
-    /// The GMS.
     #[default]
     Gms,
-    /// The smoothed GMS.
     Smoothed(SmoothedGmsParameters),
     /// LuGre; its viscous friction is the static model's.
     Lugre(LugreParameters),

@@ -19,7 +19,7 @@ use crate::plant::SimulatedStage;
 /// The program's motion, sampled at the control rate.
 #[derive(Clone, Debug)]
 pub struct ProgramTables {
-    /// Path, a point each control period.
+    /// Position on the path at every control period.
     pub places: Vec<Place>,
     /// The references of x, y and z at the same times, mm, from the program's origin.
     pub reference_mm: [Vec<f64>; 3],
@@ -63,7 +63,6 @@ impl ProgramTables {
 /// Result of one configuration on a program.
 #[derive(Clone, Debug)]
 pub struct ProgramOutcome {
-    /// The configuration.
     pub configuration: Configuration,
     /// Largest distance of the true path from the programmed one, mm.
     pub contour_largest_mm: f64,

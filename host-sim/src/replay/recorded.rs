@@ -80,7 +80,7 @@ const MARGINS: (f64, f64) = (9.9, 54.2);
 /// Integral gain over proportional gain, 1/s: that of the x axis.
 const INTEGRAL_RATIO_PER_S: f64 = 0.66;
 
-/// Machine and plant of a run.
+/// Axis under test: law and plant.
 struct Axis {
     settings: AxisSettings,
     truth: AxisTruth,
@@ -100,7 +100,7 @@ impl RecordedAxis {
         })
     }
 
-    /// Limits of a record for this axis.
+    /// Returns the limits that a record for this axis must keep.
     pub fn limits(self) -> AxisLimits {
         let (travel_mm, resolution_mm) = match self {
             Self::Emps => (emps::TRAVEL_MM, emps::RESOLUTION_MM),
@@ -197,7 +197,7 @@ fn settled(mut error_mm: Vec<f64>, period_s: f64) -> Vec<f64> {
 /// Result of one configuration on the record.
 #[derive(Clone, Debug)]
 pub struct RecordedOutcome {
-    /// The configuration; `None` for the recorded machine itself.
+    /// Configuration; `None` for the recorded machine itself.
     pub configuration: Option<Configuration>,
     /// Largest |e|, mm.
     pub largest_mm: f64,
@@ -209,10 +209,9 @@ pub struct RecordedOutcome {
     pub period_s: f64,
 }
 
-/// Reason that a record cannot be replayed.
+/// Reasons for which a record cannot be replayed.
 #[derive(Debug, thiserror::Error)]
 pub enum ReplayError {
-    /// The run failed.
     #[error(transparent)]
     Run(#[from] RunError),
     /// No PID has the margins.
@@ -223,12 +222,7 @@ pub enum ReplayError {
         "the record's sample time, {sample_time_s} s, is not a whole number of control periods of {period_s} s; \
          resample the record to a multiple of the control period"
     )]
-    SampleTime {
-        /// The record's.
-        sample_time_s: f64,
-        /// The controller's.
-        period_s: f64,
-    },
+    SampleTime { sample_time_s: f64, period_s: f64 },
 }
 
 impl From<quadrant::settings::SettingsError> for ReplayError {

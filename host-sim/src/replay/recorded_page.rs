@@ -13,7 +13,7 @@ impl RecordedOutcome {
             .map_or_else(|| "recorded machine".to_owned(), |ours| ours.name())
     }
 
-    /// Source of the numbers.
+    /// Returns the source of the numbers, in words.
     fn source(&self) -> &'static str {
         if self.configuration.is_some() {
             "simulated"

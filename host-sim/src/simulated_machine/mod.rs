@@ -7,13 +7,13 @@ mod flash;
 
 use std::collections::VecDeque;
 
+use quadrant::app::{
+    After, Axis, Control, ControlInputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
+};
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::link::message::NumberType;
-use quadrant::machine::{
-    After, Axis, Control, ControlInputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
-};
 use quadrant::safety::{Command, FaultCode, Switches};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};

@@ -1,11 +1,11 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
 use indicatif::ProgressBar;
+use quadrant::app::supervisor::Event;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{Command, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::supervisor::Event;
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;

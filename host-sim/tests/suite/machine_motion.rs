@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use quadrant::app::supervisor::{Event, Refusal};
 use quadrant::axis::CourseMode;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{
@@ -9,7 +10,6 @@ use quadrant::reference::{
 };
 use quadrant::safety::{AxisName, Command, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::supervisor::{Event, Refusal};
 use quadrant::units::Position;
 use quadrant_sim::machine::Machine;
 use quadrant_sim::plant::{MarkTruth, SimulatedStage, StageTruth};

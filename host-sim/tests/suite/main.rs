@@ -2,7 +2,6 @@
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
-mod browser;
 mod circle;
 mod command;
 mod commission;
@@ -14,6 +13,7 @@ mod design_commands;
 mod design_npid;
 mod design_pid;
 mod experiments;
+mod hostile_link;
 mod identified_stage;
 mod identify_commands;
 mod identify_frf;
@@ -34,11 +34,17 @@ mod plant_unchanged;
 mod record_bad_input;
 mod record_emps;
 mod record_experiment;
+#[cfg(target_os = "linux")]
+mod record_large;
 mod record_refusals;
 mod record_trace;
-mod report_browser;
-mod report_formats;
-mod report_page;
 mod rig;
-mod sample;
 mod simulated_machine;
+mod transcript;
+
+#[allow(dead_code, reason = "the law's tests use the rest")]
+#[path = "../../../tests/law/common.rs"]
+mod common;
+#[allow(dead_code, reason = "the law's tests use the rest")]
+#[path = "../../../tests/law/link_traffic.rs"]
+mod link_traffic;

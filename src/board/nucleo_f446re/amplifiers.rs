@@ -1,7 +1,7 @@
 //! Three amplifiers: their command voltages through the external converter, their enable line through a pin.
 
 use embedded_hal::delay::DelayNs;
-use quadrant::driver::ad5754r::{self, ALL_ZERO, Ad5754r, Error, Item};
+use quadrant::drivers::ad5754r::{self, ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
 use quadrant::units::DacCode;
 use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB12, PB13, PB14, PB15, PC9, Speed};

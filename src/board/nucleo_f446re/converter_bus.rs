@@ -1,7 +1,7 @@
 //! SPI 2, as the converter wants it: mode 1, a choice of two clocks, and no wait without an end.
 
 use embedded_hal::spi::{Error, ErrorKind, ErrorType, SpiBus};
-use quadrant::driver::ad5754r::{Clock, SelectClock};
+use quadrant::drivers::ad5754r::{Clock, SelectClock};
 use stm32f4xx_hal::gpio::{PB13, PB14, PB15, Pull, Speed};
 use stm32f4xx_hal::pac::SPI2;
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};

@@ -10,7 +10,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use quadrant::driver::counter::ExtendedCounter;
+use quadrant::drivers::counter::ExtendedCounter;
 use quadrant::encoder::EncoderReading;
 use quadrant::hal;
 use stm32f4xx_hal::gpio::{PA6, PA7, PB0, PB8, PB9, PB10, PC6, PC7, PC8, Pull};

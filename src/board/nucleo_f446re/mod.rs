@@ -52,7 +52,7 @@ pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
-use quadrant::driver::hold_button::HoldButton;
+use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
 use quadrant::safety::Command;
 

@@ -3,7 +3,7 @@
 //!
 //! `docs/outputs.md` says what this costs in tracking error, and the circuit that makes ±10 V of 0 to 3.3 V.
 
-use quadrant::driver::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::hal;
 use quadrant::units::DacCode;
 use stm32f4xx_hal::gpio::{Output, PA4, PA5, PC9};

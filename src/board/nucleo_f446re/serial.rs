@@ -6,7 +6,7 @@
 use core::cell::UnsafeCell;
 use core::sync::atomic::{Ordering, fence};
 
-use quadrant::driver::dma_ring::DmaRing;
+use quadrant::drivers::dma_ring::DmaRing;
 use quadrant::hal;
 use stm32f4xx_hal::gpio::{PA2, PA3, Pull};
 use stm32f4xx_hal::pac::{DMA1, USART2};

@@ -1,6 +1,6 @@
 //! What the board's words mean. No registers here: the tests of the library include this file and run it on the host.
 
-use quadrant::driver::input_filter::{InputFilter, shortest_level_ns};
+use quadrant::drivers::input_filter::{InputFilter, shortest_level_ns};
 use quadrant::hal::ResetCause;
 use quadrant::safety::{AxisSwitches, Switches};
 

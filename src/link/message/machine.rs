@@ -4,11 +4,11 @@ use heapless::String;
 use serde::{Deserialize, Serialize};
 
 use super::motion::AxisSet;
-use crate::axis::CourseMode;
-use crate::capture::CapturePhase;
+use crate::law::axis::CourseMode;
+use crate::law::capture::CapturePhase;
+use crate::law::safety::AxisName;
+use crate::law::telemetry::{LimitedBy, MachineState};
 use crate::link::frame::FrameCounters;
-use crate::safety::AxisName;
-use crate::telemetry::{LimitedBy, MachineState};
 
 /// What the control law computes with.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -26,7 +26,7 @@ pub use text::{Text, text};
 
 use serde::{Deserialize, Serialize};
 
-use crate::safety::AxisName;
+use crate::law::safety::AxisName;
 use crate::settings::PlanSettings;
 
 /// What a client asks.
@@ -223,7 +223,7 @@ pub enum Reply {
     Provenance(Provenance),
     /// The generation of the blocks that will come.
     Telemetry {
-        /// As in [`TelemetryBlock::generation`](crate::telemetry::TelemetryBlock::generation).
+        /// As in [`TelemetryBlock::generation`](crate::law::telemetry::TelemetryBlock::generation).
         generation: u8,
     },
     /// How the capture is.

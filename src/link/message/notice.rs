@@ -4,9 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::motion::AxisSet;
 use super::text::{Text, text};
-use crate::safety::AxisName;
-use crate::supervisor;
-use crate::telemetry::TelemetryBlock;
+use crate::app::supervisor;
+use crate::law::safety::AxisName;
+use crate::law::telemetry::TelemetryBlock;
 
 /// What a server tells without being asked.
 // Nothing here can be boxed: there is no heap.

@@ -3,8 +3,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::capture::{CapturePhase, CaptureRecord, Trigger};
-use crate::telemetry::{Channel, MAX_CHANNELS, Words};
+use crate::law::capture::{CapturePhase, CaptureRecord, Trigger};
+use crate::law::telemetry::{Channel, MAX_CHANNELS, Words};
 
 /// What is asked of the telemetry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]

@@ -3,8 +3,8 @@
 use strum::VariantNames;
 
 use super::{Bound, LeafInfo, Range, at, leaves};
-use crate::control::feedback::LawKind;
-use crate::control::{nctf, schedule};
+use crate::law::control::feedback::LawKind;
+use crate::law::control::{nctf, schedule};
 use crate::settings::StageSettings;
 
 fn output_limit_v(settings: &StageSettings, axis: usize) -> f64 {

@@ -3,9 +3,9 @@
 use strum::VariantNames;
 
 use super::{Bound, LeafInfo, Range, at, leaves};
-use crate::axis::MAX_PREVIEW_TICKS;
-use crate::feedforward::FeedforwardKind;
-use crate::friction::gms::FIRMWARE_ELEMENTS;
+use crate::law::axis::MAX_PREVIEW_TICKS;
+use crate::law::feedforward::FeedforwardKind;
+use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 
 pub(super) const LEAVES: &[LeafInfo] = leaves! {
     "/axes/*/friction/sliding/positive/curve/coulomb_v" "V" Range::Number(at(1e-6), at(10.0));

@@ -3,7 +3,7 @@
 use strum::VariantNames;
 
 use super::{Bound, LeafInfo, Range, at, leaves};
-use crate::friction::Direction;
+use crate::law::friction::Direction;
 use crate::settings::{HomeSwitch, StageSettings};
 
 fn resolution_mm(settings: &StageSettings, axis: usize) -> f64 {

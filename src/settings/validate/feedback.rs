@@ -1,13 +1,13 @@
 //! Checks of the feedback law.
 
 use super::Place;
-use crate::control::feedback::LawKind;
-use crate::control::npid::NonlinearGain;
-use crate::control::popov::sector_bound;
-use crate::control::schedule::SchedulePoint;
+use crate::law::control::feedback::LawKind;
+use crate::law::control::npid::NonlinearGain;
+use crate::law::control::popov::sector_bound;
+use crate::law::control::schedule::SchedulePoint;
 use crate::settings::{AxisSettings, Reason, SettingsError};
 
-/// Largest share of a schedule: what [`crate::scalar::Quantity::Multiplier`] holds.
+/// Largest share of a schedule: what [`crate::law::scalar::Quantity::Multiplier`] holds.
 const MOST_SHARE: f64 = 30.0;
 
 impl AxisSettings {
@@ -151,7 +151,7 @@ impl AxisSettings {
             return Ok(());
         };
         let count = gains.characteristic.len() as f64;
-        let most = crate::control::nctf::MAX_POINTS as f64;
+        let most = crate::law::control::nctf::MAX_POINTS as f64;
         at.within(POINTS, count, 1.0, most)?;
         let mut before = (0.0, 0.0);
         for point in &gains.characteristic {
@@ -200,7 +200,7 @@ impl Place {
     fn validate_schedule(self, schedule: &[SchedulePoint]) -> Result<(), SettingsError> {
         const POINTS: &str = "feedback.schedule";
         const SPEED: &str = "feedback.schedule.speed_mm_s";
-        let most = crate::control::schedule::MAX_POINTS as f64;
+        let most = crate::law::control::schedule::MAX_POINTS as f64;
         self.within(POINTS, schedule.len() as f64, 1.0, most)?;
         let mut before = None;
         for point in schedule {

@@ -1,9 +1,9 @@
 //! Checks of friction and its feedforward.
 
 use super::Place;
-use crate::axis::MAX_PREVIEW_TICKS;
-use crate::feedforward::FeedforwardKind;
-use crate::friction::stribeck::StaticFriction;
+use crate::law::axis::MAX_PREVIEW_TICKS;
+use crate::law::feedforward::FeedforwardKind;
+use crate::law::friction::stribeck::StaticFriction;
 use crate::settings::{AxisSettings, Reason, SettingsError};
 
 /// The largest product of control period and pre-sliding resonance, rad.

@@ -21,7 +21,7 @@ const RISE_S: f64 = 0.5;
 /// Steps of the load a second.
 const RATE_HZ: f64 = 10e3;
 
-/// Motion of the mass.
+/// Motion of the mass under the drift test.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drift {
     /// Means over each period of the vibration: time in s, position in mm.

@@ -26,18 +26,13 @@ use rayon::prelude::*;
 use drift::{Drift, drift};
 use driven::Driven;
 
-/// A friction model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
     /// The static model: a level and nothing before sliding.
     Static,
-    /// Dahl's model.
     Dahl,
-    /// LuGre.
     Lugre,
-    /// The GMS.
     Gms,
-    /// The smoothed GMS.
     SmoothedGms,
 }
 
@@ -51,7 +46,6 @@ impl Model {
         Self::SmoothedGms,
     ];
 
-    /// Its name.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Static => "static",
@@ -68,18 +62,15 @@ impl Model {
 pub struct Parameters {
     /// As settings hold them, with every model.
     pub friction: FrictionSettings,
-    /// Dahl's.
     pub dahl: DahlParameters,
-    /// LuGre's.
     pub lugre: LugreParameters,
     /// Acceleration of the free mass per volt, mm/(V s^2).
     pub gain_mm_per_v_s2: f64,
 }
 
-/// Reason that an axis' settings cannot be used.
+/// Reasons for which an axis' settings do not do.
 #[derive(Debug, PartialEq, Eq, thiserror::Error)]
 pub enum ParametersError {
-    /// No linear model.
     #[error(
         "the axis has no linear model (plant), and how its mass moves is part of the comparison; run `quadrant commission` first"
     )]
@@ -157,7 +148,6 @@ pub type Curve = (Vec<f64>, Vec<f64>);
 /// A small loop within a large one.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Nested {
-    /// The whole path.
     pub path: Curve,
     /// Difference between the forces before and after the small loop, at the same place, over the breakaway level.
     pub closing_error: f64,
@@ -174,10 +164,9 @@ pub struct Lag {
     pub width_v: f64,
 }
 
-/// Result of one model.
+/// Behaviour of one model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Behaviour {
-    /// The model.
     pub model: Model,
     /// From rest, springs slack.
     pub virgin: Curve,

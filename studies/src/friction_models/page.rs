@@ -13,7 +13,7 @@ use crate::friction_models::{Behaviour, Curve, LAG_FREQUENCIES_HZ, Model, Parame
 /// Largest closing error of a small loop that counts as closed, of the breakaway level.
 const CLOSES: f64 = 0.05;
 
-/// Properties of each model (simulated).
+/// Returns the table of each model's properties and costs in the simulated axis.
 pub fn friction_models_table(behaviours: &[Behaviour]) -> Table {
     let lag_heads = LAG_FREQUENCIES_HZ.map(|hertz| format!("lag at {hertz} Hz"));
     let mut heads = vec![
@@ -135,7 +135,7 @@ pub fn friction_parameters_table(parameters: &Parameters) -> Table {
     }
 }
 
-/// RMS error and glitch with each kind of feedforward on axes that follow one model or another.
+/// Returns the table of RMS error and glitch that each kind of feedforward leaves on axes of each friction model.
 pub fn tracking_table(tracked: &[Tracked]) -> Table {
     let heads: Vec<String> = TRUTHS
         .iter()
@@ -179,7 +179,6 @@ const fn kind_name(kind: FeedforwardKind) -> &'static str {
     }
 }
 
-/// The page.
 pub fn friction_models_page(
     parameters: &Parameters,
     behaviours: &[Behaviour],

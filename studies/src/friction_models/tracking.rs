@@ -1,5 +1,5 @@
-//! Each model as feedforward: the comparison's sine under N-PID, on axes whose friction really follows one
-//! model or another.
+//! Worth of each friction model as feedforward: the comparison's sine under N-PID, on axes whose friction really
+//! follows one model or another.
 
 use indicatif::ProgressBar;
 use quadrant::control::feedback::LawKind;
@@ -26,9 +26,9 @@ pub const RUNS: u64 = (TRUTHS.len() * FeedforwardKind::ALL.len()) as u64;
 /// Mean scores over the comparison's velocities, of one kind of feedforward on one truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Tracked {
-    /// Model of the axis' friction.
+    /// Friction model of the axis.
     pub truth: Model,
-    /// Model that is fed forward.
+    /// Friction model of the feedforward.
     pub kind: FeedforwardKind,
     /// RMS tracking error, mm.
     pub rms_mm: f64,
@@ -36,7 +36,7 @@ pub struct Tracked {
     pub glitch_mm: f64,
 }
 
-/// Reason that there is no comparison.
+/// Reasons for which there is no comparison.
 #[derive(Debug, thiserror::Error)]
 pub enum TrackingError {
     /// The settings of the stage that the axis is put into.

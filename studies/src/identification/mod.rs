@@ -19,11 +19,9 @@ pub const NOISE_LEVELS: [f64; 3] = [0.5, 1.0, 2.0];
 /// The parameters that are judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Judged {
-    /// A.
     Gain,
     /// B + A sigma.
     TotalDamping,
-    /// Td.
     Delay,
     /// Fc of a direction, offset included.
     Coulomb,
@@ -34,7 +32,6 @@ pub enum Judged {
 }
 
 impl Judged {
-    /// All of them.
     pub const ALL: [Self; 6] = [
         Self::Gain,
         Self::TotalDamping,
@@ -70,13 +67,10 @@ impl Judged {
 /// One estimate beside the truth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// The parameter.
     pub judged: Judged,
-    /// As identified.
     pub found: f64,
     /// One standard deviation, as stated.
     pub standard_error: f64,
-    /// The truth.
     pub truth: f64,
 }
 
@@ -86,7 +80,7 @@ impl Estimate {
         100.0 * (self.found / self.truth - 1.0)
     }
 
-    /// True if the plant's value lies within two standard deviations.
+    /// True if the plant's parameter lies within two standard deviations.
     pub fn is_honest(&self) -> bool {
         (self.found - self.truth).abs() <= 2.0 * self.standard_error
     }
@@ -101,7 +95,6 @@ pub struct Judgement {
     pub noise: f64,
     /// Seed of the noise.
     pub seed: u64,
-    /// The estimates.
     pub estimates: Vec<Estimate>,
     /// RMS error of the predicted hysteresis over the breakaway level, %.
     pub hysteresis_percent: f64,

@@ -20,7 +20,7 @@ pub struct Arguments {
     /// The axis of the simulated stage.
     #[arg(long, value_enum, default_value_t = Axis::X)]
     axis: Axis,
-    /// Settings of the axis, as `quadrant commission` leaves them; without it, the simulated stage's own commissioning.
+    /// Settings of the axis, as `quadrant commission` leaves them [default: the simulated stage's own commissioning].
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Noise seeds of the comparison, from --seed on.

@@ -30,9 +30,7 @@ pub const SINES: [SineTest; 3] = [
 /// Result of one law with one feedforward.
 #[derive(Clone, Debug)]
 pub struct LawOutcome {
-    /// The law.
     pub law: LawKind,
-    /// The feedforward.
     pub feedforward: FeedforwardKind,
     /// One a seed, and in it one a trial.
     pub outcomes: Vec<[SineTestOutcome; 3]>,

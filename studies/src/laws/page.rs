@@ -12,7 +12,7 @@ use quadrant_sim::report::{
 use crate::laws::comparison::LawOutcome;
 use crate::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw};
 
-/// The tuning of each law.
+/// Returns the table of each law's tuning.
 pub fn tuning_table(laws: &[TunedLaw]) -> Table {
     let rows = laws.iter().map(|tuned| {
         let best = tuned
@@ -70,7 +70,7 @@ pub fn tuning_table(laws: &[TunedLaw]) -> Table {
     }
 }
 
-/// The result of each law.
+/// Returns the table of each law's results.
 pub fn laws_table(outcomes: &[LawOutcome]) -> Table {
     let um = UM_PER_MM;
     let rows = outcomes.iter().map(|outcome| {
@@ -203,7 +203,7 @@ pub fn laws_section(laws: &[TunedLaw], outcomes: &[LawOutcome]) -> Section {
     }
 }
 
-/// The distance between the laws, with and without feedforward.
+/// Describes the distance between the laws, with and without feedforward.
 fn closeness(outcomes: &[LawOutcome]) -> String {
     let range = |kind: FeedforwardKind| {
         let of = outcomes

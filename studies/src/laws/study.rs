@@ -20,18 +20,18 @@ const TUNING_SHARE: f64 = 0.3;
 /// Laws that are tuned.
 const LAWS: u64 = 7;
 
-/// Result of the study.
+/// Results of the study.
 #[derive(Clone, Debug)]
 pub struct LawsStudy {
     /// The laws as tuned.
     pub laws: Vec<TunedLaw>,
-    /// Their results on the axis.
+    /// Results on the axis.
     pub outcomes: Vec<LawOutcome>,
-    /// Results of the competitors with models that are wrong on purpose.
+    /// Results of competitors whose models are wrong on purpose.
     pub wrong: Vec<WrongOutcome>,
 }
 
-/// Reason that the study failed.
+/// Reasons for which there is no study.
 #[derive(Debug, thiserror::Error)]
 pub enum LawsError {
     /// The trajectory that NCTF follows cannot be measured.
@@ -40,7 +40,6 @@ pub enum LawsError {
     /// A law cannot be tuned.
     #[error(transparent)]
     Tuning(#[from] TuningError),
-    /// A run failed.
     #[error(transparent)]
     Run(#[from] RunError),
 }

@@ -48,21 +48,18 @@ const MOST_SHARE: f64 = 30.0;
 /// A law as it was tuned.
 #[derive(Clone, Debug)]
 pub struct TunedLaw {
-    /// The law.
     pub law: LawKind,
-    /// The knob of the grid, with its unit.
+    /// Parameter that was varied, with its unit.
     pub knob: &'static str,
-    /// Its best value.
     pub value: f64,
     /// RMS error in training, mm, of every value tried.
     pub tried: Vec<(f64, f64)>,
-    /// The feedback's settings.
     pub feedback: FeedbackSettings,
     /// Margins at small errors; of a schedule, at rest.
     pub margins: Margins,
 }
 
-/// Reason that a law cannot be tuned.
+/// Reasons for which a law cannot be tuned.
 #[derive(Debug, thiserror::Error)]
 pub enum TuningError {
     /// The settings have no linear model.
@@ -76,17 +73,12 @@ pub enum TuningError {
     /// The loop cannot be judged.
     #[error("the tuned {law} cannot be judged: {source}")]
     Margins {
-        /// The law.
         law: &'static str,
-        /// Cause.
         source: quadrant_sim::design::MarginError,
     },
     /// No candidate is left.
     #[error("no setting of {law} keeps the bounds on this axis")]
-    NoCandidate {
-        /// The law.
-        law: &'static str,
-    },
+    NoCandidate { law: &'static str },
     /// A training run failed.
     #[error(transparent)]
     Run(#[from] RunError),
@@ -114,7 +106,7 @@ pub fn twin(axis: &AxisSettings) -> Option<AxisTruth> {
     })
 }
 
-/// Input of the tuning.
+/// Axis and bounds that tuning works with.
 struct Bench<'a> {
     axis: &'a AxisSettings,
     twin: AxisTruth,

@@ -1,8 +1,8 @@
-//! The cost of the number type: `f32` and fixed point against `f64`, over the whole comparison.
+//! Cost of the number type: `f32` and fixed point against `f64`, over the whole comparison.
 //!
 //! *Output*: all three laws read the same counts, those of the stage under the `f64` law, so the difference is the
-//! arithmetic's alone. *Tracking error*: each law runs its own stage in closed loop with the same noise, and what is
-//! compared is the error over time, and the score.
+//! arithmetic's alone. *Tracking error*: each law runs its own stage in closed loop with the same noise, and the error
+//! over time and the score are compared.
 
 pub mod command;
 pub mod page;
@@ -47,11 +47,9 @@ impl Deviation {
 /// Deviations of the number types under one configuration.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Numerics {
-    /// The configuration.
     pub configuration: Configuration,
     /// `f32`.
     pub single: Deviation,
-    /// Fixed point.
     pub fixed: Deviation,
 }
 

@@ -5,7 +5,6 @@ use quadrant_sim::report::{Cell, Column, Table};
 
 use crate::numerics::{Deviation, Numerics};
 
-/// V to uV.
 const UV_PER_V: f64 = 1e6;
 
 /// Worst deviations from `f64`, configuration by configuration.

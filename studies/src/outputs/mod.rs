@@ -1,17 +1,17 @@
-//! The cost of a coarser output: 16 bits, 12 bits, and 12 bits with the error of the past shaped away, on the thesis'
+//! Cost of a coarser output: 16 bits, 12 bits, and 12 bits with the error of the past shaped away, on the thesis'
 //! sines.
 
 pub mod command;
 pub mod page;
 
-use quadrant::driver::noise_shaper::NoiseShaper;
+use quadrant::drivers::noise_shaper::NoiseShaper;
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_bench};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use rayon::prelude::*;
 
-/// Conversion from codes to volts.
+/// Conversion of codes to volts.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Output {
     /// The external converter: every bit of the code.
@@ -40,10 +40,9 @@ impl Output {
     }
 }
 
-/// Results of one output.
+/// Result of one output.
 #[derive(Clone, Debug)]
 pub struct OutputRun {
-    /// The output.
     pub output: Output,
     /// One outcome for each velocity of the comparison.
     pub outcomes: [Outcome; 3],

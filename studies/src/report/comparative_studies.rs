@@ -1,5 +1,5 @@
-//! The comparative studies: other laws, other friction models, other disturbances and drives; and the
-//! circle as machine builders know it.
+//! Studies that the thesis names beside its own method: other laws, other friction models, other disturbances and
+//! drives; and the circle as machine builders know it.
 
 use indicatif::ProgressBar;
 use quadrant_sim::circle::page::circle_sections;
@@ -65,7 +65,6 @@ pub(super) fn scenarios(context: &Context, progress: &Progress) -> anyhow::Resul
     Ok(robustness_sections(&study))
 }
 
-/// The circle tests.
 pub(super) fn circles(context: &Context, _: &Progress) -> anyhow::Result<Vec<Section>> {
     let request = CircleRequest {
         configurations: Configuration::EXTREMES.to_vec(),

@@ -1,4 +1,4 @@
-//! Input of the parts of a report.
+//! Inputs that the parts of a report share.
 
 use std::path::PathBuf;
 use std::sync::OnceLock;
@@ -10,7 +10,7 @@ use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
-/// Input of the parts of a report.
+/// Inputs that the parts of a report share.
 pub struct Context {
     /// Seed of the simulated noise; of repeated runs the first, which the others follow.
     pub seed: u64,

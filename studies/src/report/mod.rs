@@ -1,5 +1,5 @@
-//! Parts of `quadrant-studies report`, each a few sections of one page, kept in files so that an interrupted report
-//! goes on where it stopped.
+//! `quadrant-studies report`: parts, each a few sections of one page, kept in files so that an interrupted report goes
+//! on where it stopped.
 //!
 //! A new part is a function from [`Context`] to sections and one line in [`PARTS`].
 
@@ -24,7 +24,6 @@ use store::{Key, Store, Stored};
 pub struct Part {
     /// Its name on the command line and of its file: lower-case letters, digits and hyphens.
     pub id: &'static str,
-    /// Its content, in a line.
     pub title: &'static str,
     /// About how long it takes on two cores, s, without the runs of chapter 5: its share of the progress bar.
     pub expected_s: fn(&Context) -> f64,
@@ -98,7 +97,7 @@ pub const PARTS: &[Part] = &[
 pub struct Request<'a> {
     /// The parts, in the order of the page.
     pub parts: &'a [Part],
-    /// Their input.
+    /// Inputs.
     pub context: &'a Context,
     /// Folder of the parts' files; made if it is missing.
     pub folder: PathBuf,
@@ -108,9 +107,7 @@ pub struct Request<'a> {
 
 /// A part that is done.
 pub struct Done {
-    /// The part.
     pub part: Part,
-    /// Its sections.
     pub sections: Vec<Section>,
 }
 

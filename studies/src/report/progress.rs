@@ -9,7 +9,7 @@ const STEPS: f64 = 1e6;
 pub struct Progress {
     bar: ProgressBar,
     steps_per_s: f64,
-    /// Start and length of the part, in steps.
+    /// Beginning and length of the part, in steps.
     part: (f64, f64),
 }
 

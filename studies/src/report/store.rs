@@ -43,7 +43,7 @@ impl Key {
         })
     }
 
-    /// First difference to another key.
+    /// Returns the first field of another key that differs.
     fn difference(&self, other: &Self) -> Option<&'static str> {
         let differs = [
             ("another form of this file", self.form != other.form),
@@ -94,9 +94,7 @@ struct Read {
 
 /// Content of a part's file.
 pub(super) enum Stored {
-    /// There is none.
     Missing,
-    /// The part.
     Sections(Vec<Section>),
     /// Nothing of use; the reason names the file.
     Unusable(String),

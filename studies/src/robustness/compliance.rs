@@ -1,4 +1,4 @@
-//! Amplitude of the axis at rest under a sinusoidal load, by the loop's linear model and on the simulated axis.
+//! Compliance of the axis at rest to a sinusoidal load: by the loop's linear model, and of the simulated axis.
 
 use std::f64::consts::TAU;
 
@@ -29,7 +29,6 @@ const LEAST_S: f64 = 1.0;
 /// Largest error over the load's amplitude.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compliance {
-    /// The law.
     pub name: String,
     /// One value a frequency, mm/V; nothing where a fault switched the stage off.
     pub mm_per_v: Vec<Option<f64>>,
@@ -77,7 +76,8 @@ pub fn pid_alone(settings: &StageSettings) -> StageSettings {
     settings
 }
 
-/// Amplitude of a law's axis under [`LOAD_V`] at every one of [`FREQUENCIES_HZ`]; the axis under test is the first of the stage.
+/// Returns the compliance of a law's axis under [`LOAD_V`] at every one of [`FREQUENCIES_HZ`]; the axis under test is
+/// the first of the stage.
 ///
 /// # Errors
 /// Settings that are refused.

@@ -28,7 +28,7 @@ pub use scenario::{Scenario, scenarios};
 pub use trial::Task;
 use trial::{Ended, Trial};
 
-/// Runs to be made.
+/// Request for the study.
 #[derive(Clone, Debug)]
 pub struct RobustnessRequest {
     /// The laws: name, and settings of the stage they were commissioned on.
@@ -46,11 +46,9 @@ pub struct RobustnessRequest {
 /// Result of one competitor in one scenario.
 #[derive(Clone, Debug)]
 pub struct RobustnessOutcome {
-    /// The scenario's name.
     pub scenario: String,
-    /// The axis' task in it.
+    /// Task of the axis.
     pub task: Task,
-    /// The competitor's name.
     pub competitor: String,
     /// One a seed: the score, or the fault that switched the stage off.
     pub runs: Vec<Result<Score, Fault>>,
@@ -77,17 +75,14 @@ impl RobustnessOutcome {
     }
 }
 
-/// Reason that a competitor cannot run.
+/// Reasons for which a competitor cannot run.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RobustnessError {
     /// Its settings are refused.
     #[error("{competitor} in the scenario {scenario}: settings refused: {source}")]
     Settings {
-        /// The competitor.
         competitor: String,
-        /// The scenario.
         scenario: String,
-        /// Cause.
         source: SettingsError,
     },
     /// A motion did not end.
@@ -95,11 +90,9 @@ pub enum RobustnessError {
         "{competitor} in the scenario {scenario}: the motion has not ended after {ticks} ticks"
     )]
     Endless {
-        /// The competitor.
         competitor: String,
-        /// The scenario.
         scenario: String,
-        /// Time that it was waited for.
+        /// Ticks waited.
         ticks: usize,
     },
 }
@@ -190,7 +183,6 @@ pub fn run_robustness(
 }
 
 impl RobustnessRequest {
-    /// Number of runs.
     pub fn runs(&self) -> u64 {
         (self.scenarios.len() * self.competitors.len()) as u64 * self.seeds
     }
@@ -207,7 +199,7 @@ pub fn find<'a>(
         .find(|outcome| outcome.scenario == scenario && outcome.competitor == competitor)
 }
 
-/// Baseline of an outcome's changes: the same competitor in the first scenario with the same task.
+/// Returns the outcome that changes are counted from: the same competitor in the first scenario with the same task.
 pub fn baseline<'a>(
     outcomes: &'a [RobustnessOutcome],
     outcome: &RobustnessOutcome,

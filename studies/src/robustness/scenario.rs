@@ -14,15 +14,16 @@ use crate::robustness::Task;
 pub struct Scenario {
     /// Its name in tables.
     pub name: String,
-    /// The difference, with its numbers.
+    /// Difference from the nominal axis, with its numbers.
     pub what: String,
     /// The axis as it then is.
     pub truth: AxisTruth,
     /// Load on the axis.
     pub load: Load,
-    /// The axis' task.
+    /// Task of the axis.
     pub task: Task,
-    /// Settings from commissioning this axis, if it is another machine; otherwise the settings stay as they were.
+    /// Settings from a commissioning of this axis, where it is another machine; otherwise the settings stay as they
+    /// were.
     pub commissioned: Option<AxisSettings>,
     /// True if the error over time is kept.
     pub keeps_trace: bool,
@@ -61,7 +62,7 @@ const HOLD: Task = Task::Hold {
     seconds: 4.0,
     scored_from: 0.0,
 };
-/// Times of the cut, s: during a hold and a slow move, and from start to end of a sine.
+/// Time of the tool in the material, s: during a hold and a slow move, and from start to end of a sine.
 const ENGAGED_S: (f64, f64) = (1.0, 3.0);
 const ALWAYS_S: (f64, f64) = (0.0, 1e3);
 

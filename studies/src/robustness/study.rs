@@ -31,12 +31,12 @@ pub struct StudyRequest {
     pub seeds: u64,
 }
 
-/// Result of the study.
+/// Results of the study.
 #[derive(Debug)]
 pub struct RobustnessReport {
     /// The scenarios, in the order of the tables.
     pub scenarios: Vec<Scenario>,
-    /// Results of the competitors in them.
+    /// Results of the competitors.
     pub outcomes: Vec<RobustnessOutcome>,
     /// Drives on which no controller could be commissioned, and why.
     pub refused: Vec<Refused>,
@@ -44,7 +44,7 @@ pub struct RobustnessReport {
     pub compliances: Vec<Compliance>,
 }
 
-/// Reason that the study failed.
+/// Reasons for which there is no study.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// No scenario has such a name.
@@ -55,7 +55,6 @@ pub enum StudyError {
         "the settings hold no linear model of the axis: commission it, or give other --settings"
     )]
     NoPlant,
-    /// A run failed.
     #[error(transparent)]
     Run(#[from] RobustnessError),
 }

@@ -23,7 +23,6 @@ pub enum Task {
     Sine,
     /// A move of 10 mm at 2 mm/s, scored from its start to its end.
     SlowFeed,
-    /// To stay.
     Hold {
         /// For how long, s.
         seconds: f64,
@@ -126,11 +125,11 @@ pub(super) struct Trial<'a> {
 pub(super) struct Ended {
     /// Its score, or what switched the stage off.
     pub(super) score: Result<Score, Fault>,
-    /// Its trace, if it is shown and the run ended well.
+    /// Trace, where it is worth showing, if the run ended well.
     pub(super) trace: Option<AxisTrace>,
 }
 
-/// Reason that a run has no result.
+/// Reasons for which a run has no result.
 pub(super) enum Stopped {
     Settings(SettingsError),
     Endless(usize),

@@ -25,9 +25,7 @@ const FINER_ENCODER: f64 = 10.0;
 /// A run with the identified model on a plant that lacks one imperfection, or whose law knows one thing better.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Change {
-    /// Nothing is changed.
     AsItIs,
-    /// No encoder noise.
     NoNoise,
     /// No offset of converter and amplifier.
     NoOffset,
@@ -149,7 +147,6 @@ pub enum StudyError {
     /// The run of the slow sine.
     #[error("GMS elements: {0}")]
     Rig(#[from] RigError),
-    /// Its identification.
     #[error("GMS elements: {0}")]
     Identification(#[from] VirginCurveError),
     /// Settings without a model.
@@ -200,7 +197,6 @@ fn identify_elements(
 /// The outcome of a change.
 #[derive(Debug)]
 pub struct Finding {
-    /// The change.
     pub change: Change,
     /// Results of PID and of the best configuration, or the reason that the change could not be identified.
     pub outcome: Result<Comparison, StudyError>,

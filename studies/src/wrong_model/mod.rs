@@ -48,19 +48,15 @@ pub const DRAWS: usize = 8;
 /// Largest gain of the cautious N-PID's sector.
 const CAUTIOUS_SECTOR: f64 = 2.0;
 
-/// A competitor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Competitor {
-    /// The tuned PID.
     Pid,
-    /// The tuned N-PID.
     NPid,
     /// N-PID within the bounds at every gain of its sector.
     CautiousNPid,
 }
 
 impl Competitor {
-    /// All of them.
     pub const ALL: [Self; 3] = [Self::Pid, Self::NPid, Self::CautiousNPid];
 
     /// Its name in tables.
@@ -73,7 +69,7 @@ impl Competitor {
     }
 }
 
-/// Fault of a model.
+/// Error of the model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Wrong {
     /// There is no feedforward.
@@ -83,23 +79,16 @@ pub enum Wrong {
     /// Its pre-sliding range is off by this factor.
     Range(f64),
     /// Every parameter is off by this share, in the signs of this draw.
-    Everything {
-        /// The share.
-        share: f64,
-        /// The draw.
-        draw: usize,
-    },
+    Everything { share: f64, draw: usize },
 }
 
 /// Result of a competitor with a model.
 #[derive(Clone, Copy, Debug)]
 pub struct WrongOutcome {
-    /// The competitor.
     pub competitor: Competitor,
-    /// With which model.
     pub wrong: Wrong,
-    /// Scores, mean over the sines.
-    pub mean: SineTestOutcome,
+    /// Score, mean over the sine tests.
+    pub mean: TrialOutcome,
 }
 
 /// All that is run.

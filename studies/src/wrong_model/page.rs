@@ -16,7 +16,7 @@ const READINGS: [Reading; 2] = [
     ("rms", "RMS error", |outcome| outcome.score.rms_mm),
 ];
 
-/// Scores of a competitor in the cases that fit.
+/// Returns the scores of a competitor in the cases that fit.
 fn scores(
     outcomes: &[WrongOutcome],
     competitor: Competitor,
@@ -174,7 +174,6 @@ fn break_even_table(outcomes: &[WrongOutcome]) -> Table {
     }
 }
 
-/// The study.
 pub fn wrong_model_section(outcomes: &[WrongOutcome]) -> Section {
     let force_axis = (
         "force",

@@ -1,4 +1,4 @@
-//! Who has what among the friction models, by the simulated experiments of `quadrant-studies friction`.
+//! Properties of the friction models, by the simulated experiments of `quadrant-studies friction`.
 
 use crate::command::{fail, succeed};
 use indicatif::ProgressBar;

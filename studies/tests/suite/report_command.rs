@@ -13,7 +13,7 @@ fn report(folder: &Path, threads: &str, arguments: &[&str]) -> Output {
         .unwrap()
 }
 
-/// What it says on the way, of a report that must succeed.
+/// Returns the progress lines of a report that must succeed.
 fn told(output: &Output) -> String {
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
     assert!(output.status.success(), "{errors}");

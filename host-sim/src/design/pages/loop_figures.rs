@@ -11,9 +11,7 @@ use crate::report::{Block, Colour, Figure, Plot, Scale, Series, Style};
 
 /// A loop to draw.
 pub(super) struct DrawnLoop<'a, L: OpenLoop> {
-    /// For the legend.
     pub(super) name: &'a str,
-    /// The loop.
     pub(super) open_loop: &'a L,
     /// Style.
     pub(super) style: Style,
@@ -23,7 +21,7 @@ pub(super) struct DrawnLoop<'a, L: OpenLoop> {
 const POINTS: usize = 600;
 /// The frequencies drawn, if the loop's band reaches so far, Hz.
 const DRAWN_HZ: (f64, f64) = (1.0, 1000.0);
-/// Duration of a drawn step response, in the longest settling times.
+/// Length of a drawn step response, in multiples of the longest settling time.
 const DRAWN_SETTLINGS: f64 = 3.0;
 /// Half of the Nyquist plot's width: what lies beyond concerns nobody.
 const NYQUIST_REACH: f64 = 2.5;

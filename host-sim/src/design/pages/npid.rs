@@ -18,15 +18,12 @@ use crate::report::{Block, Cell, Colour, Page, Provenance, Section, Style, Table
 /// Everything a nonlinear gain's design found.
 #[derive(Clone, Debug)]
 pub struct NonlinearPage {
-    /// Process of the design.
+    /// Process that it is designed on.
     pub subject: String,
     /// The model, its hold included in the delay as the proof counts it.
     pub plant: PlantModel,
-    /// The PID.
     pub gains: PidGains,
-    /// The proof.
     pub proof: SectorProof,
-    /// The gain chosen.
     pub gain: NonlinearGain,
     /// The smallest destabilising gain of a search.
     pub destabiliser: Option<Destabiliser>,
@@ -154,7 +151,6 @@ impl NonlinearPage {
         step_table(&properties)
     }
 
-    /// All tables.
     pub fn tables(&self) -> [Table; 3] {
         [
             self.bounds_table(),
@@ -265,7 +261,6 @@ impl NonlinearPage {
         ))
     }
 
-    /// The page.
     pub fn page(&self, provenance: Provenance) -> Page {
         let steps: Vec<(String, &StepResponse, Style)> = self
             .steps

@@ -109,12 +109,11 @@ pub fn step_table(responses: &[(String, StepProperties)]) -> Table {
     }
 }
 
-/// Content of the page of a PID's design.
+/// Content of a page of a PID's design.
 #[derive(Clone, Debug)]
 pub struct PidPage<'a> {
-    /// Process of the design.
+    /// Process that it is designed on.
     pub subject: String,
-    /// The gains.
     pub gains: PidGains,
     /// The loop in its forms, the one designed on first, each with its margins.
     pub forms: Vec<(String, AnyLoop<'a>, Result<Margins, MarginError>)>,
@@ -139,7 +138,6 @@ impl PidPage<'_> {
         tables
     }
 
-    /// The page.
     pub fn page(&self, provenance: Provenance) -> Page {
         let colours = [Colour::Blue, Colour::Vermillion];
         let loops: Vec<DrawnLoop<'_, AnyLoop<'_>>> = self

@@ -23,7 +23,7 @@ pub struct Candidate {
     pub rows: Rows,
 }
 
-/// What a fit explains, row by row.
+/// Voltage explained by a fit, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
     /// Time, s.
@@ -32,7 +32,7 @@ pub struct Rows {
     pub velocity_mm_s: Vec<f64>,
     /// Voltage that was commanded a dead time before, V.
     pub voltage_v: Vec<f64>,
-    /// What the model leaves unexplained of it, V.
+    /// Residual of the model, V.
     pub residual_v: Vec<f64>,
     /// Voltage without inertia and offset, V: the friction.
     pub friction_v: Vec<f64>,

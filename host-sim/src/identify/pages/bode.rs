@@ -5,9 +5,7 @@ use crate::report::{Block, Figure, Lines, Plot, Scale, Series, Style};
 
 /// A response to draw.
 pub(super) struct Curve<'a> {
-    /// For the legend.
     pub(super) name: String,
-    /// The response.
     pub(super) response: &'a FrequencyResponse,
     /// Style.
     pub(super) style: Style,

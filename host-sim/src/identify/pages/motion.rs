@@ -4,7 +4,7 @@ use crate::identify::motion::{Candidate, MotionModel, Replayed};
 use crate::pages::{UM_PER_MM, columns, lines, series};
 use crate::report::{Block, Cell, Colour, Page, Provenance, Section, Style, Table};
 
-/// Result of a model that is run over its record.
+/// Misfit of a model that is run over its record.
 #[derive(Clone, Debug)]
 pub struct Reruns {
     /// Driven by the recorded voltage.

@@ -8,7 +8,7 @@ use crate::report::{Block, Colour, Figure, Section, Style};
 /// Time over which the drawn velocity is taken, s.
 const VELOCITY_S: f64 = 2e-3;
 
-/// Result and record of the test: voltage and velocity over time.
+/// Returns the section of the test: its result, voltage and velocity over time.
 pub fn motor_constant_section(found: &MotorConstant, moving_mass_kg: Option<f64>) -> Section {
     let recording = &found.recording;
     let time = |index: usize| index as f64 * recording.sample_time_s;

@@ -12,7 +12,6 @@ use crate::report::{Block, Cell, Colour, Column, Page, Provenance, Section, Styl
 pub struct AmplitudeResponse {
     /// RMS of the excitation, V.
     pub amplitude_v: f64,
-    /// As measured.
     pub measured: FrequencyResponse,
     /// As predicted by the model revised for static and GMS friction.
     pub predicted: FrequencyResponse,

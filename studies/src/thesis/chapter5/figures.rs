@@ -21,7 +21,7 @@ const POINTS: usize = 1500;
 const ZOOM: f64 = 2.0 * GLITCH_WINDOW;
 /// Points of a reference velocity.
 const VELOCITY_POINTS: usize = 200;
-/// Range of a figure's axis, as a multiple of the largest value on it.
+/// Length of a drawn axis over the largest value on it.
 const ROOM: f64 = 1.05;
 /// Velocity of Figure 5.18, mm/s: the middle one.
 const AMPLITUDE_VELOCITY_MM_S: f64 = VELOCITIES_MM_S[1];
@@ -94,7 +94,7 @@ fn figure(
     .labelled(format!("Figure 5.{number}{part}"))
 }
 
-/// A reference in the cycle that is drawn, which begins at a reversal.
+/// Returns the figure of the reference's velocity in the cycle that is drawn, which begins at a reversal.
 fn velocity_figure((number, part): (usize, &str), velocity_mm_s: f64) -> Block {
     let period_s = cycle_s(AMPLITUDES_MM[0], velocity_mm_s);
     let shares = || (0..=VELOCITY_POINTS).map(|point| point as f64 / VELOCITY_POINTS as f64);

@@ -1,0 +1,245 @@
+//! The fast half: what the control interrupt owns and does.
+
+use super::queues::{CaptureOrder, ControlEnds, Exchange, Feed};
+use super::{Axis, Snapshot};
+use crate::app::supervisor::PERIOD_TICKS;
+use crate::law::capture::Capture;
+use crate::law::encoder::EncoderReading;
+use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use crate::law::reference::Motion;
+use crate::law::safety::{AxisName, Command, FaultCode, StreamLoss, Switches};
+use crate::law::scalar::Scalar;
+use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
+use crate::law::telemetry::{Observation, Sampler, SamplerState};
+
+/// What a tick reads from the board.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ControlInputs {
+    /// What the encoders say.
+    pub readings: [EncoderReading; 3],
+    /// What the digital inputs say.
+    pub switches: Switches,
+    /// What the supervising task let through.
+    pub command: Option<Command>,
+    /// The last tick ended after its deadline.
+    pub deadline_missed: bool,
+    /// The host whose set points the axes follow has fallen silent.
+    pub link_lost: bool,
+}
+
+/// Everything that the control interrupt owns.
+pub struct Control<'q, 'a, S: Scalar> {
+    axes: [&'a mut Axis<S>; 3],
+    streaming: StreamLoss,
+    plan: Plan<S>,
+    state: StageState<S, FIRMWARE_ELEMENTS>,
+    sampler: Sampler,
+    sampling: SamplerState,
+    capture: Option<Capture<'a>>,
+    commanded: bool,
+    /// Values of the first waiting block that were taken.
+    place: usize,
+    ends: ControlEnds<'q, 'a, S>,
+}
+
+impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
+    /// Ready for the first tick.
+    // Not inlined: its frame is gone when the start goes on.
+    #[inline(never)]
+    pub fn new(
+        axes: [&'a mut Axis<S>; 3],
+        streaming: StreamLoss,
+        plan: Plan<S>,
+        ends: ControlEnds<'q, 'a, S>,
+    ) -> Self {
+        Self {
+            axes,
+            streaming,
+            plan,
+            state: StageState::default(),
+            sampler: Sampler::default(),
+            sampling: SamplerState::default(),
+            capture: None,
+            commanded: false,
+            place: 0,
+            ends,
+        }
+    }
+
+    /// Starts with a fault latched, before the first tick: what the last run or the stored settings left.
+    pub fn start_faulted(&mut self, code: FaultCode) {
+        self.state.start_faulted(code);
+    }
+
+    /// The control law's memory.
+    pub fn state(&self) -> &StageState<S, FIRMWARE_ELEMENTS> {
+        &self.state
+    }
+
+    /// One control period: takes what the server has sent, and computes the outputs.
+    #[inline(always)]
+    pub fn tick(&mut self, inputs: &ControlInputs) -> Outputs {
+        let settings_changed = match self.ends.exchanges.dequeue() {
+            Some(exchange) => self.exchange(exchange),
+            None => [false; 3],
+        };
+        if let Some((name, motion)) = self.ends.motions.dequeue() {
+            self.take_motion(name, motion);
+        }
+        match self.ends.feeds.peek() {
+            None => {}
+            Some(Feed::Segments(_)) => self.take_segments(),
+            Some(Feed::Injection(_) | Feed::Voltages(_)) => self.take_voltage(),
+        }
+        let command = inputs.command.or_else(|| self.ends.commands.dequeue());
+        self.commanded = command.is_some();
+        let [x, y, z] = &self.axes;
+        StageRef {
+            axes: [x, y, z],
+            streaming: self.streaming,
+        }
+        .tick(
+            &self.plan,
+            &mut self.state,
+            &Inputs {
+                readings: inputs.readings,
+                switches: inputs.switches,
+                command,
+                settings_changed,
+                deadline_missed: inputs.deadline_missed,
+                link_lost: inputs.link_lost,
+            },
+        )
+    }
+
+    /// Lets the tick be seen, once the outputs are written. Gives what the supervising task looks at, when it is due.
+    #[inline(always)]
+    pub fn observe(&mut self, elapsed_cycles: u32) -> Option<Snapshot<S>> {
+        if let Some(sampler) = self.ends.samplers.dequeue() {
+            self.sampler = sampler;
+        }
+        if let Some(order) = self.ends.orders.dequeue() {
+            self.take_order(order);
+        }
+        let seen = Observation {
+            stage: &self.state,
+            elapsed_cycles,
+            commanded: self.commanded,
+        };
+        if let Some(sample) = self.sampler.step(&mut self.sampling, &seen) {
+            // A full queue drops the newest; its number is missing, so that the server can tell.
+            let _ = self.ends.samples.enqueue(sample);
+        }
+        let full = self
+            .capture
+            .as_mut()
+            .is_some_and(|capture| capture.step(&seen));
+        if full {
+            self.give_capture_back();
+        }
+        self.state
+            .tick()
+            .is_multiple_of(PERIOD_TICKS)
+            .then(|| Snapshot::of(&self.state))
+    }
+
+    /// Puts an axis in the place of another, which goes back to the server.
+    #[cold]
+    #[inline(never)]
+    fn exchange(&mut self, exchange: Exchange<'a, S>) -> [bool; 3] {
+        let Exchange {
+            name,
+            axis,
+            streaming,
+        } = exchange;
+        let [x, y, z] = &mut self.axes;
+        let place = match name {
+            AxisName::X => x,
+            AxisName::Y => y,
+            AxisName::Z => z,
+        };
+        // There is one spare axis, so the queue has room for it.
+        let _ = self.ends.spares.enqueue(core::mem::replace(place, axis));
+        self.streaming = streaming;
+        AxisName::ALL.map(|axis| axis == name)
+    }
+
+    /// Takes the motion that an axis will start next. One that comes while the axis follows the old one is dropped: the
+    /// server sends none then.
+    #[cold]
+    #[inline(never)]
+    fn take_motion(&mut self, name: AxisName, motion: Motion<S>) {
+        let [x, y, z] = &mut self.plan;
+        let [at_x, at_y, at_z] = self.state.axes();
+        let (place, axis) = match name {
+            AxisName::X => (x, at_x),
+            AxisName::Y => (y, at_y),
+            AxisName::Z => (z, at_z),
+        };
+        if !axis.is_running() {
+            *place = motion;
+        }
+    }
+
+    /// Hands the axes the next segments of a stream, if they have room.
+    #[inline(always)]
+    fn take_segments(&mut self) {
+        if self.state.axes().iter().all(|axis| axis.wants_segment())
+            && let Some(Feed::Segments(segments)) = self.ends.feeds.dequeue()
+        {
+            for (name, segment) in AxisName::ALL.into_iter().zip(segments) {
+                self.state.offer_segment(name, segment);
+            }
+        }
+    }
+
+    /// Hands the next value of an injection on, if there is room. What is left of one that was broken off is dropped.
+    #[cold]
+    #[inline(never)]
+    fn take_voltage(&mut self) {
+        let used = match self.ends.feeds.peek() {
+            Some(Feed::Injection(injection)) => {
+                self.state.prepare_injection(injection.clone());
+                true
+            }
+            Some(Feed::Voltages(_)) if !self.state.has_injection() => true,
+            Some(Feed::Voltages(block)) => {
+                if self.state.wants_voltage()
+                    && let Some(value) = block.value(self.place)
+                {
+                    self.state.offer_value(value);
+                    self.place += 1;
+                }
+                self.place >= block.len()
+            }
+            Some(Feed::Segments(_)) | None => false,
+        };
+        if used {
+            self.place = 0;
+            let _ = self.ends.feeds.dequeue();
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn take_order(&mut self, order: CaptureOrder<'a>) {
+        match order {
+            CaptureOrder::Record(capture) => self.capture = Some(capture),
+            CaptureOrder::GiveBack => {
+                if let Some(capture) = &mut self.capture {
+                    capture.stop();
+                }
+                self.give_capture_back();
+            }
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn give_capture_back(&mut self) {
+        if let Some(capture) = self.capture.take() {
+            // There is one, so the queue has room for it.
+            let _ = self.ends.captures.enqueue(capture);
+        }
+    }
+}

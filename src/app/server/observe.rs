@@ -1,0 +1,233 @@
+//! Requests about samples: telemetry while it runs, and the capture.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::{Server, busy, invalid, refused};
+use crate::app::queues::CaptureOrder;
+use crate::law::capture::{Capture, CapturePhase, Trigger};
+use crate::law::safety::{AxisName, SafetyState};
+use crate::law::scalar::Scalar;
+use crate::law::telemetry::{
+    AxisSignal, BLOCK_WORDS, Channel, Packer, Sampler, Selection, StageSignal, TelemetryBlock,
+};
+use crate::link::message::{
+    CaptureRequest, CaptureStatus, Event, LinkError, Reply, TelemetryRequest, WordPage,
+};
+
+/// Pre-trigger share of the capture that waits for faults, %.
+const FAULT_PRE_TRIGGER_PERCENT: u8 = 75;
+
+/// The capture's book-keeping on this side.
+#[derive(Debug)]
+pub(super) struct Recorder<'a> {
+    /// The capture, while the control interrupt has it not.
+    capture: Option<Capture<'a>>,
+    /// What it was armed with.
+    selection: Option<Selection>,
+    /// Captures so far.
+    number: u16,
+}
+
+impl<'a> Recorder<'a> {
+    pub(super) fn new(words: &'a mut [u32]) -> Self {
+        Self {
+            capture: Some(Capture::new(words)),
+            selection: None,
+            number: 0,
+        }
+    }
+
+    pub(super) fn phase(&self) -> CapturePhase {
+        self.capture
+            .as_ref()
+            .map_or(CapturePhase::Armed, Capture::phase)
+    }
+
+    /// Captures so far.
+    pub(super) const fn number(&self) -> u16 {
+        self.number
+    }
+
+    /// Whether the frozen capture holds a tick.
+    pub(super) fn holds_trace_of(&self, tick: u32) -> bool {
+        let record = self.capture.as_ref().and_then(Capture::record);
+        record.is_some_and(|record| {
+            let decimation = self.selection.as_ref().map_or(1, Selection::decimation);
+            let span = record.samples.saturating_mul(decimation.into());
+            tick.wrapping_sub(record.first_tick) < span
+        })
+    }
+}
+
+impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    #[inline(never)]
+    pub(super) fn serve_telemetry(
+        &mut self,
+        request: TelemetryRequest,
+    ) -> Result<Reply, LinkError> {
+        let selection = match request {
+            TelemetryRequest::Select {
+                channels,
+                decimation,
+            } => Some(
+                Selection::new(&channels, decimation)
+                    .map_err(|error| invalid(format_args!("{error}")))?,
+            ),
+            TelemetryRequest::Stop => None,
+        };
+        let generation = self.generation.wrapping_add(1);
+        let packer = match &selection {
+            Some(selection) => Packer::new(selection, generation),
+            None => Packer::default(),
+        };
+        self.ends
+            .samplers
+            .enqueue(Sampler::new(selection, generation))
+            .map_err(|_| {
+                busy(format_args!(
+                    "the last selection is not taken yet; ask again"
+                ))
+            })?;
+        self.generation = generation;
+        self.packer = packer;
+        Ok(Reply::Telemetry { generation })
+    }
+
+    /// The next block that is full, or what there is.
+    #[inline(never)]
+    pub(super) fn next_block(&mut self) -> Option<TelemetryBlock> {
+        while let Some(sample) = self.ends.samples.dequeue() {
+            if let Some(block) = self.packer.push(&sample) {
+                return Some(block);
+            }
+        }
+        self.packer.flush()
+    }
+
+    #[inline(never)]
+    pub(super) fn serve_capture(&mut self, request: CaptureRequest) -> Result<Reply, LinkError> {
+        match request {
+            CaptureRequest::Arm {
+                channels,
+                decimation,
+                pre_trigger_percent,
+                trigger,
+            } => {
+                let selection = Selection::new(&channels, decimation)
+                    .map_err(|error| invalid(format_args!("{error}")))?;
+                self.arm(selection, pre_trigger_percent, trigger)?;
+            }
+            CaptureRequest::Disarm => {
+                if self.recorder.capture.is_none() {
+                    self.ends
+                        .orders
+                        .enqueue(CaptureOrder::GiveBack)
+                        .map_err(|_| busy(format_args!("the capture is being armed; ask again")))?;
+                }
+            }
+            CaptureRequest::State => {}
+            CaptureRequest::Read { offset } => return self.read_capture(offset),
+        }
+        Ok(Reply::Capture(self.capture_status()))
+    }
+
+    fn arm(
+        &mut self,
+        selection: Selection,
+        pre_trigger_percent: u8,
+        trigger: Trigger,
+    ) -> Result<(), LinkError> {
+        let Some(mut capture) = self.recorder.capture.take() else {
+            return Err(busy(format_args!(
+                "a capture is armed; disarm it first, or wait until it is full"
+            )));
+        };
+        if let Err(error) = capture.arm(selection.clone(), pre_trigger_percent, trigger) {
+            self.recorder.capture = Some(capture);
+            return Err(invalid(format_args!("{error}")));
+        }
+        match self.ends.orders.enqueue(CaptureOrder::Record(capture)) {
+            Ok(()) => {
+                self.recorder.selection = Some(selection);
+                Ok(())
+            }
+            Err(order) => {
+                if let CaptureOrder::Record(capture) = order {
+                    self.recorder.capture = Some(capture);
+                }
+                Err(busy(format_args!(
+                    "the last order is not taken yet; ask again"
+                )))
+            }
+        }
+    }
+
+    /// Arms the capture for the first time once the stage has seen good inputs, so that every fault from then on leaves its
+    /// trace; one that was latched at the start has none.
+    pub(super) fn arm_at_start(&mut self) {
+        if self.recorder.phase() == CapturePhase::Idle
+            && self.seen.view.safety != SafetyState::Start
+        {
+            self.arm_for_faults();
+        }
+    }
+
+    /// Lets the capture wait for a fault, unless it waits for something already.
+    pub(super) fn arm_for_faults(&mut self) {
+        let of = |axis, signal| Channel::Axis(axis, signal);
+        let channels = [
+            of(AxisName::X, AxisSignal::Error),
+            of(AxisName::Y, AxisSignal::Error),
+            of(AxisName::Z, AxisSignal::Error),
+            of(AxisName::X, AxisSignal::Output),
+            of(AxisName::Y, AxisSignal::Output),
+            of(AxisName::Z, AxisSignal::Output),
+            Channel::Stage(StageSignal::State),
+            Channel::Stage(StageSignal::Fault),
+        ];
+        if let Ok(selection) = Selection::new(&channels, 1) {
+            // Busy: it waits for something already, and a fault triggers that as well.
+            let _ = self.arm(selection, FAULT_PRE_TRIGGER_PERCENT, Trigger::Fault);
+        }
+    }
+
+    /// Takes a capture that the control interrupt gives back.
+    pub(super) fn collect_capture(&mut self) {
+        if let Some(capture) = self.ends.captures.dequeue() {
+            self.recorder.capture = Some(capture);
+            self.recorder.number = self.recorder.number.wrapping_add(1);
+            let number = self.recorder.number;
+            self.tell(self.seen.tick, Event::CaptureFrozen { number });
+        }
+    }
+
+    fn capture_status(&self) -> CaptureStatus {
+        let selection = self.recorder.selection.as_ref();
+        CaptureStatus {
+            phase: self.recorder.phase(),
+            number: self.recorder.number,
+            channels: selection
+                .and_then(|selection| heapless::Vec::from_slice(selection.channels()).ok())
+                .unwrap_or_default(),
+            decimation: selection.map_or(1, Selection::decimation),
+            record: self.recorder.capture.as_ref().and_then(Capture::record),
+        }
+    }
+
+    #[inline(never)]
+    fn read_capture(&self, offset: u16) -> Result<Reply, LinkError> {
+        let Some(capture) = &self.recorder.capture else {
+            return Err(refused(format_args!(
+                "the capture is armed; disarm it, or wait until it is full"
+            )));
+        };
+        let mut page = WordPage {
+            number: self.recorder.number,
+            offset,
+            ..WordPage::default()
+        };
+        let words = capture.words(offset.into());
+        let _ = page.words.extend(words.take(BLOCK_WORDS));
+        Ok(Reply::Words(page))
+    }
+}

@@ -1,0 +1,155 @@
+//! Requests about settings: a draft is edited leaf by leaf, and takes effect as a whole.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::{Server, busy, index, invalid, refused};
+use crate::app::queues::Exchange;
+use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use crate::law::safety::AxisName;
+use crate::law::scalar::Scalar;
+use crate::link::message::{
+    Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,
+    Value, text,
+};
+use crate::settings::MAX_VALUE_BYTES;
+use crate::settings::draft::ApplyError;
+
+impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    #[inline(never)]
+    pub(super) fn serve_settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
+        match request {
+            SettingsRequest::Get(path) => {
+                let mut bytes = heapless::Vec::new();
+                // Cannot fail: that is its capacity.
+                let _ = bytes.resize_default(MAX_VALUE_BYTES);
+                let (kind, length) = self
+                    .draft
+                    .settings()
+                    .get_bytes(&path, &mut bytes)
+                    .map_err(|error| invalid(format_args!("{path}: {error}")))?;
+                bytes.truncate(length);
+                Ok(Reply::Value(Value { kind, bytes }))
+            }
+            SettingsRequest::Set { path, value } => self
+                .draft
+                .set_bytes(&path, value.kind, &value.bytes)
+                .map(|()| Reply::Done)
+                .map_err(|error| invalid(format_args!("{path}: {error}"))),
+            SettingsRequest::List { cursor } => self.list(cursor),
+            SettingsRequest::Apply => self.apply(),
+            SettingsRequest::Revert => {
+                self.draft.revert();
+                Ok(Reply::Done)
+            }
+            SettingsRequest::Defaults => {
+                self.draft.settings_mut().set_default();
+                Ok(Reply::Done)
+            }
+            SettingsRequest::Store(provenance) => self.save(provenance),
+            SettingsRequest::Provenance => Ok(Reply::Provenance(self.provenance.clone())),
+        }
+    }
+
+    #[inline(never)]
+    fn list(&self, cursor: u16) -> Result<Reply, LinkError> {
+        let mut page = PathPage::default();
+        let mut number = 0;
+        let visited = self.draft.settings().list("", &mut |path| {
+            if number >= usize::from(cursor) {
+                if page.paths.len() < PAGE_PATHS {
+                    let _ = page.paths.push(text(format_args!("{path}")));
+                } else {
+                    page.next = Some(cursor + PAGE_PATHS as u16);
+                }
+            }
+            number += 1;
+        });
+        match visited {
+            Ok(()) => Ok(Reply::Paths(page)),
+            Err(error) => Err(invalid(format_args!("{error}"))),
+        }
+    }
+
+    /// Takes the draft over as a whole, or not at all. The axes get theirs one after the other within milliseconds.
+    #[inline(never)]
+    fn apply(&mut self) -> Result<Reply, LinkError> {
+        if !self.pending.is_empty() {
+            return Err(busy(format_args!(
+                "the settings applied last are still being built; ask again"
+            )));
+        }
+        let changed = match self.draft.apply(FIRMWARE_ELEMENTS) {
+            Ok(changed) => changed,
+            Err(ApplyError::Refused(error)) => return Err(invalid(format_args!("{error}"))),
+            // They stay in the draft: stored and restarted, they take effect.
+            Err(ApplyError::RateNeedsRestart | ApplyError::EncoderNeedsRestart(_)) => {
+                return Ok(Reply::Applied(Applied {
+                    changed: AxisSet::NONE,
+                    restart_needed: true,
+                }));
+            }
+        };
+        let changed = AxisName::ALL
+            .into_iter()
+            .filter(|&axis| changed[index(axis)])
+            .collect();
+        self.pending = changed;
+        Ok(Reply::Applied(Applied {
+            changed,
+            restart_needed: false,
+        }))
+    }
+
+    /// Builds the next axis whose settings have changed into the spare one, and hands it over.
+    pub(super) fn build_pending(&mut self) {
+        if self.spare.is_none() {
+            self.spare = self.ends.spares.dequeue();
+        }
+        let Some(name) = self.pending.iter().next() else {
+            return;
+        };
+        let Some(axis) = self.spare.take() else {
+            return;
+        };
+        let settings = self.draft.in_force();
+        settings.build_axis_into(name, axis);
+        let exchange = Exchange {
+            name,
+            axis,
+            streaming: settings.streaming.build(),
+        };
+        match self.ends.exchanges.enqueue(exchange) {
+            Ok(()) => {
+                self.pending = self.pending.iter().filter(|&other| other != name).collect();
+                if self.pending.is_empty() {
+                    self.applied = self.applied.wrapping_add(1);
+                    self.tell(self.seen.tick, Event::SettingsApplied(AxisSet::ALL));
+                }
+            }
+            // The control law has not taken the last one: the same axis again at the next poll.
+            Err(exchange) => self.spare = Some(exchange.axis),
+        }
+    }
+
+    /// Stores the draft, which is what is in force unless it was edited since, or needs a restart.
+    #[inline(never)]
+    fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
+        if self.seen.view.safety.drives() {
+            return Err(refused(format_args!(
+                "the outputs are on, and writing flash stops the processor; disable them first"
+            )));
+        }
+        self.store
+            .save(
+                self.draft.settings(),
+                FIRMWARE_ELEMENTS,
+                &provenance,
+                self.buffer,
+            )
+            .map_err(|error| LinkError::Storage(text(format_args!("{error}"))))?;
+        self.provenance = provenance;
+        self.stored = self.stored.wrapping_add(1);
+        self.tell(self.seen.tick, Event::SettingsStored);
+        Ok(Reply::Done)
+    }
+}

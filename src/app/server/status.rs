@@ -1,0 +1,86 @@
+//! What the machine is and how it is.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::Server;
+use crate::law::axis::CourseMode;
+use crate::law::safety::{AxisName, SafetyState};
+use crate::law::scalar::{Quantity, Scalar};
+use crate::law::telemetry::MachineState;
+use crate::law::units::{POSITION_FRACTION_BITS, Position};
+use crate::link::PROTOCOL_VERSION;
+use crate::link::message::{AxisSet, AxisStatus, FaultReport, Identity, Status, text};
+
+impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    pub(super) fn identity(&self) -> Identity {
+        Identity {
+            protocol: PROTOCOL_VERSION,
+            firmware: text(format_args!("{}", env!("CARGO_PKG_VERSION"))),
+            board: text(format_args!("{}", self.board)),
+            rate_hz: self.draft.in_force().rate_hz,
+            cycle_hz: self.cycle_hz,
+            number: self.number,
+            tick: self.seen.tick,
+        }
+    }
+
+    pub(super) fn status(&self) -> Status {
+        let view = &self.seen.view;
+        let axes = core::array::from_fn(|index| {
+            let (axis, settings) = (&self.seen.axes[index], &self.draft.in_force().axes[index]);
+            let measured = Position(axis.measured.0 << POSITION_FRACTION_BITS);
+            AxisStatus {
+                mode: view.modes[index].into(),
+                position_mm: measured.to_mm(settings.encoder.resolution_mm),
+                error_mm: axis.error.to_f32(Quantity::Length),
+                output_v: axis.output.to_f32(Quantity::Voltage),
+                limited_by: axis.limited_by,
+                high_mark: axis.following.high_mark(),
+            }
+        });
+        let homed = AxisName::ALL.into_iter().zip(view.homed);
+        Status {
+            tick: self.seen.tick,
+            state: self.state(),
+            fault: view.safety.fault().map(|fault| fault.code.number()),
+            running: view.running,
+            homed: homed
+                .filter_map(|(axis, homed)| homed.then_some(axis))
+                .collect::<AxisSet>(),
+            axes,
+            overruns: self.meters.overruns,
+            longest_tick_cycles: self.meters.longest_tick_cycles,
+            capture: self.recorder.phase(),
+            frames: self.frames,
+            dropped_samples: self.packer.dropped(),
+            dropped_events: self.dropped_events,
+        }
+    }
+
+    /// Homing is a motion for the safety, but for a person a state of the machine.
+    fn state(&self) -> MachineState {
+        let view = &self.seen.view;
+        let homing = view.modes.into_iter().any(|mode| mode == CourseMode::Home);
+        match MachineState::from(view.safety) {
+            MachineState::Enabled if homing => MachineState::Homing,
+            state => state,
+        }
+    }
+
+    /// The latched fault, or the one that the axes brake for.
+    pub(super) fn fault(&self) -> Option<FaultReport> {
+        let fault = match self.seen.view.safety {
+            SafetyState::Faulted(fault) | SafetyState::Stopping(fault) => fault,
+            _ => return None,
+        };
+        Some(FaultReport {
+            code: fault.code.number(),
+            axis: fault.axis,
+            tick: fault.tick,
+            name: text(format_args!("{}", fault.code.name())),
+            cause: text(format_args!("{}", fault.code.cause())),
+            remedy: text(format_args!("{}", fault.code.remedy())),
+            captured: self.recorder.holds_trace_of(fault.tick),
+        })
+    }
+}

@@ -1,0 +1,170 @@
+//! Set points that a host streams.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::{Server, invalid, refused};
+use crate::app::queues::{FEED_ROOM, Feed};
+use crate::law::reference::{
+    AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
+    StreamPlanner,
+};
+use crate::law::safety::Command;
+use crate::law::scalar::Scalar;
+use crate::law::units::Position;
+use crate::link::message::{self, LinkError, Reply, StreamRequest, StreamStatus};
+
+/// Segments that must wait before the axes start: the host is that far ahead.
+const START_SEGMENTS: usize = FEED_ROOM / 2;
+
+/// A stream that a host has opened.
+#[derive(Debug)]
+pub(super) struct OpenStream {
+    planner: StreamPlanner,
+    /// The host's number of the set point that is expected next.
+    next: u32,
+    /// The axes have been told to start.
+    started: bool,
+    /// The last set point has come.
+    complete: bool,
+}
+
+impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    #[inline(never)]
+    pub(super) fn serve_stream(&mut self, request: StreamRequest) -> Result<Reply, LinkError> {
+        match request {
+            StreamRequest::Open { period_ticks } => self.open_stream(period_ticks.into()),
+            StreamRequest::Points {
+                sequence,
+                points,
+                last,
+            } => {
+                let end = sequence.saturating_add(points.len() as u32);
+                for (number, point) in (sequence..end).zip(&points) {
+                    if !self.take_point(number, point, last && number + 1 == end)? {
+                        break;
+                    }
+                }
+                self.stream_status()
+            }
+            StreamRequest::Close => {
+                self.stream = None;
+                self.command(Command::Stop)?;
+                Ok(Reply::Done)
+            }
+        }
+    }
+
+    #[inline(never)]
+    fn open_stream(&mut self, period_ticks: u32) -> Result<Reply, LinkError> {
+        let view = &self.seen.view;
+        if !view.safety.is_enabled() {
+            return Err(refused(format_args!(
+                "the outputs are off; enable them first"
+            )));
+        }
+        if view.running || self.is_injecting() {
+            return Err(refused(format_args!(
+                "a motion is under way; stop it or wait until it ends"
+            )));
+        }
+        if !(LEAST_PERIOD_TICKS..=MOST_SEGMENT_TICKS).contains(&period_ticks) {
+            return Err(invalid(format_args!(
+                "period_ticks = {period_ticks} is outside {LEAST_PERIOD_TICKS} to {MOST_SEGMENT_TICKS}"
+            )));
+        }
+        let limits = self.draft.in_force().stream_limits(view.homed);
+        let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
+        self.stream = Some(OpenStream {
+            planner: StreamPlanner::new(limits, period_ticks, start),
+            next: 0,
+            started: false,
+            complete: false,
+        });
+        self.stream_status()
+    }
+
+    fn opened(&mut self) -> Result<&mut OpenStream, LinkError> {
+        self.stream
+            .as_mut()
+            .ok_or_else(|| refused(format_args!("no stream is open; open one first")))
+    }
+
+    /// Takes a point unless it is known, or there is no room; says whether there may be room for more. Missing points are
+    /// bridged as far as the planner can.
+    #[inline(never)]
+    fn take_point(
+        &mut self,
+        number: u32,
+        point: &message::SetPoint,
+        last: bool,
+    ) -> Result<bool, LinkError> {
+        let scales: [MotionScale; 3] =
+            core::array::from_fn(|axis| self.draft.in_force().motion_scale(axis));
+        let room = self.ends.feeds.ready();
+        let stream = self.opened()?;
+        if number < stream.next {
+            return Ok(true);
+        }
+        if stream.complete {
+            return Err(refused(format_args!(
+                "set point {number} comes after the last one; open another stream when the axes rest"
+            )));
+        }
+        if !room {
+            return Ok(false);
+        }
+        let axes = core::array::from_fn(|axis| {
+            let (from, scale) = (point.axes[axis], scales[axis]);
+            let sample = ReferenceSample {
+                position: Position::from_mm(from.position_mm, scale.resolution_mm),
+                velocity: f64::from(from.velocity_mm_s),
+                acceleration: f64::from(from.acceleration_mm_s2),
+            };
+            AxisPoint::new(sample, scale)
+        });
+        // The planner counts from the start, where the axes rest.
+        let segments = stream
+            .planner
+            .plan(&SetPoint {
+                number: number.saturating_add(1),
+                axes,
+                last,
+            })
+            .map_err(|error| invalid(format_args!("{error}")))?;
+        stream.next = number.saturating_add(1);
+        stream.complete = last;
+        // There is room: it was looked at before.
+        let _ = self.ends.feeds.enqueue(Feed::Segments(segments));
+        Ok(true)
+    }
+
+    fn stream_status(&mut self) -> Result<Reply, LinkError> {
+        let waiting = self.ends.feeds.len();
+        let stream = self.opened()?;
+        Ok(Reply::Stream(StreamStatus {
+            next_sequence: stream.next,
+            free: (FEED_ROOM - waiting) as u16,
+        }))
+    }
+
+    /// Starts the axes when enough is there, and forgets a stream that has ended.
+    pub(super) fn follow_stream(&mut self) {
+        let waiting = self.ends.feeds.len();
+        let view = &self.seen.view;
+        let (running, enabled) = (view.running, view.safety.is_enabled());
+        let Some(stream) = &self.stream else {
+            return;
+        };
+        let ended = stream.started && waiting == 0 && !running && self.seen.tick != self.heard_tick;
+        if !enabled || ended {
+            self.stream = None;
+        } else if !stream.started
+            && (waiting >= START_SEGMENTS || stream.complete)
+            && view.stream_ready
+            && self.command(Command::StartStream).is_ok()
+            && let Some(stream) = &mut self.stream
+        {
+            stream.started = true;
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! The feedback law of an axis: which one it is, and what they all share.
+
+use serde::{Deserialize, Serialize};
+use strum::{AsRefStr, EnumString, VariantNames};
+
+use super::cascade::Cascade;
+use super::nctf::Nctf;
+use super::npid::NonlinearGainTable;
+use super::pid::Pid;
+use super::schedule::ScheduledPid;
+use super::sliding_mode::SlidingMode;
+use crate::law::scalar::Scalar;
+
+/// The feedback laws.
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum LawKind {
+    /// PID without an integral.
+    Pd,
+    /// PID.
+    Pid,
+    /// PID behind the nonlinear gain.
+    NPid,
+    /// PID with gains that depend on the reference's speed.
+    Scheduled,
+    /// P position loop around a PI velocity loop.
+    Cascade,
+    /// Sliding mode with a boundary layer.
+    SlidingMode,
+    /// Nominal characteristic trajectory following.
+    Nctf,
+}
+
+impl LawKind {
+    /// All laws.
+    pub const ALL: [Self; 7] = [
+        Self::Pd,
+        Self::Pid,
+        Self::NPid,
+        Self::Scheduled,
+        Self::Cascade,
+        Self::SlidingMode,
+        Self::Nctf,
+    ];
+
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Pd => "PD",
+            Self::Pid => "PID",
+            Self::NPid => "N-PID",
+            Self::Scheduled => "gain scheduling",
+            Self::Cascade => "cascade P/PI",
+            Self::SlidingMode => "sliding mode",
+            Self::Nctf => "NCTF",
+        }
+    }
+}
+
+/// What a law reads in one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeedbackInput<S> {
+    /// Tracking error e, mm.
+    pub error: S,
+    /// Velocity of the reference, mm/s; only the laws that [`Feedback::needs_velocity`] names read it.
+    pub velocity: S,
+}
+
+/// The memory of a law, the same for all.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct FeedbackState<S: Scalar> {
+    /// The integral, V.
+    pub(super) integral: S::Sum,
+    /// The filtered derivative, V.
+    pub(super) derivative: S,
+    /// What was differentiated last, mm.
+    pub(super) last_error: S,
+}
+
+/// What a law put out, term by term, V.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeedbackTerms<S> {
+    /// What follows the error itself. PID: Kp f. Cascade: G (v_set - v_ref). Sliding mode: the saturated surface.
+    /// NCTF: G n(e).
+    pub proportional: S,
+    /// The integral.
+    pub integral: S,
+    /// What follows the error's filtered rate.
+    pub derivative: S,
+    /// The sum, within the bounds given to the step.
+    pub output: S,
+    /// Whether the bounds cut the output.
+    pub saturated: bool,
+}
+
+/// A law ready for the tick. Made by [`StageSettings::build`](crate::settings::StageSettings::build).
+// The variants differ in size by their tables, and an axis is made once.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq)]
+pub enum Feedback<S: Scalar> {
+    /// PID, or PD.
+    Pid(Pid<S>),
+    /// PID behind the nonlinear gain.
+    NPid(NonlinearGainTable<S>, Pid<S>),
+    /// PID with scheduled gains.
+    Scheduled(ScheduledPid<S>),
+    /// Cascade.
+    Cascade(Cascade<S>),
+    /// Sliding mode.
+    SlidingMode(SlidingMode<S>),
+    /// NCTF.
+    Nctf(Nctf<S>),
+}
+
+impl<S: Scalar> Feedback<S> {
+    /// Whether the law reads the velocity of the reference.
+    #[inline(always)]
+    pub const fn needs_velocity(&self) -> bool {
+        matches!(self, Self::Scheduled(_) | Self::Cascade(_))
+    }
+
+    /// Takes over the memory of another law, or of this one with other gains: the next step, from the error given (mm),
+    /// leaves the derivative as it is, and the integral goes on from its volts.
+    pub fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
+        match self {
+            Self::Pid(pid) => pid.take_over(state, error),
+            Self::NPid(gain, pid) => pid.take_over(state, gain.scaled_error(error)),
+            Self::Scheduled(law) => law.pid.take_over(state, error),
+            Self::Cascade(law) => law.inner.rate.take_over(state, error),
+            Self::SlidingMode(law) => law.inner.rate.take_over(state, error),
+            Self::Nctf(law) => law.inner.rate.take_over(state, error),
+        }
+    }
+
+    /// One control period; the output stays within `low..=high` (V), which must be ordered.
+    #[inline(always)]
+    pub fn step(
+        &self,
+        state: &mut FeedbackState<S>,
+        input: FeedbackInput<S>,
+        low: S,
+        high: S,
+    ) -> FeedbackTerms<S> {
+        match self {
+            Self::Pid(pid) => pid.step(state, input.error, low, high),
+            Self::NPid(gain, pid) => pid.step(state, gain.scaled_error(input.error), low, high),
+            Self::Scheduled(law) => law.step(state, input, low, high),
+            Self::Cascade(law) => law.step(state, input, low, high),
+            Self::SlidingMode(law) => law.step(state, input.error, low, high),
+            Self::Nctf(law) => law.step(state, input.error, low, high),
+        }
+    }
+}

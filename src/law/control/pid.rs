@@ -1,0 +1,65 @@
+//! PID with a filtered derivative, an output clamp, and an integrator that stops at the clamp.
+//!
+//! `u = Kp f + Ki int(f) + Kd s / (1 + tau s) f` of the scaled error `f`. The integral adds the present error. PD is the
+//! same without an integral.
+
+use super::derivative::Derivative;
+use super::feedback::{FeedbackState, FeedbackTerms};
+use super::integrator::Integrator;
+use crate::law::scalar::{Quantity, Scalar};
+
+pub use super::popov::PidGains;
+
+/// The PID ready for the tick.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Pid<S: Scalar> {
+    pub(super) proportional: S::Gain,
+    pub(super) derivative: Derivative<S>,
+    pub(super) integrator: Integrator<S>,
+}
+
+impl<S: Scalar> Pid<S> {
+    /// Makes the PID for a control period. The integral stays within +-`integral_limit_v`; with a limit of zero it is a
+    /// PD. Settings time only.
+    pub fn build(gains: &PidGains, integral_limit_v: f64, period_s: f64) -> Self {
+        Self {
+            proportional: S::gain(gains.kp_v_per_mm, Quantity::Length, Quantity::Voltage),
+            derivative: Derivative::build(gains.kd_v_s_per_mm, gains.derivative_filter_s, period_s),
+            integrator: Integrator::build(
+                gains.ki_v_per_mm_s,
+                Quantity::Length,
+                integral_limit_v,
+                period_s,
+            ),
+        }
+    }
+
+    /// Forgets the past: no integral, and no derivative kick at the next step from the present scaled error.
+    pub fn reset(&self, state: &mut FeedbackState<S>, error: S) {
+        self.derivative.reset(state, error);
+    }
+
+    /// Takes over the memory of a PID with other gains, or of one that saw another scaled error: the next step, from
+    /// the scaled error given, leaves the derivative as it is.
+    #[inline(always)]
+    pub fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
+        self.derivative.take_over(state, error);
+    }
+
+    /// One control period. `error` is the scaled error f(e) in mm; the output stays within `low..=high` (V), which
+    /// must be ordered.
+    #[inline(always)]
+    pub fn step(
+        &self,
+        state: &mut FeedbackState<S>,
+        error: S,
+        low: S,
+        high: S,
+    ) -> FeedbackTerms<S> {
+        let error = self.derivative.clip(error);
+        let proportional = error.scale(self.proportional);
+        let derivative = self.derivative.step(state, error);
+        self.integrator
+            .close(state, error, (proportional, derivative), (low, high))
+    }
+}

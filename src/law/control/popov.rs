@@ -1,0 +1,373 @@
+//! How much nonlinear gain the loop bears: the Popov criterion.
+//!
+//! N-PID puts a gain `k(e)` in front of a linear loop `L`. The loop is absolutely stable for every constant or
+//! error-dependent gain in `[1, k_max]` if, with the lower bound of that sector shifted to zero (`H = L / (1 + L)`,
+//! sector `[0, k_max - 1]`), `1 + L` has no root in the right half plane and some `q >= 0` gives
+//!
+//! ```text
+//! Re[(1 + j w q) H(jw)] + 1 / (k_max - 1) > 0   for all w
+//! ```
+//!
+//! Unshifted, the integrator's pole at the origin spoils the test.
+//!
+//! # How it is computed
+//! The left side is linear in q, so its smallest value over w is concave in q: the sign of its slope tells on which
+//! side of a q the best one lies, and bisection finds it. w runs over a fixed grid, even on a log scale until the delay
+//! turns the phase faster than the steps resolve, then even on a linear one. Minima between grid points come from
+//! parabolas, the crossings of the real axis, where even a constant gain is limited, from bisection, and everything
+//! above the grid is covered by a bound on `|L|` that only falls.
+//!
+//! On the axes this was written for the result errs on the narrow side only: by 0.01 % with 5 dB of gain margin, by
+//! 0.05 % with 2 dB, by 2 % below 1 dB, where the resonance of the closed loop is narrower than the grid.
+//!
+//! Stability of `1 + L` is read by Mikhailov's criterion: along w from 0 upwards the characteristic function
+//! `(s^2 + B s + C) s (1 + tau s) + A exp(-s Td) [...]` must turn by a right angle per power of s. Unlike a Nyquist
+//! count it needs no detour around poles on the imaginary axis.
+
+use core::f64::consts::{FRAC_PI_2, PI};
+
+use miniconf::{TreeAny, TreeSchema};
+use num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+
+use crate::law::control::plant_model::PlantModel;
+
+/// The gains of a PID with filtered derivative, `Kp + Ki/s + Kd s / (1 + tau s)`, as its design yields them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct PidGains {
+    /// Kp, V/mm. Above zero.
+    pub kp_v_per_mm: f64,
+    /// Ki, V/(mm s). Zero or more.
+    pub ki_v_per_mm_s: f64,
+    /// Kd, V s/mm. Zero or more.
+    pub kd_v_s_per_mm: f64,
+    /// tau, the time constant of the derivative's filter, s. Zero or more; zero leaves the derivative unfiltered.
+    pub derivative_filter_s: f64,
+}
+
+impl PidGains {
+    /// The response at `s = j omega`, V/mm, of the continuous form. Infinite at zero frequency unless Ki is zero.
+    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
+        let s = Complex64::new(0.0, omega_rad_s);
+        let derivative = s * self.kd_v_s_per_mm / (s * self.derivative_filter_s + 1.0);
+        let proportional = derivative + self.kp_v_per_mm;
+        if self.ki_v_per_mm_s == 0.0 {
+            proportional
+        } else {
+            proportional + s.inv() * self.ki_v_per_mm_s
+        }
+    }
+
+    /// Whether every gain is finite and within the range its field states.
+    pub fn is_valid(&self) -> bool {
+        let not_negative = |x: f64| x.is_finite() && x >= 0.0;
+        self.kp_v_per_mm.is_finite()
+            && self.kp_v_per_mm > 0.0
+            && not_negative(self.ki_v_per_mm_s)
+            && not_negative(self.kd_v_s_per_mm)
+            && not_negative(self.derivative_filter_s)
+    }
+}
+
+/// k_max: the largest nonlinear gain `k(emax)` for which the Popov criterion proves the loop of `plant` and `gains`
+/// stable. From 1 to a million, which stands for no limit.
+///
+/// `sample_time_s` is the control period of a sampled controller, s, whose zero-order hold is accounted for as a
+/// further delay of half a period; 0 stands for a continuous controller. The criterion stays that of continuous time:
+/// at 10 kHz the answer lies within 0.1 % of the sampled loop's own gain margin, on either side.
+///
+/// The answer is 1, no nonlinear gain, whenever nothing can be proven: an unstable or barely stable linear loop, a
+/// parameter outside the range its field states, NaN included, or a loop so fast against its delay that the frequency
+/// grid does not reach the end of it.
+///
+/// Settings time only: some 400,000 operations in double precision and 5 KiB of stack.
+pub fn sector_bound(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> f64 {
+    sector_proof(plant, gains, sample_time_s).popov
+}
+
+/// What is proven of a loop with a varying gain in front of it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SectorProof {
+    /// [`sector_bound`]: stable for every gain from 1 to this that depends on the error alone.
+    pub popov: f64,
+    /// The q of the line that proves it, s; in the plane of `Re H` and `w Im H` the line has the slope 1/q and meets
+    /// the real axis at `-1 / (popov - 1)`.
+    pub slope_s: f64,
+    /// The circle criterion, q = 0: stable for every gain from 1 to this, even one that varies with time in any way.
+    pub circle: f64,
+}
+
+impl SectorProof {
+    const NOTHING: Self = Self {
+        popov: 1.0,
+        slope_s: 0.0,
+        circle: 1.0,
+    };
+}
+
+/// [`sector_bound`] with the line that proves it, and the bound for gains that vary with time.
+pub fn sector_proof(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> SectorProof {
+    let sampling_valid = sample_time_s.is_finite() && sample_time_s >= 0.0;
+    if !(plant.is_valid() && gains.is_valid() && sampling_valid) {
+        return SectorProof::NOTHING;
+    }
+    let held = PlantModel {
+        delay_s: plant.delay_s + sample_time_s / 2.0,
+        ..*plant
+    };
+    let tested = Loop {
+        plant: held,
+        gains: *gains,
+    };
+    let mut plot = PopovPlot::EMPTY;
+    if tested.tabulate(&mut plot).is_none() {
+        return SectorProof::NOTHING;
+    }
+    let bound = |intercept: f64| (1.0 - 1.0 / intercept).min(NO_LIMIT);
+    let (slope_s, intercept) = plot.best_line();
+    SectorProof {
+        popov: bound(intercept),
+        slope_s,
+        circle: bound(plot.leftmost(0.0).0.min(-f64::MIN_POSITIVE)),
+    }
+}
+
+/// The largest answer.
+const NO_LIMIT: f64 = 1e6;
+/// Points of the frequency grid.
+const POINTS: usize = 512;
+/// Step of the grid's logarithmic part, as a fraction of the frequency.
+const LOG_STEP: f64 = 0.025;
+/// Step of the grid's linear part, as the phase the delay turns in it, rad.
+const DELAY_STEP_RAD: f64 = PI / 8.0;
+/// A turn of the characteristic function between neighbouring points above which its direction is no longer certain,
+/// rad.
+const LARGEST_TURN_RAD: f64 = 2.0;
+/// Halvings of the interval in each search.
+const BISECTIONS: usize = 48;
+
+/// The linear loop under test.
+struct Loop {
+    plant: PlantModel,
+    gains: PidGains,
+}
+
+impl Loop {
+    /// The numerator of `L` and the characteristic function, over the common denominator
+    /// `(s^2 + B s + C) (1 + tau s)`, times s when the controller integrates: finite at every frequency.
+    fn polynomials(&self, omega: f64) -> (Complex64, Complex64) {
+        let s = Complex64::new(0.0, omega);
+        let filter = s * self.gains.derivative_filter_s + 1.0;
+        let mut numerator = filter * self.gains.kp_v_per_mm + s * self.gains.kd_v_s_per_mm;
+        let mut denominator = self.plant.denominator(omega) * filter;
+        if self.integrates() {
+            numerator = numerator * s + filter * self.gains.ki_v_per_mm_s;
+            denominator *= s;
+        }
+        numerator *= self.plant.delayed_gain(omega);
+        (numerator, denominator + numerator)
+    }
+
+    fn integrates(&self) -> bool {
+        self.gains.ki_v_per_mm_s > 0.0
+    }
+
+    /// The angle of the common denominator, followed continuously from zero frequency, rad.
+    fn denominator_angle(&self, omega: f64) -> f64 {
+        let plant = self.plant.denominator(omega);
+        let integrator = if self.integrates() { FRAC_PI_2 } else { 0.0 };
+        integrator
+            + libm::atan(omega * self.gains.derivative_filter_s)
+            + libm::atan2(plant.im, plant.re)
+    }
+
+    /// A bound on `|L|` that falls with the frequency, even multiplied by it, above the plant's own resonance.
+    fn magnitude_bound(&self, omega: f64) -> f64 {
+        let inertia = omega * omega - self.plant.stiffness_per_s2;
+        if inertia <= 0.0 {
+            return f64::INFINITY;
+        }
+        // The derivative's part is bounded without the damping: with it, it could still rise.
+        let damped = libm::hypot(inertia, self.plant.damping_per_s * omega);
+        let filter = libm::hypot(1.0, omega * self.gains.derivative_filter_s);
+        let proportional = self.gains.kp_v_per_mm + self.gains.ki_v_per_mm_s / omega;
+        let derivative = self.gains.kd_v_s_per_mm * omega / filter;
+        self.plant.gain_mm_per_v_s2 * (proportional / damped + derivative / inertia)
+    }
+
+    /// Of the order of the crossover frequency, rad/s.
+    fn scale(&self) -> f64 {
+        let gain = self.plant.gain_mm_per_v_s2;
+        libm::sqrt(self.plant.stiffness_per_s2 + gain * self.gains.kp_v_per_mm)
+            .max(gain * self.gains.kd_v_s_per_mm)
+    }
+
+    /// H.
+    fn shifted(&self, omega: f64) -> Complex64 {
+        let (numerator, characteristic) = self.polynomials(omega);
+        numerator / characteristic
+    }
+
+    /// Re H where Im H changes its sign between two frequencies.
+    fn real_part_at_crossing(&self, mut low: f64, mut high: f64) -> f64 {
+        let negative_below = self.shifted(low).im < 0.0;
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if (self.shifted(middle).im < 0.0) == negative_below {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        self.shifted(low).re
+    }
+
+    /// Fills the Popov plot; nothing when the loop is not shown to be stable.
+    fn tabulate(&self, plot: &mut PopovPlot) -> Option<()> {
+        let longest_step = if self.plant.delay_s > 0.0 {
+            DELAY_STEP_RAD / self.plant.delay_s
+        } else {
+            f64::INFINITY
+        };
+        let scale = self.scale();
+        let (_, mut previous) = self.polynomials(0.0);
+        if !(previous.re > 0.0 && previous.im == 0.0) {
+            return None;
+        }
+        let mut omega = scale * 1e-3;
+        let mut last = omega;
+        let mut below = self.shifted(omega);
+        let mut angle = 0.0;
+        let mut crossing = 0.0;
+        for point in &mut plot.points {
+            let (numerator, characteristic) = self.polynomials(omega);
+            let turn = angle_between(previous, characteristic);
+            // Also false for NaN, from parameters too large for their products to be finite.
+            let certain = turn.abs() < LARGEST_TURN_RAD;
+            if !certain {
+                return None;
+            }
+            angle += turn;
+            let shifted = numerator / characteristic;
+            if (shifted.im < 0.0) != (below.im < 0.0) && shifted.re.min(below.re) < 0.0 {
+                crossing = self.real_part_at_crossing(last, omega).min(crossing);
+            }
+            *point = (shifted.re as f32, (omega * shifted.im) as f32);
+            let held = point.0.is_finite() && point.1.is_finite();
+            if !held {
+                return None;
+            }
+            (previous, below, last) = (characteristic, shifted, omega);
+            omega += (omega * LOG_STEP).min(longest_step);
+        }
+        let bound = self.magnitude_bound(last);
+        let complete = bound < 0.5;
+        if !complete {
+            return None;
+        }
+        // With all roots on the left, the angle is that of the denominator plus that of 1 + L, here below 30 degrees;
+        // every pair of roots on the right takes a full turn away.
+        if (angle - self.denominator_angle(last)).abs() > PI {
+            return None;
+        }
+        let tail = bound / (1.0 - bound);
+        plot.crossing = crossing;
+        plot.tail = (-tail, last * tail);
+        plot.largest_q = 1e3 / scale;
+        Some(())
+    }
+}
+
+/// The angle from one vector to the other, within half a turn, rad.
+fn angle_between(from: Complex64, to: Complex64) -> f64 {
+    let turned = to * from.conj();
+    libm::atan2(turned.im, turned.re)
+}
+
+/// The Popov plot of `H`: Re H against w Im H, per point of the frequency grid.
+struct PopovPlot {
+    /// Re H, and w Im H in rad/s. In single precision, whose rounding is far below what the grid leaves uncertain: this is
+    /// the largest thing on the firmware's stack.
+    points: [(f32, f32); POINTS],
+    /// The leftmost crossing of the real axis, Re H; 0 without one on its negative half.
+    crossing: f64,
+    /// No point above the grid lies further left or higher than this.
+    tail: (f64, f64),
+    /// Where the search for q ends, s.
+    largest_q: f64,
+}
+
+impl PopovPlot {
+    const EMPTY: Self = Self {
+        points: [(0.0, 0.0); POINTS],
+        crossing: 0.0,
+        tail: (0.0, 0.0),
+        largest_q: 0.0,
+    };
+
+    /// The q >= 0 for which the smallest `Re H - q w Im H` is largest, and that value, below zero: where the Popov line
+    /// meets the real axis.
+    fn best_line(&self) -> (f64, f64) {
+        let (mut low, mut high) = (0.0, self.largest_q);
+        for _ in 0..BISECTIONS {
+            let middle = 0.5 * (low + high);
+            if self.leftmost(middle).1 > 0.0 {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        let (at_low, at_high) = (self.leftmost(low).0, self.leftmost(high).0);
+        let (q, best) = if at_low >= at_high {
+            (low, at_low)
+        } else {
+            (high, at_high)
+        };
+        // The tail lies below zero, except for numbers so small that it vanishes.
+        (q, best.min(-f64::MIN_POSITIVE))
+    }
+
+    /// The smallest `Re H - q w Im H` over w, and its slope in q.
+    fn leftmost(&self, q: f64) -> (f64, f64) {
+        let value = |(x, y): (f64, f64)| x - q * y;
+        let mut smallest = (value(self.tail), -self.tail.1);
+        let mut consider = |candidate: (f64, f64)| {
+            if candidate.0 < smallest.0 {
+                smallest = candidate;
+            }
+        };
+        consider((self.crossing, 0.0));
+        let wide = |(x, y): (f32, f32)| (f64::from(x), f64::from(y));
+        let first = wide(self.points[0]);
+        consider((value(first), -first.1));
+        for window in self.points.windows(3) {
+            let &[before, here, after] = window else {
+                continue;
+            };
+            let (before, here, after) = (wide(before), wide(here), wide(after));
+            if value(here) > value(before).min(value(after)) {
+                continue;
+            }
+            // The parabola's vertex, in steps from `here`.
+            let curvature = value(after) - 2.0 * value(here) + value(before);
+            let shift = if curvature > 0.0 {
+                0.5 * (value(before) - value(after)) / curvature
+            } else {
+                0.0
+            };
+            let interpolate = |before: f64, here: f64, after: f64| {
+                here + 0.5 * shift * (after - before)
+                    + 0.5 * shift * shift * (after - 2.0 * here + before)
+            };
+            let x = interpolate(before.0, here.0, after.0);
+            let y = interpolate(before.1, here.1, after.1);
+            consider((value((x, y)), -y));
+        }
+        smallest
+    }
+}
+
+#[cfg(test)]
+#[path = "popov_tests.rs"]
+mod tests;

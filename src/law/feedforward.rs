@@ -1,0 +1,399 @@
+//! Feedforward of friction and inertia, from the reference alone.
+//!
+//! Each effect is counted once, whatever is combined:
+//!
+//! | kind         | Coulomb and Stribeck level           | pre-sliding       | viscous |
+//! |--------------|--------------------------------------|-------------------|---------|
+//! | none         | -                                    | -                 | -       |
+//! | static       | `s(v) sgn(v)`                        | -                 | `sigma v` |
+//! | GMS          | the elements, on a constant `s = Fs` | elements          | -       |
+//! | combined     | the elements, on `s(v)`              | elements          | `sigma v` |
+//! | Dahl         | the bristle, on a constant `s = Fc`  | bristle           | `sigma v` |
+//! | LuGre        | the bristles, on `s(v)`              | bristles, damped  | `sigma v`, which is LuGre's sigma2 |
+//! | smoothed GMS | the elements, on `s(v)`              | smoothed elements | `sigma v` |
+//!
+//! Inertia (`a / A`) is separate and acts with any kind.
+//!
+//! The springs of the elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and
+//! LuGre. When a change of settings goes from one group to the other, the force of the springs goes with it: the bristle takes
+//! the elements' sum, the elements take their weights' shares of the bristle's force. What else the elements remember is
+//! right again once the reference has moved over the pre-sliding range in one sense.
+
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
+use strum::{AsRefStr, EnumString, VariantNames};
+
+use crate::law::friction::bristle::Bristle;
+use crate::law::friction::dahl::Dahl;
+use crate::law::friction::gms::{Gms, GmsState};
+use crate::law::friction::lugre::Lugre;
+use crate::law::friction::smoothed_gms::SmoothedGms;
+use crate::law::friction::stribeck::{Sliding, SlidingTable};
+use crate::law::friction::{Direction, PerDirection};
+use crate::law::scalar::{Quantity, Scalar};
+use crate::settings::FrictionSettings;
+
+/// Which friction models act.
+#[derive(
+    Clone,
+    Copy,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    AsRefStr,
+    EnumString,
+    VariantNames,
+)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum FeedforwardKind {
+    /// No friction feedforward.
+    #[default]
+    None,
+    /// The static model: Stribeck curve and viscous friction.
+    Static,
+    /// GMS alone, at the breakaway level.
+    Gms,
+    /// GMS on the Stribeck curve, and the static model's viscous friction.
+    Combined,
+    /// Dahl's model at the Coulomb level, and the static model's viscous friction.
+    Dahl,
+    /// The LuGre model on the Stribeck curve.
+    Lugre,
+    /// The smoothed GMS on the Stribeck curve, and the static model's viscous friction.
+    SmoothedGms,
+}
+
+impl FeedforwardKind {
+    /// All kinds.
+    pub const ALL: [Self; 7] = [
+        Self::None,
+        Self::Static,
+        Self::Gms,
+        Self::Combined,
+        Self::Dahl,
+        Self::Lugre,
+        Self::SmoothedGms,
+    ];
+
+    /// Those that the thesis compares, in the order of its tables.
+    pub const THESIS: [Self; 4] = [Self::None, Self::Static, Self::Gms, Self::Combined];
+
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Static => "static",
+            Self::Gms => "GMS",
+            Self::Combined => "static + GMS",
+            Self::Dahl => "Dahl",
+            Self::Lugre => "LuGre",
+            Self::SmoothedGms => "smoothed GMS",
+        }
+    }
+
+    /// Whether the static model's `s(v) sgn(v)` acts.
+    const fn has_static_level(self) -> bool {
+        matches!(self, Self::Static)
+    }
+
+    /// Whether a pre-sliding model acts.
+    const fn has_presliding(self) -> bool {
+        !matches!(self, Self::None | Self::Static)
+    }
+
+    /// Whether viscous friction acts.
+    const fn has_viscous(self) -> bool {
+        !matches!(self, Self::None | Self::Gms)
+    }
+}
+
+/// How much of each effect is fed forward.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct FeedforwardGains {
+    /// Share of `s(v) sgn(v)`, 0..=2; 1 is the identified value.
+    pub level: f64,
+    /// Share of `sigma v`, 0..=2.
+    pub viscous: f64,
+    /// Share of the pre-sliding model's force, whichever model acts, 0..=2.
+    pub gms: f64,
+    /// Inertia, V s^2/mm: 1 / A for the whole of it, 0 for none.
+    pub inertia_v_s2_per_mm: f64,
+}
+
+/// What the reference does in one tick, seen far enough ahead.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct ReferenceStep<S> {
+    /// Displacement since the last tick, mm.
+    pub displacement: S,
+    /// Velocity, mm/s.
+    pub velocity: S,
+    /// Acceleration, mm/s^2.
+    pub acceleration: S,
+}
+
+/// What is fed forward, term by term, V.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FeedforwardTerms<S> {
+    /// The static model's Coulomb and Stribeck level.
+    pub level: S,
+    /// Viscous friction.
+    pub viscous: S,
+    /// The pre-sliding model: the GMS elements, smoothed or not, or the bristles.
+    pub gms: S,
+    /// Inertia.
+    pub inertia: S,
+}
+
+impl<S: Scalar> FeedforwardTerms<S> {
+    /// The sum of all terms, V.
+    #[inline(always)]
+    pub fn total(&self) -> S {
+        S::ZERO + self.level + self.viscous + self.gms + self.inertia
+    }
+}
+
+/// The pre-sliding model of a kind, with what only that model needs.
+#[derive(Clone, Debug, PartialEq)]
+enum Presliding<S: Scalar, const N: usize> {
+    /// None, static, GMS, combined: the elements move with each of them.
+    Gms {
+        elements: Gms<S, N>,
+        surface: SlidingTable<S>,
+        breakaway: PerDirection<Sliding<S>>,
+    },
+    Smoothed {
+        elements: SmoothedGms<S, N>,
+        surface: SlidingTable<S>,
+    },
+    Lugre(Lugre<S>),
+    Dahl(Dahl<S>),
+}
+
+/// The memory of the feedforward; springs slack by default.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FeedforwardState<S: Scalar, const N: usize> {
+    elements: GmsState<S, N>,
+    bristle: Bristle<S>,
+    /// The bristle moved last, and not the elements.
+    on_bristle: bool,
+}
+
+impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
+    fn default() -> Self {
+        Self {
+            elements: GmsState::default(),
+            bristle: Bristle::default(),
+            on_bristle: false,
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
+    /// What the springs of the last kind carry, V.
+    pub fn force(&self) -> S {
+        if self.on_bristle {
+            self.bristle.force()
+        } else {
+            self.elements.total()
+        }
+    }
+
+    /// The elements, loaded by `spread` if the bristle moved last.
+    #[inline(always)]
+    fn elements(&mut self, spread: impl FnOnce(S) -> GmsState<S, N>) -> &mut GmsState<S, N> {
+        if self.on_bristle {
+            self.elements = spread(self.bristle.force());
+            self.on_bristle = false;
+        }
+        &mut self.elements
+    }
+
+    /// The bristle, loaded if the elements moved last.
+    #[inline(always)]
+    fn bristle(&mut self) -> &mut Bristle<S> {
+        if !self.on_bristle {
+            self.bristle = Bristle::bent(self.elements.total());
+            self.on_bristle = true;
+        }
+        &mut self.bristle
+    }
+}
+
+/// The feedforward ready for the tick; `N` is the room for GMS elements.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Feedforward<S: Scalar, const N: usize> {
+    kind: FeedforwardKind,
+    presliding: Presliding<S, N>,
+    level_gain: S::Gain,
+    gms_gain: S::Gain,
+    viscous: PerDirection<S::Gain>,
+    inertia: S::Gain,
+}
+
+impl<S: Scalar, const N: usize> Feedforward<S, N> {
+    /// Makes the feedforward from validated parameters. Settings time only.
+    pub fn build(
+        kind: FeedforwardKind,
+        gains: &FeedforwardGains,
+        friction: &FrictionSettings,
+        period_s: f64,
+    ) -> Self {
+        let mut feedforward = Self::blank();
+        feedforward.build_over(kind, gains, friction, period_s);
+        feedforward
+    }
+
+    /// None at all, to be [built over](Self::build_over).
+    pub(crate) fn blank() -> Self {
+        Self {
+            kind: FeedforwardKind::None,
+            presliding: Presliding::blank(),
+            level_gain: S::Gain::default(),
+            gms_gain: S::Gain::default(),
+            viscous: PerDirection::default(),
+            inertia: S::Gain::default(),
+        }
+    }
+
+    /// As [`build`](Self::build), in place.
+    #[inline(never)]
+    pub(crate) fn build_over(
+        &mut self,
+        kind: FeedforwardKind,
+        gains: &FeedforwardGains,
+        friction: &FrictionSettings,
+        period_s: f64,
+    ) {
+        let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
+        self.kind = kind;
+        (self.level_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
+        self.viscous = friction.sliding.map(|model| {
+            S::gain(
+                gains.viscous * model.viscous_v_s_per_mm,
+                Quantity::Velocity,
+                Quantity::Voltage,
+            )
+        });
+        self.inertia = S::gain(
+            gains.inertia_v_s2_per_mm,
+            Quantity::Acceleration,
+            Quantity::Voltage,
+        );
+        self.presliding = Presliding::without_tables(kind, friction, period_s);
+        self.presliding.fill_tables(friction, period_s);
+    }
+
+    /// One control period.
+    #[inline(always)]
+    pub fn step(
+        &self,
+        state: &mut FeedforwardState<S, N>,
+        reference: ReferenceStep<S>,
+    ) -> FeedforwardTerms<S> {
+        let mut terms = FeedforwardTerms {
+            inertia: reference.acceleration.scale(self.inertia),
+            ..FeedforwardTerms::default()
+        };
+        let direction = if reference.velocity < S::ZERO {
+            Direction::Negative
+        } else {
+            Direction::Positive
+        };
+        if self.kind.has_viscous() {
+            terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
+        }
+        let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
+        let force = match &self.presliding {
+            Presliding::Gms {
+                elements,
+                surface,
+                breakaway,
+            } => {
+                let sliding = match self.kind {
+                    FeedforwardKind::Gms => *breakaway.of(direction),
+                    _ => surface.at(speed, direction),
+                };
+                if self.kind.has_static_level() && reference.velocity != S::ZERO {
+                    let level = sliding.level.scale(self.level_gain);
+                    terms.level = match direction {
+                        Direction::Positive => level,
+                        Direction::Negative => -level,
+                    };
+                }
+                // The elements move with any of these kinds: their springs are loaded when a change makes them act.
+                let springs = state.elements(|force| elements.spread(force));
+                elements.step(springs, displacement, sliding)
+            }
+            Presliding::Smoothed { elements, surface } => {
+                let springs = state.elements(|force| elements.spread(force));
+                elements.step(springs, displacement, surface.at(speed, direction))
+            }
+            Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
+            Presliding::Dahl(model) => model.step(state.bristle(), displacement),
+        };
+        if self.kind.has_presliding() {
+            terms.gms = force.scale(self.gms_gain);
+        }
+        terms
+    }
+}
+
+impl<S: Scalar, const N: usize> Presliding<S, N> {
+    fn blank() -> Self {
+        Self::Gms {
+            elements: Gms::build(&[]),
+            surface: SlidingTable::blank(),
+            breakaway: PerDirection::default(),
+        }
+    }
+
+    /// Fills the tables of a model made by [`without_tables`](Self::without_tables) of the same parameters.
+    fn fill_tables(&mut self, friction: &FrictionSettings, period_s: f64) {
+        let curves = friction.sliding.map(|model| model.curve);
+        match self {
+            Self::Gms { surface, .. } | Self::Smoothed { surface, .. } => {
+                surface.fill(&curves, friction.gms.attraction_v_s, period_s);
+            }
+            Self::Lugre(model) => {
+                if let Some(parameters) = &friction.lugre {
+                    model.fill(parameters, &curves, period_s);
+                }
+            }
+            // Its tables are small, and made with it.
+            Self::Dahl(_) => {}
+        }
+    }
+
+    /// The model of a kind. Settings without the parameters of their kind are refused before they come here; the
+    /// elements would stand in.
+    fn without_tables(kind: FeedforwardKind, friction: &FrictionSettings, period_s: f64) -> Self {
+        let (sliding, gms) = (&friction.sliding, &friction.gms);
+        match (kind, &friction.lugre, &friction.dahl) {
+            (FeedforwardKind::Lugre, Some(_), _) => Self::Lugre(Lugre::blank()),
+            (FeedforwardKind::Dahl, _, Some(dahl)) => Self::Dahl(Dahl::build(
+                dahl,
+                sliding.map(|model| model.curve.coulomb_v),
+            )),
+            (FeedforwardKind::SmoothedGms, ..) => Self::Smoothed {
+                elements: SmoothedGms::build(
+                    &gms.elements,
+                    &friction.smoothed_gms,
+                    friction.mean_breakaway_v(),
+                ),
+                surface: SlidingTable::blank(),
+            },
+            _ => Self::Gms {
+                elements: Gms::build(&gms.elements),
+                surface: SlidingTable::blank(),
+                breakaway: sliding.map(|model| {
+                    Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
+                }),
+            },
+        }
+    }
+}

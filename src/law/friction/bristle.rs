@@ -1,0 +1,21 @@
+//! What the models with a single state share: the force that the deflected bristles of a surface carry.
+
+use crate::law::scalar::Scalar;
+
+/// The memory of a model with a single state; slack bristles by default.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bristle<S> {
+    pub(super) force: S,
+}
+
+impl<S: Scalar> Bristle<S> {
+    /// Bristles that carry a force, V.
+    pub fn bent(force: S) -> Self {
+        Self { force }
+    }
+
+    /// What the bristles carry, `sigma0 z`, V.
+    pub fn force(&self) -> S {
+        self.force
+    }
+}

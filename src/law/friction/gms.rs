@@ -1,0 +1,194 @@
+//! The generalized Maxwell-slip (GMS) model: friction before and during sliding, with memory.
+//!
+//! `N` massless blocks in parallel, each on its own spring, share the load by weights that sum to one. A block sticks,
+//! `dF_i/dt = k_i v`, until its force reaches its share `alpha_i s(v)` of the sliding surface; then it slips,
+//! `dF_i/dt = sgn(v) C (alpha_i - |F_i| / s(v))`, until the velocity reverses.
+//! Source: Lampaert, Al-Bender and Swevers, *A generalized Maxwell-slip friction model appropriate for control
+//! purposes*, IEEE PhysCon 2003.
+//!
+//! Discretised by the exact step of each branch: sticking by the displacement, slipping by the exponential. An
+//! explicit step of the slip equation overshoots when `C Ts / s` is not small.
+
+use heapless::Vec;
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
+
+use super::Direction;
+use super::stribeck::Sliding;
+use crate::law::scalar::{Quantity, Scalar};
+
+/// Elements in a settings file at most.
+pub const MAX_ELEMENTS: usize = 10;
+
+/// Elements that the firmware has room for: with eight, identification and not their number decides the accuracy.
+pub const FIRMWARE_ELEMENTS: usize = 8;
+
+/// One block of the model.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct GmsElement {
+    /// k_i, the spring of the block, V/mm; positive.
+    pub stiffness_v_per_mm: f64,
+    /// alpha_i, its share of the load, 0..=1; the shares of all blocks sum to one.
+    pub weight: f64,
+}
+
+/// The blocks of a model, one to [`MAX_ELEMENTS`].
+pub type GmsElements = Vec<GmsElement, MAX_ELEMENTS>;
+
+/// The GMS model as a person writes it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct GmsParameters {
+    /// The blocks, one to [`MAX_ELEMENTS`].
+    pub elements: GmsElements,
+    /// C, the rate at which sliding friction follows the Stribeck effect, V/s.
+    pub attraction_v_s: f64,
+}
+
+impl GmsParameters {
+    /// The force in V at a displacement in mm from rest on a surface of constant level: the virgin curve
+    /// `sum(min(k_i x, alpha_i s))`, odd in the displacement. Settings time and host only.
+    pub fn virgin_curve_v(&self, displacement_mm: f64, level_v: f64) -> f64 {
+        let distance = libm::fabs(displacement_mm);
+        let force: f64 = self
+            .elements
+            .iter()
+            .map(|element| (element.stiffness_v_per_mm * distance).min(element.weight * level_v))
+            .sum();
+        libm::copysign(force, displacement_mm)
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct ElementConfig<S: Scalar> {
+    stiffness: S::Gain,
+    weight: S::Gain,
+}
+
+/// The GMS model ready for the tick. `N` is the room for elements; those not used do not act.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Gms<S: Scalar, const N: usize> {
+    elements: [ElementConfig<S>; N],
+}
+
+/// The memory of the GMS model.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GmsState<S: Scalar, const N: usize> {
+    pub(super) forces: [S; N],
+    slipping: [bool; N],
+    direction: Direction,
+}
+
+impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
+    /// All springs slack: the virgin state.
+    fn default() -> Self {
+        Self {
+            forces: [S::ZERO; N],
+            slipping: [false; N],
+            direction: Direction::Positive,
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> GmsState<S, N> {
+    /// Sticking elements that carry `force` by their weights.
+    pub(super) fn carrying(force: S, weights: impl Iterator<Item = S::Gain>) -> Self {
+        let mut state = Self::default();
+        for (slot, weight) in state.forces.iter_mut().zip(weights) {
+            *slot = force.scale(weight);
+        }
+        state
+    }
+
+    /// The forces of the elements, V.
+    pub fn forces(&self) -> &[S; N] {
+        &self.forces
+    }
+
+    /// The friction, the sum of the elements' forces, V.
+    #[inline(always)]
+    pub fn total(&self) -> S {
+        let mut force = S::ZERO;
+        for element in self.forces {
+            force = force + element;
+        }
+        force
+    }
+
+    /// Forgets that elements slip, as a reversal does: for a model that does not remember it.
+    #[inline(always)]
+    pub(super) fn stick(&mut self, direction: Direction) {
+        self.direction = direction;
+        self.slipping = [false; N];
+    }
+}
+
+impl<S: Scalar, const N: usize> Gms<S, N> {
+    /// Makes the model from its elements, at most `N` of them; any beyond are left out, so settings are checked
+    /// against `N` before they come here. Settings time only.
+    pub fn build(elements: &[GmsElement]) -> Self {
+        Self {
+            elements: core::array::from_fn(|index| {
+                // An absent element has no weight: it slips at zero force.
+                let (stiffness, weight) = elements
+                    .get(index)
+                    .map_or((0.0, 0.0), |e| (e.stiffness_v_per_mm, e.weight));
+                ElementConfig {
+                    stiffness: S::gain(stiffness, Quantity::Length, Quantity::Voltage),
+                    weight: S::gain(weight, Quantity::Voltage, Quantity::Voltage),
+                }
+            }),
+        }
+    }
+
+    /// Sticking elements that carry `force` by their weights.
+    pub fn spread(&self, force: S) -> GmsState<S, N> {
+        GmsState::carrying(force, self.elements.iter().map(|element| element.weight))
+    }
+
+    /// The friction in V after moving by `displacement` (mm) over the surface `sliding`; without a displacement
+    /// nothing changes.
+    #[inline(always)]
+    pub fn step(&self, state: &mut GmsState<S, N>, displacement: S, sliding: Sliding<S>) -> S {
+        if displacement > S::ZERO {
+            self.advance(state, displacement, sliding, Direction::Positive, |f| f);
+        } else if displacement < S::ZERO {
+            self.advance(state, displacement, sliding, Direction::Negative, |f| -f);
+        }
+        state.total()
+    }
+
+    /// `along` turns a force into its component along the motion, and back.
+    #[inline(always)]
+    fn advance(
+        &self,
+        state: &mut GmsState<S, N>,
+        displacement: S,
+        sliding: Sliding<S>,
+        direction: Direction,
+        along: impl Fn(S) -> S,
+    ) {
+        if state.direction != direction {
+            state.stick(direction);
+        }
+        for ((element, force), slipping) in self
+            .elements
+            .iter()
+            .zip(&mut state.forces)
+            .zip(&mut state.slipping)
+        {
+            let share = sliding.level.scale(element.weight);
+            if *slipping {
+                let distance = along(*force) - share;
+                *force = along(share + distance.times(sliding.decay, Quantity::Fraction));
+            } else {
+                let trial = *force + displacement.scale(element.stiffness);
+                // Not so if the trial is not a number.
+                let sticks = along(trial) < share;
+                *slipping = !sticks;
+                *force = if sticks { trial } else { along(share) };
+            }
+        }
+    }
+}

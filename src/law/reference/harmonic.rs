@@ -1,0 +1,299 @@
+//! Sinusoidal motion, and the circle that two of them make.
+//!
+//! The phase is a 64-bit integer, so it neither drifts nor loses resolution. Its speed rises and falls smoothly at
+//! the ends, so the axis starts and stops on the curve without a step of velocity or acceleration.
+
+use core::f64::consts::TAU;
+
+use serde::{Deserialize, Serialize};
+
+use super::sine::{SINE_BITS, sine, sine_and_cosine};
+use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
+use crate::law::rounding;
+use crate::law::scalar::{Quantity, Scalar};
+use crate::law::units::{POSITION_FRACTION_BITS, Position};
+
+/// A sine as a person writes it: `amplitude sin(2 pi frequency t + phase)` about its centre.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct HarmonicSettings {
+    /// Half the travel, mm.
+    pub amplitude_mm: f64,
+    /// Cycles per second at full speed, Hz.
+    pub frequency_hz: f64,
+    /// Phase at which the full-speed cycles begin, rad. The centre is where the start puts it.
+    pub phase_rad: f64,
+    /// Cycles at full speed; `None` goes on for ever.
+    pub cycles: Option<f64>,
+    /// Duration of the lead-in and of the lead-out, s.
+    pub lead_s: f64,
+}
+
+impl HarmonicSettings {
+    /// The sine whose largest velocity is `velocity_mm_s`.
+    pub fn with_velocity(amplitude_mm: f64, velocity_mm_s: f64, cycles: f64, lead_s: f64) -> Self {
+        Self {
+            amplitude_mm,
+            frequency_hz: velocity_mm_s / (TAU * amplitude_mm),
+            phase_rad: 0.0,
+            cycles: Some(cycles),
+            lead_s,
+        }
+    }
+
+    /// The largest velocity (mm/s) and acceleration (mm/s^2), lead-in included.
+    pub(super) fn peaks(&self) -> (f64, f64) {
+        let velocity = self.amplitude_mm * TAU * self.frequency_hz;
+        // Phase speed rises at most at 3/2 of its mean rate; the two parts of the acceleration are in quadrature.
+        let along = 1.5 * velocity / self.lead_s;
+        let across = velocity * TAU * self.frequency_hz;
+        (velocity, libm::hypot(along, across))
+    }
+}
+
+/// A plane of the stage.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Plane {
+    /// x and y.
+    Xy,
+    /// y and z.
+    Yz,
+    /// z and x.
+    Zx,
+}
+
+impl Plane {
+    /// The indices of the plane's first and second axis.
+    pub const fn axes(self) -> (usize, usize) {
+        match self {
+            Self::Xy => (0, 1),
+            Self::Yz => (1, 2),
+            Self::Zx => (2, 0),
+        }
+    }
+}
+
+/// A sense of rotation, seen with the plane's first axis to the right and the second up.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Sense {
+    /// Counter-clockwise, G3.
+    CounterClockwise,
+    /// Clockwise, G2.
+    Clockwise,
+}
+
+/// The three axes' motions of a circle: radius in mm, feed in mm/s along the path, the angle (rad, from the plane's
+/// first axis) at which the full-speed turns begin, the number of turns, and the duration of lead-in and lead-out.
+pub fn circle(
+    plane: Plane,
+    sense: Sense,
+    radius_mm: f64,
+    feed_mm_s: f64,
+    start_rad: f64,
+    turns: f64,
+    lead_s: f64,
+) -> [MotionSettings; 3] {
+    let sine = HarmonicSettings::with_velocity(radius_mm, feed_mm_s, turns, lead_s);
+    let quarter = TAU / 4.0;
+    // cos(a) = sin(a + 90 deg); clockwise, the angle runs backwards: cos(-a) = sin(90 deg + a - 2 start), and so on.
+    let (first, second) = match sense {
+        Sense::CounterClockwise => (start_rad + quarter, start_rad),
+        Sense::Clockwise => (quarter - start_rad, 2.0 * quarter - start_rad),
+    };
+    let mut motions = [MotionSettings::Hold; 3];
+    let (first_axis, second_axis) = plane.axes();
+    motions[first_axis] = MotionSettings::Harmonic(HarmonicSettings {
+        phase_rad: first,
+        ..sine
+    });
+    motions[second_axis] = MotionSettings::Harmonic(HarmonicSettings {
+        phase_rad: second,
+        ..sine
+    });
+    motions
+}
+
+/// A sine ready for the tick.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Harmonic<S: Scalar> {
+    amplitude_counts: i32,
+    amplitude_fraction: i32,
+    start_phase: u32,
+    start_swing: i64,
+    phase_per_tick: u64,
+    lead_ticks: u32,
+    lead_step: u64,
+    /// Ticks at full speed; more than can elapse when there is no end.
+    cruise_ticks: u32,
+    /// When the lead-out has ended, if it ever does.
+    end_tick: Option<u32>,
+    velocity: S::Gain,
+    centripetal: S::Gain,
+    tangential: S::Gain,
+    q30: S::Gain,
+}
+
+/// Where a tick lies in a harmonic motion.
+enum Lead {
+    /// In the lead-in or the lead-out, at this tick from its standing end.
+    Under { tick: u32, leaving: bool },
+    /// Between them.
+    FullSpeed,
+    /// After the lead-out.
+    Ended,
+}
+
+/// One, as a Q31 phase speed or lead progress.
+const ONE: u64 = 1 << 31;
+
+/// A sine times an amplitude split in counts and 2^-16 counts, in 2^-16 counts.
+#[inline(always)]
+fn swing(sine: i32, counts: i32, fraction: i32) -> i64 {
+    const SHIFT: u32 = SINE_BITS - POSITION_FRACTION_BITS;
+    let product = |factor: i32| i64::from(sine) * i64::from(factor);
+    ((product(counts) + (1 << (SHIFT - 1))) >> SHIFT) + (product(fraction) >> SINE_BITS)
+}
+
+/// `rate` times a Q31 factor.
+#[inline(always)]
+fn scaled_phase(rate: u64, factor: u64) -> u64 {
+    (((rate >> 32) * factor) << 1) + (((rate & 0xFFFF_FFFF) * factor) >> 31)
+}
+
+impl<S: Scalar> Harmonic<S> {
+    /// Builds the sine from validated settings. Settings time only.
+    pub(super) fn build(settings: &HarmonicSettings, scale: MotionScale) -> Self {
+        let amplitude = Position::from_mm(settings.amplitude_mm, scale.resolution_mm).0;
+        let turns_per_tick = settings.frequency_hz / scale.rate_hz;
+        let phase_per_tick = rounding::round(libm::scalbn(turns_per_tick, 64)) as u64;
+        let ticks = |seconds: f64| rounding::round(seconds * scale.rate_hz) as u32;
+        let lead_ticks = ticks(settings.lead_s).max(1);
+        let cruise_ticks = settings
+            .cycles
+            .map(|cycles| ticks(cycles / settings.frequency_hz));
+        // The lead-in covers half of what full speed would.
+        let lead_turns = 0.5 * f64::from(lead_ticks) * turns_per_tick;
+        let start_turns = settings.phase_rad / TAU - lead_turns;
+        let start_turns = start_turns - rounding::floor(start_turns);
+        let start_phase = rounding::round(libm::scalbn(start_turns, 32)) as u64 as u32;
+        let angular = TAU * settings.frequency_hz;
+        let unit = 1.0 / f64::from(1u32 << SINE_BITS);
+        // Settings are refused whose amplitude does not fit.
+        let amplitude_counts = (amplitude >> POSITION_FRACTION_BITS) as i32;
+        let amplitude_fraction = (amplitude & ((1 << POSITION_FRACTION_BITS) - 1)) as i32;
+        let lead_s = f64::from(lead_ticks) / scale.rate_hz;
+        let gain = |value: f64, to| S::gain(value * unit, Quantity::Integer, to);
+        Self {
+            amplitude_counts,
+            amplitude_fraction,
+            start_phase,
+            start_swing: swing(sine(start_phase), amplitude_counts, amplitude_fraction),
+            phase_per_tick,
+            lead_ticks,
+            lead_step: (1 << 62) / u64::from(lead_ticks),
+            cruise_ticks: cruise_ticks.unwrap_or(u32::MAX),
+            end_tick: cruise_ticks.map(|cruise| cruise.saturating_add(2 * lead_ticks)),
+            velocity: gain(settings.amplitude_mm * angular, Quantity::Velocity),
+            centripetal: gain(
+                -settings.amplitude_mm * angular * angular,
+                Quantity::Acceleration,
+            ),
+            tangential: gain(
+                1.5 * settings.amplitude_mm * angular / lead_s,
+                Quantity::Acceleration,
+            ),
+            q30: S::gain(unit, Quantity::Integer, Quantity::Fraction),
+        }
+    }
+
+    /// Where a tick lies in the motion.
+    #[inline(always)]
+    fn lead(&self, elapsed: u32) -> Lead {
+        if elapsed < self.lead_ticks {
+            return Lead::Under {
+                tick: elapsed,
+                leaving: false,
+            };
+        }
+        let cruised = elapsed - self.lead_ticks;
+        if cruised < self.cruise_ticks {
+            return Lead::FullSpeed;
+        }
+        let past = cruised - self.cruise_ticks;
+        if past < self.lead_ticks {
+            Lead::Under {
+                tick: self.lead_ticks - 1 - past,
+                leaving: true,
+            }
+        } else {
+            Lead::Ended
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
+        match self.lead(state.elapsed) {
+            Lead::FullSpeed => self.advance(state, self.phase_per_tick),
+            Lead::Under { tick, leaving } => self.step_lead(state, tick, leaving),
+            Lead::Ended => ReferenceSample {
+                velocity: S::ZERO,
+                acceleration: S::ZERO,
+                ..self.advance(state, 0)
+            },
+        }
+    }
+
+    /// Turns the phase and looks up the sample at full speed.
+    #[inline(always)]
+    fn advance(&self, state: &mut MotionState, phase: u64) -> ReferenceSample<S> {
+        state.phase = state.phase.wrapping_add(phase);
+        let (sine, cosine) = sine_and_cosine(self.phase(state));
+        let swing = swing(sine, self.amplitude_counts, self.amplitude_fraction);
+        ReferenceSample {
+            position: Position(swing - self.start_swing),
+            velocity: S::scale_integer(cosine, self.velocity),
+            acceleration: S::scale_integer(sine, self.centripetal),
+        }
+    }
+
+    #[inline(always)]
+    fn phase(&self, state: &MotionState) -> u32 {
+        ((state.phase >> 32) as u32).wrapping_add(self.start_phase)
+    }
+
+    /// A tick of the lead-in or lead-out, whose phase speed is a smooth step `p^2 (3 - 2 p)` of the progress `p`. Kept
+    /// apart: most ticks run at full speed.
+    #[inline(never)]
+    fn step_lead(&self, state: &mut MotionState, tick: u32, leaving: bool) -> ReferenceSample<S> {
+        // The middle of the tick, so that lead-in and lead-out are mirror images. lead_ticks fits 31 bits.
+        let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
+        let square = (progress * progress) >> 31;
+        let speed = (square * (3 * ONE - 2 * progress)) >> 31;
+        let full = self.advance(state, scaled_phase(self.phase_per_tick, speed));
+
+        let fraction = |q31: u64| S::scale_integer((q31 >> 1) as i32, self.q30);
+        let ratio = fraction(speed);
+        let centripetal = full
+            .acceleration
+            .times(ratio, Quantity::Fraction)
+            .times(ratio, Quantity::Fraction);
+        // The slope of the smooth step over its largest, 4 p (1 - p).
+        let slope = fraction((progress * (ONE - progress)) >> 29);
+        let (_, cosine) = sine_and_cosine(self.phase(state));
+        let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
+        ReferenceSample {
+            velocity: full.velocity.times(ratio, Quantity::Fraction),
+            acceleration: if leaving {
+                centripetal - along
+            } else {
+                centripetal + along
+            },
+            ..full
+        }
+    }
+
+    #[inline(always)]
+    pub(super) fn finished(&self, state: &MotionState) -> bool {
+        self.end_tick.is_some_and(|end| state.elapsed >= end)
+    }
+}

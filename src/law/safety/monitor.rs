@@ -1,0 +1,219 @@
+//! What is watched on each axis in every tick: one small pure step each, without a division.
+
+use crate::law::rounding;
+use crate::law::scalar::{Quantity, Scalar};
+
+/// Fraction bits of a filtered speed.
+const SPEED_FRACTION_BITS: u32 = 8;
+/// The speed is filtered over 2^3 ticks: at one count a tick, a single reading says little.
+const SPEED_FILTER_BITS: u32 = 3;
+/// No axis moves further in a tick, counts; an encoder that does so is faulty, and its filter shall not wrap.
+const LARGEST_STEP: i32 = 1 << 16;
+/// What quantisation and noise add to a filtered speed, counts per tick.
+const SPEED_NOISE_COUNTS: f64 = 0.5;
+
+/// Watches the measured speed.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overspeed {
+    limit: u32,
+}
+
+/// The filtered speed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct OverspeedState {
+    /// In 2^-8 counts per tick.
+    filtered: i32,
+}
+
+impl OverspeedState {
+    /// The filtered speed, 2^-8 counts per tick, towards larger positions.
+    #[inline(always)]
+    pub fn speed(&self) -> i32 {
+        self.filtered
+    }
+}
+
+impl Overspeed {
+    /// A limit in counts per tick, at most 2^16; half a count is added for the quantisation. Settings time only.
+    pub fn new(counts_per_tick: f64) -> Self {
+        let limit = (counts_per_tick + SPEED_NOISE_COUNTS) * f64::from(1 << SPEED_FRACTION_BITS);
+        Self {
+            limit: rounding::round(limit) as u32,
+        }
+    }
+
+    /// Takes a step of the encoder, counts; says whether the filtered speed is within the limit.
+    #[inline(always)]
+    pub fn step(&self, state: &mut OverspeedState, counts: i32) -> bool {
+        let speed = counts.clamp(-LARGEST_STEP, LARGEST_STEP - 1) << SPEED_FRACTION_BITS;
+        state.filtered += (speed - state.filtered) >> SPEED_FILTER_BITS;
+        state.filtered.unsigned_abs() <= self.limit
+    }
+}
+
+/// Counts within which an encoder with one dead line dithers.
+const DITHER_COUNTS: u32 = 2;
+
+/// Watches for an encoder that shows no motion while the output is high. An encoder of which one line is dead dithers by
+/// a count; that is no motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Silence<S> {
+    /// The output from which the axis must move, V.
+    pub(crate) level: S,
+    /// Ticks that it may take.
+    pub(crate) ticks: u32,
+}
+
+/// For how long the output has been high, and how far the axis has come since.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SilenceState {
+    ticks: u32,
+    travelled: i32,
+}
+
+impl<S: Scalar> Silence<S> {
+    /// Takes a step of the encoder, counts, and the output that was in force before it, V; says whether all is well.
+    #[inline(always)]
+    pub fn step(&self, state: &mut SilenceState, counts: i32, output: S) -> bool {
+        if output.magnitude() >= self.level {
+            self.listen(state, counts)
+        } else {
+            state.ticks = 0;
+            true
+        }
+    }
+
+    #[inline(never)]
+    fn listen(&self, state: &mut SilenceState, counts: i32) -> bool {
+        let before = if state.ticks == 0 { 0 } else { state.travelled };
+        state.travelled = before.saturating_add(counts);
+        if state.travelled.unsigned_abs() > DITHER_COUNTS {
+            state.ticks = 0;
+        } else {
+            state.ticks = state.ticks.saturating_add(1);
+        }
+        state.ticks <= self.ticks
+    }
+}
+
+/// Watches the counts between index pulses: an encoder that loses edges comes to the next pulse with others.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct IndexSpacing {
+    /// Counts between neighbouring pulses; zero: there is no index, or its spacing is not known.
+    counts: u32,
+    /// 2^32 over the counts, rounded down.
+    reciprocal: u32,
+    tolerance: u32,
+}
+
+/// Where the last index pulse was, as the low bits of the count.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct IndexState {
+    last: Option<u32>,
+}
+
+impl IndexSpacing {
+    /// Pulses `counts` apart (2 or more), each of which may be off by `tolerance` counts: a pulse has a width, and is
+    /// met from both sides. None: there is no index, or its spacing is not known. Settings time only.
+    pub fn new(counts: Option<u32>, tolerance: u32) -> Self {
+        let counts = counts.unwrap_or(0);
+        Self {
+            counts,
+            reciprocal: (1u64 << 32).checked_div(counts.into()).unwrap_or(0) as u32,
+            tolerance,
+        }
+    }
+
+    /// What is left of a distance after whole spacings.
+    #[inline(always)]
+    const fn beyond(&self, distance: u32) -> u32 {
+        // The quotient from the rounded reciprocal is the true one or one less.
+        let quotient = ((distance as u64 * self.reciprocal as u64) >> 32) as u32;
+        let rest = distance.wrapping_sub(quotient.wrapping_mul(self.counts));
+        if rest >= self.counts {
+            rest - self.counts
+        } else {
+            rest
+        }
+    }
+
+    /// Takes the count at an index pulse, its low 32 bits; says whether it fits the last one.
+    #[cold]
+    #[inline(never)]
+    pub fn step(&self, state: &mut IndexState, count: u32) -> bool {
+        let last = state.last.replace(count);
+        let Some(last) = last else {
+            return true;
+        };
+        let distance = (count.wrapping_sub(last) as i32).unsigned_abs();
+        let beyond = self.beyond(distance);
+        self.counts == 0
+            || beyond <= self.tolerance
+            || self.counts.wrapping_sub(beyond) <= self.tolerance
+    }
+
+    /// Forgets the last pulse: the counts that follow do not belong to the same count.
+    pub fn forget(state: &mut IndexState) {
+        state.last = None;
+    }
+}
+
+/// Watches the tracking error against a limit that grows with the speed of the reference.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Following<S: Scalar> {
+    /// The limit at rest, mm.
+    pub(crate) at_rest: S,
+    /// What it grows by, mm per mm/s.
+    pub(crate) per_speed: S::Gain,
+    /// What it grows to, mm.
+    pub(crate) largest: S,
+}
+
+/// The largest error so far, and the limit that it stood against.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FollowingState<S> {
+    error: S,
+    limit: S,
+}
+
+impl<S: Scalar> FollowingState<S> {
+    /// The largest error so far as a share of the limit at its time; above 1 after a following error, 0 before the
+    /// first tick. For telemetry, not for the law: it divides.
+    pub fn high_mark(&self) -> f32 {
+        if self.limit > S::ZERO {
+            self.error.to_f32(Quantity::Length) / self.limit.to_f32(Quantity::Length)
+        } else {
+            0.0
+        }
+    }
+}
+
+impl<S: Scalar> Following<S> {
+    /// A memory without an error.
+    #[inline(always)]
+    pub fn start(&self) -> FollowingState<S> {
+        FollowingState {
+            error: S::ZERO,
+            limit: self.largest,
+        }
+    }
+
+    /// Takes the error (mm) and the reference's speed (mm/s, not negative); says whether the axis follows.
+    #[inline(always)]
+    pub fn step(&self, state: &mut FollowingState<S>, error: S, speed: S) -> bool {
+        let grown = self.at_rest + speed.scale(self.per_speed);
+        let limit = if grown < self.largest {
+            grown
+        } else {
+            self.largest
+        };
+        let error = error.magnitude();
+        // error / limit against the mark, without dividing. As fractions, because in fixed point the product of two
+        // lengths up to the largest limit, 20 mm, then fits.
+        let crosswise = |a: S, b: S| a.times(b, Quantity::Fraction);
+        if crosswise(error, state.limit) > crosswise(state.error, limit) {
+            *state = FollowingState { error, limit };
+        }
+        error <= limit
+    }
+}

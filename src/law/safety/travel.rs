@@ -1,0 +1,133 @@
+//! The travel of an axis: soft limits of the measured position, and of where a stop would end.
+
+use crate::law::reference::{Ramp, Velocity};
+use crate::law::safety::FaultCode;
+use crate::law::scalar::Scalar;
+use crate::law::units::Position;
+
+/// A range of positions, made for one comparison.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Range {
+    low: Position,
+    span: u64,
+}
+
+impl Range {
+    /// From `low` to `high`; empty if they are out of order.
+    const fn new(low: Position, high: Position) -> Self {
+        let span = high.0.saturating_sub(low.0);
+        Self {
+            low,
+            // Counts the positions, so that zero is none.
+            span: if span < 0 { 0 } else { span as u64 + 1 },
+        }
+    }
+
+    #[inline(always)]
+    const fn holds(self, position: Position) -> bool {
+        (position.0.wrapping_sub(self.low.0) as u64) < self.span
+    }
+
+    /// The upper end; one below the lower end if the range is empty.
+    #[inline(always)]
+    const fn high(self) -> Position {
+        Position(self.low.0.wrapping_add_unsigned(self.span).wrapping_sub(1))
+    }
+}
+
+/// Where an axis may be. In force once the axis is homed.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Travel {
+    /// For the measured position, and for where a stop ends.
+    allowed: Range,
+    /// For the reference: within it a stop from any allowed velocity ends in time.
+    clear: Range,
+    /// What the speed may grow by in a tick.
+    growth: Position,
+}
+
+/// Whether the axis has been within its travel since it was enabled: one that was enabled outside may come back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TravelState {
+    inside: bool,
+}
+
+impl Travel {
+    /// No limits.
+    pub const UNLIMITED: Self = {
+        let everywhere = Range::new(Position(i64::MIN / 4), Position(i64::MAX / 4));
+        Self {
+            allowed: everywhere,
+            clear: everywhere,
+            growth: Position::ZERO,
+        }
+    };
+
+    /// From `low` to `high`, for references that move by at most `fastest` in a tick, and by at most `growth` more than in
+    /// the tick before; `ramp` is what a stop follows. Settings time only.
+    pub fn new<S: Scalar>(
+        low: Position,
+        high: Position,
+        fastest: Position,
+        growth: Position,
+        ramp: &Ramp<S>,
+    ) -> Self {
+        let stop = stop_from(ramp, fastest + growth);
+        Self {
+            allowed: Range::new(low, high),
+            clear: Range::new(low + stop, high - stop),
+            growth,
+        }
+    }
+
+    /// Takes the reference, its displacement in this tick, and the measured position; what is found calls for a stop
+    /// along `ramp`.
+    #[inline(always)]
+    pub fn step<S: Scalar>(
+        &self,
+        state: &mut TravelState,
+        ramp: &Ramp<S>,
+        reference: Position,
+        displacement: Position,
+        measured: Position,
+    ) -> Option<FaultCode> {
+        if self.clear.holds(reference) && self.allowed.holds(measured) {
+            state.inside = true;
+            return None;
+        }
+        self.at_the_edge(state, ramp, reference, displacement, measured)
+    }
+
+    /// The same near an end of the travel or beyond.
+    #[inline(never)]
+    fn at_the_edge<S: Scalar>(
+        &self,
+        state: &mut TravelState,
+        ramp: &Ramp<S>,
+        reference: Position,
+        displacement: Position,
+        measured: Position,
+    ) -> Option<FaultCode> {
+        if self.allowed.holds(measured) {
+            state.inside = true;
+        } else if state.inside {
+            return Some(FaultCode::TravelExceeded);
+        }
+        let (room, speed) = if displacement.0 > 0 {
+            (self.allowed.high() - reference, displacement)
+        } else if displacement.0 < 0 {
+            (reference - self.allowed.low, -displacement)
+        } else {
+            return None;
+        };
+        // The stop begins after the next tick, which may be faster by the growth.
+        (stop_from(ramp, speed + self.growth).0 > room.0).then_some(FaultCode::TravelAhead)
+    }
+}
+
+/// The distance of a tick at this speed, and of a stop after it.
+#[inline(always)]
+fn stop_from<S: Scalar>(ramp: &Ramp<S>, speed: Position) -> Position {
+    ramp.stopping_distance(Velocity::from_displacement(speed))
+        .saturating_add(speed)
+}

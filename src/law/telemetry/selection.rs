@@ -1,0 +1,101 @@
+//! Which channels are sampled, and how often.
+
+use core::fmt;
+
+use heapless::Vec;
+
+use super::Channel;
+use crate::law::scalar::Scalar;
+use crate::law::stage::StageState;
+
+/// Channels that a selection holds at most: what bounds the reads of a tick.
+pub const MAX_CHANNELS: usize = 8;
+
+/// What can be read after a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a, S: Scalar, const N: usize> {
+    /// The stage as the tick left it.
+    pub stage: &'a StageState<S, N>,
+    /// How long the tick before took, in cycles of the board's tick timer.
+    pub elapsed_cycles: u32,
+    /// The tick was given a command.
+    pub commanded: bool,
+}
+
+impl<S: Scalar, const N: usize> Observation<'_, S, N> {
+    /// The number of the tick that has just ended, as a fault of that tick has it.
+    #[inline(always)]
+    pub const fn tick(&self) -> u32 {
+        self.stage.tick().wrapping_sub(1)
+    }
+}
+
+/// Channels to sample together, checked.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Selection {
+    channels: Vec<Channel, MAX_CHANNELS>,
+    decimation: u16,
+}
+
+/// Why a selection cannot be sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum SelectionError {
+    /// The number of channels, which was none or more than [`MAX_CHANNELS`].
+    Channels(usize),
+    /// A decimation of zero.
+    Decimation,
+}
+
+impl fmt::Display for SelectionError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Channels(count) => write!(
+                f,
+                "channels: {count} are selected, 1 to {MAX_CHANNELS} can be sampled; select fewer"
+            ),
+            Self::Decimation => f.write_str(
+                "decimation: 0 is not a number of ticks between samples; 1 samples every tick",
+            ),
+        }
+    }
+}
+
+impl core::error::Error for SelectionError {}
+
+impl Selection {
+    /// One to [`MAX_CHANNELS`] channels, sampled every `decimation` ticks (1 to 65535).
+    pub fn new(channels: &[Channel], decimation: u16) -> Result<Self, SelectionError> {
+        if decimation == 0 {
+            return Err(SelectionError::Decimation);
+        }
+        match Vec::from_slice(channels) {
+            Ok(channels) if !channels.is_empty() => Ok(Self {
+                channels,
+                decimation,
+            }),
+            _ => Err(SelectionError::Channels(channels.len())),
+        }
+    }
+
+    /// The channels, in the order of a sample's words.
+    pub fn channels(&self) -> &[Channel] {
+        &self.channels
+    }
+
+    /// Ticks from one sample to the next.
+    pub const fn decimation(&self) -> u16 {
+        self.decimation
+    }
+
+    /// Reads every channel into the words given; what they have no room for is left out.
+    #[inline(always)]
+    pub(crate) fn read<S: Scalar, const N: usize>(
+        &self,
+        seen: &Observation<'_, S, N>,
+        words: &mut [u32],
+    ) {
+        for (word, channel) in words.iter_mut().zip(&self.channels) {
+            *word = channel.read(seen);
+        }
+    }
+}
