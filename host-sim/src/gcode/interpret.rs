@@ -11,7 +11,7 @@ use crate::gcode::segment::{Segment, Vector};
 /// A piece of the path, and how fast it is to be run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Move {
-    pub element: Element,
+    pub segment: Segment,
     /// Feed along the path, mm/s; `None` for a rapid move.
     pub feed_mm_s: Option<f64>,
     /// The program's line that it comes from, from 1.

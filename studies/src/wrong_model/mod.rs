@@ -88,7 +88,7 @@ pub struct WrongOutcome {
     pub competitor: Competitor,
     pub wrong: Wrong,
     /// Score, mean over the sine tests.
-    pub mean: TrialOutcome,
+    pub mean: SineTestOutcome,
 }
 
 /// All that is run.
