@@ -19,7 +19,7 @@ const FORM: u32 = 1;
 pub struct SettingsFile {
     /// Form of the file: 1.
     form: u32,
-    /// Where the numbers come from, newest last.
+    /// Source of the numbers, newest last.
     #[serde(default)]
     pub provenance: Vec<Provenance>,
     /// The settings.
@@ -38,11 +38,11 @@ pub struct Provenance {
     pub axis: String,
     /// The recordings that it worked on, and what each was for.
     pub records: Vec<String>,
-    /// What in the settings it set.
+    /// Parts of the settings that it set.
     pub sets: Vec<String>,
 }
 
-/// Why a settings file cannot be used, or written.
+/// Reason that a settings file cannot be used, or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsFileError {
     /// The file cannot be read or written.
@@ -50,7 +50,7 @@ pub enum SettingsFileError {
     Io {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
     /// It is no TOML, a field is missing, misspelt, or of the wrong type.
@@ -58,7 +58,7 @@ pub enum SettingsFileError {
     Syntax {
         /// The file.
         path: PathBuf,
-        /// Where and what.
+        /// Place and error.
         source: Box<toml::de::Error>,
     },
     /// It cannot be expressed as TOML.
@@ -66,7 +66,7 @@ pub enum SettingsFileError {
     Serialise {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: toml::ser::Error,
     },
     /// It is of a form that this program does not know.

@@ -1,6 +1,6 @@
 //! From an unknown axis to settings that the firmware runs: the whole chain, unattended.
 //!
-//! What is known beforehand is what a person reads off a data sheet: the encoder's resolution, the amplifier's full scale,
+//! Known beforehand is what stands in a data sheet: the encoder's resolution, the amplifier's full scale,
 //! limits. Everything else is measured on the axis, in an order in which each step makes the next one safe: an open-loop
 //! square wave gives the acceleration per volt, that a slow controller, that the response at a constant velocity, that the
 //! final PID, and that the friction.

@@ -20,11 +20,11 @@ pub const AMPLITUDES_MM: [f64; 2] = [30.0, 15.0];
 /// Seconds that a run takes on two cores of a current machine, for each mm of amplitude.
 const SECONDS_PER_MM: f64 = 0.009;
 
-/// What one configuration did on one sine.
+/// Result of one configuration on one sine.
 #[derive(Clone, Debug)]
 pub struct Entry {
     pub configuration: Configuration,
-    /// What the compensator knew.
+    /// The law's knowledge of the plant.
     pub knowledge: ModelKnowledge,
     /// Amplitude of the sine, mm.
     pub amplitude_mm: f64,
@@ -43,18 +43,18 @@ impl Entry {
     }
 }
 
-/// What is to be run.
+/// Runs to be made.
 #[derive(Clone, Debug)]
 pub struct Request<'a> {
     /// The stages, each with the settings of its law.
     pub setups: &'a [RunConfiguration],
-    /// Who runs.
+    /// The configurations.
     pub configurations: &'a [Configuration],
     /// Amplitudes of the sines, mm.
     pub amplitudes_mm: &'a [f64],
     /// The first seed of the noise; the others follow it.
     pub seed: u64,
-    /// How many; one at least.
+    /// Number of seeds, one at least.
     pub seeds: u64,
 }
 
@@ -140,7 +140,7 @@ impl Run<'_> {
     }
 }
 
-/// What all configurations did.
+/// Results of all configurations.
 #[derive(Clone, Debug, Default)]
 pub struct Comparison {
     entries: Vec<Entry>,
@@ -191,7 +191,7 @@ impl Comparison {
         })
     }
 
-    /// What a configuration did on one sine; nothing if that was not run.
+    /// Result of a configuration on one sine; nothing if that was not run.
     pub fn find(
         &self,
         configuration: Configuration,

@@ -19,9 +19,9 @@ struct Headline {
     metrics: &'static [Metric],
     /// Change, %.
     change_percent: f64,
-    /// From which configuration.
+    /// Configuration that the change is counted from.
     from: Configuration,
-    /// To which configuration.
+    /// Configuration that has changed.
     to: Configuration,
 }
 

@@ -22,11 +22,11 @@ pub const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-/// What one configuration did at one velocity.
+/// Result of one configuration at one velocity.
 #[derive(Clone, Debug)]
 pub struct Outcome {
     pub configuration: Configuration,
-    /// What the compensator knew.
+    /// The law's knowledge of the plant.
     pub knowledge: ModelKnowledge,
     /// Amplitude of the sine, mm.
     pub amplitude_mm: f64,
@@ -65,7 +65,7 @@ pub fn cycle_s(amplitude_mm: f64, velocity_mm_s: f64) -> f64 {
 
 /// All that a run of the comparison needs but the machine itself.
 pub struct Bench {
-    /// What the machine is to run.
+    /// Settings and plan of the machine.
     pub job: Job,
     /// The stage it runs on.
     pub plant: SimulatedStage,

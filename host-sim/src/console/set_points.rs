@@ -30,7 +30,7 @@ pub fn set_points(
         .places(rate_hz)
         .map(|place| {
             let tangent = trajectory.moves()[place.index]
-                .element
+                .segment
                 .tangent(place.along_mm);
             (tangent * place.speed_mm_s, trajectory.point(&place))
         })

@@ -61,7 +61,7 @@ impl ModelKnowledge {
 /// A simulated stage, and the settings of the law that runs on it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RunConfiguration {
-    /// What the settings know of the stage.
+    /// The law's knowledge of the plant.
     pub knowledge: ModelKnowledge,
     /// The settings.
     pub stage: StageSettings,
@@ -117,7 +117,7 @@ fn set_exact_friction(stage: &mut StageSettings, truth: &StageTruth) {
     }
 }
 
-/// What a run at constant velocity shows as viscous friction: sigma, and the linear damping B / A, which no motion
+/// Viscous friction as a run at constant velocity shows it: sigma, and the linear damping B / A, which no motion
 /// can tell from it.
 fn with_total_damping(model: &StaticFriction, truth: &AxisTruth) -> StaticFriction {
     StaticFriction {

@@ -1,4 +1,4 @@
-//! A trial: an axis on a sine, scored over its last whole cycles.
+//! An axis on a sine, scored over its last whole cycles.
 
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -10,9 +10,9 @@ use crate::experiment::run::{RunError, run};
 use crate::machine::Machine;
 use crate::plant::{AxisTruth, SimulatedStage, StageTruth};
 
-/// A sine to try an axis on.
+/// A sine for an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trial {
+pub struct SineTest {
     /// Amplitude, mm.
     pub amplitude_mm: f64,
     /// Largest velocity, mm/s.
@@ -21,7 +21,7 @@ pub struct Trial {
 
 /// Result of a sine test.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct TrialOutcome {
+pub struct SineTestOutcome {
     /// Tracking error and glitch.
     pub score: Score,
     /// RMS of the output's change from tick to tick, V: chatter.
@@ -34,7 +34,7 @@ const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-impl Trial {
+impl SineTest {
     fn cycle_s(self) -> f64 {
         std::f64::consts::TAU * self.amplitude_mm / self.velocity_mm_s
     }
@@ -49,17 +49,17 @@ impl Trial {
     }
 }
 
-/// Tries three settings of one axis, each on its sine, side by side; f32, as on the target. `seed` decides the noise.
+/// Runs three settings of one axis, each on its sine, side by side; f32, as on the target. `seed` decides the noise.
 ///
 /// # Errors
 /// Refused settings or a fault.
-pub fn try_three(
+pub fn run_sine_tests(
     settings: [AxisSettings; 3],
     truth: &AxisTruth,
-    trials: [Trial; 3],
+    tests: [SineTest; 3],
     rate_hz: f64,
     seed: u64,
-) -> Result<[TrialOutcome; 3], RunError> {
+) -> Result<[SineTestOutcome; 3], RunError> {
     let resolution_mm = settings.each_ref().map(|axis| axis.encoder.resolution_mm);
     let job = Job {
         stage: StageSettings {
@@ -68,10 +68,10 @@ pub fn try_three(
             axes: settings,
         },
         plan: PlanSettings {
-            motions: trials.map(Trial::motion),
+            motions: tests.map(SineTest::motion),
         },
     };
-    let slowest_s = trials.map(Trial::cycle_s).into_iter().fold(0.0, f64::max);
+    let slowest_s = tests.map(SineTest::cycle_s).into_iter().fold(0.0, f64::max);
     let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * slowest_s;
     let mut machine = Machine::<f32, ELEMENTS>::new(&job)?;
     let truth = StageTruth {
@@ -84,9 +84,9 @@ pub fn try_three(
         (longest_s * rate_hz) as usize,
     )?;
     let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
-    let mut of = trials.into_iter();
+    let mut of = tests.into_iter();
     Ok(traces.map(|trace| {
-        let cycle_s = of.next().map_or(1.0, Trial::cycle_s);
+        let cycle_s = of.next().map_or(1.0, SineTest::cycle_s);
         let cycle = samples(cycle_s);
         let end = samples(LEAD_S) + samples(CYCLES * cycle_s);
         let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
@@ -94,7 +94,7 @@ pub fn try_three(
             .output_v
             .windows(2)
             .map(|pair| (pair[1] - pair[0]).powi(2));
-        TrialOutcome {
+        SineTestOutcome {
             score: score(&scored.reference_mm, &scored.error_mm, cycle),
             chatter_v: (changes.sum::<f64>() / scored.output_v.len() as f64).sqrt(),
         }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use quadrant::reference::{Plane, Sense};
 
 use crate::gcode::error::ProgramError;
-use crate::gcode::segment::{Element, Vector};
+use crate::gcode::segment::{Segment, Vector};
 
 /// Words of a line that describe an arc.
 #[derive(Clone, Debug, PartialEq)]
@@ -42,7 +42,7 @@ impl ArcWords {
     ///
     /// # Errors
     /// A circle that does not fit the ends.
-    pub(super) fn element(&self) -> Result<Element, ProgramError> {
+    pub(super) fn segment(&self) -> Result<Segment, ProgramError> {
         let (first_axis, second_axis) = self.plane.axes();
         let flat = |point: &Vector| [point[first_axis], point[second_axis]];
         let (start, end) = (flat(&self.from), flat(&self.to));
@@ -79,9 +79,9 @@ impl ArcWords {
         };
         let units = [unit(from_centre), unit(ahead)];
         let middle = self.from - units[0] * radius_mm;
-        let closing = Element::arc(middle, units, radius_mm, sweep_rad, Vector::zeros());
+        let closing = Segment::arc(middle, units, radius_mm, sweep_rad, Vector::zeros());
         let rise = self.to - closing.point(closing.length_mm());
-        Ok(Element::arc(middle, units, radius_mm, sweep_rad, rise))
+        Ok(Segment::arc(middle, units, radius_mm, sweep_rad, rise))
     }
 
     /// The angle from start to end in the arc's sense, above zero, a whole turn from a point to itself.
@@ -143,7 +143,7 @@ impl ArcWords {
 mod tests {
     use super::*;
 
-    fn arc(sense: Sense, to: [f64; 2], circle: CircleWords) -> Result<Element, ProgramError> {
+    fn arc(sense: Sense, to: [f64; 2], circle: CircleWords) -> Result<Segment, ProgramError> {
         ArcWords {
             plane: Plane::Xy,
             sense,
@@ -152,7 +152,7 @@ mod tests {
             circle,
             line: 7,
         }
-        .element()
+        .segment()
     }
 
     #[test]

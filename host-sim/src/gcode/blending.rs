@@ -1,7 +1,7 @@
 //! Corners between straight lines, rounded by an arc that is tangent to both.
 
 use crate::gcode::interpret::Move;
-use crate::gcode::segment::{Element, Vector};
+use crate::gcode::segment::{Segment, Vector};
 use crate::gcode::speeds::TANGENT_RAD;
 
 /// Sharper turns than this, rad (175 degrees), are no corners but ways back: they are stopped at.
@@ -20,8 +20,8 @@ impl Rounding {
     /// The arc that leaves the corner of two lines by `deviation_mm`, or by less if it would take more than half of the
     /// shorter line; nothing where there is no such corner. A rapid move is not rounded into a cutting one.
     fn between(before: &Move, after: &Move, deviation_mm: f64) -> Option<Self> {
-        let (_, arriving) = before.element.as_line()?;
-        let (corner, leaving) = after.element.as_line()?;
+        let (_, arriving) = before.segment.as_line()?;
+        let (corner, leaving) = after.segment.as_line()?;
         let feed_mm_s = match (before.feed_mm_s, after.feed_mm_s) {
             (Some(one), Some(other)) => Some(one.min(other)),
             (None, None) => None,
@@ -34,14 +34,14 @@ impl Rounding {
         }
         let half = (0.5 * turn).tan();
         let wanted = deviation_mm / (1.0 / (0.5 * turn).cos() - 1.0) * half;
-        let shorter = before.element.length_mm().min(after.element.length_mm());
+        let shorter = before.segment.length_mm().min(after.segment.length_mm());
         let taken_mm = wanted.min(0.5 * shorter);
         let radius_mm = taken_mm / half;
         let inwards = (leaving - arriving * cos) / sin;
         let centre = corner - arriving * taken_mm + inwards * radius_mm;
         Some(Self {
             arc: Move {
-                element: Element::arc(
+                segment: Segment::arc(
                     centre,
                     [-inwards, arriving],
                     radius_mm,
@@ -70,12 +70,12 @@ pub(super) fn round(moves: Vec<Move>, deviation_mm: f64) -> Vec<Move> {
         if taken_mm == 0.0 && given_mm == 0.0 {
             rounded.push(step.clone());
         } else {
-            let left = step.element.length_mm() - taken_mm - given_mm;
-            let from = step.element.point(taken_mm);
-            let to = step.element.point(step.element.length_mm() - given_mm);
-            if let Some(element) = Element::line(from, to).filter(|_| left > LEAST_LINE_MM) {
+            let left = step.segment.length_mm() - taken_mm - given_mm;
+            let from = step.segment.point(taken_mm);
+            let to = step.segment.point(step.segment.length_mm() - given_mm);
+            if let Some(segment) = Segment::line(from, to).filter(|_| left > LEAST_LINE_MM) {
                 rounded.push(Move {
-                    element,
+                    segment,
                     ..step.clone()
                 });
             }
@@ -96,14 +96,14 @@ mod tests {
         let program = Program::parse("G1 X10 F600\nY10").unwrap();
         let rounded = round(program.moves, 0.05);
         assert_eq!(rounded.len(), 3);
-        let arc = &rounded[1].element;
+        let arc = &rounded[1].segment;
         let middle = arc.point(0.5 * arc.length_mm());
         let from_corner = (middle - Vector::new(10.0, 0.0, 0.0)).norm();
         assert!((from_corner - 0.05).abs() < 1e-9, "{from_corner}");
         for pair in rounded.windows(2) {
-            let length = pair[0].element.length_mm();
-            let gap = pair[1].element.point(0.0) - pair[0].element.point(length);
-            let kink = pair[1].element.tangent(0.0) - pair[0].element.tangent(length);
+            let length = pair[0].segment.length_mm();
+            let gap = pair[1].segment.point(0.0) - pair[0].segment.point(length);
+            let kink = pair[1].segment.tangent(0.0) - pair[0].segment.tangent(length);
             assert!(gap.norm() < 1e-12 && kink.norm() < 1e-12);
         }
     }
@@ -114,11 +114,11 @@ mod tests {
         let rounded = round(program.moves, 1.0);
         let lengths: Vec<f64> = rounded
             .iter()
-            .map(|step| step.element.length_mm())
+            .map(|step| step.segment.length_mm())
             .collect();
         // The line of 0.1 mm has gone into its two arcs of 0.05 mm radius.
         assert_eq!(lengths.len(), 4, "{lengths:?}");
-        assert!((rounded[1].element.curvature_per_mm() - 20.0).abs() < 1e-6);
+        assert!((rounded[1].segment.curvature_per_mm() - 20.0).abs() < 1e-6);
     }
 
     #[test]

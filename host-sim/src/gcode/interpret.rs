@@ -6,12 +6,12 @@ use crate::gcode::arc::{ArcWords, CircleWords};
 use crate::gcode::error::ProgramError;
 use crate::gcode::lexer::{Word, words};
 use crate::gcode::modal::{Effect, Modes, Motion};
-use crate::gcode::segment::{Element, Vector};
+use crate::gcode::segment::{Segment, Vector};
 
 /// A piece of the path, and how fast it is to be run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Move {
-    pub element: Element,
+    pub segment: Segment,
     /// Feed along the path, mm/s; `None` for a rapid move.
     pub feed_mm_s: Option<f64>,
     /// The program's line that it comes from, from 1.
@@ -195,10 +195,10 @@ impl Interpreter {
                 target[axis] = origin + word.value * unit_mm;
             }
         }
-        let element = match motion {
+        let segment = match motion {
             Motion::Rapid | Motion::Line => {
                 self.refuse_arc_words(line, motion)?;
-                Element::line(self.position, target)
+                Segment::line(self.position, target)
             }
             Motion::Arc(sense) => Some(
                 ArcWords {
@@ -209,12 +209,12 @@ impl Interpreter {
                     circle: self.circle(line, first.line)?,
                     line: first.line,
                 }
-                .element()?,
+                .segment()?,
             ),
         };
-        if let Some(element) = element {
+        if let Some(segment) = segment {
             self.moves.push(Move {
-                element,
+                segment,
                 feed_mm_s,
                 line: first.line,
             });

@@ -22,6 +22,6 @@ mod velocity_profile;
 
 pub use error::ProgramError;
 pub use interpret::{Move, Program};
-pub use segment::{Element, Vector};
+pub use segment::{Segment, Vector};
 pub use speeds::Limits;
 pub use trajectory::{Place, Trajectory};

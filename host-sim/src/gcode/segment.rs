@@ -7,7 +7,7 @@ pub type Vector = nalgebra::Vector3<f64>;
 
 /// A piece of a path with one curvature.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Element {
+pub struct Segment {
     shape: Shape,
     length_mm: f64,
 }
@@ -31,10 +31,10 @@ enum Shape {
     },
 }
 
-/// Steps of [`Element::nearest`]; each leaves a share of the error that is distance over radius, below 1e-2 here.
+/// Steps of [`Segment::nearest`]; each leaves a share of the error that is distance over radius, below 1e-2 here.
 const NEAREST_STEPS: usize = 4;
 
-impl Element {
+impl Segment {
     /// A straight line, unless it has no length.
     pub(super) fn line(from: Vector, to: Vector) -> Option<Self> {
         let length_mm = (to - from).norm();
@@ -176,7 +176,7 @@ impl Element {
         extent
     }
 
-    /// The place of the point of this element that is nearest to `point`, looked for from `along_mm`; mm from the start.
+    /// The place of the point of this segment that is nearest to `point`, looked for from `along_mm`; mm from the start.
     pub(super) fn nearest(&self, point: &Vector, along_mm: f64) -> f64 {
         let mut along = along_mm.clamp(0.0, self.length_mm);
         for _ in 0..NEAREST_STEPS {
@@ -192,9 +192,9 @@ mod tests {
     use super::*;
 
     /// Three quarters of a helix of 10 mm radius about (1, 2), rising by 3 mm.
-    fn helix() -> Element {
+    fn helix() -> Segment {
         let units = [Vector::x(), Vector::y()];
-        Element::arc(
+        Segment::arc(
             Vector::new(1.0, 2.0, 0.0),
             units,
             10.0,

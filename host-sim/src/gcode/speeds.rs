@@ -96,7 +96,7 @@ impl Limits {
     pub(super) fn check_travel(&self, step: &Move) -> Result<(), ProgramError> {
         for (index, axis) in ["x", "y", "z"].into_iter().enumerate() {
             let (low_mm, high_mm) = self.travel_mm[index];
-            let (least, most) = step.element.extent(index);
+            let (least, most) = step.segment.extent(index);
             // Rounding of an arc's crest is no excursion.
             let beyond = [least, most]
                 .into_iter()
@@ -116,7 +116,7 @@ impl Limits {
 
     /// The largest speed on a move, mm/s, and the pace along it.
     pub(super) fn on(&self, step: &Move) -> (f64, Pace) {
-        let curvature = step.element.curvature_per_mm();
+        let curvature = step.segment.curvature_per_mm();
         let (along_share, across_share) = if curvature > 0.0 {
             let across = (1.0 - ARC_TANGENTIAL_SHARE * ARC_TANGENTIAL_SHARE).sqrt();
             (CURVE_SHARE * ARC_TANGENTIAL_SHARE, CURVE_SHARE * across)
@@ -125,7 +125,7 @@ impl Limits {
         };
         let mut speed = step.feed_mm_s.unwrap_or(f64::INFINITY);
         let mut acceleration = self.path_acceleration_mm_s2;
-        for (axis, (along, across)) in step.element.axis_shares().into_iter().enumerate() {
+        for (axis, (along, across)) in step.segment.axis_shares().into_iter().enumerate() {
             let limit = self.acceleration_mm_s2[axis];
             if along > 0.0 {
                 speed = speed.min(self.velocity_mm_s[axis] / along);
@@ -144,8 +144,8 @@ impl Limits {
 
     /// The largest speed through the joint of two moves, mm/s.
     fn through(&self, before: &Move, after: &Move) -> f64 {
-        let arrives = before.element.tangent(before.element.length_mm());
-        let corner = after.element.tangent(0.0) - arrives;
+        let arrives = before.segment.tangent(before.segment.length_mm());
+        let corner = after.segment.tangent(0.0) - arrives;
         if corner.norm() > TANGENT_RAD {
             return 0.0;
         }
@@ -168,14 +168,14 @@ impl Limits {
         }
         // Backwards, so that every joint can be braked for; then forwards, so that it can be reached.
         for index in (0..moves.len()).rev() {
-            let length = moves[index].element.length_mm();
+            let length = moves[index].segment.length_mm();
             let reach = on[index]
                 .1
                 .reach_mm_s(joints[index + 1], joints[index], length);
             joints[index] = joints[index].min(reach);
         }
         for index in 0..moves.len() {
-            let length = moves[index].element.length_mm();
+            let length = moves[index].segment.length_mm();
             let reach = on[index]
                 .1
                 .reach_mm_s(joints[index], joints[index + 1], length);

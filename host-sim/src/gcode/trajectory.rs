@@ -54,7 +54,7 @@ impl Trajectory {
         for (index, step) in moves.iter().enumerate() {
             let (most, pace) = on[index];
             let ends = [joints[index], joints[index + 1]];
-            for phase in pace.phases(ends, most, step.element.length_mm()) {
+            for phase in pace.phases(ends, most, step.segment.length_mm()) {
                 phases.push(TimedPhase {
                     index,
                     start_s,
@@ -88,7 +88,7 @@ impl Trajectory {
 
     /// Length of the path, mm.
     pub fn length_mm(&self) -> f64 {
-        self.moves.iter().map(|step| step.element.length_mm()).sum()
+        self.moves.iter().map(|step| step.segment.length_mm()).sum()
     }
 
     /// The places at equal times, `rate_hz` a second, from the start to the end, both included.
@@ -115,7 +115,7 @@ impl Trajectory {
                     let (along, speed_mm_s) = timed.phase.at(since);
                     Place {
                         index: timed.index,
-                        along_mm: along.clamp(0.0, self.moves[timed.index].element.length_mm()),
+                        along_mm: along.clamp(0.0, self.moves[timed.index].segment.length_mm()),
                         speed_mm_s,
                     }
                 },
@@ -125,7 +125,7 @@ impl Trajectory {
 
     /// The point at a place, mm.
     pub fn point(&self, place: &Place) -> Vector {
-        self.moves[place.index].element.point(place.along_mm)
+        self.moves[place.index].segment.point(place.along_mm)
     }
 
     /// The vector from the path to a point, mm: from the nearest point of the path about a place.
@@ -134,13 +134,13 @@ impl Trajectory {
         let last = (place.index + NEIGHBOURS).min(self.moves.len() - 1);
         let mut nearest = point - self.point(place);
         for index in first..=last {
-            let element = &self.moves[index].element;
+            let segment = &self.moves[index].segment;
             let from_mm = match index.cmp(&place.index) {
-                std::cmp::Ordering::Less => element.length_mm(),
+                std::cmp::Ordering::Less => segment.length_mm(),
                 std::cmp::Ordering::Equal => place.along_mm,
                 std::cmp::Ordering::Greater => 0.0,
             };
-            let deviation = point - element.point(element.nearest(point, from_mm));
+            let deviation = point - segment.point(segment.nearest(point, from_mm));
             if deviation.norm_squared() < nearest.norm_squared() {
                 nearest = deviation;
             }

@@ -1,8 +1,8 @@
-//! The speed along one element: a jerk-limited rise to a peak, a stretch at it, and a jerk-limited fall.
+//! The speed along one segment: a jerk-limited rise to a peak, a stretch at it, and a jerk-limited fall.
 //!
 //! It is the S-curve of `quadrant::reference::PointToPoint`, which starts and ends at rest, between any two speeds: speed
 //! changes by a constant jerk up and a constant jerk down, with constant acceleration between them if its limit is reached.
-//! The acceleration is zero at both ends, so elements can follow one another without a jump of it. Source: Biagiotti and
+//! The acceleration is zero at both ends, so segments can follow one another without a jump of it. Source: Biagiotti and
 //! Melchiorri, *Trajectory Planning for Automatic Machines and Robots*, Springer 2008, section 3.4.
 
 /// Halvings of an interval of speeds; 60 leave less than a double resolves.
@@ -32,7 +32,7 @@ pub(super) struct Phase {
 }
 
 impl Phase {
-    /// Place, mm along the element, and speed, mm/s, at a time from its beginning.
+    /// Place, mm along the segment, and speed, mm/s, at a time from its beginning.
     pub(super) fn at(&self, time_s: f64) -> (f64, f64) {
         let half_jerk = 0.5 * self.jerk_mm_s3;
         let speed = self.speed_mm_s + time_s * (self.acceleration_mm_s2 + time_s * half_jerk);
@@ -84,7 +84,7 @@ impl Pace {
         })
     }
 
-    /// The phases over an element of `length_mm` that is entered and left at two speeds within reach of each other, at
+    /// The phases over an segment of `length_mm` that is entered and left at two speeds within reach of each other, at
     /// no more than `most_mm_s`.
     pub(super) fn phases(
         &self,
@@ -155,7 +155,7 @@ mod tests {
     }
 
     #[test]
-    fn every_element_is_run_to_its_end_at_the_speeds_asked_for() {
+    fn every_segment_is_run_to_its_end_at_the_speeds_asked_for() {
         for (enter, leave, most, length) in [
             (0.0, 0.0, 50.0, 100.0),
             (0.0, 0.0, 50.0, 0.001),

@@ -237,7 +237,7 @@ fn contour_figure(tables: &ProgramTables, outcomes: &[ProgramOutcome]) -> Figure
 fn feed_figure(trajectory: &Trajectory, tables: &ProgramTables) -> Figure {
     let mut starts_mm = vec![0.0];
     for step in trajectory.moves() {
-        let end = starts_mm.last().copied().unwrap_or_default() + step.element.length_mm();
+        let end = starts_mm.last().copied().unwrap_or_default() + step.segment.length_mm();
         starts_mm.push(end);
     }
     Figure {

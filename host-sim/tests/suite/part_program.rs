@@ -183,14 +183,14 @@ fn what_the_stage_does_not_have_is_noted_and_the_end_ends() {
 fn the_deviation_from_the_path_is_measured_across_it() {
     let trajectory = plan("G1 X20 F600\nG3 X20 Y20 R10\nG1 X0");
     for place in trajectory.places(200.0) {
-        let element = &trajectory.moves()[place.index].element;
-        let tangent = element.tangent(place.along_mm);
+        let segment = &trajectory.moves()[place.index].segment;
+        let tangent = segment.tangent(place.along_mm);
         let across = Vector::new(-tangent.y, tangent.x, 0.0);
         // 0.02 mm beside the path and 0.03 mm late: only the first is a contour error.
         let point = trajectory.point(&place) + across * 0.02 - tangent * 0.03;
         let found = trajectory.deviation(&place, &point).norm();
         assert!(found <= 0.0362, "{found}");
-        if (1.0..element.length_mm() - 1.0).contains(&place.along_mm) {
+        if (1.0..segment.length_mm() - 1.0).contains(&place.along_mm) {
             assert!((found - 0.02).abs() < 1e-4, "{found} at {place:?}");
         }
     }
@@ -273,7 +273,7 @@ proptest! {
         let points: Vec<Vector> = places.iter().map(|place| trajectory.point(place)).collect();
         let last = program.moves.last().unwrap();
         prop_assert!(points[0].norm() < 1e-9);
-        let end = last.element.point(last.element.length_mm());
+        let end = last.segment.point(last.segment.length_mm());
         prop_assert!((points[points.len() - 1] - end).norm() < 1e-6);
         let rate = limits.rate_hz;
         for three in points.windows(3) {

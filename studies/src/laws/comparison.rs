@@ -4,7 +4,7 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::AxisSettings;
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::sine_test::{Trial, TrialOutcome, try_three};
+use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
 use quadrant_sim::experiment::statistic::Statistic;
 use quadrant_sim::plant::AxisTruth;
 use rayon::prelude::*;
@@ -12,16 +12,16 @@ use rayon::prelude::*;
 use crate::laws::tuning::TunedLaw;
 
 /// The sines of the comparison.
-pub const TRIALS: [Trial; 3] = [
-    Trial {
+pub const SINES: [SineTest; 3] = [
+    SineTest {
         amplitude_mm: 30.0,
         velocity_mm_s: 5.0,
     },
-    Trial {
+    SineTest {
         amplitude_mm: 30.0,
         velocity_mm_s: 10.0,
     },
-    Trial {
+    SineTest {
         amplitude_mm: 30.0,
         velocity_mm_s: 15.0,
     },
@@ -33,12 +33,12 @@ pub struct LawOutcome {
     pub law: LawKind,
     pub feedforward: FeedforwardKind,
     /// One a seed, and in it one a trial.
-    pub outcomes: Vec<[TrialOutcome; 3]>,
+    pub outcomes: Vec<[SineTestOutcome; 3]>,
 }
 
 impl LawOutcome {
     /// A reading of every seed, mean over the trials, spread over the seeds.
-    pub fn statistic(&self, read: impl Fn(&TrialOutcome) -> f64) -> Statistic {
+    pub fn statistic(&self, read: impl Fn(&SineTestOutcome) -> f64) -> Statistic {
         let seeds: Vec<f64> = self
             .outcomes
             .iter()
@@ -66,14 +66,14 @@ pub fn compare_laws(
         .flat_map(|(law, kind)| seeds.clone().map(move |seed| (law, kind, seed)))
         .collect();
     let each = seeds.count().max(1);
-    let outcomes: Vec<[TrialOutcome; 3]> = runs
+    let outcomes: Vec<[SineTestOutcome; 3]> = runs
         .par_iter()
         .map(|&(law, kind, seed)| {
             let mut axis = settings.clone();
             axis.feedback = laws[law].feedback.clone();
             axis.feedforward.kind = kind;
             let axes = [axis.clone(), axis.clone(), axis];
-            let outcome = try_three(axes, truth, TRIALS, rate_hz, seed);
+            let outcome = run_sine_tests(axes, truth, SINES, rate_hz, seed);
             progress();
             outcome
         })

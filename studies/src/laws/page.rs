@@ -2,7 +2,7 @@
 
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant_sim::experiment::sine_test::TrialOutcome;
+use quadrant_sim::experiment::sine_test::SineTestOutcome;
 use quadrant_sim::pages::{UM_PER_MM, columns, dot, lines, series, statistic_cells};
 use quadrant_sim::report;
 use quadrant_sim::report::{
@@ -209,7 +209,7 @@ fn closeness(outcomes: &[LawOutcome]) -> String {
         let of = outcomes
             .iter()
             .filter(|outcome| outcome.feedforward == kind);
-        of.map(|outcome| outcome.statistic(|o: &TrialOutcome| o.score.rms_mm).mean * UM_PER_MM)
+        of.map(|outcome| outcome.statistic(|o: &SineTestOutcome| o.score.rms_mm).mean * UM_PER_MM)
             .fold((f64::INFINITY, 0.0f64), |(low, high), rms| {
                 (low.min(rms), high.max(rms))
             })

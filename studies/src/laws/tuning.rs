@@ -14,7 +14,7 @@ use quadrant_sim::design::{
     DesignError, Form, Margins, PidDesign, PidRequest, Process, Target, design_pid,
 };
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::sine_test::{Trial, try_three};
+use quadrant_sim::experiment::sine_test::{SineTest, run_sine_tests};
 use quadrant_sim::identify::characteristic::Characteristic;
 use quadrant_sim::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 use rayon::prelude::*;
@@ -25,7 +25,7 @@ pub const SENSITIVITY_PEAK: f64 = 1.7;
 pub const COMPLEMENTARY_PEAK: f64 = 1.3;
 
 /// The sine that knobs are chosen on.
-const TRAINING: Trial = Trial {
+const TRAINING: SineTest = SineTest {
     amplitude_mm: 5.0,
     velocity_mm_s: 10.0,
 };
@@ -326,7 +326,7 @@ impl Bench<'_> {
                 let of = |index: usize| &chunk[index.min(chunk.len() - 1)].1;
                 let settings = [0, 1, 2].map(|index| self.training(of(index)));
                 let outcomes =
-                    try_three(settings, &self.twin, [TRAINING; 3], self.rate_hz, self.seed)?;
+                    run_sine_tests(settings, &self.twin, [TRAINING; 3], self.rate_hz, self.seed)?;
                 Ok(outcomes.map(|outcome| outcome.score.rms_mm))
             })
             .collect::<Result<_, RunError>>()?;

@@ -1,4 +1,4 @@
-//! What becomes of tracking when the axis is no longer what it was commissioned as: named scenarios, and the laws that
+//! Tracking of an axis that has changed since it was commissioned: named scenarios, and the laws that
 //! compete in them.
 //!
 //! The settings of the competitors are those of the axis as it was commissioned and stay as they are while mass, friction,

@@ -50,7 +50,7 @@ pub fn chapter4_sections(
     sections
 }
 
-/// What the data of the simulation (exact model) and of the experiment (identified model) are: rates, resolutions, cycles.
+/// Data of the simulation (exact model) and of the experiment (identified model): rates, resolutions, cycles.
 pub fn data_section(stage: &StageSettings, truth: &AxisTruth, seeds: u64) -> Section {
     let [x, ..] = &stage.axes;
     Section {

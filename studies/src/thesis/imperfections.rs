@@ -19,7 +19,7 @@ use rayon::prelude::*;
 /// Elements of the GMS models that are identified: up to the firmware's room. From nine on the search for the
 /// parameters takes minutes or ends without an answer: the record does not determine so many.
 const ELEMENTS: [usize; 3] = [4, 6, FIRMWARE_ELEMENTS];
-/// How much finer the finer encoder is.
+/// Ratio of the encoder's resolution to that of the finer one.
 const FINER_ENCODER: f64 = 10.0;
 
 /// A run with the identified model on a plant that lacks one imperfection, or whose law knows one thing better.
@@ -87,7 +87,7 @@ impl Change {
         }
     }
 
-    /// Whether it changes one thing alone.
+    /// True if it changes one thing alone.
     pub const fn is_single(self) -> bool {
         !matches!(
             self,
@@ -138,7 +138,7 @@ impl Change {
     }
 }
 
-/// Why something could not be identified anew.
+/// Reason that something could not be identified anew.
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// Settings that the axis refuses.
@@ -198,7 +198,7 @@ fn identify_elements(
 #[derive(Debug)]
 pub struct Finding {
     pub change: Change,
-    /// What PID and the best configuration did, or why what was to be changed could not be identified.
+    /// Results of PID and of the best configuration, or the reason that the change could not be identified.
     pub outcome: Result<Comparison, StudyError>,
 }
 

@@ -13,7 +13,7 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 use quadrant_sim::experiment::run::RunError;
-use quadrant_sim::experiment::sine_test::{Trial, TrialOutcome, try_three};
+use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
 use quadrant_sim::plant::AxisTruth;
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -22,16 +22,16 @@ use rayon::prelude::*;
 use crate::laws::tuning::TunedLaw;
 
 /// The sines of the study.
-pub const TRIALS: [Trial; 3] = [
-    Trial {
+pub const SINES: [SineTest; 3] = [
+    SineTest {
         amplitude_mm: 15.0,
         velocity_mm_s: 5.0,
     },
-    Trial {
+    SineTest {
         amplitude_mm: 15.0,
         velocity_mm_s: 10.0,
     },
-    Trial {
+    SineTest {
         amplitude_mm: 15.0,
         velocity_mm_s: 15.0,
     },
@@ -88,7 +88,7 @@ pub struct WrongOutcome {
     pub competitor: Competitor,
     pub wrong: Wrong,
     /// Score, mean over the sine tests.
-    pub mean: TrialOutcome,
+    pub mean: SineTestOutcome,
 }
 
 /// All that is run.
@@ -209,7 +209,7 @@ pub fn run_wrong_models(
             let mut axis = with_wrong_model(settings, wrong, seed);
             axis.feedback = feedback;
             let axes = [axis.clone(), axis.clone(), axis];
-            let outcomes = try_three(axes, truth, TRIALS, rate_hz, seed)?;
+            let outcomes = run_sine_tests(axes, truth, SINES, rate_hz, seed)?;
             progress();
             Ok(WrongOutcome {
                 competitor,
@@ -220,11 +220,11 @@ pub fn run_wrong_models(
         .collect()
 }
 
-fn mean(outcomes: &[TrialOutcome]) -> TrialOutcome {
-    let of = |read: fn(&TrialOutcome) -> f64| {
+fn mean(outcomes: &[SineTestOutcome]) -> SineTestOutcome {
+    let of = |read: fn(&SineTestOutcome) -> f64| {
         outcomes.iter().map(read).sum::<f64>() / outcomes.len() as f64
     };
-    let mut mean = TrialOutcome::default();
+    let mut mean = SineTestOutcome::default();
     mean.score.largest_mm = of(|outcome| outcome.score.largest_mm);
     mean.score.rms_mm = of(|outcome| outcome.score.rms_mm);
     mean.score.glitch_mm = of(|outcome| outcome.score.glitch_mm);

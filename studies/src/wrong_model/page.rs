@@ -1,13 +1,13 @@
 //! "A well-tuned PID is as good": the answer, in tables and figures.
 
-use quadrant_sim::experiment::sine_test::TrialOutcome;
+use quadrant_sim::experiment::sine_test::SineTestOutcome;
 use quadrant_sim::pages::{UM_PER_MM, columns, lines, series};
 use quadrant_sim::report::{Block, Cell, Column, Figure, Section, Series, Style, Table};
 
 use crate::wrong_model::{Competitor, SHARES, Wrong, WrongOutcome};
 
 /// A reading, in mm.
-type Reading = (&'static str, &'static str, fn(&TrialOutcome) -> f64);
+type Reading = (&'static str, &'static str, fn(&SineTestOutcome) -> f64);
 
 const READINGS: [Reading; 2] = [
     ("largest", "Largest error", |outcome| {
@@ -20,7 +20,7 @@ const READINGS: [Reading; 2] = [
 fn scores(
     outcomes: &[WrongOutcome],
     competitor: Competitor,
-    read: fn(&TrialOutcome) -> f64,
+    read: fn(&SineTestOutcome) -> f64,
     fits: impl Fn(Wrong) -> bool,
 ) -> Vec<f64> {
     outcomes
@@ -92,7 +92,7 @@ fn curve(
     outcomes: &[WrongOutcome],
     competitor: Competitor,
     place: fn(Wrong) -> Option<f64>,
-    read: fn(&TrialOutcome) -> f64,
+    read: fn(&SineTestOutcome) -> f64,
 ) -> (Vec<f64>, Vec<f64>) {
     outcomes
         .iter()
@@ -137,7 +137,7 @@ fn figure(
 fn break_even(
     outcomes: &[WrongOutcome],
     competitor: Competitor,
-    read: fn(&TrialOutcome) -> f64,
+    read: fn(&SineTestOutcome) -> f64,
 ) -> Option<f64> {
     let (factors, errors) = curve(outcomes, competitor, force, read);
     let alone = *errors.first()?;

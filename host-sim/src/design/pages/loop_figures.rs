@@ -13,7 +13,7 @@ use crate::report::{Block, Colour, Figure, Plot, Scale, Series, Style};
 pub(super) struct DrawnLoop<'a, L: OpenLoop> {
     pub(super) name: &'a str,
     pub(super) open_loop: &'a L,
-    /// How it is drawn.
+    /// Style.
     pub(super) style: Style,
 }
 

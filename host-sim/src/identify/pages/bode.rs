@@ -7,7 +7,7 @@ use crate::report::{Block, Figure, Lines, Plot, Scale, Series, Style};
 pub(super) struct Curve<'a> {
     pub(super) name: String,
     pub(super) response: &'a FrequencyResponse,
-    /// How it is drawn.
+    /// Style.
     pub(super) style: Style,
 }
 

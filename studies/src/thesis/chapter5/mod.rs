@@ -16,7 +16,7 @@ use quadrant_sim::report::Section;
 /// Controllers in the order of the chapter.
 const CONTROLLERS: [LawKind; 2] = [LawKind::Pid, LawKind::NPid];
 
-/// What the tables and figures are drawn from.
+/// Data of the tables and figures.
 struct Chapter<'a>(&'a Comparison);
 
 impl<'a> Chapter<'a> {
@@ -53,7 +53,7 @@ impl<'a> Chapter<'a> {
     }
 }
 
-/// What the thesis calls it, and what ours is.
+/// The thesis' name and ours.
 const fn knowledge_name(knowledge: ModelKnowledge) -> &'static str {
     match knowledge {
         ModelKnowledge::Exact => "simulation (exact model)",
