@@ -58,7 +58,11 @@ fn roots(sources: &BTreeMap<String, String>) -> Vec<String> {
         let parts: Vec<_> = path.split('/').collect();
         match parts.as_slice() {
             [.., "src", "lib.rs" | "main.rs"] | [.., "build.rs"] => true,
-            [.., "tests" | "benches" | "examples" | "bin" | "fuzz_targets", _] => true,
+            [
+                ..,
+                "tests" | "benches" | "examples" | "bin" | "fuzz_targets",
+                _,
+            ] => true,
             [.., "tests" | "benches" | "examples" | "bin", _, "main.rs"] => true,
             _ => false,
         }
@@ -104,10 +108,16 @@ fn a_circle_of_three_files_is_found() {
 #[test]
 fn a_circle_through_names_that_others_export_is_found() {
     let found = circles_of(&[
-        ("src/lib.rs", "mod inner; mod user; pub use inner::deep; pub use user::*;"),
+        (
+            "src/lib.rs",
+            "mod inner; mod user; pub use inner::deep; pub use user::*;",
+        ),
         ("src/inner/mod.rs", "pub mod deep;"),
         ("src/inner/deep.rs", "use crate::User; pub struct Deep;"),
-        ("src/user.rs", "use crate::deep::Deep; pub struct User(Deep);"),
+        (
+            "src/user.rs",
+            "use crate::deep::Deep; pub struct User(Deep);",
+        ),
     ]);
     assert_eq!(found, 1);
 }
@@ -119,7 +129,10 @@ fn a_parent_and_its_child_that_use_each_other_are_a_circle() {
     let uses = "mod child; use child::Child; pub struct Parent(Child);";
     assert_eq!(circles_of(&[root, child, ("src/a/mod.rs", uses)]), 1);
     let exports_and_uses = "mod child; pub use child::Child; pub struct Parent(Child);";
-    assert_eq!(circles_of(&[root, child, ("src/a/mod.rs", exports_and_uses)]), 1);
+    assert_eq!(
+        circles_of(&[root, child, ("src/a/mod.rs", exports_and_uses)]),
+        1
+    );
     let exports = "mod child; pub use child::Child; pub struct Parent;";
     assert_eq!(circles_of(&[root, child, ("src/a/mod.rs", exports)]), 0);
 }
@@ -128,8 +141,14 @@ fn a_parent_and_its_child_that_use_each_other_are_a_circle() {
 fn imports_one_way_and_those_of_tests_are_no_circle() {
     let found = circles_of(&[
         ("src/lib.rs", "mod a; mod b;"),
-        ("src/a.rs", "pub struct A; #[cfg(test)] mod tests { use crate::b::B; }"),
-        ("src/b.rs", "use crate::a::A; // use crate::b::B\npub struct B(A);"),
+        (
+            "src/a.rs",
+            "pub struct A; #[cfg(test)] mod tests { use crate::b::B; }",
+        ),
+        (
+            "src/b.rs",
+            "use crate::a::A; // use crate::b::B\npub struct B(A);",
+        ),
     ]);
     assert_eq!(found, 0);
 }

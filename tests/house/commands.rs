@@ -160,8 +160,15 @@ impl Programs {
         };
         // An option's value is no command.
         let at = arguments.iter().position(|word| word == first).unwrap_or(0);
-        let value = at > 0 && arguments[at - 1].starts_with("--") && !arguments[at - 1].contains('=');
-        let flag = ["--simulated", "--emulated", "--echo", "--json", "--keep-going"];
+        let value =
+            at > 0 && arguments[at - 1].starts_with("--") && !arguments[at - 1].contains('=');
+        let flag = [
+            "--simulated",
+            "--emulated",
+            "--echo",
+            "--json",
+            "--keep-going",
+        ];
         if value && !flag.contains(&arguments[at - 1]) {
             return found;
         }
@@ -174,7 +181,11 @@ impl Programs {
             true => self.below(first),
             false => BTreeSet::new(),
         };
-        if !below.is_empty() && !arguments[..at].iter().any(|word| word.starts_with("--port")) {
+        if !below.is_empty()
+            && !arguments[..at]
+                .iter()
+                .any(|word| word.starts_with("--port"))
+        {
             found.extend(self.check_verbs(&below, &arguments[at + 1..]));
         }
         found
@@ -188,7 +199,9 @@ fn is_list(word: &str) -> bool {
 
 fn is_name(word: &str) -> bool {
     word.starts_with(|c: char| c.is_ascii_lowercase())
-        && word.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
+        && word
+            .chars()
+            .all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '-')
 }
 
 #[test]

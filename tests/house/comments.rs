@@ -6,9 +6,26 @@ use crate::tree::sources;
 
 /// First words of a subordinate clause: what follows says neither what the thing is nor what it does.
 const QUESTIONS: [&str; 20] = [
-    "What", "How", "Whether", "Where", "Which", "When", "Who", "Why", "From which", "From what",
-    "At which", "On which", "By which", "In which", "To which", "By how", "To what", "By what",
-    "For which", "Of which",
+    "What",
+    "How",
+    "Whether",
+    "Where",
+    "Which",
+    "When",
+    "Who",
+    "Why",
+    "From which",
+    "From what",
+    "At which",
+    "On which",
+    "By which",
+    "In which",
+    "To which",
+    "By how",
+    "To what",
+    "By what",
+    "For which",
+    "Of which",
 ];
 
 /// The doc comments of a source: line and text of each.
@@ -46,7 +63,10 @@ fn fewer_than_one_doc_comment_in_a_hundred_begins_with_a_question_word() {
         for (line, text) in doc_comments(&source) {
             all += 1;
             if begins_with_a_question(&text) {
-                found.push(format!("{file}:{line}: {}", text.lines().next().unwrap_or("")));
+                found.push(format!(
+                    "{file}:{line}: {}",
+                    text.lines().next().unwrap_or("")
+                ));
             }
         }
     }

@@ -199,13 +199,25 @@ impl Crate {
                 self.modules[module].globs.push(path.clone());
                 if !public {
                     let re_exports = None;
-                    self.uses.push(Use { module, path, line, re_exports });
+                    self.uses.push(Use {
+                        module,
+                        path,
+                        line,
+                        re_exports,
+                    });
                 }
                 continue;
             };
-            self.modules[module].bindings.insert(name.clone(), path.clone());
+            self.modules[module]
+                .bindings
+                .insert(name.clone(), path.clone());
             let re_exports = public.then_some(name);
-            self.uses.push(Use { module, path, line, re_exports });
+            self.uses.push(Use {
+                module,
+                path,
+                line,
+                re_exports,
+            });
         }
     }
 
@@ -218,7 +230,15 @@ impl Crate {
         previous: Option<Token<'_>>,
     ) {
         const ITEMS: [&str; 9] = [
-            "struct", "enum", "union", "trait", "type", "fn", "const", "static", "macro_rules",
+            "struct",
+            "enum",
+            "union",
+            "trait",
+            "type",
+            "fn",
+            "const",
+            "static",
+            "macro_rules",
         ];
         let token = all[*at];
         let item = previous.is_some_and(|before| ITEMS.contains(&before.text));
@@ -236,7 +256,9 @@ impl Crate {
         *at += 1;
         while begins
             && all.get(*at).is_some_and(|token| token.is_sign("::"))
-            && all.get(*at + 1).is_some_and(|token| token.kind == Kind::Word)
+            && all
+                .get(*at + 1)
+                .is_some_and(|token| token.kind == Kind::Word)
         {
             path.push(all[*at + 1].text.to_owned());
             *at += 2;
@@ -244,7 +266,12 @@ impl Crate {
         if path.len() > 1 {
             let line = token.line;
             let re_exports = None;
-            self.uses.push(Use { module, path, line, re_exports });
+            self.uses.push(Use {
+                module,
+                path,
+                line,
+                re_exports,
+            });
         }
     }
 

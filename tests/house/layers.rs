@@ -65,7 +65,9 @@ fn dependencies(manifest: &str) -> Vec<(String, String, String)> {
 
 #[test]
 fn the_law_knows_neither_settings_nor_link_nor_application() {
-    let foreign = ["settings", "link", "app", "store", "drivers", "board", "hal"];
+    let foreign = [
+        "settings", "link", "app", "store", "drivers", "board", "hal",
+    ];
     let found = offences("src/law/", |_, path| match path {
         ["crate", first, ..] => foreign.contains(first),
         ["quadrant_link", ..] => true,
@@ -121,7 +123,13 @@ fn unsafe_code_is_in_the_boards_only() {
 
 #[test]
 fn registers_are_in_the_boards_only() {
-    let registers = ["stm32f4xx_hal", "pac", "steal", "read_volatile", "write_volatile"];
+    let registers = [
+        "stm32f4xx_hal",
+        "pac",
+        "steal",
+        "read_volatile",
+        "write_volatile",
+    ];
     let found = offences("src/", |file, path| {
         path.iter().any(|word| registers.contains(word)) && !file.starts_with("src/board/")
     });

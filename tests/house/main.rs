@@ -4,8 +4,8 @@
 #![forbid(unsafe_code)]
 
 mod circles;
-mod comments;
 mod commands;
+mod comments;
 mod crate_modules;
 mod layers;
 mod lexer;

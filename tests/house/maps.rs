@@ -44,7 +44,11 @@ fn left_out(source: &str) -> Vec<String> {
 fn a_map_of_modules_is_complete() {
     let mut found = Vec::new();
     for (file, source) in sources() {
-        found.extend(left_out(&source).into_iter().map(|name| format!("{file}: {name}")));
+        found.extend(
+            left_out(&source)
+                .into_iter()
+                .map(|name| format!("{file}: {name}")),
+        );
     }
     assert_none("modules that their map leaves out", &found);
 }

@@ -10,8 +10,19 @@ use crate::tree::{files, kebab_case, root, sources};
 
 /// Folders at the root whose contents documentation names.
 const FOLDERS: [&str; 13] = [
-    "src", "crates", "host-sim", "studies", "target-tests", "xtask", "tests", "examples", "fuzz",
-    "docs", ".cargo", ".ci", ".vscode",
+    "src",
+    "crates",
+    "host-sim",
+    "studies",
+    "target-tests",
+    "xtask",
+    "tests",
+    "examples",
+    "fuzz",
+    "docs",
+    ".cargo",
+    ".ci",
+    ".vscode",
 ];
 
 /// Folders that commands of the documentation make.
@@ -19,8 +30,16 @@ const MADE: [&str; 1] = ["fuzz/found"];
 
 /// Names of other projects.
 const FOREIGN: [&str; 10] = [
-    "cargo-fuzz", "defmt-print", "flip-link", "no-OS", "probe-rs", "probe-rs-tools", "r4-r7",
-    "rust-lld", "sequential-storage", "_defmt_acquire",
+    "cargo-fuzz",
+    "defmt-print",
+    "flip-link",
+    "no-OS",
+    "probe-rs",
+    "probe-rs-tools",
+    "r4-r7",
+    "rust-lld",
+    "sequential-storage",
+    "_defmt_acquire",
 ];
 
 /// Every word in code and in its literals, parts of kebab-case names included whole; and every identifier in kebab case.
@@ -80,7 +99,9 @@ fn every_file_named_in_documentation_exists() {
         .collect();
     let missing = |text: &Text, path: &str| {
         let path = path.split("::").next().unwrap_or(path);
-        let plain = path.chars().all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c));
+        let plain = path
+            .chars()
+            .all(|c| c.is_ascii_alphanumeric() || "-_./".contains(c));
         let first = path.split('/').next().unwrap_or("");
         if !plain || path.is_empty() {
             return false;
@@ -121,7 +142,14 @@ fn settings_paths() -> Vec<Vec<String>> {
 /// A settings path in one of its written forms, from its first segment; none if the text is no such path.
 fn as_settings_path(span: &str) -> Option<Vec<String>> {
     const PARTS: [&str; 9] = [
-        "encoder", "amplifier", "limits", "plant", "feedback", "friction", "feedforward", "homing",
+        "encoder",
+        "amplifier",
+        "limits",
+        "plant",
+        "feedback",
+        "friction",
+        "feedforward",
+        "homing",
         "streaming",
     ];
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_*/.[]".contains(c);
@@ -168,7 +196,11 @@ fn is_setting(path: &[String], all: &[Vec<String>]) -> bool {
 #[test]
 fn every_settings_path_in_documentation_exists() {
     let all = settings_paths();
-    assert!(all.len() > 60, "docs/settings.md lists {} settings", all.len());
+    assert!(
+        all.len() > 60,
+        "docs/settings.md lists {} settings",
+        all.len()
+    );
     report("settings that do not exist", |_, span| {
         as_settings_path(span).is_some_and(|path| !is_setting(&path, &all))
     });
@@ -264,7 +296,8 @@ fn every_fault_has_its_number_and_row_on_the_page_of_safety() {
             };
             let right = names.contains(name) || faults.iter().any(|fault| fault == name);
             let ours = faults.get(number.wrapping_sub(1));
-            if !right || (faults.iter().any(|fault| fault == name) && ours.is_none_or(|is| is != name))
+            if !right
+                || (faults.iter().any(|fault| fault == name) && ours.is_none_or(|is| is != name))
             {
                 wrong.push(format!("{page}: {number} {name}"));
             }
@@ -291,7 +324,9 @@ fn every_channel_in_documentation_exists() {
             };
             let signal = signal.to_owned();
             let spelt = !signal.is_empty()
-                && signal.chars().all(|c| c.is_ascii_lowercase() || c == '-' || c.is_ascii_digit());
+                && signal
+                    .chars()
+                    .all(|c| c.is_ascii_lowercase() || c == '-' || c.is_ascii_digit());
             let known = match source {
                 "x" | "y" | "z" => &axis,
                 "stage" => &stage,
@@ -309,10 +344,16 @@ fn every_name_in_documentation_exists() {
     let known = known_words();
     report("names that do not exist", |text, span| {
         // The change log tells of what was.
-        if text.file == "CHANGELOG.md" || span.contains(['/', '.', '<', '*']) && !span.contains("::") {
+        if span.contains(['<', '>']) {
             return false;
         }
-        let name = span.trim_end_matches("()").rsplit("::").next().unwrap_or("");
+        if text.file == "CHANGELOG.md"
+            || span.contains(['/', '.', '<', '*']) && !span.contains("::")
+        {
+            return false;
+        }
+        let path = span.trim_end_matches("()");
+        let name = path.rsplit("::").next().unwrap_or("");
         let letters = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
         if name.is_empty() || !name.chars().all(letters) || name.starts_with('-') {
             return false;
@@ -325,6 +366,15 @@ fn every_name_in_documentation_exists() {
         // Symbols of the compiler's runtime, and quantities such as k_i.
         let other = name.starts_with("__") || name.find('_') == Some(1);
         let ours = (span.contains("::") || joined || camel) && !other;
-        ours && letter && !name.ends_with('-') && !known.contains(name)
+        // Of a path every part, but not of one into the standard library or another crate.
+        let foreign = ["std", "core", "alloc", "libm", "clap"]
+            .iter()
+            .any(|root| path.starts_with(root));
+        let exists = known.contains(name)
+            && (foreign
+                || path
+                    .split("::")
+                    .all(|part| part.is_empty() || known.contains(part)));
+        ours && letter && !name.ends_with('-') && !exists
     });
 }

@@ -21,12 +21,7 @@ pub(crate) fn sources() -> BTreeMap<String, String> {
     files(&["rs"])
 }
 
-fn collect(
-    folder: &Path,
-    prefix: &str,
-    extensions: &[&str],
-    found: &mut BTreeMap<String, String>,
-) {
+fn collect(folder: &Path, prefix: &str, extensions: &[&str], found: &mut BTreeMap<String, String>) {
     for entry in fs::read_dir(folder).expect("a readable folder").flatten() {
         let name = entry.file_name().to_string_lossy().into_owned();
         let path = entry.path();

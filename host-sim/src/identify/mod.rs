@@ -13,7 +13,7 @@
 //! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
 //! - [`revise`]: the linear model once friction stands beside it;
-//! - [`setting`]: the lines that a result adds to a settings file;
+//! - [`setting`]: the error of a step's own setting that is out of range;
 //! - [`single_state`]: Dahl and LuGre, fitted to a GMS model;
 //! - [`static_friction`]: the friction-velocity map and its model;
 //! - [`virgin_curve`]: pre-sliding friction, the GMS model.
