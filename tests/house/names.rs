@@ -29,11 +29,12 @@ const FOLDERS: [&str; 13] = [
 const MADE: [&str; 1] = ["fuzz/found"];
 
 /// Names of other projects.
-const FOREIGN: [&str; 10] = [
+const FOREIGN: [&str; 11] = [
     "cargo-fuzz",
     "defmt-print",
     "flip-link",
     "no-OS",
+    "nonlinear-benchmarks",
     "probe-rs",
     "probe-rs-tools",
     "r4-r7",
