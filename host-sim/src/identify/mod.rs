@@ -10,6 +10,7 @@
 //! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which the steps share;
 //! - [`motion`]: inertia and friction from an ordinary motion record;
 //! - [`motor_constant`]: acceleration per volt from a square wave;
+//! - [`pages`]: the steps' tables and figures;
 //! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
 //! - [`revise`]: the linear model once friction stands beside it;
@@ -25,6 +26,7 @@ pub mod fit;
 pub mod frf;
 pub mod motion;
 pub mod motor_constant;
+pub mod pages;
 pub mod plant;
 pub mod response;
 pub mod revise;
