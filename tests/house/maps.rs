@@ -30,14 +30,14 @@ fn linked(source: &str) -> BTreeSet<String> {
         .collect()
 }
 
-/// Public modules that a map of modules leaves out; a page that names less than two is no map.
+/// Public modules that a map of modules leaves out; a page that names no more than half of them is no map.
 fn left_out(source: &str) -> Vec<String> {
     let modules = public_modules(source);
     let linked = linked(source);
-    match modules.intersection(&linked).count() {
-        0 | 1 => Vec::new(),
-        _ => modules.difference(&linked).cloned().collect(),
+    if modules.intersection(&linked).count() * 2 <= modules.len() {
+        return Vec::new();
     }
+    modules.difference(&linked).cloned().collect()
 }
 
 #[test]

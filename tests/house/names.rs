@@ -28,8 +28,8 @@ const FOLDERS: [&str; 13] = [
 /// Folders that commands of the documentation make.
 const MADE: [&str; 1] = ["fuzz/found"];
 
-/// Names of other projects.
-const FOREIGN: [&str; 11] = [
+/// Names of other projects and formats.
+const FOREIGN: [&str; 13] = [
     "cargo-fuzz",
     "defmt-print",
     "flip-link",
@@ -40,6 +40,8 @@ const FOREIGN: [&str; 11] = [
     "r4-r7",
     "rust-lld",
     "sequential-storage",
+    "serde_with",
+    "text-anchor",
     "_defmt_acquire",
 ];
 
