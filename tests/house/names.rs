@@ -343,6 +343,35 @@ fn every_channel_in_documentation_exists() {
 }
 
 #[test]
+fn every_channel_has_its_row_on_the_page_of_the_link() {
+    let page = fs::read_to_string(root().join("docs/link.md")).expect("the page");
+    let (_, channels) = page.split_once("## Channels").expect("the section");
+    let mut wrong = Vec::new();
+    for (table, name) in channels
+        .split("| number |")
+        .skip(1)
+        .zip(["AxisSignal", "StageSignal"])
+    {
+        let rows = table
+            .lines()
+            .skip(2)
+            .take_while(|line| line.starts_with('|'));
+        let listed: Vec<usize> = rows
+            .filter_map(|row| row.split('|').nth(1))
+            .flat_map(|cell| cell.split(','))
+            .filter_map(|number| number.trim().parse().ok())
+            .collect();
+        let (signals, _) = names_of(name);
+        for (number, signal) in signals.iter().enumerate() {
+            if !listed.contains(&number) {
+                wrong.push(format!("{name} {number}, {signal}"));
+            }
+        }
+    }
+    assert_none("channels without a row in docs/link.md", &wrong);
+}
+
+#[test]
 fn every_name_in_documentation_exists() {
     let known = known_words();
     report("names that do not exist", |text, span| {
