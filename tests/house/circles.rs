@@ -56,15 +56,12 @@ fn circles(imports: &[Import]) -> Vec<String> {
 fn roots(sources: &BTreeMap<String, String>) -> Vec<String> {
     let is_root = |path: &&String| {
         let parts: Vec<_> = path.split('/').collect();
+        let folders = ["tests", "benches", "examples", "bin"];
         match parts.as_slice() {
-            [.., "src", "lib.rs" | "main.rs"] | [.., "build.rs"] => true,
-            [
-                ..,
-                "tests" | "benches" | "examples" | "bin" | "fuzz_targets",
-                _,
-            ] => true,
-            [.., "tests" | "benches" | "examples" | "bin", _, "main.rs"] => true,
-            _ => false,
+            [.., "src", file] if ["lib.rs", "main.rs"].contains(file) => true,
+            [.., folder, _, "main.rs"] if folders.contains(folder) => true,
+            [.., folder, _] if folders.contains(folder) || *folder == "fuzz_targets" => true,
+            _ => path.ends_with("build.rs"),
         }
     };
     // `tests` is a module's folder, too.
