@@ -260,6 +260,18 @@ fn every_command_is_in_the_documentation() {
 }
 
 #[test]
+fn a_command_or_an_option_that_does_not_exist_is_found() {
+    let programs = Programs::read();
+    let complaints = |line| programs.check(line).len();
+    assert_eq!(complaints("quadrant compare --out results"), 0);
+    assert_eq!(complaints("quadrant compar"), 1);
+    assert_eq!(complaints("cargo run --release -- identify plannt"), 1);
+    assert_eq!(complaints("quadrant connect --simulated statuss"), 1);
+    assert_eq!(complaints("cargo xtask setup && cargo xtask biuld"), 1);
+    assert_eq!(complaints("quadrant design pid --crossing-hz 60"), 1);
+}
+
+#[test]
 fn subcommands_are_read_from_the_source() {
     let source = "#[derive(Debug, Subcommand)]\nenum Verb { /// Does.\n First(a::B), \
                   #[command(name = \"-\")] Script, LastOne { #[arg(long)] all: bool, } }";
