@@ -64,7 +64,7 @@ fn get_bytes(client: &mut Client, path: &str) -> Result<LeafValue, ClientError> 
 }
 
 /// Changes a leaf of the machine's draft, makes a part (`"present"`), or leaves it out (`null`). A value that is no JSON is
-/// taken for a text: `npid` for `"npid"`.
+/// taken for a text: `n-pid` for `"n-pid"`.
 ///
 /// # Errors
 /// A path that there is not, a value of another type, or a connection that is broken.
@@ -133,7 +133,7 @@ pub fn apply(client: &mut Client) -> Result<Applied, ClientError> {
     }
 }
 
-/// Keeps what acts for the next start, with where it comes from.
+/// Stores the draft for the next start, with its origin.
 ///
 /// # Errors
 /// A memory that failed, or a connection that is broken.

@@ -13,6 +13,9 @@
 //! | cascade P/PI | [`cascade`] | a velocity error, its set point made from the error |
 //! | sliding mode | [`sliding_mode`] | the distance from a line in the phase plane, saturated |
 //! | NCTF | [`nctf`] | the distance from a measured trajectory in the phase plane |
+//!
+//! [`surface`] is the PI that the last three have in common, [`plant_model`] the linear model of the axis, and [`popov`] the
+//! bound of the nonlinear gain on it.
 
 pub mod cascade;
 mod derivative;

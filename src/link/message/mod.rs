@@ -213,7 +213,7 @@ pub enum Reply {
     Fault(Option<FaultReport>),
     /// How far the stream of set points has come.
     Stream(StreamStatus),
-    /// The value of a setting, as JSON.
+    /// The value of a setting, in postcard.
     Value(Value),
     /// Some of the settings' paths.
     Paths(PathPage),

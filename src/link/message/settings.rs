@@ -9,7 +9,7 @@ use crate::settings::MAX_VALUE_BYTES;
 /// Paths in a [`PathPage`] at most.
 pub const PAGE_PATHS: usize = 4;
 
-/// The path of a setting, such as `/axes/0/feedback/pid/kp`: up to 96 bytes.
+/// The path of a setting, such as `/axes/0/feedback/pid/kp_v_per_mm`: up to 96 bytes.
 pub type Path = String<96>;
 
 /// The value of a setting, as [`StageSettings::get_bytes`](crate::settings::StageSettings::get_bytes) gives it. A host turns
@@ -46,11 +46,11 @@ pub enum SettingsRequest {
     },
     /// Check the draft and act on it from the next tick: `Applied`.
     Apply,
-    /// Make the draft what acts.
+    /// Replaces the draft by the settings in force.
     Revert,
     /// Make the draft the defaults.
     Defaults,
-    /// Keep what acts, for the next start.
+    /// Stores the draft for the next start.
     Store(Provenance),
     /// Where the kept settings came from: a `Provenance`.
     Provenance,

@@ -1,0 +1,151 @@
+//! Who may know whom.
+
+use std::collections::BTreeSet;
+use std::fs;
+
+use crate::assert_none;
+use crate::lexer::{Kind, Token, tokens};
+use crate::tree::{root, sources};
+
+/// Words of a source, each with the ones that follow it as `::` paths do.
+fn paths<'a>(all: &'a [Token<'a>]) -> impl Iterator<Item = (usize, Vec<&'a str>)> {
+    all.iter().enumerate().filter_map(|(at, token)| {
+        if token.kind != Kind::Word {
+            return None;
+        }
+        let mut path = vec![token.text];
+        let mut rest = &all[at + 1..];
+        while let [sign, word, others @ ..] = rest
+            && sign.is_sign("::")
+            && word.kind == Kind::Word
+        {
+            path.push(word.text);
+            rest = others;
+        }
+        Some((token.line, path))
+    })
+}
+
+/// Findings of a rule over the words of all sources below `folder`.
+fn offences(folder: &str, breaks: impl Fn(&str, &[&str]) -> bool) -> Vec<String> {
+    let mut found = Vec::new();
+    for (file, source) in sources() {
+        if !file.starts_with(folder) {
+            continue;
+        }
+        for (line, path) in paths(&tokens(&source)) {
+            if breaks(&file, &path) {
+                found.push(format!("{file}:{line}: {}", path.join("::")));
+            }
+        }
+    }
+    found
+}
+
+fn manifest(path: &str) -> String {
+    fs::read_to_string(root().join(path)).expect("a manifest")
+}
+
+/// The dependencies that a manifest names, in whatever table: each with its table's heading and its line.
+fn dependencies(manifest: &str) -> Vec<(String, String, String)> {
+    let mut table = String::new();
+    let mut found = Vec::new();
+    for line in manifest.lines().map(str::trim) {
+        if line.starts_with('[') {
+            table = line.to_owned();
+        } else if table.contains("dependencies")
+            && let Some((name, _)) = line.split_once(['=', '.'])
+        {
+            let name = name.trim().to_owned();
+            found.push((table.clone(), name, line.to_owned()));
+        }
+    }
+    found
+}
+
+#[test]
+fn the_law_knows_neither_settings_nor_link_nor_application() {
+    let foreign = [
+        "settings", "link", "app", "store", "drivers", "board", "hal",
+    ];
+    let found = offences("src/law/", |_, path| match path {
+        ["crate", first, ..] => foreign.contains(first),
+        ["quadrant_link", ..] => true,
+        _ => false,
+    });
+    assert_none("the law imports what stands above it", &found);
+}
+
+#[test]
+fn the_host_command_does_not_know_the_studies() {
+    let mut found = offences("host-sim/", |_, path| path[0] == "quadrant_studies");
+    if dependencies(&manifest("host-sim/Cargo.toml"))
+        .iter()
+        .any(|(_, name, _)| name == "quadrant-studies")
+    {
+        found.push("host-sim/Cargo.toml".to_owned());
+    }
+    assert_none("host-sim names the studies", &found);
+}
+
+#[test]
+fn the_chores_do_not_depend_on_the_host_command() {
+    let named: Vec<_> = dependencies(&manifest("xtask/Cargo.toml"))
+        .into_iter()
+        .filter(|(_, name, _)| name == "quadrant-sim")
+        .map(|(table, _, line)| format!("{table} {line}"))
+        .collect();
+    assert_none("xtask depends on the host command", &named);
+}
+
+#[test]
+fn the_library_brings_no_runtime_and_no_log_to_a_target() {
+    let runtime = ["rtic", "cortex-m", "cortex-m-rt", "defmt"];
+    let found: Vec<_> = dependencies(&manifest("Cargo.toml"))
+        .into_iter()
+        .filter(|(table, name, line)| {
+            !table.starts_with("[workspace")
+                && runtime.contains(&name.as_str())
+                && !line.contains("optional = true")
+        })
+        .map(|(table, _, line)| format!("{table} {line}"))
+        .collect();
+    assert_none("always in the library's dependencies", &found);
+}
+
+#[test]
+fn unsafe_code_is_in_the_boards_only() {
+    let found = offences("", |file, path| {
+        path.contains(&"unsafe") && !file.starts_with("src/board/")
+    });
+    assert_none("unsafe outside src/board", &found);
+}
+
+#[test]
+fn registers_are_in_the_boards_only() {
+    let registers = [
+        "stm32f4xx_hal",
+        "pac",
+        "steal",
+        "read_volatile",
+        "write_volatile",
+    ];
+    let found = offences("src/", |file, path| {
+        path.iter().any(|word| registers.contains(word)) && !file.starts_with("src/board/")
+    });
+    assert_none("registers outside src/board", &found);
+}
+
+#[test]
+fn a_module_with_a_folder_is_a_file_in_that_folder() {
+    let files: BTreeSet<String> = sources().into_keys().collect();
+    let found: Vec<_> = files
+        .iter()
+        .filter_map(|file| {
+            let folder = file.strip_suffix(".rs").map(|stem| format!("{stem}/"))?;
+            let twice = files.range(folder.clone()..).next()?.starts_with(&folder);
+            twice.then(|| format!("{file} beside {folder}"))
+        })
+        .collect();
+    assert_none("`foo.rs` beside `foo/`; here it is `foo/mod.rs`", &found);
+}
