@@ -157,7 +157,8 @@ fn as_settings_path(span: &str) -> Option<Vec<String>> {
     ];
     let plain = |c: char| c.is_ascii_lowercase() || c.is_ascii_digit() || "_*/.[]".contains(c);
     let path = span.split(['=', ' ']).next().unwrap_or("");
-    if !path.chars().all(plain) || path.ends_with(".rs") || path.contains("..") {
+    let blank = path.trim_matches('/').is_empty();
+    if blank || !path.chars().all(plain) || path.ends_with(".rs") || path.contains("..") {
         return None;
     }
     let path = path.replace("[]", "");
@@ -222,6 +223,7 @@ fn settings_paths_are_recognised() {
     assert_eq!(known("x/feedback/pid/kp"), Some(false));
     assert_eq!(known("feedback.gain"), Some(false));
     assert_eq!(known("friction.rs"), None);
+    assert_eq!(known("/"), None);
     assert_eq!(known("x.error"), None);
 }
 
