@@ -51,12 +51,12 @@ mod app {
 
     use heapless::spsc::{Consumer, Producer, Queue};
     use quadrant::app::supervisor::Event;
-    use quadrant::app::{
-        After, Control, ControlInputs, Liveness, Meters, Server, Snapshot, Supervision,
-    };
+    use quadrant::app::{After, Control, Inputs, Liveness, Meters, Server, Snapshot, Supervision};
+    use quadrant::axes::AxisName;
+    use quadrant::command::Command;
     use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
     use quadrant::link::message::NumberType;
-    use quadrant::safety::{AxisName, AxisSwitches, Command};
+    use quadrant::safety::AxisSwitches;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
@@ -197,7 +197,7 @@ mod app {
                 switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
             }
         }
-        let outputs = cx.local.control.tick(&ControlInputs {
+        let outputs = cx.local.control.tick(&Inputs {
             readings: cx.local.encoders.read(),
             switches,
             command: cx.local.commands_out.dequeue(),

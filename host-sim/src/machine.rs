@@ -2,10 +2,12 @@
 
 use std::collections::VecDeque;
 
-use quadrant::app::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
+use quadrant::admission::StageView;
+use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
-use quadrant::safety::{AxisName, Command};
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};

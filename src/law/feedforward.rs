@@ -14,10 +14,10 @@
 //!
 //! Inertia (`a / A`) is separate and acts with any kind.
 //!
-//! The springs of the elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and
-//! LuGre. When a change of settings goes from one group to the other, the force of the springs goes with it: the bristle takes
-//! the elements' sum, the elements take their weights' shares of the bristle's force. What else the elements remember is
-//! right again once the reference has moved over the pre-sliding range in one sense.
+//! The elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and LuGre. When a
+//! change of settings goes from one group to the other, the force goes with it: the bristle takes the elements' sum, the
+//! elements take their weights' shares of the bristle's force. The rest of the elements' memory is right again once the
+//! reference has moved over the pre-sliding range in one sense.
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
@@ -29,9 +29,8 @@ use crate::law::friction::gms::{Gms, GmsState};
 use crate::law::friction::lugre::Lugre;
 use crate::law::friction::smoothed_gms::SmoothedGms;
 use crate::law::friction::stribeck::{Sliding, SlidingTable};
-use crate::law::friction::{Direction, PerDirection};
+use crate::law::friction::{Direction, FrictionSettings, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::settings::FrictionSettings;
 
 /// Which friction models act.
 #[derive(
@@ -174,13 +173,20 @@ enum Presliding<S: Scalar, const N: usize> {
     Dahl(Dahl<S>),
 }
 
-/// The memory of the feedforward; springs slack by default.
+/// The friction state of the feedforward; slack by default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeedforwardState<S: Scalar, const N: usize> {
     elements: GmsState<S, N>,
     bristle: Bristle<S>,
-    /// The bristle moved last, and not the elements.
-    on_bristle: bool,
+    last: LastModel,
+}
+
+/// The model that moved last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum LastModel {
+    #[default]
+    Elements,
+    Bristle,
 }
 
 impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
@@ -188,27 +194,26 @@ impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
         Self {
             elements: GmsState::default(),
             bristle: Bristle::default(),
-            on_bristle: false,
+            last: LastModel::Elements,
         }
     }
 }
 
 impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
-    /// What the springs of the last kind carry, V.
+    /// The friction of the model that moved last, V.
     pub fn force(&self) -> S {
-        if self.on_bristle {
-            self.bristle.force()
-        } else {
-            self.elements.total()
+        match self.last {
+            LastModel::Bristle => self.bristle.force(),
+            LastModel::Elements => self.elements.total(),
         }
     }
 
     /// The elements, loaded by `spread` if the bristle moved last.
     #[inline(always)]
     fn elements(&mut self, spread: impl FnOnce(S) -> GmsState<S, N>) -> &mut GmsState<S, N> {
-        if self.on_bristle {
+        if self.last == LastModel::Bristle {
             self.elements = spread(self.bristle.force());
-            self.on_bristle = false;
+            self.last = LastModel::Elements;
         }
         &mut self.elements
     }
@@ -216,9 +221,9 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
     /// The bristle, loaded if the elements moved last.
     #[inline(always)]
     fn bristle(&mut self) -> &mut Bristle<S> {
-        if !self.on_bristle {
+        if self.last == LastModel::Elements {
             self.bristle = Bristle::bent(self.elements.total());
-            self.on_bristle = true;
+            self.last = LastModel::Bristle;
         }
         &mut self.bristle
     }
@@ -229,7 +234,7 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
     presliding: Presliding<S, N>,
-    level_gain: S::Gain,
+    coulomb_gain: S::Gain,
     gms_gain: S::Gain,
     viscous: PerDirection<S::Gain>,
     inertia: S::Gain,
@@ -253,11 +258,17 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         Self {
             kind: FeedforwardKind::None,
             presliding: Presliding::blank(),
-            level_gain: S::Gain::default(),
+            coulomb_gain: S::Gain::default(),
             gms_gain: S::Gain::default(),
             viscous: PerDirection::default(),
             inertia: S::Gain::default(),
         }
+    }
+
+    /// Feeds nothing forward. The tables stay: to clear them would take as long as to fill them.
+    pub(crate) fn switch_off(&mut self) {
+        self.kind = FeedforwardKind::None;
+        self.inertia = S::Gain::default();
     }
 
     /// As [`build`](Self::build), in place.
@@ -271,7 +282,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     ) {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         self.kind = kind;
-        (self.level_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
+        (self.coulomb_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
         self.viscous = friction.sliding.map(|model| {
             S::gain(
                 gains.viscous * model.viscous_v_s_per_mm,
@@ -319,19 +330,19 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
                     _ => surface.at(speed, direction),
                 };
                 if self.kind.has_static_level() && reference.velocity != S::ZERO {
-                    let level = sliding.level.scale(self.level_gain);
+                    let level = sliding.level.scale(self.coulomb_gain);
                     terms.level = match direction {
                         Direction::Positive => level,
                         Direction::Negative => -level,
                     };
                 }
-                // The elements move with any of these kinds: their springs are loaded when a change makes them act.
-                let springs = state.elements(|force| elements.spread(force));
-                elements.step(springs, displacement, sliding)
+                // The elements move with any of these kinds: they carry their load when a change makes them act.
+                let memory = state.elements(|force| elements.spread(force));
+                elements.step(memory, displacement, sliding)
             }
             Presliding::Smoothed { elements, surface } => {
-                let springs = state.elements(|force| elements.spread(force));
-                elements.step(springs, displacement, surface.at(speed, direction))
+                let memory = state.elements(|force| elements.spread(force));
+                elements.step(memory, displacement, surface.at(speed, direction))
             }
             Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
             Presliding::Dahl(model) => model.step(state.bristle(), displacement),

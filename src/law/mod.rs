@@ -3,16 +3,19 @@
 //! Pure: no register, no operating system, no heap, no clock. Nothing in this folder imports settings, link or
 //! application; a test holds that. Each module is also reachable from the root of the crate: `quadrant::axis`.
 
+pub mod admission;
+pub mod axes;
 pub mod axis;
 pub mod capture;
+pub mod command;
 pub mod control;
-pub(crate) mod course;
 pub mod decimal;
 pub mod encoder;
 pub mod feedforward;
 pub mod friction;
 pub mod homing;
 pub mod injection;
+pub mod motion;
 pub mod reference;
 pub(crate) mod rounding;
 pub mod safety;

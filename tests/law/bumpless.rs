@@ -48,7 +48,7 @@ fn volts<S: Scalar>(first: &StageSettings, second: Option<&StageSettings>) -> Ve
             let seen = rig.state.axes()[0].telemetry();
             (
                 seen.output.to_f64(Quantity::Voltage),
-                seen.transfer.to_f64(Quantity::Voltage),
+                seen.bumpless_offset.to_f64(Quantity::Voltage),
             )
         })
         .collect()
@@ -190,5 +190,5 @@ fn settings_exchanged_while_disabled_leave_no_offset() {
     rig.exchange(&x_alone(linear));
     rig.tick();
     rig.start();
-    assert_eq!(rig.state.axes()[0].telemetry().transfer, 0.0);
+    assert_eq!(rig.state.axes()[0].telemetry().bumpless_offset, 0.0);
 }

@@ -2,9 +2,10 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
+use quadrant::axes::PerAxis;
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::Command;
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
@@ -133,6 +134,6 @@ impl<S: Scalar> Rig<S> {
     /// Goes over to other settings at the next tick.
     pub(crate) fn exchange(&mut self, settings: &StageSettings) {
         self.stage = settings.build().expect("valid settings");
-        self.inputs.settings_changed = [true; 3];
+        self.inputs.settings_changed = PerAxis::splat(true);
     }
 }

@@ -1,6 +1,7 @@
 //! Traffic for the link: any request, and what a bad line makes of it.
 
 use heapless::{String, Vec as Bounded};
+use quadrant::axes::AxisName;
 use quadrant::capture::{Edge, Level, Trigger};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{
@@ -8,7 +9,6 @@ use quadrant::link::message::{
     StreamRequest, TelemetryRequest, Value, Voltages,
 };
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::safety::AxisName;
 use quadrant::settings::PlanSettings;
 use quadrant::telemetry::Channel;
 

@@ -1,6 +1,8 @@
 //! What brings the monitors' parameters into play: short runs that end in a fault, or would with other parameters.
 
-use quadrant::safety::{AxisName, AxisSwitches, Command, SafetyState, StreamLoss, Switches};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::safety::{AxisSwitches, SafetyState, StreamLoss, Switches};
 use quadrant::settings::StageSettings;
 
 use crate::common::Rig;
@@ -109,7 +111,7 @@ fn run(settings: &StageSettings, axis: usize, moves: bool, run: Run) -> Trace {
         rig.start();
     } else {
         rig.tick();
-        rig.command(quadrant::safety::Command::Enable);
+        rig.command(quadrant::command::Command::Enable);
     }
     let mut trace = vec![];
     for tick in 1..LONGEST {

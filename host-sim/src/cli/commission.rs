@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use quadrant::safety::AxisName;
+use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::npid::NonlinearGain;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{PidGains, SectorProof};
+use quadrant::control::popov::SectorProof;
 
 use super::design_pid::{step_name, step_table};
 use super::identify::{columns, lines, series};

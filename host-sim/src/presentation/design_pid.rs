@@ -1,6 +1,6 @@
 //! What a person reads of a PID's design.
 
-use quadrant::control::popov::PidGains;
+use quadrant::control::pid::PidGains;
 
 use super::identify::columns;
 use super::loop_figures::{DrawnLoop, bode_blocks, nyquist_block, sensitivity_blocks, step_blocks};

@@ -8,13 +8,14 @@ mod flash;
 use std::collections::VecDeque;
 
 use quadrant::app::{
-    After, Axis, Control, ControlInputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
+    After, Axis, Control, Inputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
 };
+use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::link::message::NumberType;
-use quadrant::safety::{Command, FaultCode, Switches};
+use quadrant::safety::{FaultCode, Switches};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::{Outputs, StageState};
@@ -286,7 +287,7 @@ impl<S: Scalar> Running<S> {
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
     pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, After) {
-        let outputs = self.control.tick(&ControlInputs {
+        let outputs = self.control.tick(&Inputs {
             readings: inputs.readings,
             switches: inputs.switches,
             command: self.command.take(),

@@ -18,9 +18,10 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::hal::{self, ResetCause};
-use quadrant::safety::{self, Command};
+use quadrant::safety;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 

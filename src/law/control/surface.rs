@@ -11,9 +11,9 @@
 //! law can be asked of all.
 
 use super::derivative::Derivative;
-use super::feedback::{FeedbackState, FeedbackTerms};
 use super::integrator::Integrator;
-use super::popov::PidGains;
+use super::pid::PidGains;
+use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
 /// A PI on `w = lambda e + de/dt`.

@@ -13,7 +13,7 @@ use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::Direction;
+use super::direction::Direction;
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
 

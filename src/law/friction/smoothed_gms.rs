@@ -18,7 +18,7 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::Direction;
+use super::direction::Direction;
 use super::gms::{GmsElement, GmsState};
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};

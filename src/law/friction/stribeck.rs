@@ -7,7 +7,7 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::{Direction, PerDirection};
+use super::direction::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::{OctaveTable, interpolation_error};
 

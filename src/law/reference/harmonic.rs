@@ -1,4 +1,4 @@
-//! Sinusoidal motion, and the circle that two of them make.
+//! Sinusoidal motion.
 //!
 //! The phase is a 64-bit integer, so it neither drifts nor loses resolution. Its speed rises and falls smoothly at
 //! the ends, so the axis starts and stops on the curve without a step of velocity or acceleration.
@@ -7,8 +7,9 @@ use core::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use super::motion_state::MotionState;
+use super::sample::{MotionScale, ReferenceSample};
 use super::sine::{SINE_BITS, sine, sine_and_cosine};
-use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
@@ -49,68 +50,6 @@ impl HarmonicSettings {
         let across = velocity * TAU * self.frequency_hz;
         (velocity, libm::hypot(along, across))
     }
-}
-
-/// A plane of the stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Plane {
-    /// x and y.
-    Xy,
-    /// y and z.
-    Yz,
-    /// z and x.
-    Zx,
-}
-
-impl Plane {
-    /// The indices of the plane's first and second axis.
-    pub const fn axes(self) -> (usize, usize) {
-        match self {
-            Self::Xy => (0, 1),
-            Self::Yz => (1, 2),
-            Self::Zx => (2, 0),
-        }
-    }
-}
-
-/// A sense of rotation, seen with the plane's first axis to the right and the second up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Sense {
-    /// Counter-clockwise, G3.
-    CounterClockwise,
-    /// Clockwise, G2.
-    Clockwise,
-}
-
-/// The three axes' motions of a circle: radius in mm, feed in mm/s along the path, the angle (rad, from the plane's
-/// first axis) at which the full-speed turns begin, the number of turns, and the duration of lead-in and lead-out.
-pub fn circle(
-    plane: Plane,
-    sense: Sense,
-    radius_mm: f64,
-    feed_mm_s: f64,
-    start_rad: f64,
-    turns: f64,
-    lead_s: f64,
-) -> [MotionSettings; 3] {
-    let sine = HarmonicSettings::with_velocity(radius_mm, feed_mm_s, turns, lead_s);
-    let quarter = TAU / 4.0;
-    // cos(a) = sin(a + 90 deg); clockwise, the angle runs backwards: cos(-a) = sin(90 deg + a - 2 start), and so on.
-    let (first, second) = match sense {
-        Sense::CounterClockwise => (start_rad + quarter, start_rad),
-        Sense::Clockwise => (quarter - start_rad, 2.0 * quarter - start_rad),
-    };
-    let mut motions = [MotionSettings::Hold; 3];
-    let (first_axis, second_axis) = plane.axes();
-    motions[first_axis] = MotionSettings::Harmonic(HarmonicSettings {
-        phase_rad: first,
-        ..sine
-    });
-    motions[second_axis] = MotionSettings::Harmonic(HarmonicSettings {
-        phase_rad: second,
-        ..sine
-    });
-    motions
 }
 
 /// A sine ready for the tick.

@@ -1,6 +1,7 @@
 //! Jogging: a velocity that holds until it is changed, and that ends by itself before the end of the travel.
 
-use super::{Ramp, RampState, ReferenceSample, Velocity};
+use super::ramp::{Ramp, RampState, Velocity};
+use super::sample::ReferenceSample;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 

@@ -7,7 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{MotionScale, MotionState, ReferenceSample};
+use super::motion_state::MotionState;
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
@@ -57,16 +58,6 @@ pub(super) const FRACTION_BITS: u32 = 64;
 /// Bits dropped from the sums before they become a velocity and an acceleration.
 const VELOCITY_SHIFT: u32 = 52;
 const ACCELERATION_SHIFT: u32 = 48;
-
-/// The running sums of a move, from jerk to position, and the next impulse.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Chain {
-    jerk: i128,
-    acceleration: i128,
-    velocity: i128,
-    position: i128,
-    impulse: u8,
-}
 
 /// A move ready for the tick.
 #[derive(Clone, Debug, PartialEq)]

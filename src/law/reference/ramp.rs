@@ -7,7 +7,7 @@
 
 use core::ops::Neg;
 
-use super::{MotionScale, ReferenceSample};
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};

@@ -5,7 +5,7 @@
 //! written as forward differences, so position, velocity and acceleration are continuous over the whole stream and
 //! every set point is met to the unit.
 
-use super::{MotionScale, ReferenceSample};
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 

@@ -1,6 +1,6 @@
 //! Faults: their stable numbers and names, what they mean, what to do, and what the stage does by itself.
 
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
 
 /// What the stage does by itself when it finds a fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,13 +32,13 @@ pub enum FaultCode {
     /// The measured position lies beyond the travel.
     TravelExceeded = 7,
     /// The reference would not come to rest within the travel.
-    TravelAhead = 8,
+    PredictedSoftLimit = 8,
     /// The axis moves faster than it may.
     Overspeed = 9,
     /// Both lines of the encoder changed at once.
     EncoderInvalid = 10,
     /// The encoder shows no motion though the output is high.
-    EncoderSilent = 11,
+    EncoderSignalLoss = 11,
     /// The index pulse is not where the counts say.
     IndexMismatch = 12,
     /// A reading of the encoder was not taken in this tick.
@@ -83,10 +83,10 @@ impl FaultCode {
         Self::NegativeLimitSwitch,
         Self::PositiveLimitSwitch,
         Self::TravelExceeded,
-        Self::TravelAhead,
+        Self::PredictedSoftLimit,
         Self::Overspeed,
         Self::EncoderInvalid,
-        Self::EncoderSilent,
+        Self::EncoderSignalLoss,
         Self::IndexMismatch,
         Self::StaleSample,
         Self::AmplifierFault,
@@ -138,7 +138,7 @@ impl FaultCode {
             Self::NegativeLimitSwitch
             | Self::PositiveLimitSwitch
             | Self::TravelExceeded
-            | Self::TravelAhead
+            | Self::PredictedSoftLimit
             | Self::LinkLost
             | Self::StreamUnderrun
             | Self::HomeSwitchMissing
@@ -190,7 +190,7 @@ impl FaultCode {
                 "the measured position lies beyond the travel",
                 "reset, enable, and move back; check for overshoot and a pushing load, or widen travel_mm",
             ],
-            Self::TravelAhead => [
+            Self::PredictedSoftLimit => [
                 "travel-ahead",
                 "the motion would not have come to rest within the travel",
                 "end the motion within travel_mm, or reach the end more slowly; \
@@ -206,7 +206,7 @@ impl FaultCode {
                 "both lines of the encoder changed at once: counts are lost",
                 "check the encoder's cable, shield and supply, and its largest edge rate; then home again",
             ],
-            Self::EncoderSilent => [
+            Self::EncoderSignalLoss => [
                 "encoder-silent",
                 "the encoder showed no motion though the output was high for silent_s",
                 "check the encoder's cable and both its lines, the amplifier's enable line, and for a blocked axis",
@@ -337,7 +337,7 @@ impl Default for StreamLoss {
 
 /// Why the outputs cannot be enabled at present: an input that is bad.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Obstacle {
+pub struct EnableInterlock {
     /// The fault that the input would be, were the outputs enabled.
     pub code: FaultCode,
     /// On which axis, if on one.

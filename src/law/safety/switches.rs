@@ -1,7 +1,8 @@
 //! What the board's digital inputs say, as a set of bits. All are active-true: polarity is the board's business, and a
 //! broken wire reads as active.
 
-use crate::law::safety::{AxisName, FaultCode, Obstacle};
+use super::fault::{EnableInterlock, FaultCode};
+use crate::law::axes::AxisName;
 
 /// Bits of each axis.
 const BITS_PER_AXIS: u32 = 5;
@@ -107,9 +108,9 @@ impl Switches {
     }
 
     /// The first that speaks against enabled outputs.
-    pub(crate) fn obstacle(self) -> Option<Obstacle> {
+    pub(crate) fn interlock(self) -> Option<EnableInterlock> {
         if self.emergency_stop() {
-            return Some(Obstacle {
+            return Some(EnableInterlock {
                 code: FaultCode::EmergencyStop,
                 axis: None,
             });
@@ -123,7 +124,7 @@ impl Switches {
             } else {
                 continue;
             };
-            return Some(Obstacle {
+            return Some(EnableInterlock {
                 code,
                 axis: Some(axis),
             });

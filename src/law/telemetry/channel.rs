@@ -5,9 +5,10 @@ use core::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use super::Observation;
+use super::observation::Observation;
+use crate::law::axes::AxisName;
 use crate::law::axis::AxisState;
-use crate::law::safety::{AxisName, SafetyState};
+use crate::law::safety::SafetyState;
 use crate::law::scalar::{Quantity, Scalar};
 
 /// A signal of an axis. The numbers are stable: they cross the link.
@@ -37,7 +38,7 @@ pub enum AxisSignal {
     /// Feedforward of inertia, V.
     Inertia = 10,
     /// What remains of a bumpless change's offset, V.
-    Transfer = 11,
+    BumplessOffset = 11,
     /// Output after all limits, V.
     Output = 12,
     /// The converter's word.
@@ -164,7 +165,7 @@ impl AxisSignal {
         Self::Viscous,
         Self::Gms,
         Self::Inertia,
-        Self::Transfer,
+        Self::BumplessOffset,
         Self::Output,
         Self::Code,
         Self::LimitedBy,
@@ -186,7 +187,7 @@ impl AxisSignal {
             Self::Viscous => "viscous",
             Self::Gms => "gms",
             Self::Inertia => "inertia",
-            Self::Transfer => "transfer",
+            Self::BumplessOffset => "transfer",
             Self::Output => "output",
             Self::Code => "code",
             Self::LimitedBy => "limited-by",
@@ -211,7 +212,7 @@ impl AxisSignal {
             Self::Viscous => volts(seen.feedforward.viscous),
             Self::Gms => volts(seen.feedforward.gms),
             Self::Inertia => volts(seen.feedforward.inertia),
-            Self::Transfer => volts(seen.transfer),
+            Self::BumplessOffset => volts(seen.bumpless_offset),
             Self::Output => volts(seen.output),
             Self::Code => i32::from(seen.code.0) as u32,
             Self::LimitedBy => seen.limited_by as u32,
@@ -299,17 +300,9 @@ impl Channel {
     /// Its word at this tick.
     #[inline(always)]
     pub fn read<S: Scalar, const N: usize>(self, seen: &Observation<'_, S, N>) -> u32 {
-        let [x, y, z] = seen.stage.axes();
         match self {
             Self::Stage(signal) => signal.read(seen),
-            Self::Axis(name, signal) => {
-                let axis = match name {
-                    AxisName::X => x,
-                    AxisName::Y => y,
-                    AxisName::Z => z,
-                };
-                signal.read(axis)
-            }
+            Self::Axis(name, signal) => signal.read(&seen.stage.axes()[name]),
         }
     }
 }

@@ -3,7 +3,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::{Sample, Selection};
+use super::sampler::Sample;
+use super::selection::Selection;
 
 /// Words that a block holds: 14 samples of 8 channels, 112 of one.
 pub const BLOCK_WORDS: usize = 112;

@@ -1,6 +1,7 @@
 //! The fast half of telemetry: at most one sample a tick, at most [`MAX_CHANNELS`] reads.
 
-use super::{MAX_CHANNELS, Observation, Selection};
+use super::observation::Observation;
+use super::selection::{MAX_CHANNELS, Selection};
 use crate::law::scalar::Scalar;
 
 /// What is sampled. The slow half makes it and hands it over whole.

@@ -9,7 +9,7 @@ use std::process::Stdio;
 use std::time::Duration;
 
 use anyhow::{Context, Result, anyhow};
-use quadrant::safety::Command;
+use quadrant::command::Command;
 
 use super::bench::Bench;
 use super::case::{moving, setup};

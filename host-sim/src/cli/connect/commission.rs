@@ -2,8 +2,8 @@
 
 use anyhow::Context;
 use clap::Args;
+use quadrant::axes::AxisName;
 use quadrant::link::message::Body;
-use quadrant::safety::AxisName;
 use quadrant_sim::console::rig::{ConnectedRig, room_mm};
 use quadrant_sim::console::{Client, settings};
 use quadrant_sim::settings_file::SettingsFile;

@@ -14,9 +14,10 @@ mod driven;
 pub mod tracking;
 
 use indicatif::ProgressBar;
+use quadrant::friction::FrictionSettings;
 use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
-use quadrant::settings::{AxisSettings, FrictionSettings};
+use quadrant::settings::AxisSettings;
 use rayon::prelude::*;
 
 use crate::identify::single_state::{presliding_range_mm, with_all_models};
