@@ -227,7 +227,7 @@ fn place_control<S: Scalar>(
     plan: Plan<S>,
     ends: ControlEnds<'static, 'static, S>,
 ) -> &'static mut Control<'static, 'static, S> {
-    place.write(Control::new(axes, streaming, plan, ends))
+    place.write(Control::new(axes.into(), streaming, plan, ends))
 }
 
 /// Makes the slow half in its place.

@@ -198,13 +198,16 @@ mod app {
             }
         }
         let outputs = cx.local.control.tick(&Inputs {
-            readings: cx.local.encoders.read(),
+            readings: cx.local.encoders.read().into(),
             switches,
             command: cx.local.commands_out.dequeue(),
             deadline_missed: *cx.local.deadline_missed,
             link_lost: LINK_LOST.load(Ordering::Relaxed),
+            ..Inputs::default()
         });
-        cx.local.amplifiers.write(outputs.codes, outputs.enabled);
+        cx.local
+            .amplifiers
+            .write(outputs.codes.into_array(), outputs.enabled);
 
         TICK.store(cx.local.control.state().tick(), Ordering::Relaxed);
         if let Some(request) = cx.local.operator.request() {

@@ -39,7 +39,7 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
     }
 
     /// A machine on built settings, with a plan that settings cannot hold, such as a recorded table.
-    pub fn with_plan(stage: Stage<S, N>, plan: Plan<S>) -> Self {
+    pub fn with_plan(stage: Stage<S, N>, plan: impl Into<Plan<S>>) -> Self {
         Self {
             stage,
             plan,

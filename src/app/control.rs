@@ -32,13 +32,13 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(
-        axes: [&'a mut Axis<S>; 3],
+        axes: PerAxis<&'a mut Axis<S>>,
         streaming: StreamLoss,
         plan: Plan<S>,
         ends: ControlEnds<'q, 'a, S>,
     ) -> Self {
         Self {
-            axes: axes.into(),
+            axes,
             streaming,
             plan,
             state: StageState::default(),

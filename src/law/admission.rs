@@ -10,7 +10,7 @@ use crate::law::safety::{EnableInterlock, Fault, FaultCode, SafetyState};
 /// The state of the stage, as far as a command depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageView {
-    /// Who drives the outputs.
+    /// The safety state after the last tick.
     pub safety: SafetyState,
     /// A motion is under way.
     pub running: bool,

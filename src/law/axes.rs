@@ -26,9 +26,9 @@ use strum::{AsRefStr, Display, EnumString, IntoStaticStr, VariantNames};
 pub enum AxisName {
     /// Index 0 in every array of three.
     X,
-    /// Index 1.
+    /// Index 1 in every array of three.
     Y,
-    /// Index 2.
+    /// Index 2 in every array of three.
     Z,
 }
 

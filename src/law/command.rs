@@ -3,7 +3,7 @@
 use crate::law::axes::AxisName;
 use crate::law::reference::Velocity;
 
-/// What a person or a host asks of the stage. Each takes effect once, at the next tick.
+/// A request of a person or a host to the stage. Each takes effect once, at the next tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
     /// Switch the outputs on, holding the present position. Refused while a fault is latched or an input is bad.

@@ -21,7 +21,7 @@
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
-use strum::{AsRefStr, EnumString, VariantNames};
+use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
 
 use crate::law::friction::bristle::Bristle;
 use crate::law::friction::dahl::Dahl;
@@ -32,7 +32,7 @@ use crate::law::friction::stribeck::{Sliding, SlidingTable};
 use crate::law::friction::{Direction, FrictionSettings, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 
-/// Which friction models act.
+/// The friction models that act together.
 #[derive(
     Clone,
     Copy,
@@ -44,12 +44,14 @@ use crate::law::scalar::{Quantity, Scalar};
     Deserialize,
     AsRefStr,
     EnumString,
+    VariantArray,
     VariantNames,
+    EnumCount,
 )]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum FeedforwardKind {
-    /// No friction feedforward.
+    /// No friction feedforward; inertia may act.
     #[default]
     None,
     /// The static model: Stribeck curve and viscous friction.
@@ -67,21 +69,13 @@ pub enum FeedforwardKind {
 }
 
 impl FeedforwardKind {
-    /// All kinds.
-    pub const ALL: [Self; 7] = [
-        Self::None,
-        Self::Static,
-        Self::Gms,
-        Self::Combined,
-        Self::Dahl,
-        Self::Lugre,
-        Self::SmoothedGms,
-    ];
+    /// All kinds, in the order of their tables.
+    pub const ALL: [Self; Self::COUNT] = *<Self as VariantArray>::VARIANTS.first_chunk().unwrap();
 
     /// Those that the thesis compares, in the order of its tables.
     pub const THESIS: [Self; 4] = [Self::None, Self::Static, Self::Gms, Self::Combined];
 
-    /// Its name in tables.
+    /// The name of it in tables and figures.
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -94,23 +88,23 @@ impl FeedforwardKind {
         }
     }
 
-    /// Whether the static model's `s(v) sgn(v)` acts.
+    /// True if the static model's `s(v) sgn(v)` acts.
     const fn has_static_level(self) -> bool {
         matches!(self, Self::Static)
     }
 
-    /// Whether a pre-sliding model acts.
+    /// True if a pre-sliding model acts.
     const fn has_presliding(self) -> bool {
         !matches!(self, Self::None | Self::Static)
     }
 
-    /// Whether viscous friction acts.
+    /// True if viscous friction acts.
     const fn has_viscous(self) -> bool {
         !matches!(self, Self::None | Self::Gms)
     }
 }
 
-/// How much of each effect is fed forward.
+/// The share of each effect that is fed forward.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedforwardGains {
@@ -124,27 +118,27 @@ pub struct FeedforwardGains {
     pub inertia_v_s2_per_mm: f64,
 }
 
-/// What the reference does in one tick, seen far enough ahead.
+/// The reference's motion in one tick, as far ahead as the feedforward looks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceStep<S> {
     /// Displacement since the last tick, mm.
     pub displacement: S,
-    /// Velocity, mm/s.
+    /// Velocity of the reference, mm/s.
     pub velocity: S,
-    /// Acceleration, mm/s^2.
+    /// Acceleration of the reference, mm/s^2.
     pub acceleration: S,
 }
 
-/// What is fed forward, term by term, V.
+/// The feedforward, term by term, V.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedforwardTerms<S> {
     /// The static model's Coulomb and Stribeck level.
     pub level: S,
-    /// Viscous friction.
+    /// Viscous friction, `sigma v`.
     pub viscous: S,
     /// The pre-sliding model: the GMS elements, smoothed or not, or the bristles.
     pub gms: S,
-    /// Inertia.
+    /// Inertia, `a / A`.
     pub inertia: S,
 }
 
@@ -299,7 +293,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         self.presliding.fill_tables(friction, period_s);
     }
 
-    /// One control period.
+    /// Advances by one control period.
     #[inline(always)]
     pub fn step(
         &self,

@@ -58,7 +58,7 @@ pub struct HomingInput {
     pub switches: AxisSwitches,
     /// Position at the index pulse, if one passed since the last tick.
     pub index: Option<Position>,
-    /// Measured position.
+    /// Measured position, 2^-16 counts.
     pub measured: Position,
 }
 

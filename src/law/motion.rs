@@ -9,17 +9,17 @@ use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 
-/// What the reference of an axis follows.
+/// The source that the reference of an axis follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum MotionMode {
     /// Nothing: the reference stands.
     #[default]
     Hold,
-    /// The plan's motion.
+    /// The motion of the plan.
     Plan,
     /// A velocity that a person or a host gives.
     Jog,
-    /// The homing routine.
+    /// The homing routine of the axis.
     Home,
     /// Set points from a host.
     Stream,
@@ -139,7 +139,7 @@ impl<S: Scalar> GeneratorState<S> {
     }
 }
 
-/// What the generator asks of the axis in a tick, beside the reference.
+/// Request of the generator to the axis in a tick, beside the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum GeneratorEvent {
     None,

@@ -91,7 +91,7 @@ pub struct Stage<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
 /// A stage in pieces, so that one axis can be exchanged without moving the others.
 #[derive(Clone, Copy, Debug)]
 pub struct StageRef<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
-    /// The axes.
+    /// The axes x, y and z.
     pub axes: PerAxis<&'a Axis<S, N>>,
     /// Reactions to the end of set points.
     pub streaming: StreamLoss,
@@ -144,12 +144,12 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         });
     }
 
-    /// The axes' memories.
+    /// The memories of x, y and z.
     pub fn axes(&self) -> &PerAxis<AxisState<S, N>> {
         &self.axes
     }
 
-    /// The safety state.
+    /// The safety state after the last tick.
     pub fn safety(&self) -> SafetyState {
         self.safety
     }

@@ -1,4 +1,4 @@
-//! What the reference board's words mean: the board's own file, on the host.
+//! The meaning of the reference board's words: the board's own file, on the host.
 
 use quadrant::axes::AxisName;
 use quadrant::hal::ResetCause;

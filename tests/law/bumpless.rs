@@ -13,7 +13,7 @@ const RESOLUTION_MM: f64 = 5e-4;
 /// Ticks before the change: into the motion, out of the lead-in.
 const BEFORE: usize = 2000;
 const AFTER: usize = 4000;
-/// How far the machine lags when the change comes.
+/// Lag of the machine when the change comes.
 const LAG_MM: f64 = 0.05;
 
 fn plan() -> PlanSettings {

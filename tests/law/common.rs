@@ -1,4 +1,4 @@
-//! What several tests share.
+//! Fixtures that several tests share.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
@@ -55,7 +55,7 @@ impl Noise {
         self.0
     }
 
-    /// One of `-most..=most`.
+    /// Draws a number of `-most..=most`.
     pub(crate) fn counts(&mut self, most: i64) -> i64 {
         (self.bits() >> 16) as i64 % (2 * most + 1) - most
     }

@@ -1,4 +1,4 @@
-//! What every feedback law promises, whichever it is.
+//! Promises of every feedback law, whichever it is.
 
 use proptest::prelude::*;
 use quadrant::control::feedback::{Feedback, LawKind};

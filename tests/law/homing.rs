@@ -19,7 +19,7 @@ const PULSE: i64 = 8_000;
 /// The machine around the x axis, in its own counts, of which the encoder knows nothing.
 struct Machine {
     rig: Rig<f32>,
-    /// Where the encoder's counter was switched on.
+    /// Position at which the encoder's counter was switched on.
     start: i64,
     raw: i64,
     /// The table, which hangs behind the screw by the play.
@@ -28,7 +28,7 @@ struct Machine {
     switch: Box<dyn Fn(i64) -> AxisSwitches>,
     has_index: bool,
     noise: Noise,
-    /// How far the switch's edge scatters.
+    /// Scatter of the switch's edge.
     scatter: i64,
 }
 

@@ -1,4 +1,4 @@
-//! How an injected voltage ends: what ends it, in which tick, and what the axes do then.
+//! The ends of an injected voltage: their causes, their ticks, and the axes' reactions.
 
 use quadrant::axes::AxisName;
 use quadrant::command::Command;

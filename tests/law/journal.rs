@@ -1,4 +1,4 @@
-//! What the board's own log finds worth telling.
+//! The events that the board's own log tells.
 
 use quadrant::admission::StageView;
 use quadrant::app::{Journal, MOST_NEWS, Meters, News, Vitals};

@@ -72,7 +72,7 @@ pub(crate) fn standing(settings: &StageSettings) -> Rig<f32> {
     rig
 }
 
-/// What goes wrong on an axis from a tick on; the tick counts from zero.
+/// A flaw of an axis from a tick on; the tick counts from zero.
 type Cause = fn(&mut Rig<f32>, AxisName, u32);
 
 struct Case {

@@ -1,4 +1,4 @@
-//! What the fields of the settings must hold together.
+//! Conditions that fields of the settings must hold together.
 
 use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;

@@ -1,4 +1,4 @@
-//! What the supervising task lets through, and what it tells.
+//! The commands that the supervising task lets through, and the events that it tells.
 
 use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
@@ -45,7 +45,7 @@ const STOPPING: StageView = StageView {
     ..DISABLED
 };
 
-/// What a supervisor that has seen `before` decides on `view`.
+/// The decision on `view` of a supervisor that has seen `before`.
 fn decide(before: StageView, view: StageView, request: Option<Command>) -> Decision {
     let mut supervisor = Supervisor::default();
     supervisor.step(before, None);

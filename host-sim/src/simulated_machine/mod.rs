@@ -288,11 +288,9 @@ impl<S: Scalar> Running<S> {
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
     pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, After) {
         let outputs = self.control.tick(&Inputs {
-            readings: inputs.readings,
-            switches: inputs.switches,
             command: self.command.take(),
-            deadline_missed: false,
             link_lost: self.server.link_lost(),
+            ..inputs.inputs()
         });
         if self.requests.len() < REQUESTS {
             self.requests.extend(inputs.request);

@@ -216,7 +216,7 @@ impl hal::Amplifiers for Amplifiers {
         self.mismatches = [x != held_x, y != held_y, z != held_z];
         let answer = OutputRecord {
             outputs: Outputs {
-                codes: held,
+                codes: held.into(),
                 enabled: enabled && self.mismatches == [false; 3],
             },
         };

@@ -196,7 +196,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
-    /// The encoder's counter.
+    /// The encoder's counter; 32 bits unless given.
     #[must_use]
     pub fn encoder(self, encoder: Encoder) -> Self {
         self.axis.encoder = encoder;
@@ -396,7 +396,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.injected
     }
 
-    /// Measured position.
+    /// Measured position, 2^-16 counts.
     #[inline(always)]
     pub(crate) fn measured(&self) -> Position {
         self.encoder.position()

@@ -7,22 +7,22 @@ use crate::law::feedforward::FeedforwardTerms;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{DacCode, EncoderCount, Position};
 
-/// What acts as a limit on an axis' output in this tick.
+/// The limit that acts on an axis' output in this tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub enum LimitedBy {
-    /// Nothing.
+    /// No limit acts on it.
     #[default]
     Nothing,
-    /// The output limit.
+    /// The output limit of the amplifier's settings.
     OutputLimit,
 }
 
 /// One axis at one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AxisTelemetry<S> {
-    /// Reference position.
+    /// Reference position of the feedback, 2^-16 counts.
     pub reference: Position,
-    /// Measured position.
+    /// Measured position in whole counts.
     pub measured: EncoderCount,
     /// Tracking error e, reference minus measured, mm.
     pub error: S,
@@ -32,7 +32,7 @@ pub struct AxisTelemetry<S> {
     pub feedback: FeedbackTerms<S>,
     /// Feedforward, term by term.
     pub feedforward: FeedforwardTerms<S>,
-    /// What remains of the offset that made the last change of settings bumpless, V.
+    /// Rest of the offset that made the last change of settings bumpless, V.
     pub bumpless_offset: S,
     /// Output after all limits, V.
     pub output: S,
@@ -40,17 +40,17 @@ pub struct AxisTelemetry<S> {
     pub code: DacCode,
     /// The sum of all words so far, this one included; wraps.
     pub code_sum: i32,
-    /// What limits the output.
+    /// The limit that acts on the output.
     pub limited_by: LimitedBy,
 }
 
 impl<S: Scalar> AxisTelemetry<S> {
-    /// Tracking error, mm.
+    /// Tracking error, reference minus measured, mm.
     pub fn error_mm(&self) -> f32 {
         self.error.to_f32(Quantity::Length)
     }
 
-    /// Output, V.
+    /// Output after all limits, V.
     pub fn output_v(&self) -> f32 {
         self.output.to_f32(Quantity::Voltage)
     }

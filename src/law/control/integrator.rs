@@ -1,4 +1,4 @@
-//! How every law closes: the integral is added, the output is cut to its bounds, and while it is cut the integral takes
+//! The end of every law: the integral is added, the output is cut to its bounds, and while it is cut the integral takes
 //! nothing that would push it further out.
 
 use super::terms::{FeedbackState, FeedbackTerms};

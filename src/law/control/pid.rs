@@ -39,7 +39,7 @@ impl PidGains {
         }
     }
 
-    /// Whether every gain is finite and within the range its field states.
+    /// True if every gain is finite and within the range its field states.
     pub fn is_valid(&self) -> bool {
         let not_negative = |x: f64| x.is_finite() && x >= 0.0;
         self.kp_v_per_mm.is_finite()

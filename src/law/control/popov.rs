@@ -1,4 +1,4 @@
-//! How much nonlinear gain the loop bears: the Popov criterion.
+//! The largest nonlinear gain that the loop bears: the Popov criterion.
 //!
 //! N-PID puts a gain `k(e)` in front of a linear loop `L`. The loop is absolutely stable for every constant or
 //! error-dependent gain in `[1, k_max]` if, with the lower bound of that sector shifted to zero (`H = L / (1 + L)`,
@@ -47,7 +47,7 @@ pub fn sector_bound(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) ->
     sector_proof(plant, gains, sample_time_s).popov
 }
 
-/// What is proven of a loop with a varying gain in front of it.
+/// The gains up to which a loop with a varying gain in front of it is proven stable.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SectorProof {
     /// [`sector_bound`]: stable for every gain from 1 to this that depends on the error alone.
@@ -94,7 +94,7 @@ pub fn sector_proof(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) ->
     }
 }
 
-/// The largest answer.
+/// The largest answer: it stands for no limit.
 const NO_LIMIT: f64 = 1e6;
 /// Points of the frequency grid.
 const POINTS: usize = 512;
@@ -164,7 +164,7 @@ impl Loop {
             .max(gain * self.gains.kd_v_s_per_mm)
     }
 
-    /// H.
+    /// `H = L / (1 + L)`, the loop with the lower bound of the sector shifted to zero.
     fn shifted(&self, omega: f64) -> Complex64 {
         let (numerator, characteristic) = self.polynomials(omega);
         numerator / characteristic
@@ -255,7 +255,7 @@ struct PopovPlot {
     crossing: f64,
     /// No point above the grid lies further left or higher than this.
     tail: (f64, f64),
-    /// Where the search for q ends, s.
+    /// Upper end of the search for q, s.
     largest_q: f64,
 }
 

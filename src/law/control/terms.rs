@@ -2,7 +2,7 @@
 
 use crate::law::scalar::Scalar;
 
-/// What a law reads in one tick.
+/// Inputs of a law in one tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedbackInput<S> {
     /// Tracking error e, mm.
@@ -14,26 +14,26 @@ pub struct FeedbackInput<S> {
 /// The memory of a law, the same for all.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FeedbackState<S: Scalar> {
-    /// The integral, V.
+    /// The integral's sum, V.
     pub(super) integral: S::Sum,
     /// The filtered derivative, V.
     pub(super) derivative: S,
-    /// What was differentiated last, mm.
+    /// The error that was differentiated last, mm.
     pub(super) last_error: S,
 }
 
-/// What a law put out, term by term, V.
+/// Outputs of a law, term by term, V.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedbackTerms<S> {
-    /// What follows the error itself. PID: Kp f. Cascade: G (v_set - v_ref). Sliding mode: the saturated surface.
+    /// The term that follows the error itself. PID: Kp f. Cascade: G (v_set - v_ref). Sliding mode: the saturated surface.
     /// NCTF: G n(e).
     pub proportional: S,
-    /// The integral.
+    /// The integral of the driving error, V.
     pub integral: S,
-    /// What follows the error's filtered rate.
+    /// The term that follows the error's filtered rate.
     pub derivative: S,
     /// The sum, within the bounds given to the step.
     pub output: S,
-    /// Whether the bounds cut the output.
+    /// True if the bounds cut the output.
     pub saturated: bool,
 }

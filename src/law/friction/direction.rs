@@ -11,9 +11,9 @@ use strum::{AsRefStr, EnumString, VariantNames};
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum Direction {
-    /// Towards larger positions.
+    /// Motion towards larger positions.
     Positive,
-    /// Towards smaller positions.
+    /// Motion towards smaller positions.
     Negative,
 }
 

@@ -16,7 +16,7 @@ use super::stribeck::StaticFriction;
 pub struct FrictionSettings {
     /// The static model, for each sense of motion.
     pub sliding: PerDirection<StaticFriction>,
-    /// The GMS model.
+    /// The elements of the GMS model.
     pub gms: GmsParameters,
     /// Parameters of the smoothed GMS beyond those of the GMS.
     #[serde(default)]

@@ -51,9 +51,9 @@ impl StribeckCurve {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StaticFriction {
-    /// s(v).
+    /// The Stribeck curve, s(v).
     pub curve: StribeckCurve,
-    /// sigma, V s/mm.
+    /// sigma, viscous friction, V s/mm; zero or more.
     pub viscous_v_s_per_mm: f64,
 }
 
@@ -71,10 +71,10 @@ impl StaticFriction {
     }
 }
 
-/// What the sliding surface is at this instant.
+/// The sliding surface at one velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sliding<S> {
-    /// s(v), V.
+    /// Level of the surface, s(v), V.
     pub level: S,
     /// exp(-C Ts / s(v)): what is left, after one step, of a slipping element's distance from its share of s(v).
     pub decay: S,

@@ -10,11 +10,11 @@ use super::motion::MotionSettings;
 /// A plane of the stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Plane {
-    /// x and y.
+    /// The plane of x and y, G17.
     Xy,
-    /// y and z.
+    /// The plane of y and z, G19.
     Yz,
-    /// z and x.
+    /// The plane of z and x, G18.
     Zx,
 }
 
@@ -32,9 +32,9 @@ impl Plane {
 /// A sense of rotation, seen with the plane's first axis to the right and the second up.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Sense {
-    /// Counter-clockwise, G3.
+    /// Mathematically positive: counter-clockwise, G3.
     CounterClockwise,
-    /// Clockwise, G2.
+    /// Mathematically negative: clockwise, G2.
     Clockwise,
 }
 

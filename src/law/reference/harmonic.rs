@@ -64,7 +64,7 @@ pub struct Harmonic<S: Scalar> {
     lead_step: u64,
     /// Ticks at full speed; more than can elapse when there is no end.
     cruise_ticks: u32,
-    /// When the lead-out has ended, if it ever does.
+    /// Tick after the lead-out, if it ever ends.
     end_tick: Option<u32>,
     velocity: S::Gain,
     centripetal: S::Gain,
@@ -72,13 +72,13 @@ pub struct Harmonic<S: Scalar> {
     q30: S::Gain,
 }
 
-/// Where a tick lies in a harmonic motion.
+/// The part of a harmonic motion that a tick lies in.
 enum Lead {
     /// In the lead-in or the lead-out, at this tick from its standing end.
     Under { tick: u32, leaving: bool },
-    /// Between them.
+    /// Between lead-in and lead-out.
     FullSpeed,
-    /// After the lead-out.
+    /// After the lead-out: at rest.
     Ended,
 }
 
@@ -145,7 +145,7 @@ impl<S: Scalar> Harmonic<S> {
         }
     }
 
-    /// Where a tick lies in the motion.
+    /// Returns the part of the motion that a tick lies in.
     #[inline(always)]
     fn lead(&self, elapsed: u32) -> Lead {
         if elapsed < self.lead_ticks {

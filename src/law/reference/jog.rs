@@ -5,7 +5,7 @@ use super::sample::ReferenceSample;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 
-/// What a jog is to do.
+/// The target of a jog.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JogState {
     target: Velocity,
@@ -23,7 +23,7 @@ impl JogState {
         }
     }
 
-    /// Whether it has come to its end: it rests and nothing asks for motion.
+    /// True if it has come to its end: it rests and nothing asks for motion.
     #[inline(always)]
     pub fn finished(&self, ramp: &RampState) -> bool {
         (self.held_back || self.target == Velocity::ZERO) && ramp.is_at_rest()

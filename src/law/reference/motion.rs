@@ -13,12 +13,12 @@ use crate::law::scalar::Scalar;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum MotionSettings {
-    /// Stay.
+    /// Stay where the axis is.
     #[default]
     Hold,
     /// A sine about the start, with lead-in and lead-out.
     Harmonic(HarmonicSettings),
-    /// A jerk-limited move.
+    /// A jerk-limited move over a distance.
     PointToPoint(PointToPointSettings),
 }
 
@@ -38,12 +38,12 @@ impl MotionSettings {
 /// A motion ready for the tick.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Motion<S: Scalar> {
-    /// Stay.
+    /// Stay where the axis is.
     #[default]
     Hold,
     /// A sine about the start.
     Harmonic(Harmonic<S>),
-    /// A jerk-limited move.
+    /// A jerk-limited move over a distance.
     PointToPoint(PointToPoint<S>),
     /// A recorded table of positions, relative to its first.
     Recorded(RecordedTable<S>),
@@ -77,7 +77,7 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
-    /// Whether the motion has come to its end and stays there.
+    /// True if the motion has come to its end and stays there.
     #[inline(always)]
     pub fn finished(&self, state: &MotionState) -> bool {
         match self {

@@ -12,7 +12,7 @@ pub(super) struct Chain {
     pub(super) impulse: u8,
 }
 
-/// How far a motion has come.
+/// The memory of a motion: its origin and its progress.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct MotionState {
     pub(super) origin: Position,

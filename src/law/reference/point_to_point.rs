@@ -17,13 +17,13 @@ use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointToPointSettings {
-    /// Signed distance, mm.
+    /// Signed distance, mm; not zero.
     pub distance_mm: f64,
-    /// Largest velocity, mm/s.
+    /// Largest velocity, mm/s; above zero.
     pub max_velocity_mm_s: f64,
-    /// Largest acceleration, mm/s^2.
+    /// Largest acceleration, mm/s^2; above zero.
     pub max_acceleration_mm_s2: f64,
-    /// Largest jerk, mm/s^3.
+    /// Largest jerk, mm/s^3; above zero.
     pub max_jerk_mm_s3: f64,
 }
 
@@ -47,7 +47,7 @@ impl PointToPointSettings {
         [distance / (jerk * time * time), time, time]
     }
 
-    /// How long the move takes, s, but for rounding to whole ticks.
+    /// Duration of the move, s, but for rounding to whole ticks.
     pub(crate) fn duration_s(&self) -> f64 {
         self.durations_s().iter().sum()
     }

@@ -2,14 +2,14 @@
 
 use crate::law::units::Position;
 
-/// Where an axis should be at one tick, and how it should be moving.
+/// Position of the reference at one tick, with its derivatives.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceSample<S> {
-    /// Position.
+    /// Position of the reference, 2^-16 counts.
     pub position: Position,
-    /// Velocity, mm/s.
+    /// Velocity of the reference, mm/s.
     pub velocity: S,
-    /// Acceleration, mm/s^2.
+    /// Acceleration of the reference, mm/s^2.
     pub acceleration: S,
 }
 
@@ -18,6 +18,6 @@ pub struct ReferenceSample<S> {
 pub struct MotionScale {
     /// Length of one encoder count, mm.
     pub resolution_mm: f64,
-    /// Control rate, 1/s.
+    /// Control ticks per second, 1/s.
     pub rate_hz: f64,
 }

@@ -66,14 +66,14 @@ impl AxisPoint {
     }
 }
 
-/// What a stream may ask of an axis.
+/// Limits of an axis that a stream must keep to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StreamLimits {
-    /// The axis' scale.
+    /// Resolution and control rate of the axis.
     pub scale: MotionScale,
-    /// Largest velocity, mm/s.
+    /// Largest velocity, mm/s; above zero.
     pub max_velocity_mm_s: f64,
-    /// Largest acceleration, mm/s^2.
+    /// Largest acceleration, mm/s^2; above zero.
     pub max_acceleration_mm_s2: f64,
     /// Lowest and highest position, if the axis knows where it is.
     pub travel: Option<(Position, Position)>,
@@ -84,7 +84,7 @@ pub struct StreamLimits {
 pub struct SetPoint {
     /// Counts the periods from the start, where the axes rest; from 1.
     pub number: u32,
-    /// The axes.
+    /// The set points of x, y and z.
     pub axes: [AxisPoint; 3],
     /// The stream ends here.
     pub last: bool,
@@ -209,7 +209,7 @@ struct Bounds<'a> {
     acceleration: i128,
 }
 
-/// One position unit.
+/// One unit of a position, 2^-16 counts, in 2^-33 units.
 const UNIT: i128 = 1 << FRACTION_BITS;
 
 impl<'a> Bounds<'a> {
@@ -237,7 +237,7 @@ impl<'a> Bounds<'a> {
         self.limits.scale.resolution_mm / POSITION_UNITS_PER_COUNT
     }
 
-    /// What needs no segment: the set points themselves and the mean velocity between them. After it no product of
+    /// Checks what needs no segment: the set points themselves and the mean velocity between them. After it no product of
     /// [`connect`] overflows.
     fn check_ends(&self, from: &AxisPoint, to: &AxisPoint) -> Result<(), StreamFlaw> {
         let distance = i128::from(to.position.0) - i128::from(from.position.0);
@@ -298,7 +298,7 @@ impl<'a> Bounds<'a> {
     }
 }
 
-/// What is wrong with a set point.
+/// The flaw of a refused set point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StreamFlaw {
     /// Its number is not above the last one's.
@@ -308,39 +308,39 @@ pub enum StreamFlaw {
     },
     /// Too many set points are missing before it, or the time without one is too long.
     Missing {
-        /// How many are missing.
+        /// Number of set points that are missing.
         missing: u32,
     },
     /// The way to it is faster than the axis may move.
     Velocity {
-        /// The axis.
+        /// The axis that would do so.
         axis: AxisName,
-        /// The velocity, mm/s.
+        /// Velocity on the way, mm/s.
         value_mm_s: f64,
-        /// The limit, mm/s.
+        /// Largest allowed velocity, mm/s.
         limit_mm_s: f64,
     },
     /// The way to it accelerates more than the axis may.
     Acceleration {
-        /// The axis.
+        /// The axis that would do so.
         axis: AxisName,
-        /// The acceleration, mm/s^2.
+        /// Acceleration on the way, mm/s^2.
         value_mm_s2: f64,
-        /// The limit, mm/s^2.
+        /// Largest allowed acceleration, mm/s^2.
         limit_mm_s2: f64,
     },
     /// The way to it leaves the axis' travel.
     Travel {
-        /// The axis.
+        /// The axis that would do so.
         axis: AxisName,
-        /// The position, mm.
+        /// Position on the way, mm.
         value_mm: f64,
         /// The end of the travel that it lies beyond, mm.
         limit_mm: f64,
     },
     /// It is the last, and the axis is not at rest there.
     NotAtRest {
-        /// The axis.
+        /// The axis that would do so.
         axis: AxisName,
     },
 }
@@ -348,9 +348,9 @@ pub enum StreamFlaw {
 /// A refused set point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StreamError {
-    /// Its number.
+    /// Number of the set point.
     pub number: u32,
-    /// What is wrong.
+    /// The reason for the refusal.
     pub flaw: StreamFlaw,
 }
 

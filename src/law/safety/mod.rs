@@ -1,4 +1,4 @@
-//! Who may drive the outputs: states, faults, and the monitors that find them.
+//! The safety of the outputs: states, faults, and the monitors that find them.
 //!
 //! ```text
 //!   Start --good inputs--> Disabled --Enable, good inputs--> Enabled --fault, Stop--> Stopping --at rest--> Faulted

@@ -9,7 +9,7 @@ const SPEED_FRACTION_BITS: u32 = 8;
 const SPEED_FILTER_BITS: u32 = 3;
 /// No axis moves further in a tick, counts; an encoder that does so is faulty, and its filter shall not wrap.
 const LARGEST_STEP: i32 = 1 << 16;
-/// What quantisation and noise add to a filtered speed, counts per tick.
+/// Addition of quantisation and noise to a filtered speed, counts per tick.
 const SPEED_NOISE_COUNTS: f64 = 0.5;
 
 /// Watches the measured speed.
@@ -18,7 +18,7 @@ pub struct Overspeed {
     limit: u32,
 }
 
-/// The filtered speed.
+/// The memory of the filtered speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverspeedState {
     /// In 2^-8 counts per tick.
@@ -34,7 +34,7 @@ impl OverspeedState {
 }
 
 impl Overspeed {
-    /// No limit.
+    /// A limit that no speed exceeds.
     pub const UNLIMITED: Self = Self { limit: u32::MAX };
 
     /// A limit in counts per tick, at most 2^16; half a count is added for the quantisation. Settings time only.
@@ -81,7 +81,7 @@ impl<S: Scalar> SignalLoss<S> {
         }
     }
 
-    /// Finds nothing.
+    /// A monitor that finds nothing.
     pub fn off() -> Self {
         Self {
             level: S::ZERO,

@@ -1,9 +1,9 @@
-//! Who drives the outputs.
+//! The safety states, and their changes by faults and commands.
 
 use super::fault::{Fault, Reaction};
 use crate::law::command::Command;
 
-/// Who drives the outputs.
+/// The safety state: it alone decides who drives the outputs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum SafetyState {
     /// Nobody: no good inputs have been seen yet. The state at start.
@@ -11,22 +11,22 @@ pub enum SafetyState {
     Start,
     /// Nobody: zero volts, amplifiers disabled.
     Disabled,
-    /// The control law.
+    /// The control law drives the outputs.
     Enabled,
-    /// The control law, while the axes brake; then the fault is latched.
+    /// The control law drives the outputs through a controlled stop (IEC 60204-1, category 1); then the fault is latched.
     Stopping(Fault),
     /// Nobody, until a reset.
     Faulted(Fault),
 }
 
 impl SafetyState {
-    /// Whether the outputs are enabled by request, and nothing is about to end that.
+    /// True if the outputs are enabled by request, and nothing is about to end that.
     #[inline(always)]
     pub const fn is_enabled(self) -> bool {
         matches!(self, Self::Enabled)
     }
 
-    /// Whether the control law drives the outputs: enabled, or braking after a fault.
+    /// True if the control law drives the outputs: enabled, or in a controlled stop after a fault.
     #[inline(always)]
     pub const fn drives(self) -> bool {
         matches!(self, Self::Enabled | Self::Stopping(_))

@@ -54,7 +54,7 @@ pub struct TravelState {
 }
 
 impl Travel {
-    /// No limits.
+    /// Limits that no machine reaches.
     pub const UNLIMITED: Self = {
         let everywhere = Range::new(Position(i64::MIN / 4), Position(i64::MAX / 4));
         Self {

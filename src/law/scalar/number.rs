@@ -59,7 +59,7 @@ pub trait Scalar:
     /// The value within `low..=high`, which must be ordered; `NaN` gives zero.
     fn limit(self, low: Self, high: Self) -> Self;
 
-    /// The magnitude.
+    /// The magnitude of the value.
     fn magnitude(self) -> Self {
         if self < Self::ZERO { -self } else { self }
     }
@@ -79,7 +79,7 @@ pub trait Scalar:
     fn into_sum(self) -> Self::Sum;
 }
 
-/// Where a logarithmic table starts: the first octave's lower bound, a power of two.
+/// The start of a logarithmic table: the first octave's lower bound, a power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OctaveStart<S: Scalar> {
     /// The key (exponent and leading mantissa bits) of the first octave's lower bound; negative, wrapped, when that lies

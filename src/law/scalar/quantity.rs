@@ -1,6 +1,6 @@
 //! The physical quantities of the law's signals, and their fixed-point formats.
 
-/// What a signal measures. In fixed point each has its own format; `docs/fixed-point.md` holds the range analysis.
+/// The physical quantity of a signal. In fixed point each has its own format; `docs/fixed-point.md` holds the range analysis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Quantity {
     /// Tracking error and displacement in a tick, mm. Fixed: Q5.26, +-32 mm in steps of 0.015 nm.

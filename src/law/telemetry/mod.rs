@@ -1,4 +1,4 @@
-//! What one tick can show: every term of the law, though none of it is state.
+//! Telemetry: every term of the law at one tick.
 //!
 //! [`AxisTelemetry`] is what the tick leaves behind. A [`Channel`] names one number of it, a [`Selection`] up to
 //! [`MAX_CHANNELS`] of them; the [`Sampler`] reads a selection in the control interrupt, and the [`Packer`] makes blocks of

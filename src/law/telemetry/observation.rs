@@ -3,12 +3,12 @@
 use crate::law::scalar::Scalar;
 use crate::law::stage::StageState;
 
-/// What can be read after a tick.
+/// Everything that can be read after a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a, S: Scalar, const N: usize> {
     /// The stage as the tick left it.
     pub stage: &'a StageState<S, N>,
-    /// How long the tick before took, in cycles of the board's tick timer.
+    /// Duration of the tick before, cycles of the board's tick timer.
     pub elapsed_cycles: u32,
     /// The tick was given a command.
     pub commanded: bool,

@@ -4,7 +4,7 @@ use super::observation::Observation;
 use super::selection::{MAX_CHANNELS, Selection};
 use crate::law::scalar::Scalar;
 
-/// What is sampled. The slow half makes it and hands it over whole.
+/// The selection that is sampled. The slow half makes it and hands it over whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sampler {
     selection: Option<Selection>,
@@ -12,7 +12,7 @@ pub struct Sampler {
     generation: u8,
 }
 
-/// The sampler's memory.
+/// The memory of the sampler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SamplerState {
     generation: u8,

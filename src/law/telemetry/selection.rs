@@ -1,4 +1,4 @@
-//! Which channels are sampled, and how often.
+//! Selections: the channels that are sampled together, and their period.
 
 use core::fmt;
 
@@ -18,7 +18,7 @@ pub struct Selection {
     decimation: u16,
 }
 
-/// Why a selection cannot be sampled.
+/// Reason why a selection cannot be sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SelectionError {
     /// The number of channels, which was none or more than [`MAX_CHANNELS`].

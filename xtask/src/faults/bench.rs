@@ -235,7 +235,7 @@ impl Bench {
         if self.twin.mode_of_x() == MotionMode::Stream {
             self.streams_since.get_or_insert(self.tick);
         }
-        let codes = held(told.codes, input.stuck);
+        let codes = held(told.codes.into_array(), input.stuck);
         self.mismatches = [0, 1, 2].map(|axis| codes[axis] != told.codes[axis]);
         Outputs {
             codes,

@@ -1,4 +1,4 @@
-//! What the axes follow when asked: stops, single moves and streams through the whole tick.
+//! The motion modes of the axes: stops, single moves and streams through the whole tick.
 
 use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
