@@ -42,7 +42,7 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
     pub fn with_plan(stage: Stage<S, N>, plan: impl Into<Plan<S>>) -> Self {
         Self {
             stage,
-            plan,
+            plan: plan.into(),
             state: StageState::default(),
             supervisor: Supervisor::default(),
             requests: VecDeque::new(),

@@ -224,6 +224,19 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 }
 
 /// The feedforward ready for the tick; `N` is the room for GMS elements.
+///
+/// ```
+/// use quadrant::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
+///
+/// let x = quadrant::settings::x_axis();
+/// let gains = &x.feedforward.gains;
+/// let feedforward = Feedforward::<f64, 10>::build(FeedforwardKind::Static, gains, &x.friction, 1e-4);
+/// let mut state = FeedforwardState::default();
+/// let step = ReferenceStep { displacement: 1e-3, velocity: 10.0, acceleration: 0.0 };
+/// let terms = feedforward.step(&mut state, step);
+/// let exact = x.friction.sliding.positive.friction_v(10.0);
+/// assert!((terms.total() / exact - 1.0).abs() < 1e-3);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
@@ -304,11 +317,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             inertia: reference.acceleration.scale(self.inertia),
             ..FeedforwardTerms::default()
         };
-        let direction = if reference.velocity < S::ZERO {
-            Direction::Negative
-        } else {
-            Direction::Positive
-        };
+        let direction = Direction::of(reference.velocity);
         if self.kind.has_viscous() {
             terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
         }

@@ -51,6 +51,20 @@ impl PidGains {
 }
 
 /// The PID ready for the tick.
+///
+/// ```
+/// use quadrant::control::pid::{Pid, PidGains};
+/// use quadrant::control::terms::FeedbackState;
+///
+/// let gains = PidGains { kp_v_per_mm: 2.0, ki_v_per_mm_s: 10.0, kd_v_s_per_mm: 0.0, derivative_filter_s: 0.0 };
+/// let pid = Pid::<f64>::build(&gains, 5.0, 1e-3);
+/// let mut state = FeedbackState::default();
+/// // An error of 1 mm, and +-10 V to put out: 2 V at once, and 10 mV more in every tick.
+/// let first = pid.step(&mut state, 1.0, -10.0, 10.0);
+/// let second = pid.step(&mut state, 1.0, -10.0, 10.0);
+/// assert_eq!(first.proportional, 2.0);
+/// assert!((second.output - first.output - 0.01).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pid<S: Scalar> {
     pub(super) proportional: S::Gain,

@@ -4,6 +4,8 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
+use crate::law::scalar::Scalar;
+
 /// A sense of motion.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
@@ -15,6 +17,18 @@ pub enum Direction {
     Positive,
     /// Motion towards smaller positions.
     Negative,
+}
+
+impl Direction {
+    /// The sense of a velocity or a displacement; positive at rest.
+    #[inline(always)]
+    pub fn of<S: Scalar>(velocity: S) -> Self {
+        if velocity < S::ZERO {
+            Self::Negative
+        } else {
+            Self::Positive
+        }
+    }
 }
 
 /// A pair of things, one for each sense of motion: friction is rarely the same both ways.

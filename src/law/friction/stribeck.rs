@@ -48,6 +48,16 @@ impl StribeckCurve {
 }
 
 /// The static friction model of one sense of motion.
+///
+/// ```
+/// use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+///
+/// let curve = StribeckCurve { coulomb_v: 0.1, breakaway_v: 0.15, stribeck_velocity_mm_s: 2.0, exponent: 1.0 };
+/// let friction = StaticFriction { curve, viscous_v_s_per_mm: 1e-3 };
+/// // Just moving, the breakaway level; fast, the Coulomb level and viscous friction.
+/// assert!((friction.friction_v(1e-6) - 0.15).abs() < 1e-6);
+/// assert!((friction.friction_v(100.0) - 0.2).abs() < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StaticFriction {

@@ -52,7 +52,21 @@ impl HarmonicSettings {
     }
 }
 
-/// A sine ready for the tick.
+/// A sine ready for the tick. [`Motion::build`](super::Motion::build) makes it.
+///
+/// ```
+/// use quadrant::reference::{HarmonicSettings, Motion, MotionScale, MotionSettings, MotionState};
+///
+/// // 10 mm either way at up to 20 mm/s, one cycle, with half a second of lead-in.
+/// let sine = HarmonicSettings::with_velocity(10.0, 20.0, 1.0, 0.5);
+/// let motion = Motion::<f64>::build(&MotionSettings::Harmonic(sine), MotionScale::new(0.5e-3, 1e4));
+/// let mut state = MotionState::default();
+/// let mut farthest_mm = 0.0_f64;
+/// while !motion.finished(&state) {
+///     farthest_mm = farthest_mm.max(motion.step(&mut state).position.to_mm(0.5e-3).abs());
+/// }
+/// assert!((10.0..=20.0).contains(&farthest_mm));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonic<S: Scalar> {
     amplitude_counts: i32,

@@ -36,6 +36,26 @@ impl MotionSettings {
 }
 
 /// A motion ready for the tick.
+///
+/// ```
+/// use quadrant::reference::{Motion, MotionScale, MotionSettings, MotionState, PointToPointSettings};
+/// use quadrant::units::Position;
+///
+/// let settings = MotionSettings::PointToPoint(PointToPointSettings {
+///     distance_mm: 10.0,
+///     max_velocity_mm_s: 50.0,
+///     max_acceleration_mm_s2: 500.0,
+///     max_jerk_mm_s3: 1e4,
+/// });
+/// let motion = Motion::<f64>::build(&settings, MotionScale::new(0.5e-3, 1e4));
+/// let mut state = MotionState::start(Position::ZERO);
+/// let mut fastest = 0.0_f64;
+/// while !motion.finished(&state) {
+///     fastest = fastest.max(motion.step(&mut state).velocity);
+/// }
+/// assert!(fastest > 49.0 && fastest <= 50.0);
+/// assert_eq!(motion.step(&mut state).position, Position::from_mm(10.0, 0.5e-3));
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Motion<S: Scalar> {
     /// Stay where the axis is.

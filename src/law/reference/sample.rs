@@ -21,3 +21,13 @@ pub struct MotionScale {
     /// Control ticks per second, 1/s.
     pub rate_hz: f64,
 }
+
+impl MotionScale {
+    /// Counts of `resolution_mm`, ticks at `rate_hz`.
+    pub const fn new(resolution_mm: f64, rate_hz: f64) -> Self {
+        Self {
+            resolution_mm,
+            rate_hz,
+        }
+    }
+}
