@@ -5,12 +5,13 @@ use core::mem::MaybeUninit;
 use embedded_storage::nor_flash::NorFlash;
 use quadrant::app::last_words::Death;
 use quadrant::app::{Axis, Control, ControlEnds, Queues, Server, ServerParts};
+use quadrant::axes::AxisName;
 use quadrant::capture::CAPTURE_WORDS;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::ResetCause;
 use quadrant::link::lockstep::Job;
 use quadrant::link::message::{NumberType, Provenance};
-use quadrant::safety::{AxisName, FaultCode, StreamLoss};
+use quadrant::safety::{FaultCode, StreamLoss};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
@@ -226,7 +227,7 @@ fn place_control<S: Scalar>(
     plan: Plan<S>,
     ends: ControlEnds<'static, 'static, S>,
 ) -> &'static mut Control<'static, 'static, S> {
-    place.write(Control::new(axes, streaming, plan, ends))
+    place.write(Control::new(axes.into(), streaming, plan, ends))
 }
 
 /// Makes the slow half in its place.

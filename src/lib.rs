@@ -38,13 +38,14 @@
 //! # An axis in ten lines
 //!
 //! ```
+//! use quadrant::axes::PerAxis;
+//! use quadrant::command::Command;
 //! use quadrant::reference::Motion;
-//! use quadrant::safety::Command;
 //! use quadrant::settings::StageSettings;
 //! use quadrant::stage::{Inputs, Stage, StageState};
 //!
 //! let stage: Stage<f32> = StageSettings::default().build()?;
-//! let plan = [Motion::Hold, Motion::Hold, Motion::Hold];
+//! let plan = PerAxis::from_fn(|_| Motion::Hold);
 //! let mut state = StageState::default();
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
 //! assert!(stage.tick(&plan, &mut state, &enable).enabled);
@@ -66,6 +67,6 @@ pub mod store;
 
 #[doc(inline)]
 pub use law::{
-    axis, capture, control, decimal, encoder, feedforward, friction, homing, injection, reference,
-    safety, scalar, stage, table, telemetry, units,
+    admission, axes, axis, capture, command, control, decimal, encoder, feedforward, friction,
+    homing, injection, motion, reference, safety, scalar, stage, table, telemetry, units,
 };

@@ -9,9 +9,11 @@ use embedded_storage::nor_flash::NorFlash;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
 use quadrant::app::{Journal, Meters, News, Server, Snapshot};
-use quadrant::axis::CourseMode;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::hal::ResetCause;
-use quadrant::safety::{AxisName, Command, Fault};
+use quadrant::motion::MotionMode;
+use quadrant::safety::Fault;
 use quadrant::scalar::{Quantity, Scalar};
 use quadrant::settings::StageSettings;
 
@@ -284,7 +286,7 @@ const fn topic_of(news: News) -> Topic {
 
 fn print_news(news: News) {
     match news {
-        News::Began(axis, CourseMode::Home) => defmt::info!("{=str}: homing", axis.as_str()),
+        News::Began(axis, MotionMode::Home) => defmt::info!("{=str}: homing", axis.as_str()),
         News::Homed(axis) => defmt::info!("{=str}: homed", axis.as_str()),
         News::NotHomed(axis) => {
             defmt::warn!(
@@ -315,15 +317,15 @@ fn print_news(news: News) {
     }
 }
 
-const fn verb(mode: CourseMode) -> &'static str {
+const fn verb(mode: MotionMode) -> &'static str {
     match mode {
-        CourseMode::Hold => "holding",
-        CourseMode::Plan => "moving",
-        CourseMode::Jog => "jogging",
-        CourseMode::Home => "homing",
-        CourseMode::Stream => "following a stream",
-        CourseMode::Stopping => "braking",
-        CourseMode::OpenLoop => "injected voltage in open loop",
+        MotionMode::Hold => "holding",
+        MotionMode::Plan => "moving",
+        MotionMode::Jog => "jogging",
+        MotionMode::Home => "homing",
+        MotionMode::Stream => "following a stream",
+        MotionMode::Stopping => "braking",
+        MotionMode::OpenLoop => "injected voltage in open loop",
     }
 }
 

@@ -51,12 +51,12 @@ mod app {
 
     use heapless::spsc::{Consumer, Producer, Queue};
     use quadrant::app::supervisor::Event;
-    use quadrant::app::{
-        After, Control, ControlInputs, Liveness, Meters, Server, Snapshot, Supervision,
-    };
+    use quadrant::app::{After, Control, Inputs, Liveness, Meters, Server, Snapshot, Supervision};
+    use quadrant::axes::AxisName;
+    use quadrant::command::Command;
     use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
     use quadrant::link::message::NumberType;
-    use quadrant::safety::{AxisName, AxisSwitches, Command};
+    use quadrant::safety::AxisSwitches;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
@@ -197,14 +197,17 @@ mod app {
                 switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
             }
         }
-        let outputs = cx.local.control.tick(&ControlInputs {
-            readings: cx.local.encoders.read(),
+        let outputs = cx.local.control.tick(&Inputs {
+            readings: cx.local.encoders.read().into(),
             switches,
             command: cx.local.commands_out.dequeue(),
             deadline_missed: *cx.local.deadline_missed,
             link_lost: LINK_LOST.load(Ordering::Relaxed),
+            ..Inputs::default()
         });
-        cx.local.amplifiers.write(outputs.codes, outputs.enabled);
+        cx.local
+            .amplifiers
+            .write(outputs.codes.into_array(), outputs.enabled);
 
         TICK.store(cx.local.control.state().tick(), Ordering::Relaxed);
         if let Some(request) = cx.local.operator.request() {

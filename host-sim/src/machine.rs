@@ -2,10 +2,12 @@
 
 use std::collections::VecDeque;
 
-use quadrant::app::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
+use quadrant::admission::StageView;
+use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
-use quadrant::safety::{AxisName, Command};
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
@@ -37,10 +39,10 @@ impl<S: Scalar, const N: usize> Machine<S, N> {
     }
 
     /// A machine on built settings, with a plan that settings cannot hold, such as a recorded table.
-    pub fn with_plan(stage: Stage<S, N>, plan: Plan<S>) -> Self {
+    pub fn with_plan(stage: Stage<S, N>, plan: impl Into<Plan<S>>) -> Self {
         Self {
             stage,
-            plan,
+            plan: plan.into(),
             state: StageState::default(),
             supervisor: Supervisor::default(),
             requests: VecDeque::new(),

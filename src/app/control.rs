@@ -3,33 +3,18 @@
 use super::queues::{CaptureOrder, ControlEnds, Exchange, Feed};
 use super::{Axis, Snapshot};
 use crate::app::supervisor::PERIOD_TICKS;
+use crate::law::axes::{AxisName, PerAxis};
 use crate::law::capture::Capture;
-use crate::law::encoder::EncoderReading;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::reference::Motion;
-use crate::law::safety::{AxisName, Command, FaultCode, StreamLoss, Switches};
+use crate::law::safety::{FaultCode, StreamLoss};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
 use crate::law::telemetry::{Observation, Sampler, SamplerState};
 
-/// What a tick reads from the board.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct ControlInputs {
-    /// What the encoders say.
-    pub readings: [EncoderReading; 3],
-    /// What the digital inputs say.
-    pub switches: Switches,
-    /// What the supervising task let through.
-    pub command: Option<Command>,
-    /// The last tick ended after its deadline.
-    pub deadline_missed: bool,
-    /// The host whose set points the axes follow has fallen silent.
-    pub link_lost: bool,
-}
-
 /// Everything that the control interrupt owns.
 pub struct Control<'q, 'a, S: Scalar> {
-    axes: [&'a mut Axis<S>; 3],
+    axes: PerAxis<&'a mut Axis<S>>,
     streaming: StreamLoss,
     plan: Plan<S>,
     state: StageState<S, FIRMWARE_ELEMENTS>,
@@ -47,7 +32,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(
-        axes: [&'a mut Axis<S>; 3],
+        axes: PerAxis<&'a mut Axis<S>>,
         streaming: StreamLoss,
         plan: Plan<S>,
         ends: ControlEnds<'q, 'a, S>,
@@ -76,12 +61,13 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         &self.state
     }
 
-    /// One control period: takes what the server has sent, and computes the outputs.
+    /// One control period: takes what the server has sent, and computes the outputs. The settings' changes are its own to
+    /// tell, and a command of the server's acts when the inputs have none.
     #[inline(always)]
-    pub fn tick(&mut self, inputs: &ControlInputs) -> Outputs {
+    pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
         let settings_changed = match self.ends.exchanges.dequeue() {
             Some(exchange) => self.exchange(exchange),
-            None => [false; 3],
+            None => PerAxis::splat(false),
         };
         if let Some((name, motion)) = self.ends.motions.dequeue() {
             self.take_motion(name, motion);
@@ -93,21 +79,18 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
         let command = inputs.command.or_else(|| self.ends.commands.dequeue());
         self.commanded = command.is_some();
-        let [x, y, z] = &self.axes;
+        let axes = self.axes.each_ref().map(|axis| &**axis);
         StageRef {
-            axes: [x, y, z],
+            axes: axes.into(),
             streaming: self.streaming,
         }
         .tick(
             &self.plan,
             &mut self.state,
             &Inputs {
-                readings: inputs.readings,
-                switches: inputs.switches,
                 command,
                 settings_changed,
-                deadline_missed: inputs.deadline_missed,
-                link_lost: inputs.link_lost,
+                ..*inputs
             },
         )
     }
@@ -146,22 +129,17 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// Puts an axis in the place of another, which goes back to the server.
     #[cold]
     #[inline(never)]
-    fn exchange(&mut self, exchange: Exchange<'a, S>) -> [bool; 3] {
+    fn exchange(&mut self, exchange: Exchange<'a, S>) -> PerAxis<bool> {
         let Exchange {
             name,
             axis,
             streaming,
         } = exchange;
-        let [x, y, z] = &mut self.axes;
-        let place = match name {
-            AxisName::X => x,
-            AxisName::Y => y,
-            AxisName::Z => z,
-        };
         // There is one spare axis, so the queue has room for it.
-        let _ = self.ends.spares.enqueue(core::mem::replace(place, axis));
+        let replaced = core::mem::replace(&mut self.axes[name], axis);
+        let _ = self.ends.spares.enqueue(replaced);
         self.streaming = streaming;
-        AxisName::ALL.map(|axis| axis == name)
+        PerAxis::from_fn(|axis| axis == name)
     }
 
     /// Takes the motion that an axis will start next. One that comes while the axis follows the old one is dropped: the
@@ -169,15 +147,8 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     #[cold]
     #[inline(never)]
     fn take_motion(&mut self, name: AxisName, motion: Motion<S>) {
-        let [x, y, z] = &mut self.plan;
-        let [at_x, at_y, at_z] = self.state.axes();
-        let (place, axis) = match name {
-            AxisName::X => (x, at_x),
-            AxisName::Y => (y, at_y),
-            AxisName::Z => (z, at_z),
-        };
-        if !axis.is_running() {
-            *place = motion;
+        if !self.state.axes()[name].is_running() {
+            self.plan[name] = motion;
         }
     }
 

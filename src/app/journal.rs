@@ -5,9 +5,9 @@
 use heapless::Vec;
 
 use super::{Meters, Vitals};
-use crate::app::supervisor::StageView;
-use crate::law::axis::CourseMode;
-use crate::law::safety::AxisName;
+use crate::law::admission::StageView;
+use crate::law::axes::{AxisName, PerAxis};
+use crate::law::motion::MotionMode;
 
 /// Ticks without a word from a host after which it counts as silent: 3 s at 10 kHz.
 const SILENT_TICKS: u32 = 30_000;
@@ -19,9 +19,9 @@ pub const MOST_NEWS: usize = 14;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum News {
     /// An axis began to follow something.
-    Began(AxisName, CourseMode),
+    Began(AxisName, MotionMode),
     /// It no longer does.
-    Ended(AxisName, CourseMode),
+    Ended(AxisName, MotionMode),
     /// An axis found its home position.
     Homed(AxisName),
     /// Homing ended, and the axis does not know where it is.
@@ -51,7 +51,7 @@ pub enum News {
 /// What was seen last.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Journal {
-    modes: [CourseMode; 3],
+    modes: PerAxis<MotionMode>,
     vitals: Vitals,
     overruns: u32,
     is_silent: bool,
@@ -80,12 +80,12 @@ impl Journal {
                 continue;
             }
             match was {
-                CourseMode::Hold => {}
-                CourseMode::Home if homed => tell(News::Homed(axis)),
-                CourseMode::Home => tell(News::NotHomed(axis)),
+                MotionMode::Hold => {}
+                MotionMode::Home if homed => tell(News::Homed(axis)),
+                MotionMode::Home => tell(News::NotHomed(axis)),
                 other => tell(News::Ended(axis, other)),
             }
-            if is != CourseMode::Hold {
+            if is != MotionMode::Hold {
                 tell(News::Began(axis, is));
             }
         }

@@ -28,7 +28,9 @@ mod snapshot;
 mod supervision;
 pub mod supervisor;
 
-pub use control::{Control, ControlInputs};
+pub use control::Control;
+
+pub use crate::law::stage::Inputs;
 pub use journal::{Journal, MOST_NEWS, News};
 pub use liveness::Liveness;
 pub use queues::{ControlEnds, Queues, ServerEnds};

@@ -3,10 +3,12 @@
 use heapless_queues::spsc::{Consumer, Producer, Queue};
 
 use super::Axis;
+use crate::law::axes::AxisName;
 use crate::law::capture::Capture;
+use crate::law::command::Command;
 use crate::law::injection::{Injection, VoltageBlock};
 use crate::law::reference::{Motion, Segment};
-use crate::law::safety::{AxisName, Command, StreamLoss};
+use crate::law::safety::StreamLoss;
 use crate::law::scalar::Scalar;
 use crate::law::telemetry::{Sample, Sampler};
 

@@ -1,6 +1,6 @@
 //! What the slow half sees of the fast one, once every [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS).
 
-use crate::app::supervisor::StageView;
+use crate::law::admission::StageView;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::injection::InjectionProgress;
 use crate::law::safety::monitor::FollowingState;

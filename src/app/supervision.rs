@@ -2,7 +2,7 @@
 
 use super::Snapshot;
 use crate::app::supervisor::{Decision, Event, Supervisor};
-use crate::law::safety::Command;
+use crate::law::command::Command;
 use crate::law::scalar::Scalar;
 
 /// What one run of the supervising task found.

@@ -29,7 +29,7 @@ fn power_of_ten(exponent: i32) -> f64 {
     power
 }
 
-/// `value * 10^exponent`.
+/// Returns `value * 10^exponent`.
 #[inline(never)]
 fn scaled(value: f64, exponent: i32) -> f64 {
     match exponent {

@@ -2,7 +2,7 @@
 
 use crate::law::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
 
-/// What a board reads of one encoder in one tick.
+/// A board's reading of one encoder in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct EncoderReading {
     /// The raw counter. One narrower than 32 bits fills the low bits.
@@ -34,12 +34,12 @@ impl Default for EncoderReading {
     }
 }
 
-/// What a reading says of the motion since the last one.
+/// The motion between two readings.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Step {
     /// Counts towards larger positions.
     pub counts: i32,
-    /// Whether the axis can have moved that far.
+    /// True if the axis can have moved that far.
     pub plausible: bool,
 }
 

@@ -14,14 +14,14 @@
 //!
 //! Inertia (`a / A`) is separate and acts with any kind.
 //!
-//! The springs of the elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and
-//! LuGre. When a change of settings goes from one group to the other, the force of the springs goes with it: the bristle takes
-//! the elements' sum, the elements take their weights' shares of the bristle's force. What else the elements remember is
-//! right again once the reference has moved over the pre-sliding range in one sense.
+//! The elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and LuGre. When a
+//! change of settings goes from one group to the other, the force goes with it: the bristle takes the elements' sum, the
+//! elements take their weights' shares of the bristle's force. The rest of the elements' memory is right again once the
+//! reference has moved over the pre-sliding range in one sense.
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
-use strum::{AsRefStr, EnumString, VariantNames};
+use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
 
 use crate::law::friction::bristle::Bristle;
 use crate::law::friction::dahl::Dahl;
@@ -29,11 +29,10 @@ use crate::law::friction::gms::{Gms, GmsState};
 use crate::law::friction::lugre::Lugre;
 use crate::law::friction::smoothed_gms::SmoothedGms;
 use crate::law::friction::stribeck::{Sliding, SlidingTable};
-use crate::law::friction::{Direction, PerDirection};
+use crate::law::friction::{Direction, FrictionSettings, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::settings::FrictionSettings;
 
-/// Which friction models act.
+/// The friction models that act together.
 #[derive(
     Clone,
     Copy,
@@ -45,12 +44,14 @@ use crate::settings::FrictionSettings;
     Deserialize,
     AsRefStr,
     EnumString,
+    VariantArray,
     VariantNames,
+    EnumCount,
 )]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum FeedforwardKind {
-    /// No friction feedforward.
+    /// No friction feedforward; inertia may act.
     #[default]
     None,
     /// The static model: Stribeck curve and viscous friction.
@@ -68,21 +69,13 @@ pub enum FeedforwardKind {
 }
 
 impl FeedforwardKind {
-    /// All kinds.
-    pub const ALL: [Self; 7] = [
-        Self::None,
-        Self::Static,
-        Self::Gms,
-        Self::Combined,
-        Self::Dahl,
-        Self::Lugre,
-        Self::SmoothedGms,
-    ];
+    /// All kinds, in the order of their tables.
+    pub const ALL: [Self; Self::COUNT] = *<Self as VariantArray>::VARIANTS.first_chunk().unwrap();
 
     /// Those that the thesis compares, in the order of its tables.
     pub const THESIS: [Self; 4] = [Self::None, Self::Static, Self::Gms, Self::Combined];
 
-    /// Its name in tables.
+    /// The name of it in tables and figures.
     pub const fn name(self) -> &'static str {
         match self {
             Self::None => "none",
@@ -95,23 +88,23 @@ impl FeedforwardKind {
         }
     }
 
-    /// Whether the static model's `s(v) sgn(v)` acts.
+    /// True if the static model's `s(v) sgn(v)` acts.
     const fn has_static_level(self) -> bool {
         matches!(self, Self::Static)
     }
 
-    /// Whether a pre-sliding model acts.
+    /// True if a pre-sliding model acts.
     const fn has_presliding(self) -> bool {
         !matches!(self, Self::None | Self::Static)
     }
 
-    /// Whether viscous friction acts.
+    /// True if viscous friction acts.
     const fn has_viscous(self) -> bool {
         !matches!(self, Self::None | Self::Gms)
     }
 }
 
-/// How much of each effect is fed forward.
+/// The share of each effect that is fed forward.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedforwardGains {
@@ -125,27 +118,27 @@ pub struct FeedforwardGains {
     pub inertia_v_s2_per_mm: f64,
 }
 
-/// What the reference does in one tick, seen far enough ahead.
+/// The reference's motion in one tick, as far ahead as the feedforward looks.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct ReferenceStep<S> {
     /// Displacement since the last tick, mm.
     pub displacement: S,
-    /// Velocity, mm/s.
+    /// Velocity of the reference, mm/s.
     pub velocity: S,
-    /// Acceleration, mm/s^2.
+    /// Acceleration of the reference, mm/s^2.
     pub acceleration: S,
 }
 
-/// What is fed forward, term by term, V.
+/// The feedforward, term by term, V.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedforwardTerms<S> {
     /// The static model's Coulomb and Stribeck level.
     pub level: S,
-    /// Viscous friction.
+    /// Viscous friction, `sigma v`.
     pub viscous: S,
     /// The pre-sliding model: the GMS elements, smoothed or not, or the bristles.
     pub gms: S,
-    /// Inertia.
+    /// Inertia, `a / A`.
     pub inertia: S,
 }
 
@@ -174,13 +167,20 @@ enum Presliding<S: Scalar, const N: usize> {
     Dahl(Dahl<S>),
 }
 
-/// The memory of the feedforward; springs slack by default.
+/// The friction state of the feedforward; slack by default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeedforwardState<S: Scalar, const N: usize> {
     elements: GmsState<S, N>,
     bristle: Bristle<S>,
-    /// The bristle moved last, and not the elements.
-    on_bristle: bool,
+    last: LastModel,
+}
+
+/// The model that moved last.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum LastModel {
+    #[default]
+    Elements,
+    Bristle,
 }
 
 impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
@@ -188,27 +188,26 @@ impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
         Self {
             elements: GmsState::default(),
             bristle: Bristle::default(),
-            on_bristle: false,
+            last: LastModel::Elements,
         }
     }
 }
 
 impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
-    /// What the springs of the last kind carry, V.
+    /// The friction of the model that moved last, V.
     pub fn force(&self) -> S {
-        if self.on_bristle {
-            self.bristle.force()
-        } else {
-            self.elements.total()
+        match self.last {
+            LastModel::Bristle => self.bristle.force(),
+            LastModel::Elements => self.elements.total(),
         }
     }
 
     /// The elements, loaded by `spread` if the bristle moved last.
     #[inline(always)]
     fn elements(&mut self, spread: impl FnOnce(S) -> GmsState<S, N>) -> &mut GmsState<S, N> {
-        if self.on_bristle {
+        if self.last == LastModel::Bristle {
             self.elements = spread(self.bristle.force());
-            self.on_bristle = false;
+            self.last = LastModel::Elements;
         }
         &mut self.elements
     }
@@ -216,20 +215,33 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
     /// The bristle, loaded if the elements moved last.
     #[inline(always)]
     fn bristle(&mut self) -> &mut Bristle<S> {
-        if !self.on_bristle {
+        if self.last == LastModel::Elements {
             self.bristle = Bristle::bent(self.elements.total());
-            self.on_bristle = true;
+            self.last = LastModel::Bristle;
         }
         &mut self.bristle
     }
 }
 
 /// The feedforward ready for the tick; `N` is the room for GMS elements.
+///
+/// ```
+/// use quadrant::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
+///
+/// let x = quadrant::settings::x_axis();
+/// let gains = &x.feedforward.gains;
+/// let feedforward = Feedforward::<f64, 10>::build(FeedforwardKind::Static, gains, &x.friction, 1e-4);
+/// let mut state = FeedforwardState::default();
+/// let step = ReferenceStep { displacement: 1e-3, velocity: 10.0, acceleration: 0.0 };
+/// let terms = feedforward.step(&mut state, step);
+/// let exact = x.friction.sliding.positive.friction_v(10.0);
+/// assert!((terms.total() / exact - 1.0).abs() < 1e-3);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
     presliding: Presliding<S, N>,
-    level_gain: S::Gain,
+    coulomb_gain: S::Gain,
     gms_gain: S::Gain,
     viscous: PerDirection<S::Gain>,
     inertia: S::Gain,
@@ -253,11 +265,17 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         Self {
             kind: FeedforwardKind::None,
             presliding: Presliding::blank(),
-            level_gain: S::Gain::default(),
+            coulomb_gain: S::Gain::default(),
             gms_gain: S::Gain::default(),
             viscous: PerDirection::default(),
             inertia: S::Gain::default(),
         }
+    }
+
+    /// Feeds nothing forward. The tables stay: to clear them would take as long as to fill them.
+    pub(crate) fn switch_off(&mut self) {
+        self.kind = FeedforwardKind::None;
+        self.inertia = S::Gain::default();
     }
 
     /// As [`build`](Self::build), in place.
@@ -271,7 +289,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     ) {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         self.kind = kind;
-        (self.level_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
+        (self.coulomb_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
         self.viscous = friction.sliding.map(|model| {
             S::gain(
                 gains.viscous * model.viscous_v_s_per_mm,
@@ -288,7 +306,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         self.presliding.fill_tables(friction, period_s);
     }
 
-    /// One control period.
+    /// Advances by one control period.
     #[inline(always)]
     pub fn step(
         &self,
@@ -299,11 +317,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             inertia: reference.acceleration.scale(self.inertia),
             ..FeedforwardTerms::default()
         };
-        let direction = if reference.velocity < S::ZERO {
-            Direction::Negative
-        } else {
-            Direction::Positive
-        };
+        let direction = Direction::of(reference.velocity);
         if self.kind.has_viscous() {
             terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
         }
@@ -319,19 +333,19 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
                     _ => surface.at(speed, direction),
                 };
                 if self.kind.has_static_level() && reference.velocity != S::ZERO {
-                    let level = sliding.level.scale(self.level_gain);
+                    let level = sliding.level.scale(self.coulomb_gain);
                     terms.level = match direction {
                         Direction::Positive => level,
                         Direction::Negative => -level,
                     };
                 }
-                // The elements move with any of these kinds: their springs are loaded when a change makes them act.
-                let springs = state.elements(|force| elements.spread(force));
-                elements.step(springs, displacement, sliding)
+                // The elements move with any of these kinds: they carry their load when a change makes them act.
+                let memory = state.elements(|force| elements.spread(force));
+                elements.step(memory, displacement, sliding)
             }
             Presliding::Smoothed { elements, surface } => {
-                let springs = state.elements(|force| elements.spread(force));
-                elements.step(springs, displacement, surface.at(speed, direction))
+                let memory = state.elements(|force| elements.spread(force));
+                elements.step(memory, displacement, surface.at(speed, direction))
             }
             Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
             Presliding::Dahl(model) => model.step(state.bristle(), displacement),

@@ -1,4 +1,4 @@
-//! Homing: finding out where the axis is.
+//! Homing: the search for the position of the axis in the machine.
 //!
 //! ```text
 //!   Look -> Search --switch--> Brake -> Retract --released--> Index --pulse--> Settle --origin--> Park
@@ -6,7 +6,7 @@
 //!     +--- on the switch already -----> slowly
 //! ```
 //!
-//! The mark that counts is met while the axis moves slowly away from the switch, always in the same sense, so backlash
+//! The reference mark is met while the axis moves slowly away from the switch, always in the same sense, so backlash
 //! does not enter. With an index it is the pulse that follows the release of the switch, whose count the hardware
 //! latches: it does not depend on where exactly the switch lets go, as long as that is not near a pulse itself, which is
 //! refused. The origin is defined at rest, by shifting every position of the axis alike: nothing moves by it.
@@ -19,61 +19,69 @@ use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 
-/// How an axis finds out where it is, ready for the tick. Made by
-/// [`HomingSettings`](crate::settings::HomingSettings).
+/// The homing routine of an axis, ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Homing<S: Scalar> {
-    pub(crate) direction: Direction,
-    /// The switch that is searched.
-    pub(crate) switch: AxisSwitches,
-    pub(crate) search: Velocity,
-    pub(crate) latch: Velocity,
-    /// Readings against the accepted state that are taken for bounce.
-    pub(crate) debounce_ticks: u32,
-    /// Ticks at rest before the origin is defined.
-    pub(crate) settle_ticks: u32,
-    /// Distance between index pulses; none: the release of the switch is the mark.
-    pub(crate) index_spacing: Option<Position>,
-    /// What the mark's position is to be.
-    pub(crate) mark: Position,
-    /// Where the axis goes in the end.
-    pub(crate) park: Position,
-    /// How far it goes for the switch, and off it.
-    pub(crate) travel: Position,
-    pub(crate) approach: Approach<S>,
+    parameters: HomingParameters,
+    approach: Approach<S>,
 }
 
-/// What homing reads in a tick.
+/// The parameters of homing, in the units of the tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct HomingParameters {
+    /// The end of the axis towards which the switch is searched.
+    pub direction: Direction,
+    /// The switch that is searched.
+    pub switch: AxisSwitches,
+    /// Velocity of the search; not negative.
+    pub search_velocity: Velocity,
+    /// Velocity away from the switch and to the index pulse; not negative, at most that of the search.
+    pub creep_velocity: Velocity,
+    /// Readings against the accepted state that are taken for bounce.
+    pub debounce_ticks: u32,
+    /// Ticks at rest before the origin is defined.
+    pub settle_ticks: u32,
+    /// Distance between index pulses; none: the release of the switch is the reference mark.
+    pub index_spacing: Option<Position>,
+    /// Position that the reference mark is to have.
+    pub home_offset: Position,
+    /// Position that the axis moves to in the end.
+    pub parking: Position,
+    /// Largest distance to the switch, and off it.
+    pub travel: Position,
+}
+
+/// Inputs of homing in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HomingInput {
     /// The switches of the axis.
     pub switches: AxisSwitches,
-    /// Where the axis was at the index pulse, if one passed since the last tick.
+    /// Position at the index pulse, if one passed since the last tick.
     pub index: Option<Position>,
-    /// Where the axis is.
+    /// Measured position, 2^-16 counts.
     pub measured: Position,
 }
 
-/// What homing wants in a tick, beside the reference.
+/// Request of homing in a tick, beside the reference.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum HomingEvent {
-    /// To go on.
+    /// Go on as before.
     None,
-    /// Every position of the axis to be shifted by this much: then they are the machine's.
+    /// Shift every position of the axis by this much: then they are the machine's.
     Origin(Position),
-    /// To end: the axis rests at its parking position.
+    /// End: the axis rests at its parking position.
     Finished,
-    /// To end: a mark was not found, or is not to be trusted.
+    /// End: the reference mark was not found, or is not to be trusted.
     Failed(FaultCode),
 }
 
-/// What is being done.
+/// The step of the routine that is under way.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Phase {
     /// Standing, until the switch has been read often enough.
     #[default]
     Look,
-    /// Towards the switch.
+    /// Moving to the switch.
     Search,
     /// To rest beyond its edge.
     Brake,
@@ -93,7 +101,7 @@ struct Debounced {
     pressed: bool,
     /// Readings in a row that say otherwise.
     against: u32,
-    /// Where the axis was at the first of them.
+    /// Position at the first of them.
     edge: Position,
 }
 
@@ -114,16 +122,16 @@ impl Debounced {
     }
 }
 
-/// How far homing has come.
+/// The memory of homing.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HomingState<S: Scalar> {
     phase: Phase,
     switch: Debounced,
     /// Ticks in the phase.
     ticks: u32,
-    /// Where the phase began.
+    /// Reference at the beginning of the phase.
     from: Position,
-    /// Where the mark was met.
+    /// Position at which the reference mark was met.
     mark: Position,
     parking: Motion<S>,
 }
@@ -137,9 +145,17 @@ impl<S: Scalar> HomingState<S> {
 }
 
 impl<S: Scalar> Homing<S> {
-    /// Whether a pressed limit switch is one that this homing moves onto.
+    /// Homing with a last move within the limits of `approach`. Settings time only.
+    pub fn new(parameters: HomingParameters, approach: Approach<S>) -> Self {
+        Self {
+            parameters,
+            approach,
+        }
+    }
+
+    /// True if a pressed limit switch is one that this homing moves onto.
     pub(crate) fn expects(&self, switches: AxisSwitches) -> bool {
-        switches.has(self.switch)
+        switches.has(self.parameters.switch)
     }
 
     /// The reference of the next tick along `ramp`, whose state is `moving`; `parked` is the state of the last move.
@@ -152,10 +168,10 @@ impl<S: Scalar> Homing<S> {
         parked: &mut MotionState,
         input: HomingInput,
     ) -> (ReferenceSample<S>, HomingEvent) {
-        let pressed = input.switches.has(self.switch);
+        let pressed = input.switches.has(self.parameters.switch);
         state
             .switch
-            .update(pressed, input.measured, self.debounce_ticks);
+            .update(pressed, input.measured, self.parameters.debounce_ticks);
         state.ticks = state.ticks.saturating_add(1);
         if state.phase == Phase::Park {
             let sample = state.parking.step(parked);
@@ -170,11 +186,11 @@ impl<S: Scalar> Homing<S> {
         if let HomingEvent::Origin(offset) = event {
             *moving = RampState::at_rest(moving.position() + offset);
         }
-        let target = match (state.phase, self.direction) {
-            (Phase::Search, Direction::Positive) => self.search,
-            (Phase::Search, Direction::Negative) => -self.search,
-            (Phase::Retract | Phase::Index, Direction::Positive) => -self.latch,
-            (Phase::Retract | Phase::Index, Direction::Negative) => self.latch,
+        let target = match (state.phase, self.parameters.direction) {
+            (Phase::Search, Direction::Positive) => self.parameters.search_velocity,
+            (Phase::Search, Direction::Negative) => -self.parameters.search_velocity,
+            (Phase::Retract | Phase::Index, Direction::Positive) => -self.parameters.creep_velocity,
+            (Phase::Retract | Phase::Index, Direction::Negative) => self.parameters.creep_velocity,
             _ => Velocity::ZERO,
         };
         (ramp.step(moving, target), event)
@@ -190,9 +206,9 @@ impl<S: Scalar> Homing<S> {
         let here = moving.position();
         let gone = (here - state.from).0.unsigned_abs();
         let pressed = state.switch.pressed;
-        let too_far = gone > self.travel.0.unsigned_abs();
+        let too_far = gone > self.parameters.travel.0.unsigned_abs();
         match state.phase {
-            Phase::Look if state.ticks > self.debounce_ticks + 1 => {
+            Phase::Look if state.ticks > self.parameters.debounce_ticks + 1 => {
                 let phase = if pressed {
                     Phase::Retract
                 } else {
@@ -205,7 +221,7 @@ impl<S: Scalar> Homing<S> {
             Phase::Brake if moving.is_at_rest() => state.enter(Phase::Retract, here),
             Phase::Retract if !pressed => {
                 state.mark = state.switch.edge;
-                let next = if self.index_spacing.is_some() {
+                let next = if self.parameters.index_spacing.is_some() {
                     Phase::Index
                 } else {
                     Phase::Settle
@@ -216,9 +232,9 @@ impl<S: Scalar> Homing<S> {
             Phase::Index => return self.await_index(state, here, gone, input.index),
             Phase::Settle if !moving.is_at_rest() => state.ticks = 0,
             // The feedback's reference follows by the preview, and the axis by its lag.
-            Phase::Settle if state.ticks > self.settle_ticks => {
-                let offset = self.mark - state.mark;
-                let parking = self.approach.aim(self.park - (here + offset));
+            Phase::Settle if state.ticks > self.parameters.settle_ticks => {
+                let offset = self.parameters.home_offset - state.mark;
+                let parking = self.approach.aim(self.parameters.parking - (here + offset));
                 *parked = MotionState::start(here + offset);
                 state.parking = Motion::PointToPoint(parking);
                 state.enter(Phase::Park, here + offset);
@@ -236,7 +252,12 @@ impl<S: Scalar> Homing<S> {
         gone: u64,
         index: Option<Position>,
     ) -> HomingEvent {
-        let spacing = self.index_spacing.unwrap_or_default().0.unsigned_abs();
+        let spacing = self
+            .parameters
+            .index_spacing
+            .unwrap_or_default()
+            .0
+            .unsigned_abs();
         let margin = spacing / INDEX_MARGIN;
         if let Some(index) = index {
             let distance = (index - state.mark).0.unsigned_abs();

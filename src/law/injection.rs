@@ -1,12 +1,13 @@
-//! A voltage that a host adds to an axis' output, one value a control period: what identification excites an axis with.
+//! A voltage that a host adds to an axis' output, one value a control period: the excitation of identification.
 //!
 //! The values come in blocks, ahead of the tick that takes them, and end with the last one or with the first that is not
 //! there in time. In closed loop they are added to what the law puts out, before the output limit; in open loop they are
 //! all that the amplifier gets, and the reference goes along with the axis, so that the loop can be closed from where the
 //! axis is and as fast as it is. `docs/safety.md` has the rules.
 
-use crate::law::safety::{AxisName, FaultCode};
-use crate::law::scalar::Scalar;
+use crate::law::axes::AxisName;
+use crate::law::safety::FaultCode;
+use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::Position;
 
 /// Values in a block: with two bytes each, no more than the segments of a stream that wait in the same queue.
@@ -29,17 +30,17 @@ impl VoltageBlock {
         }
     }
 
-    /// How many there are.
+    /// Number of values, 0 to [`BLOCK_VALUES`].
     pub fn len(&self) -> usize {
         self.values.len()
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// A value by its place, and whether the injection ends with it.
+    /// The value at a place, if there is one.
     #[inline(always)]
     pub(crate) fn value(&self, place: usize) -> Option<InjectedValue> {
         let word = *self.values.get(place)?;
@@ -50,10 +51,11 @@ impl VoltageBlock {
     }
 }
 
-/// One value.
+/// A word to inject, and its place in the injection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct InjectedValue {
     pub(crate) word: i16,
+    /// The injection ends with it.
     pub(crate) last: bool,
 }
 
@@ -61,21 +63,58 @@ pub(crate) struct InjectedValue {
 /// [`StageSettings::injection`](crate::settings::StageSettings::injection).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Injection<S: Scalar> {
-    /// The axis.
-    pub(crate) axis: AxisName,
-    /// The values alone drive the amplifier.
-    pub(crate) open_loop: bool,
-    /// The plan's motions start with it.
-    pub(crate) with_plan: bool,
-    /// A word as a voltage.
-    pub(crate) volts: S::Gain,
-    /// How far the axis may go either way.
-    pub(crate) travel: Position,
-    /// How fast it may be, 2^-8 counts per tick.
-    pub(crate) fastest: u32,
+    axis: AxisName,
+    coupling: Coupling,
+    volts: S::Gain,
+    travel: Position,
+    /// Limit of the speed, 2^-8 counts per tick.
+    max_speed: u32,
 }
 
-/// How far an injection has come.
+/// The relation of an injection to the loop and to the plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Coupling {
+    /// The values are added to the law's output; the axes hold.
+    #[default]
+    Added,
+    /// As [`Self::Added`], while the plan's motions run, which start with it.
+    WithPlan,
+    /// The values alone drive the amplifier; the other axes hold.
+    OpenLoop,
+}
+
+impl<S: Scalar> Injection<S> {
+    /// An injection into `axis` of words that are `volts_per_word` each. It is broken off when the axis goes farther than
+    /// `travel` either way, or faster than `counts_per_tick` and half a count for what quantisation adds. Settings time
+    /// only.
+    pub fn new(
+        axis: AxisName,
+        coupling: Coupling,
+        volts_per_word: f64,
+        travel: Position,
+        counts_per_tick: f64,
+    ) -> Self {
+        Self {
+            axis,
+            coupling,
+            volts: S::gain(volts_per_word, Quantity::Integer, Quantity::Voltage),
+            travel,
+            max_speed: libm::round(256.0 * (counts_per_tick + 0.5)) as u32,
+        }
+    }
+
+    /// The axis that the voltage is put out on.
+    pub fn axis(&self) -> AxisName {
+        self.axis
+    }
+
+    /// The relation to the loop and to the plan.
+    pub fn coupling(&self) -> Coupling {
+        self.coupling
+    }
+}
+
+/// Progress of an injection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct InjectionProgress {
     /// The control tick of the first value, numbered as in a fault.
@@ -93,12 +132,12 @@ pub struct InjectionState<S: Scalar> {
     next: Option<InjectedValue>,
     /// The last value has been put out.
     complete: bool,
-    /// Where the axis was when it began.
+    /// Position of the axis at the beginning.
     centre: Position,
     progress: InjectionProgress,
 }
 
-/// What an injection comes to in a tick.
+/// Result of a tick of an injection.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) enum InjectionStep<S> {
     Voltage(S),
@@ -115,12 +154,12 @@ impl<S: Scalar> InjectionState<S> {
         };
     }
 
-    /// Whether there is an injection: values of none are dropped.
+    /// True if there is an injection: values of none are dropped.
     pub(crate) fn is_prepared(&self) -> bool {
         self.injection.is_some()
     }
 
-    /// Whether it has room for a value.
+    /// True if there is room for a value.
     pub(crate) fn wants_value(&self) -> bool {
         self.is_prepared() && self.next.is_none()
     }
@@ -129,12 +168,12 @@ impl<S: Scalar> InjectionState<S> {
         self.next = Some(value);
     }
 
-    /// Whether it can begin.
+    /// True if it can begin: its first value is there.
     pub(crate) fn is_ready(&self) -> bool {
         self.is_prepared() && !self.running && self.next.is_some()
     }
 
-    /// Whether it is under way.
+    /// True while it is under way.
     #[inline(always)]
     pub(crate) fn is_running(&self) -> bool {
         self.running
@@ -172,7 +211,7 @@ impl<S: Scalar> InjectionState<S> {
             return InjectionStep::Finished;
         };
         let beyond = (measured - self.centre).0.unsigned_abs() > injection.travel.0.unsigned_abs();
-        if beyond || speed.unsigned_abs() > injection.fastest {
+        if beyond || speed.unsigned_abs() > injection.max_speed {
             return InjectionStep::Fault(FaultCode::InjectionBounds);
         }
         if self.complete {

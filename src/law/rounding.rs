@@ -1,4 +1,4 @@
-//! What is done to numbers at settings time, each function once in the image. libm's are small enough to be copied to every
+//! Rounding and clamping at settings time, each function once in the image. libm's are small enough to be copied to every
 //! call, and double precision without hardware makes 200 bytes of each copy.
 
 /// The nearest whole number; halves are rounded away from zero.

@@ -21,7 +21,7 @@ pub const POSITION_UNITS_PER_COUNT: f64 = 65536.0;
 pub struct Position(pub i64);
 
 impl Position {
-    /// The origin.
+    /// The origin of the axis.
     pub const ZERO: Self = Self(0);
 
     /// The displacement of a step of an encoder; never saturates.

@@ -7,8 +7,9 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::law::command::Command;
 use crate::law::encoder::EncoderReading;
-use crate::law::safety::{Command, Switches};
+use crate::law::safety::Switches;
 use crate::law::stage::{Inputs, Outputs};
 use crate::law::units::DacCode;
 use crate::settings::{PlanSettings, StageSettings};
@@ -238,7 +239,7 @@ impl InputRecord {
     #[inline(always)]
     pub fn inputs(&self) -> Inputs {
         Inputs {
-            readings: self.readings,
+            readings: self.readings.into(),
             switches: self.switches,
             link_lost: self.link_lost,
             ..Inputs::default()
@@ -325,7 +326,7 @@ impl OutputRecord {
     /// The record as words.
     #[inline(always)]
     pub fn words(&self) -> [u32; 2] {
-        let [x, y, z] = self.outputs.codes.map(|code| u32::from(code.0 as u16));
+        let [x, y, z] = (*self.outputs.codes).map(|code| u32::from(code.0 as u16));
         [x | y << 16, z | u32::from(self.outputs.enabled) << 16]
     }
 
@@ -340,7 +341,7 @@ impl OutputRecord {
         let code = |word: u32| DacCode(word as u16 as i16);
         Self {
             outputs: Outputs {
-                codes: [code(low), code(low >> 16), code(high)],
+                codes: [code(low), code(low >> 16), code(high)].into(),
                 enabled: high >> 16 & 1 == 1,
             },
         }

@@ -1,19 +1,17 @@
 //! From checked settings to what the tick reads.
 
-use super::{
-    AmplifierSettings, AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings,
-};
-use crate::law::axis::{Amplifier, Axis};
-use crate::law::course::Course;
+use super::{AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings};
+use crate::law::axes::{AxisName, PerAxis};
+use crate::law::axis::{Axis, AxisBuilder};
 use crate::law::encoder::Encoder;
-use crate::law::reference::{Motion, MotionScale, Ramp, Stream, Velocity};
+use crate::law::motion::ReferenceGenerator;
+use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
-use crate::law::safety::AxisName;
-use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
+use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
 use crate::law::safety::travel::Travel;
-use crate::law::scalar::{Quantity, Scalar};
+use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
-use crate::law::units::{DacCode, POSITION_UNITS_PER_COUNT, Position};
+use crate::law::units::Position;
 
 impl StageSettings {
     /// Checks the settings and builds the stage, with room for `N` GMS elements. Slow: tables are filled and the
@@ -23,10 +21,10 @@ impl StageSettings {
     /// The first field that is refused; see [`StageSettings::validate`].
     pub fn build<S: Scalar, const N: usize>(&self) -> Result<Stage<S, N>, SettingsError> {
         self.validate(N)?;
-        Ok(Stage {
-            axes: AxisName::ALL.map(|axis| self.build_axis(axis)),
-            streaming: self.streaming.build(),
-        })
+        Ok(Stage::new(
+            PerAxis::from_fn(|axis| self.build_axis(axis)),
+            self.streaming.build(),
+        ))
     }
 
     /// Builds one axis of settings that [`validate`](Self::validate) has accepted, to be put in the place of another in a
@@ -82,93 +80,86 @@ impl AxisSettings {
         axis: &mut Axis<S, N>,
     ) {
         let preview_ticks = self.preview_ticks(period_s);
-        let (encoder, amplifier) = (&self.encoder, &self.amplifier);
+        let (encoder, amplifier, limits) = (&self.encoder, &self.amplifier, &self.limits);
         let (feedback, feedforward) = (&self.feedback, &self.feedforward);
-        let largest_step = 2.0 * self.limits.max_velocity_mm_s * period_s / encoder.resolution_mm;
+        let largest_step = 2.0 * limits.max_velocity_mm_s * period_s / encoder.resolution_mm;
         let scale = MotionScale {
             resolution_mm: encoder.resolution_mm,
             rate_hz: 1.0 / period_s,
         };
-        axis.encoder = Encoder::new(
-            encoder.counter_bits.into(),
-            encoder.reversed,
-            // One count more: a slow axis still steps by whole counts, and noise adds one.
-            rounding::ceil(largest_step) as i32 + 1,
-        );
-        let unit_mm = encoder.resolution_mm / POSITION_UNITS_PER_COUNT;
-        axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
-        axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
-        axis.feedback = feedback.build(period_s);
-        axis.feedforward.build_over(
-            feedforward.kind,
-            &feedforward.gains,
-            &self.friction,
-            period_s,
-        );
-        axis.preview_ticks = preview_ticks;
-        axis.amplifier = amplifier.build();
-        axis.following = self.limits.build_following();
-        axis.overspeed = Overspeed::new(self.limits.overspeed_ratio * 0.5 * largest_step);
-        axis.silence = Silence {
-            level: S::quantise(
-                self.limits.silent_share * amplifier.output_limit_v,
-                Quantity::Voltage,
-            ),
-            ticks: rounding::round(self.limits.silent_s / period_s) as u32,
-        };
-        axis.index = IndexSpacing::new(encoder.counts_per_index, encoder.index_tolerance_counts);
-        let wait_ticks = (longest_preview_ticks - preview_ticks) as u32;
-        axis.course = self.build_course(scale, wait_ticks);
-        axis.travel = self.limits.build_travel(scale, &axis.course.braking);
-        axis.transfer_decay = S::quantise(
-            libm::exp(-period_s / feedback.transfer_s),
-            Quantity::Fraction,
-        );
+        let stop_ramp = Ramp::new(limits.braking_mm_s2, limits.braking_jerk_mm_s3, scale);
+        let built = AxisBuilder::new(axis, encoder.resolution_mm, period_s)
+            .encoder(Encoder::new(
+                encoder.counter_bits.into(),
+                encoder.reversed,
+                // One count more: a slow axis still steps by whole counts, and noise adds one.
+                rounding::ceil(largest_step) as i32 + 1,
+            ))
+            .amplifier(
+                amplifier.output_limit_v,
+                amplifier.full_scale_v,
+                amplifier.offset_v,
+                amplifier.reversed,
+            )
+            .feedback(feedback.build(period_s))
+            .feedforward(
+                feedforward.kind,
+                &feedforward.gains,
+                &self.friction,
+                preview_ticks,
+            )
+            .bumpless(feedback.transfer_s)
+            .following(Following::new(
+                limits.following_error_mm,
+                limits.following_error_lag_s,
+                limits.following_error_max_mm,
+            ))
+            .overspeed(Overspeed::new(limits.overspeed_ratio * 0.5 * largest_step))
+            .signal_loss(SignalLoss::new(
+                limits.silent_share * amplifier.output_limit_v,
+                rounding::round(limits.silent_s / period_s) as u32,
+            ))
+            .index_spacing(IndexSpacing::new(
+                encoder.counts_per_index,
+                encoder.index_tolerance_counts,
+            ))
+            .travel(limits.build_travel(scale, &stop_ramp))
+            .generator(self.build_generator(
+                stop_ramp,
+                (longest_preview_ticks - preview_ticks) as u32,
+                scale,
+            ))
+            .try_build();
+        debug_assert_eq!(built, Ok(()), "validation accepted what an axis refuses");
     }
 
     #[inline(never)]
-    fn build_course<S: Scalar>(&self, scale: MotionScale, wait_ticks: u32) -> Course<S> {
+    fn build_generator<S: Scalar>(
+        &self,
+        stop_ramp: Ramp<S>,
+        wait_ticks: u32,
+        scale: MotionScale,
+    ) -> ReferenceGenerator<S> {
         let limits = &self.limits;
-        Course {
-            braking: Ramp::new(limits.braking_mm_s2, limits.braking_jerk_mm_s3, scale),
-            moving: Ramp::new(limits.max_acceleration_mm_s2, limits.max_jerk_mm_s3, scale),
-            fastest: Velocity::from_mm_s(limits.max_velocity_mm_s, scale),
-            span: limits.travel_mm.as_ref().map(|travel| {
-                let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
-                (position(travel.negative), position(travel.positive))
-            }),
-            homing: self.build_homing(scale),
-            stream: Stream::new(scale),
-            wait_ticks,
-        }
-    }
-}
-
-impl AmplifierSettings {
-    fn build<S: Scalar>(&self) -> Amplifier<S> {
-        let sign = if self.reversed { -1.0 } else { 1.0 };
-        let codes_per_volt = DacCode::FULL_SCALE / self.full_scale_v;
-        Amplifier {
-            limit: S::quantise(self.output_limit_v, Quantity::Voltage),
-            codes_per_volt: S::gain(sign * codes_per_volt, Quantity::Voltage, Quantity::Integer),
-            offset_code: rounding::round(self.offset_v * codes_per_volt) as i32,
-        }
+        let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
+        ReferenceGenerator::new(
+            stop_ramp,
+            Ramp::new(limits.max_acceleration_mm_s2, limits.max_jerk_mm_s3, scale),
+            Velocity::from_mm_s(limits.max_velocity_mm_s, scale),
+            scale,
+        )
+        .with_soft_limits(
+            limits
+                .travel_mm
+                .as_ref()
+                .map(|travel| (position(travel.negative), position(travel.positive))),
+        )
+        .with_homing(self.build_homing(scale))
+        .with_wait(wait_ticks)
     }
 }
 
 impl LimitSettings {
-    fn build_following<S: Scalar>(&self) -> Following<S> {
-        Following {
-            at_rest: S::quantise(self.following_error_mm, Quantity::Length),
-            per_speed: S::gain(
-                self.following_error_lag_s,
-                Quantity::Velocity,
-                Quantity::Length,
-            ),
-            largest: S::quantise(self.following_error_max_mm, Quantity::Length),
-        }
-    }
-
     fn build_travel<S: Scalar>(&self, scale: MotionScale, braking: &Ramp<S>) -> Travel {
         let Some(travel) = self.travel_mm else {
             return Travel::UNLIMITED;
@@ -195,7 +186,8 @@ impl PlanSettings {
     /// The first field that is refused; see [`PlanSettings::validate`].
     pub fn build<S: Scalar>(&self, stage: &StageSettings) -> Result<Plan<S>, SettingsError> {
         self.validate(stage)?;
-        Ok(core::array::from_fn(|index| {
+        Ok(PerAxis::from_fn(|axis| {
+            let index = axis as usize;
             Motion::build(&self.motions[index], stage.motion_scale(index))
         }))
     }

@@ -9,8 +9,8 @@ use super::{
     TravelSettings,
 };
 use crate::law::control::npid::NonlinearGain;
+use crate::law::control::pid::PidGains;
 use crate::law::control::plant_model::PlantModel;
-use crate::law::control::popov::PidGains;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::law::friction::dahl::DahlParameters;
 use crate::law::friction::gms::{GmsElement, GmsParameters};

@@ -3,9 +3,9 @@
 use core::fmt;
 
 use super::{AxisSettings, StageSettings};
+use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
 use crate::law::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
-use crate::law::safety::AxisName;
 use crate::law::units::Position;
 
 /// Why an axis is not moved.
@@ -94,7 +94,7 @@ impl StageSettings {
 
     /// The move of a homed axis from rest at `from` to `target_mm` at `velocity_mm_s`, within the axis' acceleration and
     /// jerk. Hand it to the axis as its plan's motion and start it with
-    /// [`Command::StartMove`](crate::law::safety::Command::StartMove).
+    /// [`Command::StartMove`](crate::law::command::Command::StartMove).
     ///
     /// # Errors
     /// The axis is not homed, the target beyond its travel, or the velocity out of its range.
@@ -140,7 +140,7 @@ impl StageSettings {
         })
     }
 
-    /// The velocity of a jog, for [`Command::Jog`](crate::law::safety::Command::Jog).
+    /// The velocity of a jog, for [`Command::Jog`](crate::law::command::Command::Jog).
     ///
     /// # Errors
     /// A speed above the axis' largest, or no number.
@@ -158,7 +158,7 @@ impl StageSettings {
         Ok(Velocity::from_mm_s(velocity_mm_s, self.scale_of(axis)))
     }
 
-    /// Whether an axis can be homed; asked before [`Command::Home`](crate::law::safety::Command::Home), which an axis without
+    /// Whether an axis can be homed; asked before [`Command::Home`](crate::law::command::Command::Home), which an axis without
     /// homing ignores.
     ///
     /// # Errors

@@ -8,7 +8,7 @@ use core::fmt;
 
 use super::tree::TreeError;
 use super::{SettingsError, StageSettings};
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
 
 /// A set of settings that is edited leaf by leaf, and the one in force.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
+use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
-use crate::law::safety::AxisName;
 
 /// Why a value is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]

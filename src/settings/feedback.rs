@@ -8,7 +8,7 @@ use crate::law::control::feedback::{Feedback, LawKind};
 use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
 use crate::law::control::npid::{NonlinearGain, NonlinearGainTable};
 use crate::law::control::pid::Pid;
-use crate::law::control::popov::PidGains;
+use crate::law::control::pid::PidGains;
 use crate::law::control::schedule::{MAX_POINTS, SchedulePoint, ScheduledPid};
 use crate::law::control::sliding_mode::{SlidingMode, SlidingModeGains};
 use crate::law::control::surface::SurfaceGains;

@@ -1,9 +1,9 @@
 //! What a request to inject a voltage comes to under the settings. For the slow half.
 
 use super::{Reason, SettingsError, StageSettings};
-use crate::law::injection::Injection;
-use crate::law::safety::AxisName;
-use crate::law::scalar::{Quantity, Scalar};
+use crate::law::axes::AxisName;
+use crate::law::injection::{Coupling, Injection};
+use crate::law::scalar::Scalar;
 use crate::law::units::{DacCode, Position};
 
 /// What is to be injected, and within which bounds.
@@ -58,15 +58,18 @@ impl StageSettings {
         let volts_per_word = axis.amplifier.full_scale_v / DacCode::FULL_SCALE;
         let resolution_mm = axis.encoder.resolution_mm;
         let counts_per_tick = request.max_velocity_mm_s / (resolution_mm * self.rate_hz);
-        let injection = Injection {
-            axis: request.axis,
-            open_loop: request.open_loop,
-            with_plan: request.with_plan,
-            volts: S::gain(volts_per_word, Quantity::Integer, Quantity::Voltage),
-            travel: Position::from_mm(request.travel_mm, resolution_mm),
-            // Half a count for what quantisation adds, as the monitor of overspeed has it.
-            fastest: libm::round(256.0 * (counts_per_tick + 0.5)) as u32,
+        let coupling = match (request.open_loop, request.with_plan) {
+            (true, _) => Coupling::OpenLoop,
+            (false, true) => Coupling::WithPlan,
+            (false, false) => Coupling::Added,
         };
+        let injection = Injection::new(
+            request.axis,
+            coupling,
+            volts_per_word,
+            Position::from_mm(request.travel_mm, resolution_mm),
+            counts_per_tick,
+        );
         let most = libm::round(request.limit_v / volts_per_word) as u16;
         Ok((injection, most))
     }

@@ -26,6 +26,8 @@ pub use injection::InjectionSettings;
 pub use limits::{LimitSettings, LossReaction, StreamingSettings, TravelSettings};
 pub use value::MAX_VALUE_BYTES;
 
+pub use crate::law::friction::FrictionSettings;
+
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
@@ -33,17 +35,11 @@ use crate::law::control::cascade::CascadeGains;
 use crate::law::control::feedback::LawKind;
 use crate::law::control::nctf::NctfGains;
 use crate::law::control::npid::NonlinearGain;
+use crate::law::control::pid::PidGains;
 use crate::law::control::plant_model::PlantModel;
-use crate::law::control::popov::PidGains;
 use crate::law::control::schedule::GainSchedule;
 use crate::law::control::sliding_mode::SlidingModeGains;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::law::friction::PerDirection;
-use crate::law::friction::dahl::DahlParameters;
-use crate::law::friction::gms::GmsParameters;
-use crate::law::friction::lugre::LugreParameters;
-use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
-use crate::law::friction::stribeck::StaticFriction;
 use crate::law::reference::MotionSettings;
 
 /// Everything the stage's control law is made from.
@@ -142,33 +138,6 @@ pub struct FeedbackSettings {
     pub sliding_mode: Option<SlidingModeGains>,
     /// NCTF.
     pub nctf: Option<NctfGains>,
-}
-
-/// The friction of an axis, as identified.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
-#[serde(deny_unknown_fields)]
-pub struct FrictionSettings {
-    /// The static model, for each sense of motion.
-    pub sliding: PerDirection<StaticFriction>,
-    /// The GMS model.
-    pub gms: GmsParameters,
-    /// What the smoothed GMS has beyond it.
-    #[serde(default)]
-    pub smoothed_gms: SmoothedGmsParameters,
-    /// Dahl's model; needed by its kind of feedforward alone.
-    #[serde(default)]
-    pub dahl: Option<DahlParameters>,
-    /// The LuGre model; needed by its kind of feedforward alone.
-    #[serde(default)]
-    pub lugre: Option<LugreParameters>,
-}
-
-impl FrictionSettings {
-    /// The mean of both directions' breakaway levels, V.
-    pub fn mean_breakaway_v(&self) -> f64 {
-        let PerDirection { positive, negative } = &self.sliding;
-        0.5 * (positive.curve.breakaway_v + negative.curve.breakaway_v)
-    }
 }
 
 /// The feedforward.

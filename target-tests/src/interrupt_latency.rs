@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::{BufRead, BufReader, Read};
 
 use anyhow::{Context, Result};
-use quadrant::safety::Command;
+use quadrant::command::Command;
 
 use crate::faults::case::moving;
 use crate::faults::fixture::Fixture;

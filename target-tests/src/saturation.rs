@@ -2,9 +2,10 @@
 //! same motion in quiet.
 
 use anyhow::{Context, Result, anyhow, ensure};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{Body, Request, TelemetryRequest};
-use quadrant::safety::{AxisName, Command};
 use quadrant::telemetry::{AxisSignal, Channel, MAX_CHANNELS};
 
 use crate::faults::case::{configuration, moving};

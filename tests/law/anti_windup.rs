@@ -1,8 +1,10 @@
 //! Recovery from a load that the output limit cannot hold.
 
-use quadrant::control::feedback::{Feedback, FeedbackInput, FeedbackState, LawKind};
+use quadrant::control::feedback::{Feedback, LawKind};
 use quadrant::control::pid::PidGains;
 use quadrant::control::surface::SurfaceGains;
+use quadrant::control::terms::FeedbackInput;
+use quadrant::control::terms::FeedbackState;
 use quadrant::settings::x_axis;
 
 const PERIOD_S: f64 = 1e-4;

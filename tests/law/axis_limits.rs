@@ -1,9 +1,10 @@
 //! Whatever the encoders say, the outputs stay within their limits and the memory stays sound.
 
 use proptest::prelude::*;
+use quadrant::axes::PerAxis;
+use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::safety::Command;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant::telemetry::LimitedBy;
@@ -43,7 +44,7 @@ fn check<S: Scalar>(rig: &mut Rig<S>) -> Result<bool, TestCaseError> {
             seen.feedback.integral,
             seen.feedback.derivative,
             seen.feedforward.total(),
-            seen.transfer,
+            seen.bumpless_offset,
         ];
         let finite = |volts: S| volts.to_f64(Quantity::Voltage).is_finite();
         prop_assert!(volts.into_iter().all(finite), "{seen:?}");
@@ -66,7 +67,7 @@ fn anything<S: Scalar>(
     for &(counts, command, changed) in ticks {
         rig.inputs.set_counts(counts);
         rig.inputs.command = Command::from_number(command);
-        rig.inputs.settings_changed = [changed; 3];
+        rig.inputs.settings_changed = PerAxis::splat(changed);
         check(&mut rig)?;
     }
     for command in [Command::Disable, Command::ResetFault, Command::Enable] {
@@ -91,7 +92,7 @@ fn plausible<S: Scalar>(
         for (reading, step) in rig.inputs.readings.iter_mut().zip(step) {
             reading.count = reading.count.wrapping_add_signed(*step);
         }
-        rig.inputs.settings_changed = [tick % 7 == 0; 3];
+        rig.inputs.settings_changed = PerAxis::splat(tick % 7 == 0);
         prop_assert!(check(&mut rig)?);
         saturated |= rig.state.axes()[0].telemetry().limited_by == LimitedBy::OutputLimit;
     }

@@ -1,7 +1,8 @@
-//! What the reference board's words mean: the board's own file, on the host.
+//! The meaning of the reference board's words: the board's own file, on the host.
 
+use quadrant::axes::AxisName;
 use quadrant::hal::ResetCause;
-use quadrant::safety::{AxisName, AxisSwitches, Switches};
+use quadrant::safety::{AxisSwitches, Switches};
 
 #[path = "../../src/board/nucleo_f446re/wiring.rs"]
 mod wiring;

@@ -13,7 +13,7 @@ const RESOLUTION_MM: f64 = 5e-4;
 /// Ticks before the change: into the motion, out of the lead-in.
 const BEFORE: usize = 2000;
 const AFTER: usize = 4000;
-/// How far the machine lags when the change comes.
+/// Lag of the machine when the change comes.
 const LAG_MM: f64 = 0.05;
 
 fn plan() -> PlanSettings {
@@ -48,7 +48,7 @@ fn volts<S: Scalar>(first: &StageSettings, second: Option<&StageSettings>) -> Ve
             let seen = rig.state.axes()[0].telemetry();
             (
                 seen.output.to_f64(Quantity::Voltage),
-                seen.transfer.to_f64(Quantity::Voltage),
+                seen.bumpless_offset.to_f64(Quantity::Voltage),
             )
         })
         .collect()
@@ -190,5 +190,5 @@ fn settings_exchanged_while_disabled_leave_no_offset() {
     rig.exchange(&x_alone(linear));
     rig.tick();
     rig.start();
-    assert_eq!(rig.state.axes()[0].telemetry().transfer, 0.0);
+    assert_eq!(rig.state.axes()[0].telemetry().bumpless_offset, 0.0);
 }

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use quadrant::capture::{Capture, CaptureCause, CaptureError, CapturePhase, Edge, Level, Trigger};
-use quadrant::safety::Command;
+use quadrant::command::Command;
 use quadrant::settings::StageSettings;
 use quadrant::telemetry::{Channel, MAX_CHANNELS, Observation, Selection};
 

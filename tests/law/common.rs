@@ -1,10 +1,11 @@
-//! What several tests share.
+//! Fixtures that several tests share.
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
+use quadrant::axes::PerAxis;
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::Command;
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
@@ -54,7 +55,7 @@ impl Noise {
         self.0
     }
 
-    /// One of `-most..=most`.
+    /// Draws a number of `-most..=most`.
     pub(crate) fn counts(&mut self, most: i64) -> i64 {
         (self.bits() >> 16) as i64 % (2 * most + 1) - most
     }
@@ -133,6 +134,6 @@ impl<S: Scalar> Rig<S> {
     /// Goes over to other settings at the next tick.
     pub(crate) fn exchange(&mut self, settings: &StageSettings) {
         self.stage = settings.build().expect("valid settings");
-        self.inputs.settings_changed = [true; 3];
+        self.inputs.settings_changed = PerAxis::splat(true);
     }
 }

@@ -1,4 +1,4 @@
-//! Numbers in messages.
+//! Tests of the decimals in messages.
 
 use proptest::prelude::*;
 use quadrant::decimal::Decimal;
@@ -43,7 +43,7 @@ fn a_number_of_decimals_is_kept() {
 }
 
 proptest! {
-    /// What has no more than twelve digits looks as `core` shows it.
+    /// A number of no more than twelve digits looks as `core` shows it.
     #[test]
     fn short_numbers_are_those_of_core(digits in -999_999_999_999i64..1_000_000_000_000, places in -2i32..7) {
         let value: f64 = format!("{digits}e{}", -places).parse().expect("a number");

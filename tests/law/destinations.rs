@@ -1,7 +1,7 @@
 //! Requests to move are checked against the settings, and refused with what was asked and what is allowed.
 
+use quadrant::axes::AxisName;
 use quadrant::reference::Velocity;
-use quadrant::safety::AxisName;
 use quadrant::settings::{MoveFlaw, StageSettings};
 use quadrant::units::Position;
 

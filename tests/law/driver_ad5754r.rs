@@ -57,7 +57,7 @@ impl SelectClock for Bus {
     }
 }
 
-/// What the bus and the pins are expected to see.
+/// The transfers and pin levels that are expected.
 #[derive(Default)]
 struct Script {
     bus: Vec<Transaction<u8>>,

@@ -1,12 +1,12 @@
 //! The dead man's switch.
 
 use proptest::prelude::*;
+use quadrant::command::Command;
 use quadrant::drivers::hold_button::{DEBOUNCE_TICKS, HoldButton};
-use quadrant::safety::Command;
 
 const LONG: usize = DEBOUNCE_TICKS as usize;
 
-/// What is asked for, and in which tick.
+/// The requests, and their ticks.
 fn asked(levels: &[bool]) -> Vec<(usize, Command)> {
     let mut button = HoldButton::new();
     let step = |(tick, &is_down)| button.step(is_down).map(|command| (tick, command));

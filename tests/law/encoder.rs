@@ -6,7 +6,7 @@ use quadrant::units::EncoderCount;
 
 use crate::common::repeatable;
 
-/// What a counter of `bits` shows at a true count.
+/// The reading of a counter of `bits` at a true count.
 fn counter(count: i64, bits: u32) -> u32 {
     (count as u64 & ((1 << bits) - 1)) as u32
 }

@@ -74,7 +74,7 @@ pub(crate) fn tick_of<S: Scalar>(rig: &mut Rig<S>) -> ([u64; 3], [i16; 3]) {
     };
     (
         core::array::from_fn(volts),
-        outputs.codes.map(|code| code.0),
+        outputs.codes.map(|code| code.0).into_array(),
     )
 }
 

@@ -1,7 +1,9 @@
-//! What every feedback law promises, whichever it is.
+//! Promises of every feedback law, whichever it is.
 
 use proptest::prelude::*;
-use quadrant::control::feedback::{Feedback, FeedbackInput, FeedbackState, LawKind};
+use quadrant::control::feedback::{Feedback, LawKind};
+use quadrant::control::terms::FeedbackInput;
+use quadrant::control::terms::FeedbackState;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::x_axis;
 

@@ -5,8 +5,9 @@ use quadrant::feedforward::{
     Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
     ReferenceStep,
 };
+use quadrant::friction::FrictionSettings;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::{FrictionSettings, PlanSettings, StageSettings, x_axis};
+use quadrant::settings::{PlanSettings, StageSettings, x_axis};
 use quadrant::units::{DacCode, Position};
 
 use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x, x_alone};
@@ -209,8 +210,8 @@ fn preview_shifts_the_feedbacks_reference_by_whole_ticks() {
         let settings = x_alone(|axis| axis.feedforward.preview_s = preview_s);
         let mut rig = Rig::<f64>::new(&settings, &sine_on_x(1.0, 10.0));
         rig.tick();
-        rig.command(quadrant::safety::Command::Enable);
-        rig.inputs.command = Some(quadrant::safety::Command::Run);
+        rig.command(quadrant::command::Command::Enable);
+        rig.inputs.command = Some(quadrant::command::Command::Run);
         (0..300)
             .map(|_| {
                 rig.tick();

@@ -10,7 +10,7 @@ use crate::common::Noise;
 /// Bytes of a sector, as on the reference board.
 pub(crate) const SECTOR: usize = 16 * 1024;
 
-/// What a cut leaves of the operation it falls into.
+/// The remains of an operation that a cut falls into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Damage {
     /// It has not begun.
@@ -83,7 +83,7 @@ impl Default for Flash {
     }
 }
 
-/// What the flash says.
+/// The answer of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
     /// There is no power.

@@ -1,9 +1,10 @@
 //! Gain scheduling: at any speed the PID of that speed.
 
 use proptest::prelude::*;
-use quadrant::control::feedback::{FeedbackInput, FeedbackState};
 use quadrant::control::pid::{Pid, PidGains};
 use quadrant::control::schedule::{GainSchedule, SchedulePoint, ScheduledPid};
+use quadrant::control::terms::FeedbackInput;
+use quadrant::control::terms::FeedbackState;
 use quadrant::settings::x_axis;
 
 use crate::common::repeatable;

@@ -2,9 +2,11 @@
 //! nor on a switch that scatters, bounces and has play.
 
 use proptest::prelude::*;
-use quadrant::axis::CourseMode;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::friction::Direction;
-use quadrant::safety::{AxisName, AxisSwitches, Command, FaultCode, SafetyState, Switches};
+use quadrant::motion::MotionMode;
+use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant::settings::{AxisSettings, HomeSwitch, HomingSettings, PlanSettings};
 use quadrant::units::Position;
 
@@ -17,7 +19,7 @@ const PULSE: i64 = 8_000;
 /// The machine around the x axis, in its own counts, of which the encoder knows nothing.
 struct Machine {
     rig: Rig<f32>,
-    /// Where the encoder's counter was switched on.
+    /// Position at which the encoder's counter was switched on.
     start: i64,
     raw: i64,
     /// The table, which hangs behind the screw by the play.
@@ -26,7 +28,7 @@ struct Machine {
     switch: Box<dyn Fn(i64) -> AxisSwitches>,
     has_index: bool,
     noise: Noise,
-    /// How far the switch's edge scatters.
+    /// Scatter of the switch's edge.
     scatter: i64,
 }
 
@@ -155,7 +157,7 @@ fn homing_finds_the_origin_and_parks() {
         let park = Position::from_mm(-30.0, 5e-4);
         assert_eq!((x.reference(), x.telemetry().reference), (park, park));
         assert_eq!(x.telemetry().measured.0, -60_000);
-        assert_eq!(x.mode(), CourseMode::Hold);
+        assert_eq!(x.mode(), MotionMode::Hold);
     }
 }
 
@@ -303,7 +305,7 @@ fn defining_the_origin_moves_nothing() {
             assert_eq!((feedforward.viscous, feedforward.inertia), (0.0, 0.0));
         }
         last = telemetry.code.0;
-        if x.mode() == CourseMode::Hold {
+        if x.mode() == MotionMode::Hold {
             break;
         }
     }

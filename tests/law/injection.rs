@@ -1,11 +1,15 @@
 //! A host's voltage through the whole tick: what it adds up to, and when it is taken.
 
 use proptest::prelude::*;
-use quadrant::app::supervisor::{Refusal, StageView, refusal};
-use quadrant::axis::CourseMode;
+use quadrant::admission::Refusal;
+use quadrant::admission::StageView;
+use quadrant::admission::refusal;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::injection::Injection;
+use quadrant::motion::MotionMode;
 use quadrant::reference::Velocity;
-use quadrant::safety::{AxisName, Command, FaultCode};
+use quadrant::safety::FaultCode;
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{InjectionSettings, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
@@ -96,7 +100,7 @@ impl<S: Scalar> Bench<S> {
         self.rig.state.safety().fault().map(|fault| fault.code)
     }
 
-    pub(crate) fn mode(&self) -> CourseMode {
+    pub(crate) fn mode(&self) -> MotionMode {
         self.rig.state.axes()[0].mode()
     }
 }
@@ -183,7 +187,7 @@ fn in_open_loop_the_law_is_off_and_the_others_hold() {
         assert_eq!(bench.fault(), None);
     }
     assert!(bench.outputs.codes[1].0 < 0, "y is pushed and holds");
-    assert_eq!(bench.mode(), CourseMode::OpenLoop);
+    assert_eq!(bench.mode(), MotionMode::OpenLoop);
     let seen = bench.rig.state.axes()[0].telemetry();
     assert_eq!(seen.reference.0 >> 16, seen.measured.0);
 }
@@ -208,7 +212,7 @@ fn nothing_else_begins_meanwhile_and_it_begins_only_at_rest() {
         bench.rig.inputs.command = Some(command);
         bench.tick();
         assert!(
-            bench.rig.state.axes()[1..]
+            bench.rig.state.axes().as_slice()[1..]
                 .iter()
                 .all(|axis| !axis.is_running())
         );
@@ -318,7 +322,7 @@ proptest! {
             let outputs = rig.tick();
             if !rig.state.is_injecting() {
                 prop_assert_eq!(rig.state.axes()[0].injected(), Fixed::ZERO);
-                prop_assert!(rig.state.axes()[0].mode() != CourseMode::OpenLoop);
+                prop_assert!(rig.state.axes()[0].mode() != MotionMode::OpenLoop);
             }
             if !outputs.enabled {
                 prop_assert_eq!(outputs, Outputs::default());

@@ -1,7 +1,9 @@
-//! How an injected voltage ends: what ends it, in which tick, and what the axes do then.
+//! The ends of an injected voltage: their causes, their ticks, and the axes' reactions.
 
-use quadrant::axis::CourseMode;
-use quadrant::safety::{AxisName, AxisSwitches, Command, FaultCode, SafetyState, Switches};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::motion::MotionMode;
+use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant::settings::{InjectionSettings, PlanSettings, TravelSettings};
 use quadrant::stage::Outputs;
 
@@ -31,7 +33,7 @@ fn the_loop_is_closed_without_a_bump_from_a_moving_axis() {
         most_mm = most_mm.max(f64::from(bench.rig.state.axes()[0].telemetry().error_mm()).abs());
     }
     assert!(bench.rig.state.safety().is_enabled(), "{:?}", bench.fault());
-    assert_eq!(bench.mode(), CourseMode::Hold);
+    assert_eq!(bench.mode(), MotionMode::Hold);
     assert!(bench.velocity_mm_s.abs() < 1.0, "{}", bench.velocity_mm_s);
     assert!(most_mm < 0.2, "{most_mm}");
 }
@@ -132,7 +134,10 @@ fn every_monitor_but_the_following_error_watches_an_open_loop() {
     // 20 mm/s towards smaller positions: the travel of the axis ends before that of the request.
     let (fault, enabled) = provoke(creep).unwrap();
     assert!(
-        matches!(fault, FaultCode::TravelAhead | FaultCode::TravelExceeded),
+        matches!(
+            fault,
+            FaultCode::PredictedSoftLimit | FaultCode::TravelExceeded
+        ),
         "{fault:?}"
     );
     assert!(enabled);
@@ -165,6 +170,6 @@ fn a_stop_and_a_disable_end_it() {
         bench.rig.inputs.command = Some(Command::Disable);
         assert_eq!(bench.step(), Outputs::default());
         assert!(!bench.rig.state.is_injecting());
-        assert_eq!(bench.mode(), CourseMode::Hold);
+        assert_eq!(bench.mode(), MotionMode::Hold);
     }
 }

@@ -1,9 +1,10 @@
 //! Jogging: at the velocity asked for, within acceleration and jerk, and never past the end of the travel.
 
 use proptest::prelude::*;
-use quadrant::axis::CourseMode;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::motion::MotionMode;
 use quadrant::reference::{JogState, MotionScale, Ramp, RampState, Velocity};
-use quadrant::safety::{AxisName, Command};
 use quadrant::settings::{PlanSettings, StageSettings, TravelSettings};
 use quadrant::units::Position;
 
@@ -124,7 +125,7 @@ fn the_travel_holds_a_jog_once_the_axis_is_homed_and_not_before() {
         assert!(rig.state.safety().is_enabled(), "{:?}", rig.state.safety());
         if homed {
             assert!((1.7..2.0).contains(&at), "{at}");
-            assert_eq!(rig.state.axes()[0].mode(), CourseMode::Hold);
+            assert_eq!(rig.state.axes()[0].mode(), MotionMode::Hold);
         } else {
             assert!(at > 9.0, "{at}");
         }
@@ -144,9 +145,9 @@ fn a_jog_is_held_to_the_largest_velocity_and_follows_changes() {
         (per_tick * 1e4 - largest).abs() < 1e-3 * largest,
         "{per_tick}"
     );
-    assert_eq!(rig.state.axes()[0].mode(), CourseMode::Hold);
+    assert_eq!(rig.state.axes()[0].mode(), MotionMode::Hold);
     rig.command(Command::Jog(AxisName::Y, Velocity::ZERO));
     follow(&mut rig, 3_000);
-    assert_eq!(rig.state.axes()[1].mode(), CourseMode::Hold);
+    assert_eq!(rig.state.axes()[1].mode(), MotionMode::Hold);
     assert!(rig.state.safety().is_enabled());
 }

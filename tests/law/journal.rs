@@ -1,9 +1,10 @@
-//! What the board's own log finds worth telling.
+//! The events that the board's own log tells.
 
-use quadrant::app::supervisor::StageView;
+use quadrant::admission::StageView;
 use quadrant::app::{Journal, MOST_NEWS, Meters, News, Vitals};
-use quadrant::axis::CourseMode;
-use quadrant::safety::AxisName;
+use quadrant::axes::AxisName;
+use quadrant::axes::PerAxis;
+use quadrant::motion::MotionMode;
 
 /// A machine that somebody else changes between looks.
 #[derive(Default)]
@@ -35,10 +36,10 @@ fn a_machine_at_rest_is_no_news() {
 #[test]
 fn homing_is_told_from_its_beginning_to_its_end() {
     let mut machine = Machine::default();
-    machine.view.modes[1] = CourseMode::Home;
-    assert_eq!(machine.look(), [News::Began(AxisName::Y, CourseMode::Home)]);
+    machine.view.modes[1] = MotionMode::Home;
+    assert_eq!(machine.look(), [News::Began(AxisName::Y, MotionMode::Home)]);
     assert_eq!(machine.look(), []);
-    machine.view.modes[1] = CourseMode::Hold;
+    machine.view.modes[1] = MotionMode::Hold;
     machine.view.homed[1] = true;
     assert_eq!(machine.look(), [News::Homed(AxisName::Y)]);
 }
@@ -46,20 +47,20 @@ fn homing_is_told_from_its_beginning_to_its_end() {
 #[test]
 fn homing_that_finds_nothing_is_told_too() {
     let mut machine = Machine::default();
-    machine.view.modes[2] = CourseMode::Home;
+    machine.view.modes[2] = MotionMode::Home;
     machine.look();
-    machine.view.modes[2] = CourseMode::Stopping;
+    machine.view.modes[2] = MotionMode::Stopping;
     assert_eq!(
         machine.look(),
         [
             News::NotHomed(AxisName::Z),
-            News::Began(AxisName::Z, CourseMode::Stopping)
+            News::Began(AxisName::Z, MotionMode::Stopping)
         ]
     );
-    machine.view.modes[2] = CourseMode::Hold;
+    machine.view.modes[2] = MotionMode::Hold;
     assert_eq!(
         machine.look(),
-        [News::Ended(AxisName::Z, CourseMode::Stopping)]
+        [News::Ended(AxisName::Z, MotionMode::Stopping)]
     );
 }
 
@@ -123,9 +124,9 @@ fn settings_and_captures_are_told_once() {
 #[test]
 fn all_at_once_finds_room() {
     let mut machine = Machine::default();
-    machine.view.modes = [CourseMode::Home; 3];
+    machine.view.modes = PerAxis::splat(MotionMode::Home);
     machine.look();
-    machine.view.modes = [CourseMode::Stopping; 3];
+    machine.view.modes = PerAxis::splat(MotionMode::Stopping);
     machine.vitals = Vitals {
         greeted: true,
         heard_tick: 0,

@@ -2,6 +2,7 @@
 
 use heapless::Vec as Bounded;
 use quadrant::app::supervisor;
+use quadrant::axes::AxisName;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{
     self, DecodeError, EncodeError, FRAME_BYTES, FrameCounters, PAYLOAD_BYTES, Receiver,
@@ -11,7 +12,7 @@ use quadrant::link::message::{
     text,
 };
 use quadrant::link::port::Port;
-use quadrant::safety::{AxisName, FaultCode};
+use quadrant::safety::FaultCode;
 
 use crate::link_traffic::framed;
 
@@ -231,7 +232,7 @@ fn the_supervisors_events_have_their_notice() {
     };
     assert_eq!(Event::from(supervisor::Event::Faulted(fault)), expected);
     let refused = supervisor::Event::Refused(
-        quadrant::safety::Command::Run,
+        quadrant::command::Command::Run,
         supervisor::Refusal::NotEnabled,
     );
     let Event::Refused(text) = Event::from(refused) else {

@@ -1,11 +1,11 @@
 //! The wire format, byte for byte: a change of it is a change of the protocol's version.
 
 use heapless::Vec as Bounded;
+use quadrant::axes::AxisName::{X, Y, Z};
 use quadrant::capture::{Edge, Level, Trigger};
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::message::*;
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::safety::AxisName::{X, Y, Z};
 use quadrant::settings::PlanSettings;
 use quadrant::telemetry::Channel;
 

@@ -1,6 +1,7 @@
 //! The room that the largest messages need.
 
 use heapless::{String, Vec as Bounded};
+use quadrant::axes::AxisName;
 use quadrant::capture::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{self, FRAME_BYTES, FrameCounters};
@@ -12,7 +13,7 @@ use quadrant::link::message::{
 };
 use quadrant::link::port::Port;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{AxisName, FaultCode};
+use quadrant::safety::FaultCode;
 use quadrant::settings::PlanSettings;
 use quadrant::telemetry::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
 

@@ -1,6 +1,7 @@
 //! Traffic for the link: any request, and what a bad line makes of it.
 
 use heapless::{String, Vec as Bounded};
+use quadrant::axes::AxisName;
 use quadrant::capture::{Edge, Level, Trigger};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{
@@ -8,7 +9,6 @@ use quadrant::link::message::{
     StreamRequest, TelemetryRequest, Value, Voltages,
 };
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::safety::AxisName;
 use quadrant::settings::PlanSettings;
 use quadrant::telemetry::Channel;
 
@@ -206,13 +206,13 @@ impl Noise {
     }
 }
 
-/// What a line made of a frame.
+/// A frame after the line.
 pub(crate) struct Arrival {
     /// The bytes that arrive.
     pub(crate) bytes: Vec<u8>,
     /// The request that was sent.
     pub(crate) request: Request,
-    /// How often the bytes hold its frame, whole and by itself.
+    /// Number of times the bytes hold its frame, whole and by itself.
     pub(crate) copies: usize,
 }
 

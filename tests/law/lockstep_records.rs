@@ -1,12 +1,14 @@
 //! The records of the lockstep channel survive the way there and back.
 
 use proptest::prelude::*;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::link::lockstep::{
     BootBlock, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Provocation, Reset, held,
 };
 use quadrant::reference::Velocity;
-use quadrant::safety::{AxisName, AxisSwitches, Command, Switches};
+use quadrant::safety::{AxisSwitches, Switches};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
@@ -47,7 +49,7 @@ proptest! {
 
     #[test]
     fn output_records_round_trip(codes in any::<[i16; 3]>(), enabled in any::<bool>()) {
-        let outputs = Outputs { codes: codes.map(DacCode), enabled };
+        let outputs = Outputs { codes: codes.map(DacCode).into(), enabled };
         let record = OutputRecord { outputs };
         prop_assert_eq!(OutputRecord::decode(&record.encode()), record);
     }
@@ -83,7 +85,7 @@ fn records_are_little_endian_words() {
     assert_eq!(record.encode(), bytes);
     let record = OutputRecord {
         outputs: Outputs {
-            codes: [DacCode(-1), DacCode(2), DacCode(-3)],
+            codes: [DacCode(-1), DacCode(2), DacCode(-3)].into(),
             enabled: true,
         },
     };

@@ -6,7 +6,7 @@ use quadrant::settings::{PlanSettings, StageSettings};
 
 use crate::common::{Noise, Rig, sine_on_x};
 
-/// What a tick shows of one axis: proportional, integral, derivative, feedforward, output (V), and the code.
+/// One axis at one tick: proportional, integral, derivative, feedforward, output (V), and the code.
 type Shown = ([f64; 5], i16);
 
 /// All axes over a motion with noise on the counts: the same counts for every type.

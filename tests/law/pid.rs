@@ -1,9 +1,9 @@
 //! The PID: bounds, filter, and its start.
 
 use proptest::prelude::*;
-use quadrant::control::feedback::FeedbackState;
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
 use quadrant::control::pid::{Pid, PidGains};
+use quadrant::control::terms::FeedbackState;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::x_axis;
 

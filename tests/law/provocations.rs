@@ -1,6 +1,8 @@
-//! What brings the monitors' parameters into play: short runs that end in a fault, or would with other parameters.
+//! Provocations of the monitors' parameters: short runs that end in a fault, or would with other parameters.
 
-use quadrant::safety::{AxisName, AxisSwitches, Command, SafetyState, StreamLoss, Switches};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::safety::{AxisSwitches, SafetyState, StreamLoss, Switches};
 use quadrant::settings::StageSettings;
 
 use crate::common::Rig;
@@ -109,7 +111,7 @@ fn run(settings: &StageSettings, axis: usize, moves: bool, run: Run) -> Trace {
         rig.start();
     } else {
         rig.tick();
-        rig.command(quadrant::safety::Command::Enable);
+        rig.command(quadrant::command::Command::Enable);
     }
     let mut trace = vec![];
     for tick in 1..LONGEST {
@@ -122,7 +124,7 @@ fn run(settings: &StageSettings, axis: usize, moves: bool, run: Run) -> Trace {
     (trace, rig.state.safety())
 }
 
-/// What comes of every run, and what the stage would do if a stream ran dry.
+/// The result of every run, and the stage's reaction if a stream ran dry.
 pub(crate) fn provoke(settings: &StageSettings, axis: usize) -> Option<(Vec<Trace>, StreamLoss)> {
     let stage = settings.build::<f32, 4>().ok()?;
     plan().validate(settings).ok()?;

@@ -19,7 +19,7 @@ fn velocity(value_mm_s: f64) -> Velocity {
     Velocity::from_mm_s(value_mm_s, SCALE)
 }
 
-/// What the numbers' own rounding may add to a change of velocity, mm/s.
+/// Largest addition of the numbers' own rounding to a change of velocity, mm/s.
 const ROUNDING_MM_S: f64 = 1e-9;
 
 /// Watches a ramp's every tick.

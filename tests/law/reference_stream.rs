@@ -153,7 +153,7 @@ fn follow_circle(period_ticks: u32, stride: u32) -> f64 {
     farthest
 }
 
-/// What interpolation of fifth degree may be off: `h^6 / 46080` times the sixth derivative of the motion; and the
+/// Error bound of interpolation of fifth degree: `h^6 / 46080` times the sixth derivative of the motion; and the
 /// rounding of the set points and of the ticks to whole units.
 fn circle_bound(period_s: f64) -> f64 {
     // That of the circle with this course of the angle is at most 46 450 mm/s^6, by its Taylor series at 4000 places.
@@ -254,7 +254,7 @@ fn hermite(from: [f64; 3], to: [f64; 3], share: f64, period_s: f64) -> f64 {
     sum(basis(share), from) + sum(basis(1.0 - share), [to[0], -to[1], to[2]])
 }
 
-/// Differences of neighbours.
+/// The differences of neighbouring values.
 fn differences(values: &[i64]) -> Vec<i64> {
     values.windows(2).map(|pair| pair[1] - pair[0]).collect()
 }

@@ -1,6 +1,9 @@
 //! The stage's states: who drives the outputs, and what ends it.
 
-use quadrant::safety::{AxisName, Command, Fault, FaultCode, SafetyState};
+use quadrant::axes::AxisName;
+use quadrant::axes::PerAxis;
+use quadrant::command::Command;
+use quadrant::safety::{Fault, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
@@ -13,7 +16,7 @@ fn rig() -> Rig<f32> {
 
 fn off() -> Outputs {
     Outputs {
-        codes: [DacCode::ZERO; 3],
+        codes: PerAxis::splat(DacCode::ZERO),
         enabled: false,
     }
 }

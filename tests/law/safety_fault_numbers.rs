@@ -1,4 +1,4 @@
-//! What hosts and people know faults by never changes.
+//! The numbers and names by which hosts and people know faults never change.
 
 use quadrant::safety::FaultCode;
 

@@ -1,10 +1,10 @@
 //! Every fault provoked: in which tick it is found, and what the outputs are in that tick. Prints the table of
 //! `docs/safety.md`.
 
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{
-    AxisName, AxisSwitches, Command, Fault, FaultCode, Reaction, SafetyState, Switches,
-};
+use quadrant::safety::{AxisSwitches, Fault, FaultCode, Reaction, SafetyState, Switches};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 
@@ -72,7 +72,7 @@ pub(crate) fn standing(settings: &StageSettings) -> Rig<f32> {
     rig
 }
 
-/// What goes wrong on an axis from a tick on; the tick counts from zero.
+/// A flaw of an axis from a tick on; the tick counts from zero.
 type Cause = fn(&mut Rig<f32>, AxisName, u32);
 
 struct Case {
@@ -154,7 +154,7 @@ const CASES: [Case; 16] = [
         },
     },
     Case {
-        code: FaultCode::TravelAhead,
+        code: FaultCode::PredictedSoftLimit,
         moves: true,
         of_axes: true,
         // Set homed where the travel does not reach.
@@ -177,7 +177,7 @@ const CASES: [Case; 16] = [
         cause: |rig, axis, _| rig.inputs.readings[index(axis)].valid = false,
     },
     Case {
-        code: FaultCode::EncoderSilent,
+        code: FaultCode::EncoderSignalLoss,
         moves: false,
         of_axes: true,
         // The way to a large error, silent_s, and the tick after.
@@ -235,9 +235,9 @@ fn settings(code: FaultCode) -> StageSettings {
         let travel = axis.limits.travel_mm.as_mut().expect("by default");
         match code {
             FaultCode::TravelExceeded => (travel.negative, travel.positive) = (-0.2, 0.2),
-            FaultCode::TravelAhead => (travel.negative, travel.positive) = (-9.0, -4.0),
+            FaultCode::PredictedSoftLimit => (travel.negative, travel.positive) = (-9.0, -4.0),
             // Nearer than the axis' own limit, and far from it.
-            FaultCode::EncoderSilent => axis.amplifier.output_limit_v = 1.0,
+            FaultCode::EncoderSignalLoss => axis.amplifier.output_limit_v = 1.0,
             FaultCode::Overspeed => {
                 axis.limits.following_error_mm = 20.0;
                 axis.limits.following_error_max_mm = 20.0;

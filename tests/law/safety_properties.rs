@@ -1,9 +1,10 @@
 //! Whatever comes in: nothing is driven unasked, and what a fault promises is kept.
 
 use proptest::prelude::*;
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::safety::monitor::{IndexSpacing, IndexState};
-use quadrant::safety::{Command, Reaction, SafetyState, Switches};
+use quadrant::safety::{Reaction, SafetyState, Switches};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{LossReaction, StageSettings};
 use quadrant::stage::{Inputs, Outputs};
@@ -56,7 +57,7 @@ fn inputs(before: &Inputs, (readings, switches, command, changed, late, lost): F
     let mut inputs = Inputs {
         switches: Switches::from_bits(switches),
         command: Command::from_number(command),
-        settings_changed: changed,
+        settings_changed: changed.into(),
         deadline_missed: late,
         link_lost: lost,
         ..Inputs::default()
@@ -87,7 +88,7 @@ fn promises<S: Scalar>(
         axis.limits.following_error_max_mm = 0.2;
     }
     let mut rig = Rig::<S>::new(&settings, &sines());
-    for (axis, homed) in quadrant::safety::AxisName::ALL.into_iter().zip(homed) {
+    for (axis, homed) in quadrant::axes::AxisName::ALL.into_iter().zip(homed) {
         rig.state.set_homed(axis, homed);
     }
     let mut enabled = 0;

@@ -1,6 +1,7 @@
 //! The stage at work: one axis can be exchanged for another between two ticks, and says how near its limit it comes.
 
-use quadrant::safety::{AxisName, Command};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::scalar::{Quantity, Scalar};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Outputs, Stage, StageRef, StageState};
@@ -45,17 +46,17 @@ fn one_axis_is_exchanged_without_a_jump_and_without_the_others() {
     };
     let before = volts(&state, 0);
     let pieces = StageRef {
-        axes: [&weak, stage.axis(AxisName::Y), stage.axis(AxisName::Z)],
+        axes: [&weak, stage.axis(AxisName::Y), stage.axis(AxisName::Z)].into(),
         ..stage.as_ref()
     };
     let changed = Inputs {
-        settings_changed: [true, false, false],
+        settings_changed: [true, false, false].into(),
         ..moved
     };
     pieces.tick(&plan, &mut state, &changed);
     stage.tick(&plan, &mut other, &moved);
     assert!((volts(&state, 0) - before).abs() < 1e-3, "x takes over");
-    assert!(state.axes()[0].telemetry().transfer.abs() > 0.01);
+    assert!(state.axes()[0].telemetry().bumpless_offset.abs() > 0.01);
     for axis in [1, 2] {
         assert_eq!(state.axes()[axis], other.axes()[axis]);
     }

@@ -1,9 +1,11 @@
 //! Ends of the travel: limit switches and soft limits stop an axis on its way out, and let it come back.
 
 use proptest::prelude::*;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::safety::{AxisName, AxisSwitches, Command, FaultCode, SafetyState, Switches};
+use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant::settings::{LossReaction, PlanSettings, StageSettings, TravelSettings};
 
 use crate::common::{Rig, repeatable, with_x};
@@ -90,7 +92,7 @@ proptest! {
         run(&mut rig, &settings, &by(if backward { -distance } else { distance }, velocity));
         let furthest = to_the_end(&mut rig);
         let fault = rig.state.safety().fault().expect("found");
-        prop_assert_eq!((fault.code, fault.axis), (FaultCode::TravelAhead, Some(AxisName::X)));
+        prop_assert_eq!((fault.code, fault.axis), (FaultCode::PredictedSoftLimit, Some(AxisName::X)));
         // Half a millimetre of following error is allowed beyond.
         prop_assert!(furthest <= positive + 0.5, "{furthest} mm of {positive} mm");
         // And not much is given away: the bound of the stopping distance is no more than 20 ticks of travel too long.
@@ -139,7 +141,7 @@ fn beyond_the_travel_an_axis_can_come_back_but_not_go_further() {
     run(&mut rig, &settings, &by(1.0, 10.0));
     to_the_end(&mut rig);
     let fault = rig.state.safety().fault().expect("further out");
-    assert_eq!(fault.code, FaultCode::TravelAhead);
+    assert_eq!(fault.code, FaultCode::PredictedSoftLimit);
     rig.command(Command::ResetFault);
     rig.command(Command::Enable);
     run(&mut rig, &settings, &by(-4.2, 100.0));
@@ -234,14 +236,14 @@ fn bad_inputs_keep_the_stage_from_being_enabled_and_are_named() {
                 spoil(&mut rig);
                 assert!(!rig.command(Command::Enable).enabled, "{code:?}");
                 assert_eq!(rig.state.safety(), state);
-                let obstacle = rig.state.obstacle().expect("named");
+                let interlock = rig.state.interlock().expect("named");
                 let axis = (code != FaultCode::EmergencyStop).then_some(AxisName::Y);
-                assert_eq!((obstacle.code, obstacle.axis), (code, axis));
+                assert_eq!((interlock.code, interlock.axis), (code, axis));
             }
             rig.inputs.switches = Switches::NONE;
             rig.tick();
             assert_eq!(rig.state.safety(), SafetyState::Disabled);
-            assert_eq!(rig.state.obstacle(), None);
+            assert_eq!(rig.state.interlock(), None);
         }
         assert!(rig.command(Command::Enable).enabled);
     }

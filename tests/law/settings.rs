@@ -1,7 +1,7 @@
 //! Every number out of its range is refused by name, with the value and what is allowed.
 
+use quadrant::axes::AxisName;
 use quadrant::decimal::Decimal;
-use quadrant::safety::AxisName;
 use quadrant::settings::{PlanSettings, Reason, SettingsError, StageSettings};
 
 use crate::common::with_x;

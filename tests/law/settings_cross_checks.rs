@@ -1,8 +1,8 @@
-//! What the fields of the settings must hold together.
+//! Conditions that fields of the settings must hold together.
 
+use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::GmsElement;
-use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::with_x;

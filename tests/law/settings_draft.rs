@@ -1,7 +1,7 @@
 //! Settings that are edited leaf by leaf and take effect as a whole.
 
+use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::safety::AxisName;
 use quadrant::settings::StageSettings;
 use quadrant::settings::draft::{ApplyError, Draft};
 use quadrant::stage::Stage;

@@ -121,7 +121,7 @@ fn field(path: &str) -> String {
     path.replace("/*/", ".").replace('/', ".")
 }
 
-/// Whether a leaf is a whole number.
+/// True if a leaf is a whole number.
 pub(crate) fn is_whole(path: &str) -> bool {
     ["counter_bits", "counts_per_index", "index_tolerance_counts"]
         .iter()

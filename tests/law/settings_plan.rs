@@ -1,7 +1,7 @@
 //! Motions are held to their ranges and to what their axis can do.
 
+use quadrant::axes::AxisName;
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::safety::AxisName;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 
 use crate::common::with_x;

@@ -276,7 +276,7 @@ fn a_dump_makes_the_same_settings_again() {
     }
 }
 
-/// What a host does that leaves JSON to itself.
+/// As a host does it that leaves JSON to itself.
 #[test]
 fn a_dump_in_bytes_makes_the_same_settings_again() {
     let mut longest = 0;

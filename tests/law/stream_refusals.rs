@@ -1,9 +1,9 @@
 //! Set points that ask for too much are refused by their number, with the value and the limit.
 
+use quadrant::axes::AxisName;
 use quadrant::reference::{
     AxisPoint, SetPoint, StreamError, StreamFlaw, StreamLimits, StreamPlanner,
 };
-use quadrant::safety::AxisName;
 use quadrant::units::Position;
 
 use crate::reference_stream::{LIMITS, mm, on_x, point};

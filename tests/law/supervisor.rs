@@ -1,8 +1,13 @@
-//! What the supervising task lets through, and what it tells.
+//! The commands that the supervising task lets through, and the events that it tells.
 
-use quadrant::app::supervisor::{Decision, Event, Refusal, StageView, Supervisor};
-use quadrant::axis::CourseMode;
-use quadrant::safety::{AxisName, Command, Fault, FaultCode, Obstacle, SafetyState};
+use quadrant::admission::Refusal;
+use quadrant::admission::StageView;
+use quadrant::app::supervisor::{Decision, Event, Supervisor};
+use quadrant::axes::AxisName;
+use quadrant::axes::PerAxis;
+use quadrant::command::Command;
+use quadrant::motion::MotionMode;
+use quadrant::safety::{EnableInterlock, Fault, FaultCode, SafetyState};
 
 const FAULT: Fault = Fault {
     code: FaultCode::DeadlineMissed,
@@ -13,10 +18,10 @@ const FAULT: Fault = Fault {
 const DISABLED: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
-    obstacle: None,
+    interlock: None,
     held: None,
-    modes: [CourseMode::Hold; 3],
-    homed: [false; 3],
+    modes: PerAxis::splat(MotionMode::Hold),
+    homed: PerAxis::splat(false),
     stream_ready: false,
     injection_ready: false,
     injecting: false,
@@ -40,7 +45,7 @@ const STOPPING: StageView = StageView {
     ..DISABLED
 };
 
-/// What a supervisor that has seen `before` decides on `view`.
+/// The decision on `view` of a supervisor that has seen `before`.
 fn decide(before: StageView, view: StageView, request: Option<Command>) -> Decision {
     let mut supervisor = Supervisor::default();
     supervisor.step(before, None);
@@ -152,11 +157,11 @@ fn enabling_with_a_bad_input_is_refused_and_names_it() {
             "z: both lines of the encoder change",
         ),
     ] {
-        let obstacle = Obstacle { code, axis };
+        let interlock = EnableInterlock { code, axis };
         for safety in [SafetyState::Start, SafetyState::Disabled] {
             let view = StageView {
                 safety,
-                obstacle: Some(obstacle),
+                interlock: Some(interlock),
                 ..DISABLED
             };
             let decision = decide(view, view, Some(Command::Enable));
@@ -164,12 +169,12 @@ fn enabling_with_a_bad_input_is_refused_and_names_it() {
             let Some(Event::Refused(Command::Enable, refusal)) = decision.events[3] else {
                 panic!("{decision:?}");
             };
-            assert_eq!(refusal, Refusal::BadInput(obstacle));
+            assert_eq!(refusal, Refusal::BadInput(interlock));
             assert!(refusal.to_string().starts_with(words), "{refusal}");
         }
         // A latched fault is what a person is to hear of first.
         let faulted = StageView {
-            obstacle: Some(obstacle),
+            interlock: Some(interlock),
             ..FAULTED
         };
         let decision = decide(faulted, faulted, Some(Command::Enable));

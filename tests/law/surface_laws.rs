@@ -1,9 +1,11 @@
 //! Cascade, sliding mode and NCTF: a PID at small errors, and each its own beyond.
 
-use quadrant::control::feedback::{FeedbackInput, FeedbackState, LawKind};
+use quadrant::control::feedback::LawKind;
 use quadrant::control::nctf::CharacteristicPoint;
 use quadrant::control::pid::{Pid, PidGains};
 use quadrant::control::surface::SurfaceGains;
+use quadrant::control::terms::FeedbackInput;
+use quadrant::control::terms::FeedbackState;
 use quadrant::settings::{FeedbackSettings, x_axis};
 
 const PERIOD_S: f64 = 1e-4;

@@ -1,7 +1,8 @@
 //! Telemetry: every channel shows what the tick computed, and no drop goes uncounted.
 
 use proptest::prelude::*;
-use quadrant::safety::{AxisName, Command};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::StageSettings;
 use quadrant::telemetry::{
@@ -77,7 +78,7 @@ fn every_channel_shows_its_term<S: Scalar>() {
             (AxisSignal::Viscous, volts(term.feedforward.viscous)),
             (AxisSignal::Gms, volts(term.feedforward.gms)),
             (AxisSignal::Inertia, volts(term.feedforward.inertia)),
-            (AxisSignal::Transfer, volts(term.transfer)),
+            (AxisSignal::BumplessOffset, volts(term.bumpless_offset)),
             (AxisSignal::Output, volts(term.output)),
             (AxisSignal::Code, f64::from(term.code.0)),
             (AxisSignal::LimitedBy, f64::from(term.limited_by as u8)),

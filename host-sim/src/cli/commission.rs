@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use quadrant::safety::AxisName;
+use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, share};

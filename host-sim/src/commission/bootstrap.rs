@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::feedback::LawKind;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::PidGains;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::AxisSettings;
 

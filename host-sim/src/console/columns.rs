@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use quadrant::safety::AxisName;
+use quadrant::axes::AxisName;
 use quadrant::telemetry::{AxisSignal, Channel, StageSignal};
 
 use super::samples::Samples;
@@ -35,7 +35,7 @@ const fn axis_column(signal: AxisSignal) -> &'static str {
         AxisSignal::Viscous => "viscous_v",
         AxisSignal::Gms => "gms_v",
         AxisSignal::Inertia => "inertia_v",
-        AxisSignal::Transfer => "transfer_v",
+        AxisSignal::BumplessOffset => "transfer_v",
         AxisSignal::Output => "voltage_v",
         AxisSignal::Code => "code",
         AxisSignal::LimitedBy => "limited_by",

@@ -123,7 +123,7 @@ pub enum ClientError {
         /// Its name.
         name: String,
         /// Its axis.
-        axis: Option<quadrant::safety::AxisName>,
+        axis: Option<quadrant::axes::AxisName>,
         /// When.
         tick: u32,
         /// Its cause.

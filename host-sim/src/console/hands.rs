@@ -2,7 +2,8 @@
 
 use std::io;
 
-use quadrant::safety::{AxisName, AxisSwitches, Switches};
+use quadrant::axes::AxisName;
+use quadrant::safety::{AxisSwitches, Switches};
 
 /// Hands at a machine that is not a real one.
 pub trait Hands {

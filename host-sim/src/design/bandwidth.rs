@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::popov::PidGains;
+use quadrant::control::pid::PidGains;
 
 use super::form::Form;
 use super::margins::Margins;

@@ -4,7 +4,7 @@
 //! largest Ki that a stated set of margins does not notice, rounded down to two significant digits, so that it can be
 //! written down and found again.
 
-use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
 use super::form::Form;
 use super::margins::{Margins, bisect};
@@ -98,7 +98,7 @@ pub fn largest_integral_gain(
 /// Acceptable to 0.05 dB and 0.05 deg of the loop without integral action, for instance:
 ///
 /// ```
-/// # use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+/// # use quadrant::control::{plant_model::PlantModel, pid::PidGains};
 /// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
 /// # let plant = PlantModel {
 /// #     gain_mm_per_v_s2: 69390.0, damping_per_s: 144.8, stiffness_per_s2: 166.6, delay_s: 1.2e-3,

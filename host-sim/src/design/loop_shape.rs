@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
-use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
 use super::held_plant::HeldPlant;
 

@@ -224,7 +224,7 @@ mod tests {
     use super::*;
     use crate::design::fixtures::{X_GAINS, X_PLANT};
     use crate::design::{ContinuousLoop, SampledLoop};
-    use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+    use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
     const CONTINUOUS: ContinuousLoop = ContinuousLoop {
         plant: X_PLANT,

@@ -35,7 +35,7 @@ pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]
 mod fixtures {
-    use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+    use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
     /// The x axis, chosen so that the thesis' printed margins come out.
     pub(crate) const X_PLANT: PlantModel = PlantModel {

@@ -1,7 +1,7 @@
 //! The nonlinear gain of N-PID: how large, and over which errors.
 
 use quadrant::control::npid::NonlinearGain;
-use quadrant::control::popov::PidGains;
+use quadrant::control::pid::PidGains;
 
 /// Rule by which ko and emax are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]

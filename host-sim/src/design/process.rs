@@ -1,7 +1,7 @@
 //! Process that a controller is designed on: a model of the axis or its measured response, closed in continuous time or
 //! as it runs.
 
-use quadrant::control::{plant_model::PlantModel, popov::PidGains};
+use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
 use super::form::Form;
 use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};

@@ -1,8 +1,9 @@
 //! Popov bound of an axis that differs from its model.
 
 use nalgebra::{Matrix4, Vector4};
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{PidGains, sector_bound};
+use quadrant::control::popov::sector_bound;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,10 +1,10 @@
 //! The step response of a linear axis under the firmware's own law, sample by sample.
 
-use quadrant::control::feedback::FeedbackState;
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
 use quadrant::control::pid::Pid;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::PidGains;
+use quadrant::control::terms::FeedbackState;
 
 use super::held_plant::{HeldPlant, HeldPlantRun};
 

@@ -1,8 +1,9 @@
 //! Margins and the Popov bound, confirmed by running the loop: tests by a method that knows no frequency response.
 
 use proptest::prelude::*;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{PidGains, sector_bound};
+use quadrant::control::popov::sector_bound;
 
 use super::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
 use super::{ContinuousLoop, Form, Process, SampledLoop, ShapingError, margins, shape_to_margins};

@@ -7,10 +7,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use quadrant::control::feedback::FeedbackState;
 use quadrant::control::pid::Pid;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::PidGains;
+use quadrant::control::terms::FeedbackState;
 use rayon::prelude::*;
 
 use super::held_plant::{HeldPlant, HeldPlantRun};

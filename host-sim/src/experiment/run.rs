@@ -47,7 +47,7 @@ pub enum RunError {
     Settings(#[from] quadrant::settings::SettingsError),
     /// The stage switched off.
     #[error("fault {number} on {axis} at tick {tick}: {cause}; {remedy}", number = .0.code.number(),
-        axis = .0.axis.map_or("the stage", quadrant::safety::AxisName::as_str), tick = .0.tick,
+        axis = .0.axis.map_or("the stage", quadrant::axes::AxisName::as_str), tick = .0.tick,
         cause = .0.code.cause(), remedy = .0.code.remedy())]
     Fault(quadrant::safety::Fault),
     /// The motion did not end.

@@ -9,10 +9,11 @@ use std::fmt;
 
 use heapless::Vec as ShortVec;
 use quadrant::control::plant_model::PlantModel;
+use quadrant::friction::FrictionSettings;
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::settings::{AxisSettings, FrictionSettings, SettingsError};
+use quadrant::settings::{AxisSettings, SettingsError};
 use rayon::prelude::*;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};

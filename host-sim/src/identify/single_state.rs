@@ -5,13 +5,13 @@
 //! both loops; the fit is the compromise. What a slow motion does not show is chosen: LuGre's sigma1 is the viscous
 //! friction, as much damping before sliding as in it.
 
+use quadrant::friction::FrictionSettings;
 use quadrant::friction::PerDirection;
 use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::gms::GmsParameters;
 use quadrant::friction::lugre::LugreParameters;
 use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant::friction::stribeck::StaticFriction;
-use quadrant::settings::FrictionSettings;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit};
 

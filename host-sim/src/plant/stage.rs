@@ -1,8 +1,10 @@
 //! The simulated stage: three axes that share nothing but the clock.
 
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::link::lockstep::InputRecord;
-use quadrant::safety::{AxisName, Command, Switches};
+use quadrant::safety::Switches;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 

@@ -8,13 +8,14 @@ mod flash;
 use std::collections::VecDeque;
 
 use quadrant::app::{
-    After, Axis, Control, ControlInputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
+    After, Axis, Control, Inputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
 };
+use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::link::message::NumberType;
-use quadrant::safety::{Command, FaultCode, Switches};
+use quadrant::safety::{FaultCode, Switches};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::{Outputs, StageState};
@@ -286,12 +287,10 @@ impl<S: Scalar> Running<S> {
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
     pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, After) {
-        let outputs = self.control.tick(&ControlInputs {
-            readings: inputs.readings,
-            switches: inputs.switches,
+        let outputs = self.control.tick(&Inputs {
             command: self.command.take(),
-            deadline_missed: false,
             link_lost: self.server.link_lost(),
+            ..inputs.inputs()
         });
         if self.requests.len() < REQUESTS {
             self.requests.extend(inputs.request);

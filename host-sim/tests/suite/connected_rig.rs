@@ -3,11 +3,12 @@
 
 use std::time::Duration;
 
+use quadrant::axes::AxisName;
 use quadrant::link::message::{
     AxisMode, Body, InjectRequest, InjectStatus, Reply, Status, Voltages,
 };
 use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::safety::{AxisName, FaultCode};
+use quadrant::safety::FaultCode;
 use quadrant::telemetry::MachineState;
 use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings};
 use quadrant_sim::console::rig::ConnectedRig;

@@ -2,9 +2,10 @@
 
 use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
+use quadrant::command::Command;
 use quadrant::link::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{Command, FaultCode, SafetyState};
+use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::sine::run_configuration;

@@ -2,13 +2,16 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::app::supervisor::{Event, Refusal};
-use quadrant::axis::CourseMode;
+use quadrant::admission::Refusal;
+use quadrant::app::supervisor::Event;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::link::lockstep::Job;
+use quadrant::motion::MotionMode;
 use quadrant::reference::{
     AxisPoint, Motion, MotionSettings, ReferenceSample, SetPoint, StreamPlanner, Velocity,
 };
-use quadrant::safety::{AxisName, Command, FaultCode, SafetyState};
+use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::units::Position;
 use quadrant_sim::machine::Machine;
@@ -311,7 +314,7 @@ fn a_stop_in_the_middle_of_a_stream_holds_and_another_stream_starts_from_there()
     bench.ask(Command::Stop);
     bench.rest();
     bench.assert_enabled();
-    assert_eq!(bench.machine.state().axes()[0].mode(), CourseMode::Hold);
+    assert_eq!(bench.machine.state().axes()[0].mode(), MotionMode::Hold);
     // What is left of it is not taken up again.
     bench.ask(Command::StartStream);
     bench.run(1_000);

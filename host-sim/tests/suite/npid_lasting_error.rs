@@ -1,11 +1,12 @@
 //! N-PID under a load that leaves a lasting error: Popov's criterion speaks of the origin, and about another point the loop
 //! has the slope of k(e) e for a gain.
 
-use quadrant::control::feedback::FeedbackState;
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
 use quadrant::control::pid::Pid;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{PidGains, sector_bound};
+use quadrant::control::popov::sector_bound;
+use quadrant::control::terms::FeedbackState;
 use quadrant_sim::design::held_plant::{HeldPlant, HeldPlantRun};
 use quadrant_sim::design::{Form, Process};
 

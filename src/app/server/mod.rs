@@ -24,8 +24,8 @@ use super::queues::ServerEnds;
 use super::{Axis, Meters, Snapshot};
 use crate::app::supervisor;
 use crate::hal::Serial;
-use crate::law::axis::CourseMode;
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
+use crate::law::motion::MotionMode;
 use crate::law::scalar::Scalar;
 use crate::law::telemetry::Packer;
 use crate::link::frame::FrameCounters;
@@ -179,7 +179,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     pub fn link_lost(&self) -> bool {
         let needed = self.stream.is_some()
             || self.is_injecting()
-            || self.seen.view.modes.contains(&CourseMode::Jog);
+            || self.seen.view.modes.contains(&MotionMode::Jog);
         needed && self.seen.tick.wrapping_sub(self.heard_tick) > LINK_PATIENCE_TICKS
     }
 

@@ -4,8 +4,9 @@ use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, busy, index, invalid, refused};
 use crate::app::supervisor;
+use crate::law::axes::AxisName;
+use crate::law::command::Command;
 use crate::law::reference::{Motion, MotionSettings};
-use crate::law::safety::{AxisName, Command};
 use crate::law::scalar::Scalar;
 use crate::link::message::{Body, LinkError, Reply};
 use crate::settings::PlanSettings;

@@ -4,8 +4,9 @@ use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, busy, invalid, refused};
 use crate::app::queues::CaptureOrder;
+use crate::law::axes::AxisName;
 use crate::law::capture::{Capture, CapturePhase, Trigger};
-use crate::law::safety::{AxisName, SafetyState};
+use crate::law::safety::SafetyState;
 use crate::law::scalar::Scalar;
 use crate::law::telemetry::{
     AxisSignal, BLOCK_WORDS, Channel, Packer, Sampler, Selection, StageSignal, TelemetryBlock,

@@ -4,8 +4,8 @@ use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::Exchange;
+use crate::law::axes::AxisName;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::safety::AxisName;
 use crate::law::scalar::Scalar;
 use crate::link::message::{
     Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,

@@ -3,8 +3,9 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::Server;
-use crate::law::axis::CourseMode;
-use crate::law::safety::{AxisName, SafetyState};
+use crate::law::axes::AxisName;
+use crate::law::motion::MotionMode;
+use crate::law::safety::SafetyState;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::telemetry::MachineState;
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
@@ -60,7 +61,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     /// Homing is a motion for the safety, but for a person a state of the machine.
     fn state(&self) -> MachineState {
         let view = &self.seen.view;
-        let homing = view.modes.into_iter().any(|mode| mode == CourseMode::Home);
+        let homing = view.modes.into_iter().any(|mode| mode == MotionMode::Home);
         match MachineState::from(view.safety) {
             MachineState::Enabled if homing => MachineState::Homing,
             state => state,

@@ -4,11 +4,11 @@ use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, invalid, refused};
 use crate::app::queues::{FEED_ROOM, Feed};
+use crate::law::command::Command;
 use crate::law::reference::{
     AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
     StreamPlanner,
 };
-use crate::law::safety::Command;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 use crate::link::message::{self, LinkError, Reply, StreamRequest, StreamStatus};
@@ -72,7 +72,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 "period_ticks = {period_ticks} is outside {LEAST_PERIOD_TICKS} to {MOST_SEGMENT_TICKS}"
             )));
         }
-        let limits = self.draft.in_force().stream_limits(view.homed);
+        let limits = self.draft.in_force().stream_limits(view.homed.into_array());
         let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
         self.stream = Some(OpenStream {
             planner: StreamPlanner::new(limits, period_ticks, start),

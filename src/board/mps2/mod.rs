@@ -18,9 +18,10 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
+use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::hal::{self, ResetCause};
-use quadrant::safety::{self, Command};
+use quadrant::safety;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 
@@ -215,7 +216,7 @@ impl hal::Amplifiers for Amplifiers {
         self.mismatches = [x != held_x, y != held_y, z != held_z];
         let answer = OutputRecord {
             outputs: Outputs {
-                codes: held,
+                codes: held.into(),
                 enabled: enabled && self.mismatches == [false; 3],
             },
         };

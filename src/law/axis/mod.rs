@@ -1,24 +1,59 @@
 //! One axis, one tick: counts in, a converter's word out.
+//!
+//! An [`Axis`] is what the tick reads, made by an [`AxisBuilder`]; an [`AxisState`] is what it remembers. The stage
+//! ticks three of them together; [`Axis::tick`] ticks one alone.
+//!
+//! ```
+//! use quadrant::axis::{Axis, AxisBuilder, AxisState};
+//! use quadrant::control::feedback::Feedback;
+//! use quadrant::control::pid::{Pid, PidGains};
+//! use quadrant::encoder::EncoderReading;
+//! use quadrant::reference::Motion;
+//!
+//! let gains = PidGains { kp_v_per_mm: 1.0, ki_v_per_mm_s: 0.5, kd_v_s_per_mm: 5e-3, derivative_filter_s: 50e-6 };
+//! let mut axis = Axis::<f32, 8>::blank();
+//! AxisBuilder::new(&mut axis, 0.5e-3, 1e-4)
+//!     .amplifier(10.0, 10.0, 0.0, false)
+//!     .feedback(Feedback::Pid(Pid::build(&gains, 2.0, 1e-4)))
+//!     .try_build()?;
+//! let mut state = AxisState::default();
+//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0).unwrap();
+//! // Pushed one count (0.5 um) away, the axis pushes back.
+//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1), 1).unwrap();
+//! assert!(code.0 < 0);
+//! # Ok::<(), quadrant::axis::AxisError>(())
+//! ```
 
-mod injected;
-mod state;
+pub mod telemetry;
 
-pub use state::AxisState;
+use core::fmt;
 
-use crate::law::control::feedback::{Feedback, FeedbackInput, FeedbackState, FeedbackTerms};
+use self::telemetry::{AxisTelemetry, LimitedBy};
+use crate::law::command::Command;
+use crate::law::control::feedback::Feedback;
 use crate::law::control::pid::Pid;
-pub use crate::law::course::CourseMode;
-use crate::law::course::{Course, CourseEvent};
-use crate::law::encoder::{Encoder, EncoderReading};
-use crate::law::feedforward::{Feedforward, FeedforwardTerms, ReferenceStep};
+use crate::law::control::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
+use crate::law::decimal::Decimal;
+use crate::law::encoder::{Encoder, EncoderReading, EncoderState};
+use crate::law::feedforward::{
+    Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
+    ReferenceStep,
+};
+use crate::law::friction::FrictionSettings;
 use crate::law::homing::HomingInput;
-use crate::law::reference::Motion;
-use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, Silence};
+use crate::law::motion::{
+    GeneratorEvent, GeneratorState, MotionMode, ReferenceGenerator, ReferenceState,
+};
+use crate::law::reference::{Motion, Segment};
+use crate::law::rounding;
+use crate::law::safety::monitor::{
+    Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
+    SignalLossState,
+};
 use crate::law::safety::travel::{Travel, TravelState};
-use crate::law::safety::{AxisSwitches, Command, FaultCode};
+use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::telemetry::{AxisTelemetry, LimitedBy};
-use crate::law::units::{DacCode, Position};
+use crate::law::units::{DacCode, POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
 
 /// Ticks that the feedforward can look ahead at most: 3 ms at 10 kHz.
 pub const MAX_PREVIEW_TICKS: usize = 30;
@@ -26,12 +61,15 @@ pub const MAX_PREVIEW_TICKS: usize = 30;
 /// Room for the reference positions from the feedforward's tick back to the one before the feedback's; a power of two.
 const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 2;
 
+/// A speed in 2^-8 counts as a displacement.
+const SPEED_SHIFT: u32 = POSITION_FRACTION_BITS - 8;
+
 /// The output stage of an axis.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Amplifier<S: Scalar> {
-    pub(crate) limit: S,
-    pub(crate) codes_per_volt: S::Gain,
-    pub(crate) offset_code: i32,
+struct Amplifier<S: Scalar> {
+    limit: S,
+    codes_per_volt: S::Gain,
+    offset_code: i32,
 }
 
 impl<S: Scalar> Amplifier<S> {
@@ -45,30 +83,396 @@ impl<S: Scalar> Amplifier<S> {
     }
 }
 
-/// An axis ready for the tick; `N` is the room for GMS elements. Made by
-/// [`StageSettings::build`](crate::settings::StageSettings::build).
+/// An axis ready for the tick; `N` is the room for GMS elements. Made by an [`AxisBuilder`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct Axis<S: Scalar, const N: usize> {
-    pub(crate) encoder: Encoder,
-    pub(crate) unit_mm: S::Gain,
+    encoder: Encoder,
+    unit_mm: S::Gain,
     /// A displacement in a tick as a velocity.
-    pub(crate) unit_mm_s: S::Gain,
-    pub(crate) feedback: Feedback<S>,
-    pub(crate) feedforward: Feedforward<S, N>,
-    pub(crate) preview_ticks: usize,
-    pub(crate) amplifier: Amplifier<S>,
-    pub(crate) transfer_decay: S,
-    pub(crate) overspeed: Overspeed,
-    pub(crate) silence: Silence<S>,
-    pub(crate) index: IndexSpacing,
-    pub(crate) following: Following<S>,
-    pub(crate) travel: Travel,
-    pub(crate) course: Course<S>,
+    unit_mm_s: S::Gain,
+    feedback: Feedback<S>,
+    feedforward: Feedforward<S, N>,
+    preview_ticks: usize,
+    amplifier: Amplifier<S>,
+    bumpless_decay: S,
+    overspeed: Overspeed,
+    signal_loss: SignalLoss<S>,
+    index_spacing: IndexSpacing,
+    following: Following<S>,
+    travel: Travel,
+    generator: ReferenceGenerator<S>,
+}
+
+/// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
+///
+/// What is not given is not there: no feedforward, no homing, no limits but the amplifier's, and a 32-bit encoder.
+#[derive(Debug)]
+pub struct AxisBuilder<'a, S: Scalar, const N: usize> {
+    axis: &'a mut Axis<S, N>,
+    period_s: f64,
+    error: Option<AxisError>,
+}
+
+/// A part that an axis cannot be made with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisError {
+    /// The length of an encoder count, mm: not above zero.
+    Resolution(f64),
+    /// The control period, s: not above zero.
+    Period(f64),
+    /// The output limit, V: not above zero, beyond the amplifier's full scale, or not given.
+    OutputLimit(f64),
+    /// The preview in ticks: more than [`MAX_PREVIEW_TICKS`].
+    Preview(usize),
+    /// The time constant of a bumpless offset, s: not above zero.
+    Bumpless(f64),
+}
+
+impl fmt::Display for AxisError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Resolution(mm) => write!(f, "a count of {} mm is not above zero", Decimal(*mm)),
+            Self::Period(s) => write!(f, "a control period of {} s is not above zero", Decimal(*s)),
+            Self::OutputLimit(v) => write!(
+                f,
+                "an output limit of {} V is not above zero and within the amplifier's full scale",
+                Decimal(*v)
+            ),
+            Self::Preview(ticks) => write!(
+                f,
+                "a preview of {ticks} ticks is longer than {MAX_PREVIEW_TICKS}"
+            ),
+            Self::Bumpless(s) => {
+                write!(f, "a bumpless time of {} s is not above zero", Decimal(*s))
+            }
+        }
+    }
+}
+
+impl core::error::Error for AxisError {}
+
+/// True for a number above zero that is finite.
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && value < f64::INFINITY
+}
+
+impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
+    /// Begins an axis in the place of one that is no longer used. An encoder count is `resolution_mm` long, a tick
+    /// takes `period_s`.
+    pub fn new(axis: &'a mut Axis<S, N>, resolution_mm: f64, period_s: f64) -> Self {
+        let unit_mm = resolution_mm / POSITION_UNITS_PER_COUNT;
+        axis.encoder = Encoder::new(32, false, i32::MAX);
+        axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
+        axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
+        axis.feedback = Feedback::Pid(Pid::default());
+        axis.feedforward.switch_off();
+        axis.preview_ticks = 0;
+        axis.amplifier = Amplifier::default();
+        axis.bumpless_decay = S::ZERO;
+        axis.overspeed = Overspeed::UNLIMITED;
+        axis.signal_loss = SignalLoss::off();
+        axis.index_spacing = IndexSpacing::default();
+        axis.following = Following::unlimited();
+        axis.travel = Travel::UNLIMITED;
+        axis.generator = ReferenceGenerator::default();
+        let builder = Self {
+            axis,
+            period_s,
+            error: None,
+        };
+        builder
+            .require(
+                is_positive(resolution_mm),
+                AxisError::Resolution(resolution_mm),
+            )
+            .require(is_positive(period_s), AxisError::Period(period_s))
+    }
+
+    /// Keeps the first error.
+    fn require(mut self, holds: bool, error: AxisError) -> Self {
+        if !holds && self.error.is_none() {
+            self.error = Some(error);
+        }
+        self
+    }
+
+    /// The encoder's counter; 32 bits unless given.
+    #[must_use]
+    pub fn encoder(self, encoder: Encoder) -> Self {
+        self.axis.encoder = encoder;
+        self
+    }
+
+    /// The output stage: outputs within +-`limit_v` on a converter of +-`full_scale_v`, whose zero lies at `offset_v`;
+    /// reversed, a positive output turns the motor the other way.
+    #[must_use]
+    pub fn amplifier(self, limit_v: f64, full_scale_v: f64, offset_v: f64, reversed: bool) -> Self {
+        let sign = if reversed { -1.0 } else { 1.0 };
+        let codes_per_volt = DacCode::FULL_SCALE / full_scale_v;
+        self.axis.amplifier = Amplifier {
+            limit: S::quantise(limit_v, Quantity::Voltage),
+            codes_per_volt: S::gain(sign * codes_per_volt, Quantity::Voltage, Quantity::Integer),
+            offset_code: rounding::round(offset_v * codes_per_volt) as i32,
+        };
+        self.require(
+            is_positive(limit_v) && limit_v <= full_scale_v,
+            AxisError::OutputLimit(limit_v),
+        )
+    }
+
+    /// The feedback law, built for the same control period.
+    #[must_use]
+    pub fn feedback(self, feedback: Feedback<S>) -> Self {
+        self.axis.feedback = feedback;
+        self
+    }
+
+    /// The feedforward, which looks `preview_ticks` ahead: the dead time of the plant.
+    #[must_use]
+    pub fn feedforward(
+        self,
+        kind: FeedforwardKind,
+        gains: &FeedforwardGains,
+        friction: &FrictionSettings,
+        preview_ticks: usize,
+    ) -> Self {
+        self.axis
+            .feedforward
+            .build_over(kind, gains, friction, self.period_s);
+        self.axis.preview_ticks = preview_ticks;
+        self.require(
+            preview_ticks <= MAX_PREVIEW_TICKS,
+            AxisError::Preview(preview_ticks),
+        )
+    }
+
+    /// The time constant with which the offset fades that makes a change of settings bumpless, s.
+    #[must_use]
+    pub fn bumpless(self, time_s: f64) -> Self {
+        self.axis.bumpless_decay =
+            S::quantise(libm::exp(-self.period_s / time_s), Quantity::Fraction);
+        self.require(is_positive(time_s), AxisError::Bumpless(time_s))
+    }
+
+    /// The limit of the measured speed.
+    #[must_use]
+    pub fn overspeed(self, overspeed: Overspeed) -> Self {
+        self.axis.overspeed = overspeed;
+        self
+    }
+
+    /// The monitor of the encoder's signal.
+    #[must_use]
+    pub fn signal_loss(self, signal_loss: SignalLoss<S>) -> Self {
+        self.axis.signal_loss = signal_loss;
+        self
+    }
+
+    /// The distance of the encoder's index pulses.
+    #[must_use]
+    pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
+        self.axis.index_spacing = index_spacing;
+        self
+    }
+
+    /// The limit of the tracking error.
+    #[must_use]
+    pub fn following(self, following: Following<S>) -> Self {
+        self.axis.following = following;
+        self
+    }
+
+    /// The soft limits, in force once the axis is homed.
+    #[must_use]
+    pub fn travel(self, travel: Travel) -> Self {
+        self.axis.travel = travel;
+        self
+    }
+
+    /// The reference generator, for motions beside the plan's.
+    #[must_use]
+    pub fn generator(self, generator: ReferenceGenerator<S>) -> Self {
+        self.axis.generator = generator;
+        self
+    }
+
+    /// Ends the axis. A refused one puts out nothing.
+    ///
+    /// # Errors
+    /// The first part that was refused.
+    pub fn try_build(self) -> Result<(), AxisError> {
+        let driven = self.axis.amplifier.limit > S::ZERO;
+        let built = self.require(driven, AxisError::OutputLimit(0.0));
+        match built.error {
+            None => Ok(()),
+            Some(error) => {
+                built.axis.amplifier = Amplifier::default();
+                Err(error)
+            }
+        }
+    }
+}
+
+/// The memory of an axis.
+#[derive(Clone, Debug, PartialEq)]
+pub struct AxisState<S: Scalar, const N: usize> {
+    encoder: EncoderState,
+    generator: GeneratorState<S>,
+    /// Position of the axis at the last index pulse, until homing takes it.
+    pulse: Option<Position>,
+    /// The travel is in force.
+    homed: bool,
+    overspeed: OverspeedState,
+    signal_loss: SignalLossState,
+    index: IndexState,
+    following: FollowingState<S>,
+    travel: TravelState,
+    /// The displacement of the reference at the feedforward's tick, and in the tick before.
+    displacement: Position,
+    displacement_before: Position,
+    /// The reference's step at the feedforward's tick.
+    step: ReferenceStep<S>,
+    /// The reference at the feedforward's tick, ahead of the feedback's.
+    look_ahead: Position,
+    preview: [Position; PREVIEW_ROOM],
+    /// The tracking error of this tick, and the velocity of the feedback's reference for a law that needs it.
+    input: FeedbackInput<S>,
+    feedback: FeedbackState<S>,
+    friction: FeedforwardState<S, N>,
+    bumpless_offset: S,
+    /// Voltage that a host adds to the output in this tick, V.
+    injected: S,
+    last_output: S,
+    telemetry: AxisTelemetry<S>,
+}
+
+impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
+    fn default() -> Self {
+        Self {
+            encoder: EncoderState::default(),
+            generator: GeneratorState::default(),
+            pulse: None,
+            homed: false,
+            overspeed: OverspeedState::default(),
+            signal_loss: SignalLossState::default(),
+            index: IndexState::default(),
+            following: FollowingState::default(),
+            travel: TravelState::default(),
+            displacement: Position::ZERO,
+            displacement_before: Position::ZERO,
+            step: ReferenceStep::default(),
+            look_ahead: Position::ZERO,
+            preview: [Position::ZERO; PREVIEW_ROOM],
+            input: FeedbackInput::default(),
+            feedback: FeedbackState::default(),
+            friction: FeedforwardState::default(),
+            bumpless_offset: S::ZERO,
+            injected: S::ZERO,
+            last_output: S::ZERO,
+            telemetry: AxisTelemetry::default(),
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> AxisState<S, N> {
+    /// Every term of the law at the last tick.
+    pub fn telemetry(&self) -> &AxisTelemetry<S> {
+        &self.telemetry
+    }
+
+    /// True while a motion is under way.
+    pub fn is_running(&self) -> bool {
+        self.mode() != MotionMode::Hold
+    }
+
+    /// The present motion mode.
+    pub fn mode(&self) -> MotionMode {
+        self.generator.mode()
+    }
+
+    /// Voltage that a host adds to the output, V.
+    #[inline(always)]
+    pub fn injected(&self) -> S {
+        self.injected
+    }
+
+    /// Measured position, 2^-16 counts.
+    #[inline(always)]
+    pub(crate) fn measured(&self) -> Position {
+        self.encoder.position()
+    }
+
+    /// Measured and filtered speed, 2^-8 counts per tick.
+    #[inline(always)]
+    pub(crate) fn speed(&self) -> i32 {
+        self.overspeed.speed()
+    }
+
+    /// Sets what is added to the output from this tick on, V.
+    pub(crate) fn inject(&mut self, voltage: S) {
+        self.injected = voltage;
+    }
+
+    /// Position of the look-ahead reference: that of the feedback follows by the preview.
+    pub fn reference(&self) -> Position {
+        self.look_ahead
+    }
+
+    /// True if there is room for a segment of a stream.
+    #[inline(always)]
+    pub fn wants_segment(&self) -> bool {
+        self.generator.stream.wants_segment()
+    }
+
+    /// Gives the axis the next segment of a stream; call it when [`AxisState::wants_segment`]. What is left of a stream
+    /// that was broken off is dropped.
+    #[inline(always)]
+    pub(crate) fn offer_segment(&mut self, segment: Segment) {
+        self.generator.stream.offer(segment);
+    }
+
+    /// True if a stream can start: its first segment is there, and starts where the axis rests.
+    pub fn is_stream_ready(&self) -> bool {
+        self.mode() == MotionMode::Hold && self.generator.stream.is_ready(self.look_ahead)
+    }
+
+    /// True if the axis' position is that of the machine, so that its travel is in force.
+    pub fn is_homed(&self) -> bool {
+        self.homed
+    }
+
+    #[inline(always)]
+    fn reference_state(&self) -> ReferenceState {
+        ReferenceState {
+            position: self.look_ahead,
+            displacement: self.displacement,
+            before: self.displacement_before,
+        }
+    }
+
+    /// The largest tracking error since enabling, against its limit.
+    #[inline(always)]
+    pub fn following(&self) -> FollowingState<S> {
+        self.following
+    }
+
+    /// The largest tracking error since enabling as a share of its limit at the time: above 1 after a following error.
+    /// It stays until the next enabling. For telemetry; it divides.
+    pub fn following_high_mark(&self) -> f32 {
+        self.following.high_mark()
+    }
+
+    /// Declares the present count that of the machine, or not: homing does, and a board whose encoders are absolute.
+    pub(crate) fn set_homed(&mut self, homed: bool) {
+        if self.homed != homed {
+            self.homed = homed;
+            self.travel = TravelState::default();
+        }
+    }
 }
 
 impl<S: Scalar, const N: usize> Axis<S, N> {
-    /// An axis that puts out nothing: room for one that is
-    /// [built in its place](crate::settings::StageSettings::build_axis_into).
+    /// An axis that puts out nothing: room for one that an [`AxisBuilder`] makes in its place.
     #[inline(never)]
     pub fn blank() -> Self {
         Self {
@@ -79,96 +483,116 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             feedforward: Feedforward::blank(),
             preview_ticks: 0,
             amplifier: Amplifier::default(),
-            transfer_decay: S::ZERO,
+            bumpless_decay: S::ZERO,
             overspeed: Overspeed::default(),
-            silence: Silence::default(),
-            index: IndexSpacing::default(),
+            signal_loss: SignalLoss::default(),
+            index_spacing: IndexSpacing::default(),
             following: Following::default(),
             travel: Travel::UNLIMITED,
-            course: Course::default(),
+            generator: ReferenceGenerator::default(),
         }
     }
 
-    /// Takes the encoder's reading; says whether there is nothing to suspect. What there is stays in `state.suspect`.
+    /// One control period of an axis that is driven by itself, without a stage: reads the encoder, advances the
+    /// reference, computes the output. `tick` numbers the ticks.
+    ///
+    /// # Errors
+    /// The fault that was found, if any. It is the caller who switches the amplifier off.
+    pub fn tick(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        reading: &EncoderReading,
+        tick: u32,
+    ) -> Result<DacCode, FaultCode> {
+        self.read_encoder(state, reading)?;
+        self.update_reference(state, motion, AxisSwitches::default(), tick)?;
+        Ok(self.drive(state, false))
+    }
+
+    /// Takes the encoder's reading and checks it.
     #[inline(always)]
-    pub(crate) fn measure(&self, state: &mut AxisState<S, N>, reading: &EncoderReading) -> bool {
+    pub(crate) fn read_encoder(
+        &self,
+        state: &mut AxisState<S, N>,
+        reading: &EncoderReading,
+    ) -> Result<(), FaultCode> {
         let step = self.encoder.update(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
         let slow = self.overspeed.step(&mut state.overspeed, step.counts);
-        let audible = self
-            .silence
-            .step(&mut state.silence, step.counts, state.last_output);
+        let alive = self
+            .signal_loss
+            .step(&mut state.signal_loss, step.counts, state.last_output);
         let indexed = match reading.index {
             Some(raw) => {
                 let at = self.encoder.count_at(&state.encoder, raw);
                 state.pulse = Some(at.position());
-                self.index.step(&mut state.index, at.0 as u32)
+                self.index_spacing.step(&mut state.index, at.0 as u32)
             }
             None => true,
         };
-        let sound = reading.fresh & reading.valid & step.plausible & slow & audible & indexed;
-        if !sound {
-            // Where counts may be lost, so is the origin.
-            if !reading.valid | !step.plausible | !indexed {
-                state.homed = false;
-            }
-            // The first that explains the others.
-            state.suspect = Some(if !reading.fresh {
-                FaultCode::StaleSample
-            } else if !reading.valid {
-                FaultCode::EncoderInvalid
-            } else if !step.plausible {
-                FaultCode::EncoderJump
-            } else if !indexed {
-                FaultCode::IndexMismatch
-            } else if !slow {
-                FaultCode::Overspeed
-            } else {
-                FaultCode::EncoderSilent
-            });
+        if reading.fresh & reading.valid & step.plausible & slow & alive & indexed {
+            return Ok(());
         }
-        sound
+        // Where counts may be lost, so is the origin.
+        if !reading.valid | !step.plausible | !indexed {
+            state.homed = false;
+        }
+        // The first that explains the others.
+        Err(if !reading.fresh {
+            FaultCode::StaleSample
+        } else if !reading.valid {
+            FaultCode::EncoderInvalid
+        } else if !step.plausible {
+            FaultCode::EncoderJump
+        } else if !indexed {
+            FaultCode::IndexMismatch
+        } else if !slow {
+            FaultCode::Overspeed
+        } else {
+            FaultCode::EncoderSignalLoss
+        })
     }
 
     /// Prepares to hold the measured position.
-    pub(crate) fn enable(&self, state: &mut AxisState<S, N>) {
+    pub fn enable(&self, state: &mut AxisState<S, N>) {
         let here = state.encoder.position();
         *state = AxisState {
             encoder: state.encoder.clone(),
             homed: state.homed,
             index: state.index,
             following: self.following.start(),
-            ahead: here,
+            look_ahead: here,
             preview: [here; PREVIEW_ROOM],
             telemetry: state.telemetry,
             ..AxisState::default()
         };
     }
 
-    /// Starts or ends a motion, from where the reference stands. What the axis cannot follow now is ignored.
-    pub(crate) fn obey(&self, state: &mut AxisState<S, N>, command: Command) {
-        let (course, here) = (&mut state.course, state.ahead);
+    /// Starts or ends a motion, from where the reference stands. Only what
+    /// [`admission`](crate::law::admission::refusal) lets through may come here.
+    pub fn handle_command(&self, state: &mut AxisState<S, N>, command: Command) {
+        let (generator, here) = (&mut state.generator, state.look_ahead);
         match command {
-            Command::Run | Command::StartMove(_) => self.course.run(course, here),
-            Command::Jog(_, velocity) => self.course.jog(course, here, velocity),
-            Command::StartStream => self.course.run_stream(course),
-            // Begins with the stage, not with an axis.
-            Command::StartInjection => {}
+            Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
+            Command::Jog(_, velocity) => self.generator.start_jog(generator, here, velocity),
+            Command::StartStream => self.generator.start_stream(generator),
             Command::Stop => self.stop(state),
             Command::Home(_) => {
-                if self.course.home(course, here) {
+                if self.generator.start_homing(generator, here) {
                     state.homed = false;
                     state.pulse = None;
                 }
             }
-            Command::Enable | Command::Disable | Command::ResetFault => {}
+            // The stage's own.
+            Command::StartInjection | Command::Enable | Command::Disable | Command::ResetFault => {}
         }
     }
 
-    /// Brakes what is under way, unless it brakes already.
+    /// Begins a controlled stop, unless one is under way.
     pub(crate) fn stop(&self, state: &mut AxisState<S, N>) {
-        let from = state.standing();
-        self.course.stop(&mut state.course, from);
+        let from = state.reference_state();
+        self.generator.stop(&mut state.generator, from);
     }
 
     /// Shifts every position of the axis: nothing moves by it.
@@ -177,7 +601,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     fn shift(state: &mut AxisState<S, N>, offset: Position) {
         state.encoder.shift(offset);
         state.telemetry.measured = state.encoder.count();
-        state.ahead = state.ahead + offset;
+        state.look_ahead = state.look_ahead + offset;
         for position in &mut state.preview {
             *position = *position + offset;
         }
@@ -187,73 +611,71 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.homed = true;
     }
 
-    /// Whether the reference goes where it may.
+    /// Checks the reference against limit switches and soft limits.
     #[inline(always)]
-    fn confine(&self, state: &mut AxisState<S, N>, switches: AxisSwitches) -> bool {
-        let found = if switches.at_limit() && !self.course.expects(&state.course, switches) {
+    fn check_limits(
+        &self,
+        state: &mut AxisState<S, N>,
+        switches: AxisSwitches,
+    ) -> Result<(), FaultCode> {
+        if switches.at_limit() && !self.generator.expects(&state.generator, switches) {
             // Away from a pressed switch the axis may go.
             let forward = state.displacement > Position::ZERO;
             let backward = state.displacement < Position::ZERO;
             if forward && switches.has(AxisSwitches::POSITIVE_LIMIT) {
-                Some(FaultCode::PositiveLimitSwitch)
-            } else if backward && switches.has(AxisSwitches::NEGATIVE_LIMIT) {
-                Some(FaultCode::NegativeLimitSwitch)
-            } else {
-                None
+                return Err(FaultCode::PositiveLimitSwitch);
             }
-        } else {
-            None
-        };
-        let found = match found {
-            None if state.homed => self.travel.step(
-                &mut state.travel,
-                &self.course.braking,
-                state.ahead,
-                state.displacement,
-                state.encoder.position(),
-            ),
-            found => found,
-        };
-        if found.is_some() {
-            state.suspect = found;
+            if backward && switches.has(AxisSwitches::NEGATIVE_LIMIT) {
+                return Err(FaultCode::NegativeLimitSwitch);
+            }
         }
-        found.is_none()
+        if !state.homed {
+            return Ok(());
+        }
+        self.travel.step(
+            &mut state.travel,
+            self.generator.stop_ramp(),
+            state.look_ahead,
+            state.displacement,
+            state.encoder.position(),
+        )
     }
 
-    /// Advances the reference and forms the error; says whether the axis follows and stays where it may. What there is to
-    /// suspect stays in `state.suspect`. `tick` numbers the ticks.
+    /// Advances the reference, forms the error, and checks both. `tick` numbers the ticks.
     #[inline(never)]
-    pub(crate) fn refer(
+    pub(crate) fn update_reference(
         &self,
         state: &mut AxisState<S, N>,
         motion: &Motion<S>,
         switches: AxisSwitches,
         tick: u32,
-    ) -> bool {
+    ) -> Result<(), FaultCode> {
         let input = HomingInput {
             switches,
             index: state.pulse.take(),
             measured: state.encoder.position(),
         };
-        let from = state.standing();
+        let from = state.reference_state();
         let (ahead, event) =
-            self.course
-                .advance(&mut state.course, motion, from, state.homed, input);
-        if event == CourseEvent::Open {
-            return self.refer_open(state, switches, tick);
+            self.generator
+                .advance(&mut state.generator, motion, from, state.homed, input);
+        if event == GeneratorEvent::Open {
+            return self.update_open_reference(state, switches, tick);
         }
-        if let CourseEvent::Origin(offset) = event {
+        if let GeneratorEvent::Origin(offset) = event {
             Self::shift(state, offset);
         }
         state.displacement_before = state.displacement;
-        state.displacement = ahead.position - state.ahead;
+        state.displacement = ahead.position - state.look_ahead;
         let displacement = state.displacement.clipped();
-        state.ahead = ahead.position;
-        let mut confined =
-            state.course.mode() == CourseMode::Stopping || self.confine(state, switches);
-        if let CourseEvent::Fault(code) = event {
-            state.suspect = Some(code);
-            confined = false;
+        state.look_ahead = ahead.position;
+        let mut found = if state.mode() == MotionMode::Stopping {
+            Ok(())
+        } else {
+            self.check_limits(state, switches)
+        };
+        if let GeneratorEvent::Fault(code) = event {
+            found = Err(code);
         }
 
         // The feedback's reference is what the feedforward's was `preview_ticks` ago.
@@ -264,14 +686,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if self.feedback.needs_velocity() {
             let before = state.preview[delayed.wrapping_sub(1) % PREVIEW_ROOM];
             let displacement = (reference - before).clipped();
-            state.velocity = S::scale_integer(displacement, self.unit_mm_s);
+            state.input.velocity = S::scale_integer(displacement, self.unit_mm_s);
         }
 
         let measured = state.encoder.position();
         let error = S::scale_wide((reference - measured).0, self.unit_mm);
+        state.input.error = error;
         state.telemetry.reference = reference;
-        state.telemetry.error = error;
-        state.telemetry.velocity = ahead.velocity;
         state.step = ReferenceStep {
             displacement: S::scale_integer(displacement, self.unit_mm),
             velocity: ahead.velocity,
@@ -280,37 +701,78 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let follows = self
             .following
             .step(&mut state.following, error, ahead.velocity.magnitude());
-        if !follows {
-            // It cannot be braked under control, so it goes before what could.
-            state.suspect = Some(FaultCode::FollowingError);
+        // An axis that does not follow cannot be stopped under control, so this goes before what could.
+        if follows {
+            found
+        } else {
+            Err(FaultCode::FollowingError)
         }
-        follows & confined
+    }
+
+    /// Lets the reference go along with the axis, so that the loop can be closed at any tick, and checks it.
+    #[cold]
+    #[inline(never)]
+    fn update_open_reference(
+        &self,
+        state: &mut AxisState<S, N>,
+        switches: AxisSwitches,
+        tick: u32,
+    ) -> Result<(), FaultCode> {
+        let here = state.encoder.position();
+        let speed = i64::from(state.speed()) << SPEED_SHIFT;
+        let ahead_by = |ticks: i64| here + Position(ticks * speed);
+        let preview = self.preview_ticks as i64;
+        for age in 0..PREVIEW_ROOM {
+            let slot = (tick as usize).wrapping_sub(age) % PREVIEW_ROOM;
+            state.preview[slot] = ahead_by(preview - age as i64);
+        }
+        state.look_ahead = ahead_by(preview);
+        state.displacement = Position(speed);
+        state.displacement_before = state.displacement;
+        let velocity = S::scale_integer(state.displacement.clipped(), self.unit_mm_s);
+        state.input = FeedbackInput {
+            error: S::ZERO,
+            velocity,
+        };
+        state.step.velocity = velocity;
+        state.telemetry.reference = here;
+        self.check_limits(state, switches)
     }
 
     /// Computes the output. `changed` says that the settings are new in this tick: the output then starts from where
     /// it was, and the difference fades.
     #[inline(never)]
     pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
-        if state.mode() == CourseMode::OpenLoop {
+        if state.mode() == MotionMode::OpenLoop {
             return self.drive_open(state);
         }
-        let feedforward = self.feedforward.step(&mut state.springs, state.step);
+        let feedforward = self.feedforward.step(&mut state.friction, state.step);
         let total = feedforward.total();
-        let input = FeedbackInput {
-            error: state.telemetry.error,
-            velocity: state.velocity,
-        };
+        let input = state.input;
         if changed {
-            self.transfer(state, input, total + state.injected);
+            self.make_bumpless(state, input, total + state.injected);
         }
-        let base = total + state.transfer + state.injected;
+        let base = total + state.bumpless_offset + state.injected;
         let feedback = self.feed_back(&mut state.feedback, input, base);
         let limit = self.amplifier.limit;
         let output = (feedback.output + base).limit(-limit, limit);
-        state.transfer = state
-            .transfer
-            .times(self.transfer_decay, Quantity::Fraction);
+        state.bumpless_offset = state
+            .bumpless_offset
+            .times(self.bumpless_decay, Quantity::Fraction);
         self.put_out(state, feedback, feedforward, output)
+    }
+
+    /// Puts the injected voltage out.
+    #[cold]
+    #[inline(never)]
+    fn drive_open(&self, state: &mut AxisState<S, N>) -> DacCode {
+        let limit = self.amplifier.limit;
+        let output = state.injected.limit(-limit, limit);
+        let feedback = FeedbackTerms {
+            saturated: output != state.injected,
+            ..FeedbackTerms::default()
+        };
+        self.put_out(state, feedback, FeedforwardTerms::default(), output)
     }
 
     /// Makes a converter's word of the output, and leaves everything to be seen.
@@ -325,9 +787,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.last_output = output;
         let code = self.amplifier.code(output);
         let telemetry = &mut state.telemetry;
+        telemetry.error = state.input.error;
+        telemetry.velocity = state.step.velocity;
         telemetry.feedback = feedback;
         telemetry.feedforward = feedforward;
-        telemetry.transfer = state.transfer;
+        telemetry.bumpless_offset = state.bumpless_offset;
         telemetry.output = output;
         telemetry.code = code;
         telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
@@ -355,19 +819,36 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Makes a change of settings bumpless: the output starts from where it was.
     #[cold]
     #[inline(never)]
-    fn transfer(&self, state: &mut AxisState<S, N>, input: FeedbackInput<S>, base: S) {
+    fn make_bumpless(&self, state: &mut AxisState<S, N>, input: FeedbackInput<S>, base: S) {
         self.feedback.take_over(&mut state.feedback, input.error);
-        // What the new settings would put out, computed on a copy, decides the offset.
+        // The output under the new settings, computed on a copy, decides the offset.
         let mut trial = state.feedback.clone();
         let terms = self.feed_back(&mut trial, input, base);
-        state.transfer = state.last_output - (terms.output + base);
+        state.bumpless_offset = state.last_output - (terms.output + base);
+    }
+
+    /// Opens the loop of an axis at rest.
+    pub(crate) fn open_loop(&self, state: &mut AxisState<S, N>) {
+        self.generator.open_loop(&mut state.generator);
+    }
+
+    /// Takes the injected voltage away. A loop that was open is closed: it stops from the motion that the axis has.
+    pub(crate) fn end_injection(&self, state: &mut AxisState<S, N>) {
+        state.injected = S::ZERO;
+        if state.mode() == MotionMode::OpenLoop {
+            // As after enabling: the law's memory is of before, and its error is zero now.
+            state.feedback = FeedbackState::default();
+            state.friction = FeedforwardState::default();
+            state.bumpless_offset = S::ZERO;
+            self.stop(state);
+        }
     }
 
     /// Shows an axis whose outputs are off.
     #[inline(always)]
-    pub(crate) fn rest(&self, state: &mut AxisState<S, N>) {
+    pub(crate) fn output_zero(&self, state: &mut AxisState<S, N>) {
         let measured = state.encoder.count();
-        state.course.hold();
+        state.generator.hold();
         state.injected = S::ZERO;
         state.last_output = S::ZERO;
         state.telemetry = AxisTelemetry {

@@ -22,11 +22,11 @@ pub const CAPTURE_WORDS: usize = 2048;
 /// Largest share of the ring before the trigger, percent: the sample at the trigger has room in any case.
 pub const MAX_PRE_TRIGGER_PERCENT: u8 = 100;
 
-/// How far a capture has come.
+/// Phase of a capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CapturePhase {
-    /// Never armed.
+    /// Not armed since the start.
     #[default]
     Idle,
     /// Recording, waiting for its trigger.
@@ -37,7 +37,7 @@ pub enum CapturePhase {
     Frozen,
 }
 
-/// Why a capture cannot be armed.
+/// Reason why a capture cannot be armed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum CaptureError {
     /// The channels or the decimation.
@@ -78,18 +78,18 @@ impl From<SelectionError> for CaptureError {
     }
 }
 
-/// What was captured, apart from the samples.
+/// A frozen capture, apart from its samples.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct CaptureRecord {
-    /// Samples.
+    /// Number of samples in the ring.
     pub samples: u32,
-    /// Which of them is the first at or after the trigger.
+    /// Index of the first sample at or after the trigger.
     pub trigger_sample: u32,
     /// The control tick of the first sample.
     pub first_tick: u32,
     /// The control tick of the trigger.
     pub trigger_tick: u32,
-    /// What froze it.
+    /// The cause that froze the ring.
     pub cause: CaptureCause,
 }
 
@@ -106,7 +106,7 @@ pub struct Capture<'a> {
     /// Samples kept from before the trigger, and recorded from it on.
     pre_samples: u32,
     post_samples: u32,
-    /// Where the next sample goes.
+    /// Index of the next sample's first word.
     next_word: usize,
     /// Ticks until the next sample.
     wait: u16,
@@ -151,7 +151,7 @@ impl<'a> Capture<'a> {
         if pre_trigger_percent > MAX_PRE_TRIGGER_PERCENT {
             return Err(CaptureError::PreTrigger(pre_trigger_percent));
         }
-        let watch = Watch::arm(trigger)?;
+        let watch = Watch::arm(trigger).ok_or(CaptureError::Level)?;
         let sample_words = selection.channels().len();
         let room = self.words.len() / sample_words;
         if room == 0 {
@@ -238,17 +238,17 @@ impl<'a> Capture<'a> {
         recording
     }
 
-    /// How far it has come.
+    /// The phase after the last tick.
     pub const fn phase(&self) -> CapturePhase {
         self.phase
     }
 
-    /// What is recorded, once it has been armed.
+    /// The recorded channels, once it has been armed.
     pub const fn selection(&self) -> Option<&Selection> {
         self.selection.as_ref()
     }
 
-    /// What was recorded, if it is frozen. Slow half only.
+    /// The record, if it is frozen. Slow half only.
     pub fn record(&self) -> Option<CaptureRecord> {
         let selection = self.selection.as_ref()?;
         (self.phase == CapturePhase::Frozen).then(|| {

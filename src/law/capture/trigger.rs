@@ -1,13 +1,12 @@
-//! What a capture waits for.
+//! Triggers of a capture.
 
 use serde::{Deserialize, Serialize};
 
-use super::CaptureError;
 use crate::law::rounding;
 use crate::law::scalar::Scalar;
 use crate::law::telemetry::{Channel, Observation, WordKind};
 
-/// Which way a level is crossed.
+/// Sense in which a level is crossed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Edge {
@@ -15,7 +14,7 @@ pub enum Edge {
     Rising,
     /// From above the level to it or below.
     Falling,
-    /// Either.
+    /// Rising or falling, whichever comes.
     Either,
 }
 
@@ -24,13 +23,13 @@ pub enum Edge {
 pub struct Level {
     /// The channel, whether it is recorded or not.
     pub channel: Channel,
-    /// Which way it is crossed.
+    /// Sense in which it is crossed.
     pub edge: Edge,
     /// The level, in the channel's unit: finite; rounded to `f32`, or to the integers of a channel of integers.
     pub level: f64,
 }
 
-/// What a capture waits for. A fault triggers it in any case.
+/// The event that a capture waits for. A fault triggers it in any case.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Trigger {
@@ -38,7 +37,7 @@ pub enum Trigger {
     Now,
     /// The next command that reaches the control law.
     Command,
-    /// The next fault.
+    /// The next fault of any kind.
     Fault,
     /// A channel that crosses a level.
     Level(Level),
@@ -46,7 +45,7 @@ pub enum Trigger {
     MotionStart,
 }
 
-/// What froze a capture.
+/// The event that froze a capture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaptureCause {
@@ -54,13 +53,13 @@ pub enum CaptureCause {
     Stopped,
     /// It waited for nothing.
     Now,
-    /// A command.
+    /// A command reached the control law.
     Command,
-    /// A fault.
+    /// A fault was found.
     Fault,
     /// A level was crossed.
     Level,
-    /// A motion began.
+    /// A motion began while none was under way.
     MotionStart,
 }
 
@@ -72,7 +71,7 @@ enum Threshold {
 }
 
 impl Threshold {
-    /// Whether a word lies below, and whether above.
+    /// Compares a word: true if below, true if above.
     #[inline(always)]
     fn sides(self, word: u32) -> (bool, bool) {
         match self {
@@ -112,10 +111,11 @@ impl Watch {
         }
     }
 
-    pub(super) fn arm(trigger: Trigger) -> Result<Self, CaptureError> {
+    /// A watch that has seen nothing yet; none if its level is not a finite number.
+    pub(super) fn arm(trigger: Trigger) -> Option<Self> {
         let threshold = match trigger {
             Trigger::Level(Level { level, .. }) if !level.is_finite() => {
-                return Err(CaptureError::Level);
+                return None;
             }
             Trigger::Level(Level { channel, level, .. }) => match channel.word_kind() {
                 WordKind::Float => Threshold::Float(level as f32),
@@ -123,7 +123,7 @@ impl Watch {
             },
             _ => Threshold::Integer(0),
         };
-        Ok(Self {
+        Some(Self {
             trigger,
             threshold,
             fresh: true,
@@ -131,7 +131,7 @@ impl Watch {
         })
     }
 
-    /// What triggers at this tick, if anything does.
+    /// Looks at a tick; gives the cause if it triggers.
     #[inline(always)]
     pub(super) fn step<S: Scalar, const N: usize>(
         &mut self,

@@ -14,8 +14,8 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::feedback::{FeedbackInput, FeedbackState, FeedbackTerms};
 use super::surface::{SurfaceGains, SurfaceLoop};
+use super::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
 /// The cascade as a person writes it.

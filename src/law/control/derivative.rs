@@ -1,7 +1,7 @@
 //! The filtered derivative that every law has: `Kd s / (1 + tau s)`, by the bilinear rule, which keeps its phase up to
 //! the loop's crossover.
 
-use super::feedback::FeedbackState;
+use super::terms::FeedbackState;
 use crate::law::scalar::{Quantity, Scalar};
 
 /// The largest error that a law acts on, mm: what [`Quantity::Length`] holds in fixed point, so that all number types

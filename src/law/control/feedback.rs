@@ -1,7 +1,7 @@
 //! The feedback law of an axis: which one it is, and what they all share.
 
 use serde::{Deserialize, Serialize};
-use strum::{AsRefStr, EnumString, VariantNames};
+use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
 
 use super::cascade::Cascade;
 use super::nctf::Nctf;
@@ -9,18 +9,30 @@ use super::npid::NonlinearGainTable;
 use super::pid::Pid;
 use super::schedule::ScheduledPid;
 use super::sliding_mode::SlidingMode;
+use super::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::scalar::Scalar;
 
-/// The feedback laws.
+/// The feedback laws by name.
 #[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
+    Clone,
+    Copy,
+    Debug,
+    PartialEq,
+    Eq,
+    Serialize,
+    Deserialize,
+    AsRefStr,
+    EnumString,
+    VariantArray,
+    VariantNames,
+    EnumCount,
 )]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum LawKind {
     /// PID without an integral.
     Pd,
-    /// PID.
+    /// Proportional, integral and derivative of the error.
     Pid,
     /// PID behind the nonlinear gain.
     NPid,
@@ -35,18 +47,10 @@ pub enum LawKind {
 }
 
 impl LawKind {
-    /// All laws.
-    pub const ALL: [Self; 7] = [
-        Self::Pd,
-        Self::Pid,
-        Self::NPid,
-        Self::Scheduled,
-        Self::Cascade,
-        Self::SlidingMode,
-        Self::Nctf,
-    ];
+    /// All laws, in the order of their tables.
+    pub const ALL: [Self; Self::COUNT] = *<Self as VariantArray>::VARIANTS.first_chunk().unwrap();
 
-    /// Its name in tables.
+    /// The name of it in tables and figures.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Pd => "PD",
@@ -60,63 +64,27 @@ impl LawKind {
     }
 }
 
-/// What a law reads in one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FeedbackInput<S> {
-    /// Tracking error e, mm.
-    pub error: S,
-    /// Velocity of the reference, mm/s; only the laws that [`Feedback::needs_velocity`] names read it.
-    pub velocity: S,
-}
-
-/// The memory of a law, the same for all.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct FeedbackState<S: Scalar> {
-    /// The integral, V.
-    pub(super) integral: S::Sum,
-    /// The filtered derivative, V.
-    pub(super) derivative: S,
-    /// What was differentiated last, mm.
-    pub(super) last_error: S,
-}
-
-/// What a law put out, term by term, V.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct FeedbackTerms<S> {
-    /// What follows the error itself. PID: Kp f. Cascade: G (v_set - v_ref). Sliding mode: the saturated surface.
-    /// NCTF: G n(e).
-    pub proportional: S,
-    /// The integral.
-    pub integral: S,
-    /// What follows the error's filtered rate.
-    pub derivative: S,
-    /// The sum, within the bounds given to the step.
-    pub output: S,
-    /// Whether the bounds cut the output.
-    pub saturated: bool,
-}
-
 /// A law ready for the tick. Made by [`StageSettings::build`](crate::settings::StageSettings::build).
 // The variants differ in size by their tables, and an axis is made once.
 #[allow(clippy::large_enum_variant)]
 #[derive(Clone, Debug, PartialEq)]
 pub enum Feedback<S: Scalar> {
-    /// PID, or PD.
+    /// PID, or PD: a PID whose integral is held at zero.
     Pid(Pid<S>),
     /// PID behind the nonlinear gain.
     NPid(NonlinearGainTable<S>, Pid<S>),
     /// PID with scheduled gains.
     Scheduled(ScheduledPid<S>),
-    /// Cascade.
+    /// P position loop around a PI velocity loop.
     Cascade(Cascade<S>),
-    /// Sliding mode.
+    /// Sliding mode with a boundary layer.
     SlidingMode(SlidingMode<S>),
-    /// NCTF.
+    /// Nominal characteristic trajectory following.
     Nctf(Nctf<S>),
 }
 
 impl<S: Scalar> Feedback<S> {
-    /// Whether the law reads the velocity of the reference.
+    /// True if the law reads the velocity of the reference.
     #[inline(always)]
     pub const fn needs_velocity(&self) -> bool {
         matches!(self, Self::Scheduled(_) | Self::Cascade(_))

@@ -1,7 +1,7 @@
-//! How every law closes: the integral is added, the output is cut to its bounds, and while it is cut the integral takes
+//! The end of every law: the integral is added, the output is cut to its bounds, and while it is cut the integral takes
 //! nothing that would push it further out.
 
-use super::feedback::{FeedbackState, FeedbackTerms};
+use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
 /// The integral ready for the tick. It is held in volts, so that a change of its gain does not move the output.

@@ -29,3 +29,4 @@ pub mod popov;
 pub mod schedule;
 pub mod sliding_mode;
 pub mod surface;
+pub mod terms;

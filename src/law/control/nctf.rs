@@ -17,8 +17,8 @@ use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::feedback::{FeedbackState, FeedbackTerms};
 use super::surface::{SurfaceGains, SurfaceLoop};
+use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
 

@@ -39,6 +39,17 @@ impl NonlinearGain {
 }
 
 /// The nonlinear gain ready for the tick.
+///
+/// ```
+/// use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
+///
+/// let gain = NonlinearGain { rate_per_mm: 100.0, range_mm: 0.01 };
+/// let table = NonlinearGainTable::<f64>::build(&gain);
+/// assert_eq!(table.at(0.0), 1.0);
+/// // From emax on the gain stays at cosh(ko emax).
+/// assert_eq!(table.at(0.02), gain.largest());
+/// assert_eq!(table.scaled_error(-0.02), -0.02 * gain.largest());
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct NonlinearGainTable<S: Scalar> {
     table: OctaveTable<S, 1>,

@@ -3,14 +3,68 @@
 //! `u = Kp f + Ki int(f) + Kd s / (1 + tau s) f` of the scaled error `f`. The integral adds the present error. PD is the
 //! same without an integral.
 
+use miniconf::{TreeAny, TreeSchema};
+use num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+
 use super::derivative::Derivative;
-use super::feedback::{FeedbackState, FeedbackTerms};
 use super::integrator::Integrator;
+use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
-pub use super::popov::PidGains;
+/// The gains of a PID with filtered derivative, `Kp + Ki/s + Kd s / (1 + tau s)`, as its design yields them.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct PidGains {
+    /// Kp, V/mm. Above zero.
+    pub kp_v_per_mm: f64,
+    /// Ki, V/(mm s). Zero or more.
+    pub ki_v_per_mm_s: f64,
+    /// Kd, V s/mm. Zero or more.
+    pub kd_v_s_per_mm: f64,
+    /// tau, the time constant of the derivative's filter, s. Zero or more; zero leaves the derivative unfiltered.
+    pub derivative_filter_s: f64,
+}
+
+impl PidGains {
+    /// The response at `s = j omega`, V/mm, of the continuous form. Infinite at zero frequency unless Ki is zero.
+    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
+        let s = Complex64::new(0.0, omega_rad_s);
+        let derivative = s * self.kd_v_s_per_mm / (s * self.derivative_filter_s + 1.0);
+        let proportional = derivative + self.kp_v_per_mm;
+        if self.ki_v_per_mm_s == 0.0 {
+            proportional
+        } else {
+            proportional + s.inv() * self.ki_v_per_mm_s
+        }
+    }
+
+    /// True if every gain is finite and within the range its field states.
+    pub fn is_valid(&self) -> bool {
+        let not_negative = |x: f64| x.is_finite() && x >= 0.0;
+        self.kp_v_per_mm.is_finite()
+            && self.kp_v_per_mm > 0.0
+            && not_negative(self.ki_v_per_mm_s)
+            && not_negative(self.kd_v_s_per_mm)
+            && not_negative(self.derivative_filter_s)
+    }
+}
 
 /// The PID ready for the tick.
+///
+/// ```
+/// use quadrant::control::pid::{Pid, PidGains};
+/// use quadrant::control::terms::FeedbackState;
+///
+/// let gains = PidGains { kp_v_per_mm: 2.0, ki_v_per_mm_s: 10.0, kd_v_s_per_mm: 0.0, derivative_filter_s: 0.0 };
+/// let pid = Pid::<f64>::build(&gains, 5.0, 1e-3);
+/// let mut state = FeedbackState::default();
+/// // An error of 1 mm, and +-10 V to put out: 2 V at once, and 10 mV more in every tick.
+/// let first = pid.step(&mut state, 1.0, -10.0, 10.0);
+/// let second = pid.step(&mut state, 1.0, -10.0, 10.0);
+/// assert_eq!(first.proportional, 2.0);
+/// assert!((second.output - first.output - 0.01).abs() < 1e-12);
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Pid<S: Scalar> {
     pub(super) proportional: S::Gain,

@@ -42,7 +42,7 @@ impl PlantModel {
         )
     }
 
-    /// Whether every parameter is finite and within the range its field states.
+    /// True if every parameter is finite and within the range its field states.
     pub fn is_valid(&self) -> bool {
         let positive = |x: f64| x.is_finite() && x > 0.0;
         let not_negative = |x: f64| x.is_finite() && x >= 0.0;

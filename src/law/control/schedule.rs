@@ -8,8 +8,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::feedback::{FeedbackInput, FeedbackState, FeedbackTerms};
 use super::pid::{Pid, PidGains};
+use super::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
 /// Points of a schedule at most.

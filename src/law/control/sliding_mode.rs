@@ -13,8 +13,8 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::feedback::{FeedbackState, FeedbackTerms};
 use super::surface::{SurfaceGains, SurfaceLoop};
+use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
 /// Sliding mode as a person writes it.

@@ -1,4 +1,4 @@
-//! What cascade control, sliding mode and NCTF have in common, and how each compares with a PID.
+//! The common part of cascade control, sliding mode and NCTF, and their equivalence with a PID.
 //!
 //! All three form a velocity-like error `w = h(e) + de/dt`, the distance from a curve in the phase plane, and put a PI
 //! on it: `u = G (w + r int(w))`. With `h(e) = lambda e`, and `int(de/dt) = e`, that is a PID with
@@ -11,9 +11,9 @@
 //! law can be asked of all.
 
 use super::derivative::Derivative;
-use super::feedback::{FeedbackState, FeedbackTerms};
 use super::integrator::Integrator;
-use super::popov::PidGains;
+use super::pid::PidGains;
+use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
 /// A PI on `w = lambda e + de/dt`.
@@ -63,7 +63,7 @@ impl SurfaceGains {
         gains.is_valid().then_some(gains)
     }
 
-    /// Whether every gain is finite and within the range its field states.
+    /// True if every gain is finite and within the range its field states.
     fn is_valid(&self) -> bool {
         let finite = self.slope_per_s.is_finite() && self.gain_v_s_per_mm.is_finite();
         finite && self.slope_per_s > 0.0 && self.gain_v_s_per_mm > 0.0 && self.integral_per_s >= 0.0

@@ -1,4 +1,4 @@
-//! What the models with a single state share: the force that the deflected bristles of a surface carry.
+//! The state that the single-state models share: the force that the deflected bristles of a surface carry.
 
 use crate::law::scalar::Scalar;
 
@@ -14,7 +14,7 @@ impl<S: Scalar> Bristle<S> {
         Self { force }
     }
 
-    /// What the bristles carry, `sigma0 z`, V.
+    /// The force of the bristles, `sigma0 z`, V.
     pub fn force(&self) -> S {
         self.force
     }

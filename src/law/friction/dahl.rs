@@ -14,7 +14,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::bristle::Bristle;
-use super::{Direction, PerDirection};
+use super::direction::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
 
@@ -28,7 +28,7 @@ pub struct DahlParameters {
     pub exponent: f64,
 }
 
-/// Where the table of the covered share ends; 1 - exp(-16) is one to seven digits.
+/// End of the table of the covered share; 1 - exp(-16) is one to seven digits.
 const LARGEST_STEP: f64 = 16.0;
 
 /// Largest `w` that the table of rates resolves: the level of one sense of motion is at most 15 times the other's.
@@ -60,9 +60,9 @@ impl DahlParameters {
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Side<S: Scalar> {
     level: S,
-    /// 1 / Fc.
+    /// Reciprocal of the level, 1 / Fc.
     per_level: S::Gain,
-    /// sigma0 / Fc.
+    /// Stiffness over the level, sigma0 / Fc.
     travel: S::Gain,
 }
 

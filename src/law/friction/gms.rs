@@ -13,7 +13,7 @@ use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::Direction;
+use super::direction::Direction;
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
 
@@ -66,7 +66,23 @@ struct ElementConfig<S: Scalar> {
     weight: S::Gain,
 }
 
-/// The GMS model ready for the tick. `N` is the room for elements; those not used do not act.
+/// The GMS model ready for the tick.
+///
+/// ```
+/// use quadrant::friction::gms::{Gms, GmsElement};
+/// use quadrant::friction::stribeck::Sliding;
+///
+/// let elements = [(100.0, 0.5), (20.0, 0.5)]
+///     .map(|(stiffness_v_per_mm, weight)| GmsElement { stiffness_v_per_mm, weight });
+/// let model = Gms::<f64, 8>::build(&elements);
+/// let surface = Sliding::constant(0.2, 10.0, 1e-4); // 0.2 V
+/// let mut state = model.spread(0.0);
+/// // Before it slides, friction is a spring: 120 V/mm over the first half micrometre.
+/// assert!((model.step(&mut state, 0.5e-3, surface) - 0.06).abs() < 1e-12);
+/// // After a millimetre it has the level of the surface.
+/// assert!((model.step(&mut state, 1.0, surface) - 0.2).abs() < 1e-12);
+/// ```
+/// `N` is the room for elements; those not used do not act.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gms<S: Scalar, const N: usize> {
     elements: [ElementConfig<S>; N],

@@ -16,8 +16,8 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::bristle::Bristle;
+use super::direction::{Direction, PerDirection};
 use super::stribeck::StribeckCurve;
-use super::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::{OctaveTable, interpolation_error};
 

@@ -18,12 +18,12 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::Direction;
+use super::direction::Direction;
 use super::gms::{GmsElement, GmsState};
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
 
-/// What the S-GMS has beyond the GMS, as a person writes it.
+/// Parameters of the S-GMS beyond those of the GMS, as a person writes them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct SmoothedGmsParameters {
@@ -42,9 +42,9 @@ impl Default for SmoothedGmsParameters {
 struct ElementConfig<S: Scalar> {
     stiffness: S::Gain,
     weight: S::Gain,
-    /// W_i, V.
+    /// Saturation of the element, W_i, V.
     width: S,
-    /// 1 / W_i.
+    /// Reciprocal of the saturation, 1 / W_i.
     per_width: S::Gain,
     /// 1 / (8 W_i).
     per_eight_widths: S::Gain,

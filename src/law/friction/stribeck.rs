@@ -7,7 +7,7 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::{Direction, PerDirection};
+use super::direction::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::{OctaveTable, interpolation_error};
 
@@ -48,12 +48,22 @@ impl StribeckCurve {
 }
 
 /// The static friction model of one sense of motion.
+///
+/// ```
+/// use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+///
+/// let curve = StribeckCurve { coulomb_v: 0.1, breakaway_v: 0.15, stribeck_velocity_mm_s: 2.0, exponent: 1.0 };
+/// let friction = StaticFriction { curve, viscous_v_s_per_mm: 1e-3 };
+/// // Just moving, the breakaway level; fast, the Coulomb level and viscous friction.
+/// assert!((friction.friction_v(1e-6) - 0.15).abs() < 1e-6);
+/// assert!((friction.friction_v(100.0) - 0.2).abs() < 1e-6);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StaticFriction {
-    /// s(v).
+    /// The Stribeck curve, s(v).
     pub curve: StribeckCurve,
-    /// sigma, V s/mm.
+    /// sigma, viscous friction, V s/mm; zero or more.
     pub viscous_v_s_per_mm: f64,
 }
 
@@ -71,10 +81,10 @@ impl StaticFriction {
     }
 }
 
-/// What the sliding surface is at this instant.
+/// The sliding surface at one velocity.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Sliding<S> {
-    /// s(v), V.
+    /// Level of the surface, s(v), V.
     pub level: S,
     /// exp(-C Ts / s(v)): what is left, after one step, of a slipping element's distance from its share of s(v).
     pub decay: S,

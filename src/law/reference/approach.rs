@@ -3,8 +3,8 @@
 //! It is a [`PointToPoint`] whose three moving averages last powers of two of ticks: then aiming it takes shifts and no
 //! division, and its sums are exact.
 
-use super::point_to_point::FRACTION_BITS;
-use super::{MotionScale, PointToPoint, PointToPointSettings};
+use super::point_to_point::{FRACTION_BITS, PointToPoint, PointToPointSettings};
+use super::sample::MotionScale;
 use crate::law::rounding;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;

@@ -1,4 +1,4 @@
-//! Sinusoidal motion, and the circle that two of them make.
+//! Sinusoidal motion.
 //!
 //! The phase is a 64-bit integer, so it neither drifts nor loses resolution. Its speed rises and falls smoothly at
 //! the ends, so the axis starts and stops on the curve without a step of velocity or acceleration.
@@ -7,8 +7,9 @@ use core::f64::consts::TAU;
 
 use serde::{Deserialize, Serialize};
 
+use super::motion_state::MotionState;
+use super::sample::{MotionScale, ReferenceSample};
 use super::sine::{SINE_BITS, sine, sine_and_cosine};
-use super::{MotionScale, MotionSettings, MotionState, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
@@ -51,69 +52,21 @@ impl HarmonicSettings {
     }
 }
 
-/// A plane of the stage.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Plane {
-    /// x and y.
-    Xy,
-    /// y and z.
-    Yz,
-    /// z and x.
-    Zx,
-}
-
-impl Plane {
-    /// The indices of the plane's first and second axis.
-    pub const fn axes(self) -> (usize, usize) {
-        match self {
-            Self::Xy => (0, 1),
-            Self::Yz => (1, 2),
-            Self::Zx => (2, 0),
-        }
-    }
-}
-
-/// A sense of rotation, seen with the plane's first axis to the right and the second up.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Sense {
-    /// Counter-clockwise, G3.
-    CounterClockwise,
-    /// Clockwise, G2.
-    Clockwise,
-}
-
-/// The three axes' motions of a circle: radius in mm, feed in mm/s along the path, the angle (rad, from the plane's
-/// first axis) at which the full-speed turns begin, the number of turns, and the duration of lead-in and lead-out.
-pub fn circle(
-    plane: Plane,
-    sense: Sense,
-    radius_mm: f64,
-    feed_mm_s: f64,
-    start_rad: f64,
-    turns: f64,
-    lead_s: f64,
-) -> [MotionSettings; 3] {
-    let sine = HarmonicSettings::with_velocity(radius_mm, feed_mm_s, turns, lead_s);
-    let quarter = TAU / 4.0;
-    // cos(a) = sin(a + 90 deg); clockwise, the angle runs backwards: cos(-a) = sin(90 deg + a - 2 start), and so on.
-    let (first, second) = match sense {
-        Sense::CounterClockwise => (start_rad + quarter, start_rad),
-        Sense::Clockwise => (quarter - start_rad, 2.0 * quarter - start_rad),
-    };
-    let mut motions = [MotionSettings::Hold; 3];
-    let (first_axis, second_axis) = plane.axes();
-    motions[first_axis] = MotionSettings::Harmonic(HarmonicSettings {
-        phase_rad: first,
-        ..sine
-    });
-    motions[second_axis] = MotionSettings::Harmonic(HarmonicSettings {
-        phase_rad: second,
-        ..sine
-    });
-    motions
-}
-
-/// A sine ready for the tick.
+/// A sine ready for the tick. [`Motion::build`](super::Motion::build) makes it.
+///
+/// ```
+/// use quadrant::reference::{HarmonicSettings, Motion, MotionScale, MotionSettings, MotionState};
+///
+/// // 10 mm either way at up to 20 mm/s, one cycle, with half a second of lead-in.
+/// let sine = HarmonicSettings::with_velocity(10.0, 20.0, 1.0, 0.5);
+/// let motion = Motion::<f64>::build(&MotionSettings::Harmonic(sine), MotionScale::new(0.5e-3, 1e4));
+/// let mut state = MotionState::default();
+/// let mut farthest_mm = 0.0_f64;
+/// while !motion.finished(&state) {
+///     farthest_mm = farthest_mm.max(motion.step(&mut state).position.to_mm(0.5e-3).abs());
+/// }
+/// assert!((10.0..=20.0).contains(&farthest_mm));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Harmonic<S: Scalar> {
     amplitude_counts: i32,
@@ -125,7 +78,7 @@ pub struct Harmonic<S: Scalar> {
     lead_step: u64,
     /// Ticks at full speed; more than can elapse when there is no end.
     cruise_ticks: u32,
-    /// When the lead-out has ended, if it ever does.
+    /// Tick after the lead-out, if it ever ends.
     end_tick: Option<u32>,
     velocity: S::Gain,
     centripetal: S::Gain,
@@ -133,13 +86,13 @@ pub struct Harmonic<S: Scalar> {
     q30: S::Gain,
 }
 
-/// Where a tick lies in a harmonic motion.
+/// The part of a harmonic motion that a tick lies in.
 enum Lead {
     /// In the lead-in or the lead-out, at this tick from its standing end.
     Under { tick: u32, leaving: bool },
-    /// Between them.
+    /// Between lead-in and lead-out.
     FullSpeed,
-    /// After the lead-out.
+    /// After the lead-out: at rest.
     Ended,
 }
 
@@ -206,7 +159,7 @@ impl<S: Scalar> Harmonic<S> {
         }
     }
 
-    /// Where a tick lies in the motion.
+    /// Returns the part of the motion that a tick lies in.
     #[inline(always)]
     fn lead(&self, elapsed: u32) -> Lead {
         if elapsed < self.lead_ticks {

@@ -1,10 +1,11 @@
 //! Jogging: a velocity that holds until it is changed, and that ends by itself before the end of the travel.
 
-use super::{Ramp, RampState, ReferenceSample, Velocity};
+use super::ramp::{Ramp, RampState, Velocity};
+use super::sample::ReferenceSample;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 
-/// What a jog is to do.
+/// The target of a jog.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct JogState {
     target: Velocity,
@@ -22,7 +23,7 @@ impl JogState {
         }
     }
 
-    /// Whether it has come to its end: it rests and nothing asks for motion.
+    /// True if it has come to its end: it rests and nothing asks for motion.
     #[inline(always)]
     pub fn finished(&self, ramp: &RampState) -> bool {
         (self.held_back || self.target == Velocity::ZERO) && ramp.is_at_rest()

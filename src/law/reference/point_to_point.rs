@@ -7,7 +7,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{MotionScale, MotionState, ReferenceSample};
+use super::motion_state::MotionState;
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
@@ -16,13 +17,13 @@ use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointToPointSettings {
-    /// Signed distance, mm.
+    /// Signed distance, mm; not zero.
     pub distance_mm: f64,
-    /// Largest velocity, mm/s.
+    /// Largest velocity, mm/s; above zero.
     pub max_velocity_mm_s: f64,
-    /// Largest acceleration, mm/s^2.
+    /// Largest acceleration, mm/s^2; above zero.
     pub max_acceleration_mm_s2: f64,
-    /// Largest jerk, mm/s^3.
+    /// Largest jerk, mm/s^3; above zero.
     pub max_jerk_mm_s3: f64,
 }
 
@@ -46,7 +47,7 @@ impl PointToPointSettings {
         [distance / (jerk * time * time), time, time]
     }
 
-    /// How long the move takes, s, but for rounding to whole ticks.
+    /// Duration of the move, s, but for rounding to whole ticks.
     pub(crate) fn duration_s(&self) -> f64 {
         self.durations_s().iter().sum()
     }
@@ -57,16 +58,6 @@ pub(super) const FRACTION_BITS: u32 = 64;
 /// Bits dropped from the sums before they become a velocity and an acceleration.
 const VELOCITY_SHIFT: u32 = 52;
 const ACCELERATION_SHIFT: u32 = 48;
-
-/// The running sums of a move, from jerk to position, and the next impulse.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Chain {
-    jerk: i128,
-    acceleration: i128,
-    velocity: i128,
-    position: i128,
-    impulse: u8,
-}
 
 /// A move ready for the tick.
 #[derive(Clone, Debug, PartialEq)]

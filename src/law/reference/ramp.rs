@@ -7,7 +7,7 @@
 
 use core::ops::Neg;
 
-use super::{MotionScale, ReferenceSample};
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
@@ -26,7 +26,7 @@ const LARGEST: i64 = 1 << 61;
 pub struct Velocity(i64);
 
 impl Velocity {
-    /// At rest.
+    /// No motion: zero velocity.
     pub const ZERO: Self = Self(0);
 
     /// The nearest velocity to `value_mm_s`, saturating; `NaN` gives rest. Settings time only.
@@ -101,7 +101,7 @@ pub struct Ramp<S: Scalar> {
     acceleration: S::Gain,
 }
 
-/// Where a ramp stands.
+/// The memory of a ramp.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RampState {
     position: Position,
@@ -137,19 +137,19 @@ impl RampState {
         }
     }
 
-    /// Where the reference stands.
+    /// Position of the reference.
     #[inline(always)]
     pub const fn position(&self) -> Position {
         self.position
     }
 
-    /// How fast it moves.
+    /// Velocity of the reference.
     #[inline(always)]
     pub const fn velocity(&self) -> Velocity {
         self.velocity
     }
 
-    /// Whether neither velocity nor acceleration is left.
+    /// True if neither velocity nor acceleration is left.
     #[inline(always)]
     pub const fn is_at_rest(&self) -> bool {
         self.velocity.0 == 0 && self.level == 0
@@ -284,7 +284,7 @@ impl<S: Scalar> Ramp<S> {
         self.bound(velocity.speed_units(), 0)
     }
 
-    /// How far a stop from this state goes at most towards smaller and towards larger positions; neither is negative.
+    /// Largest distances of a stop from this state towards smaller and towards larger positions; neither is negative.
     /// First the acceleration goes: meanwhile the speed still rises, or passes through rest.
     pub fn stop_reach(&self, state: &RampState) -> [Position; 2] {
         let signed = self.level(state);

@@ -1,6 +1,7 @@
 //! Motion along a recorded table of positions, as a drawing, a part program or another machine's record gives it.
 
-use super::{MotionScale, MotionState, ReferenceSample};
+use super::motion_state::MotionState;
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 

@@ -5,7 +5,7 @@
 //! written as forward differences, so position, velocity and acceleration are continuous over the whole stream and
 //! every set point is met to the unit.
 
-use super::{MotionScale, ReferenceSample};
+use super::sample::{MotionScale, ReferenceSample};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 
@@ -18,11 +18,11 @@ const ACCELERATION_SHIFT: u32 = 48;
 /// The way of one axis from one set point to the next.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Segment {
-    /// Where it starts.
+    /// Position at the start of the segment.
     pub(super) start: Position,
     /// The forward differences of the position at the start, first to fifth.
     pub(super) differences: [i128; 5],
-    /// How long it takes; at least one.
+    /// Duration in ticks; at least one.
     pub(super) ticks: u32,
     /// It begins a stream.
     pub(super) first: bool,
@@ -31,12 +31,12 @@ pub struct Segment {
 }
 
 impl Segment {
-    /// Where it starts.
+    /// Position at the start of the segment.
     pub const fn start(&self) -> Position {
         self.start
     }
 
-    /// How many ticks it takes.
+    /// Duration of the segment in ticks.
     pub const fn ticks(&self) -> u32 {
         self.ticks
     }
@@ -53,7 +53,7 @@ impl Segment {
     }
 }
 
-/// How a stream goes on after a tick.
+/// Result of a tick of a stream.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum StreamStep<S> {
     /// The reference of this tick.
@@ -78,7 +78,7 @@ pub struct StreamState {
 }
 
 impl StreamState {
-    /// Whether there is room for a segment.
+    /// True if there is room for a segment.
     #[inline(always)]
     pub const fn wants_segment(&self) -> bool {
         self.next.is_none()
@@ -93,7 +93,7 @@ impl StreamState {
         }
     }
 
-    /// Whether a stream can start from a reference at rest at `position`.
+    /// True if a stream can start from a reference at rest at `position`.
     pub fn is_ready(&self, position: Position) -> bool {
         self.current.is_none()
             && self

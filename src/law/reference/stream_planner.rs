@@ -3,12 +3,14 @@
 //! Every tick of a segment is checked before the segment is handed over, so what the control law gets is within the
 //! axis' limits whatever a host sends.
 
+use core::fmt;
+
 use super::ramp::{Velocity, steps_per_mm};
+use super::sample::{MotionScale, ReferenceSample};
 use super::stream::{FRACTION_BITS, Segment};
-use super::stream_error::{StreamError, StreamFlaw};
-use super::{MotionScale, ReferenceSample};
+use crate::law::axes::AxisName;
+use crate::law::decimal::Decimal;
 use crate::law::rounding;
-use crate::law::safety::AxisName;
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// The longest segment, in ticks: up to it the differences meet a set point to the unit.
@@ -64,14 +66,14 @@ impl AxisPoint {
     }
 }
 
-/// What a stream may ask of an axis.
+/// Limits of an axis that a stream must keep to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StreamLimits {
-    /// The axis' scale.
+    /// Resolution and control rate of the axis.
     pub scale: MotionScale,
-    /// Largest velocity, mm/s.
+    /// Largest velocity, mm/s; above zero.
     pub max_velocity_mm_s: f64,
-    /// Largest acceleration, mm/s^2.
+    /// Largest acceleration, mm/s^2; above zero.
     pub max_acceleration_mm_s2: f64,
     /// Lowest and highest position, if the axis knows where it is.
     pub travel: Option<(Position, Position)>,
@@ -82,7 +84,7 @@ pub struct StreamLimits {
 pub struct SetPoint {
     /// Counts the periods from the start, where the axes rest; from 1.
     pub number: u32,
-    /// The axes.
+    /// The set points of x, y and z.
     pub axes: [AxisPoint; 3],
     /// The stream ends here.
     pub last: bool,
@@ -207,7 +209,7 @@ struct Bounds<'a> {
     acceleration: i128,
 }
 
-/// One position unit.
+/// One unit of a position, 2^-16 counts, in 2^-33 units.
 const UNIT: i128 = 1 << FRACTION_BITS;
 
 impl<'a> Bounds<'a> {
@@ -235,7 +237,7 @@ impl<'a> Bounds<'a> {
         self.limits.scale.resolution_mm / POSITION_UNITS_PER_COUNT
     }
 
-    /// What needs no segment: the set points themselves and the mean velocity between them. After it no product of
+    /// Checks what needs no segment: the set points themselves and the mean velocity between them. After it no product of
     /// [`connect`] overflows.
     fn check_ends(&self, from: &AxisPoint, to: &AxisPoint) -> Result<(), StreamFlaw> {
         let distance = i128::from(to.position.0) - i128::from(from.position.0);
@@ -295,3 +297,115 @@ impl<'a> Bounds<'a> {
         })
     }
 }
+
+/// The flaw of a refused set point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum StreamFlaw {
+    /// Its number is not above the last one's.
+    OutOfOrder {
+        /// The number of the last set point that was taken.
+        last: u32,
+    },
+    /// Too many set points are missing before it, or the time without one is too long.
+    Missing {
+        /// Number of set points that are missing.
+        missing: u32,
+    },
+    /// The way to it is faster than the axis may move.
+    Velocity {
+        /// The axis that would do so.
+        axis: AxisName,
+        /// Velocity on the way, mm/s.
+        value_mm_s: f64,
+        /// Largest allowed velocity, mm/s.
+        limit_mm_s: f64,
+    },
+    /// The way to it accelerates more than the axis may.
+    Acceleration {
+        /// The axis that would do so.
+        axis: AxisName,
+        /// Acceleration on the way, mm/s^2.
+        value_mm_s2: f64,
+        /// Largest allowed acceleration, mm/s^2.
+        limit_mm_s2: f64,
+    },
+    /// The way to it leaves the axis' travel.
+    Travel {
+        /// The axis that would do so.
+        axis: AxisName,
+        /// Position on the way, mm.
+        value_mm: f64,
+        /// The end of the travel that it lies beyond, mm.
+        limit_mm: f64,
+    },
+    /// It is the last, and the axis is not at rest there.
+    NotAtRest {
+        /// The axis that would do so.
+        axis: AxisName,
+    },
+}
+
+/// A refused set point.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StreamError {
+    /// Number of the set point.
+    pub number: u32,
+    /// The reason for the refusal.
+    pub flaw: StreamFlaw,
+}
+
+impl fmt::Display for StreamError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "set point {}: ", self.number)?;
+        match self.flaw {
+            StreamFlaw::OutOfOrder { last } => write!(
+                f,
+                "its number is not above that of the last one, {last}; number the set points upwards from 1"
+            ),
+            StreamFlaw::Missing { missing } => write!(
+                f,
+                "{missing} set points are missing before it, more than {MOST_MISSING}, or more than {MOST_SEGMENT_TICKS} \
+                 ticks; send every set point, or lengthen the period"
+            ),
+            StreamFlaw::Velocity {
+                axis,
+                value_mm_s,
+                limit_mm_s,
+            } => write!(
+                f,
+                "{axis} would move at {:.3} mm/s, above its limit of {:.3} mm/s; \
+                 check for a jump of the position, or lower the feed",
+                Decimal(value_mm_s),
+                Decimal(limit_mm_s)
+            ),
+            StreamFlaw::Acceleration {
+                axis,
+                value_mm_s2,
+                limit_mm_s2,
+            } => write!(
+                f,
+                "{axis} would accelerate at {:.1} mm/s^2, above its limit of {:.1} mm/s^2; \
+                 check that position, velocity and acceleration agree, or lower the feed",
+                Decimal(value_mm_s2),
+                Decimal(limit_mm_s2)
+            ),
+            StreamFlaw::Travel {
+                axis,
+                value_mm,
+                limit_mm,
+            } => write!(
+                f,
+                "{axis} would be at {:.3} mm, beyond the end of its travel at {:.3} mm",
+                Decimal(value_mm),
+                Decimal(limit_mm)
+            ),
+            StreamFlaw::NotAtRest { axis } => write!(
+                f,
+                "it ends the stream, and {axis} still moves there; let the last set point have no velocity and \
+                 no acceleration"
+            ),
+        }
+    }
+}
+
+impl core::error::Error for StreamError {}

@@ -1,8 +1,10 @@
 //! Faults: their stable numbers and names, what they mean, what to do, and what the stage does by itself.
 
-use crate::law::safety::AxisName;
+use strum::{EnumCount, FromRepr, IntoStaticStr, VariantArray};
 
-/// What the stage does by itself when it finds a fault.
+use crate::law::axes::AxisName;
+
+/// Reaction of the stage by itself to a fault it finds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Reaction {
     /// Zero volts and disabled in the tick that finds it.
@@ -13,8 +15,9 @@ pub enum Reaction {
     Hold,
 }
 
-/// Why the outputs were switched off. The numbers and the names are stable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// Cause for which the outputs were switched off. The numbers and the names are stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumCount, FromRepr, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub enum FaultCode {
     /// The axis did not follow its reference.
@@ -32,13 +35,15 @@ pub enum FaultCode {
     /// The measured position lies beyond the travel.
     TravelExceeded = 7,
     /// The reference would not come to rest within the travel.
-    TravelAhead = 8,
+    #[strum(serialize = "travel-ahead")]
+    PredictedSoftLimit = 8,
     /// The axis moves faster than it may.
     Overspeed = 9,
     /// Both lines of the encoder changed at once.
     EncoderInvalid = 10,
     /// The encoder shows no motion though the output is high.
-    EncoderSilent = 11,
+    #[strum(serialize = "encoder-silent")]
+    EncoderSignalLoss = 11,
     /// The index pulse is not where the counts say.
     IndexMismatch = 12,
     /// A reading of the encoder was not taken in this tick.
@@ -75,62 +80,34 @@ pub enum FaultCode {
 
 impl FaultCode {
     /// All faults, in order of their numbers.
-    pub const ALL: [Self; 27] = [
-        Self::FollowingError,
-        Self::EncoderJump,
-        Self::DeadlineMissed,
-        Self::EmergencyStop,
-        Self::NegativeLimitSwitch,
-        Self::PositiveLimitSwitch,
-        Self::TravelExceeded,
-        Self::TravelAhead,
-        Self::Overspeed,
-        Self::EncoderInvalid,
-        Self::EncoderSilent,
-        Self::IndexMismatch,
-        Self::StaleSample,
-        Self::AmplifierFault,
-        Self::OutputMismatch,
-        Self::LinkLost,
-        Self::StreamUnderrun,
-        Self::WatchdogReset,
-        Self::Panic,
-        Self::HardFault,
-        Self::SettingsInvalid,
-        Self::HomeSwitchMissing,
-        Self::HomeSwitchStuck,
-        Self::IndexMissing,
-        Self::IndexNearSwitch,
-        Self::InjectionUnderrun,
-        Self::InjectionBounds,
-    ];
+    pub const ALL: [Self; Self::COUNT] = *Self::VARIANTS.first_chunk().unwrap();
 
-    /// The stable number.
+    /// The stable number, 1 to 27.
     pub const fn number(self) -> u8 {
         self as u8
     }
 
     /// The fault of a number.
     pub fn from_number(number: u8) -> Option<Self> {
-        Self::ALL.into_iter().find(|code| code.number() == number)
+        Self::from_repr(number)
     }
 
-    /// The stable name.
-    pub const fn name(self) -> &'static str {
+    /// The stable name, such as `following-error`.
+    pub fn name(self) -> &'static str {
+        self.into()
+    }
+
+    /// The cause in words.
+    pub const fn cause(self) -> &'static str {
         self.text()[0]
     }
 
-    /// What happened, in words.
-    pub const fn cause(self) -> &'static str {
+    /// The remedy in words.
+    pub const fn remedy(self) -> &'static str {
         self.text()[1]
     }
 
-    /// What to do about it.
-    pub const fn remedy(self) -> &'static str {
-        self.text()[2]
-    }
-
-    /// What the stage does by itself; of [`Self::LinkLost`] and [`Self::StreamUnderrun`] unless the settings say
+    /// The reaction of the stage by itself; of [`Self::LinkLost`] and [`Self::StreamUnderrun`] unless the settings say
     /// otherwise ([`StreamLoss`]).
     pub const fn reaction(self) -> Reaction {
         match self {
@@ -138,7 +115,7 @@ impl FaultCode {
             Self::NegativeLimitSwitch
             | Self::PositiveLimitSwitch
             | Self::TravelExceeded
-            | Self::TravelAhead
+            | Self::PredictedSoftLimit
             | Self::LinkLost
             | Self::StreamUnderrun
             | Self::HomeSwitchMissing
@@ -151,143 +128,116 @@ impl FaultCode {
         }
     }
 
-    /// Name, cause and remedy.
-    const fn text(self) -> [&'static str; 3] {
+    /// Cause and remedy.
+    const fn text(self) -> [&'static str; 2] {
         match self {
             Self::FollowingError => [
-                "following-error",
                 "the measured position left the reference by more than the limit",
                 "check for a blocked axis, a disabled amplifier, and the signs of encoder and amplifier; \
                  or raise following_error_mm",
             ],
             Self::EncoderJump => [
-                "encoder-jump",
                 "the encoder moved further in one tick than the axis can",
                 "check the encoder's cable, shield and supply; check max_velocity_mm_s and resolution_mm",
             ],
             Self::DeadlineMissed => [
-                "deadline-missed",
                 "a control tick ended after its deadline",
                 "lower the control rate, or remove load above the control interrupt's priority",
             ],
             Self::EmergencyStop => [
-                "emergency-stop",
                 "the emergency stop is pressed, or its circuit is broken",
                 "clear the danger, release the emergency stop, reset, and enable",
             ],
             Self::NegativeLimitSwitch => [
-                "negative-limit-switch",
                 "the axis moved towards its pressed negative limit switch",
                 "reset, enable, and move to larger positions; check travel_mm and the home position",
             ],
             Self::PositiveLimitSwitch => [
-                "positive-limit-switch",
                 "the axis moved towards its pressed positive limit switch",
                 "reset, enable, and move to smaller positions; check travel_mm and the home position",
             ],
             Self::TravelExceeded => [
-                "travel-exceeded",
                 "the measured position lies beyond the travel",
                 "reset, enable, and move back; check for overshoot and a pushing load, or widen travel_mm",
             ],
-            Self::TravelAhead => [
-                "travel-ahead",
+            Self::PredictedSoftLimit => [
                 "the motion would not have come to rest within the travel",
                 "end the motion within travel_mm, or reach the end more slowly; \
                  raise braking_mm_s2 if the axis can brake harder",
             ],
             Self::Overspeed => [
-                "overspeed",
                 "the axis moved faster than overspeed_ratio times max_velocity_mm_s",
                 "check the signs of encoder and amplifier, the gains, and what drives the axis from outside",
             ],
             Self::EncoderInvalid => [
-                "encoder-invalid",
                 "both lines of the encoder changed at once: counts are lost",
                 "check the encoder's cable, shield and supply, and its largest edge rate; then home again",
             ],
-            Self::EncoderSilent => [
-                "encoder-silent",
+            Self::EncoderSignalLoss => [
                 "the encoder showed no motion though the output was high for silent_s",
                 "check the encoder's cable and both its lines, the amplifier's enable line, and for a blocked axis",
             ],
             Self::IndexMismatch => [
-                "index-mismatch",
                 "the counts between two index pulses are no multiple of counts_per_index",
                 "check the encoder for missing edges: cable, shield, dirt; check counts_per_index; then home again",
             ],
             Self::StaleSample => [
-                "stale-sample",
                 "a reading of the encoder was not taken in this tick",
                 "check the encoder's interface and its timing against the control rate",
             ],
             Self::AmplifierFault => [
-                "amplifier-fault",
                 "the amplifier reports a fault, or its cable is broken",
                 "read the amplifier's own display; check supply, motor cable and temperature",
             ],
             Self::OutputMismatch => [
-                "output-mismatch",
                 "the converter holds another word than was written to it",
                 "check the converter's bus and supply, and the shield of its cable",
             ],
             Self::LinkLost => [
-                "link-lost",
                 "the host that streamed set points, jogged or injected a voltage has fallen silent",
                 "check the cable and the host; then begin again; a jog goes on only while its host asks something twice a second",
             ],
             Self::StreamUnderrun => [
-                "stream-underrun",
                 "the next set point of the stream did not come in time",
                 "send set points further ahead, or at a longer period",
             ],
             Self::WatchdogReset => [
-                "watchdog-reset",
                 "the watchdog ended the last run: control, supervision or link made no progress",
                 "read the log of the last run; report it with the firmware's version",
             ],
             Self::Panic => [
-                "panic",
                 "a panic ended the last run",
                 "read the text that it left; report it with the firmware's version",
             ],
             Self::HardFault => [
-                "hard-fault",
                 "a hard fault of the processor ended the last run",
                 "read the registers that it left; check the supply; report it with the firmware's version",
             ],
             Self::SettingsInvalid => [
-                "settings-invalid",
                 "the stored settings were refused; the defaults are in force",
                 "read which field was refused, correct it, apply and store; then reset",
             ],
             Self::HomeSwitchMissing => [
-                "home-switch-missing",
                 "homing went homing.travel_mm without meeting its switch",
                 "check the switch and its cable, homing.direction and homing.switch; or raise homing.travel_mm",
             ],
             Self::HomeSwitchStuck => [
-                "home-switch-stuck",
                 "homing went homing.travel_mm away from its switch, and it stayed pressed",
                 "check the switch, its cable and its polarity, and homing.direction",
             ],
             Self::IndexMissing => [
-                "index-missing",
                 "no index pulse came within a revolution after the home switch",
                 "check the encoder's index line and encoder.counts_per_index; or home without the index",
             ],
             Self::IndexNearSwitch => [
-                "index-near-switch",
                 "the home switch lets go within an eighth of a revolution of an index pulse",
                 "move the switch, or turn the encoder on its shaft, by a quarter of a revolution",
             ],
             Self::InjectionUnderrun => [
-                "injection-underrun",
                 "the next value of the injected voltage did not come in time",
                 "check the cable and the host's load; the line must carry 20 kB/s to the machine at 10 kHz",
             ],
             Self::InjectionBounds => [
-                "injection-bounds",
                 "the axis left the travel, or exceeded the velocity, that was given with its injected voltage",
                 "lower the voltage or its duration, or raise its lowest frequency; or allow more travel",
             ],
@@ -298,20 +248,20 @@ impl FaultCode {
 /// A latched fault: what, where, when.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Fault {
-    /// What happened.
+    /// The cause of the fault.
     pub code: FaultCode,
-    /// On which axis, if on one.
+    /// The axis, if it is about one.
     pub axis: Option<AxisName>,
-    /// At which control tick.
+    /// The control tick that found it.
     pub tick: u32,
 }
 
-/// What happens when set points no longer come.
+/// Reactions to the end of set points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct StreamLoss {
-    /// When the host has fallen silent.
+    /// Reaction to the loss of the host's signal.
     pub link_lost: Reaction,
-    /// When the next set point is late.
+    /// Reaction to a set point that is late.
     pub underrun: Reaction,
 }
 
@@ -335,11 +285,11 @@ impl Default for StreamLoss {
     }
 }
 
-/// Why the outputs cannot be enabled at present: an input that is bad.
+/// A bad input that keeps the outputs from being enabled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Obstacle {
+pub struct EnableInterlock {
     /// The fault that the input would be, were the outputs enabled.
     pub code: FaultCode,
-    /// On which axis, if on one.
+    /// The axis, if it is about one.
     pub axis: Option<AxisName>,
 }

@@ -1,4 +1,4 @@
-//! What is watched on each axis in every tick: one small pure step each, without a division.
+//! The monitors of each axis, one small pure step a tick each, without a division.
 
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
@@ -9,7 +9,7 @@ const SPEED_FRACTION_BITS: u32 = 8;
 const SPEED_FILTER_BITS: u32 = 3;
 /// No axis moves further in a tick, counts; an encoder that does so is faulty, and its filter shall not wrap.
 const LARGEST_STEP: i32 = 1 << 16;
-/// What quantisation and noise add to a filtered speed, counts per tick.
+/// Addition of quantisation and noise to a filtered speed, counts per tick.
 const SPEED_NOISE_COUNTS: f64 = 0.5;
 
 /// Watches the measured speed.
@@ -18,7 +18,7 @@ pub struct Overspeed {
     limit: u32,
 }
 
-/// The filtered speed.
+/// The memory of the filtered speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OverspeedState {
     /// In 2^-8 counts per tick.
@@ -34,6 +34,9 @@ impl OverspeedState {
 }
 
 impl Overspeed {
+    /// A limit that no speed exceeds.
+    pub const UNLIMITED: Self = Self { limit: u32::MAX };
+
     /// A limit in counts per tick, at most 2^16; half a count is added for the quantisation. Settings time only.
     pub fn new(counts_per_tick: f64) -> Self {
         let limit = (counts_per_tick + SPEED_NOISE_COUNTS) * f64::from(1 << SPEED_FRACTION_BITS);
@@ -42,7 +45,7 @@ impl Overspeed {
         }
     }
 
-    /// Takes a step of the encoder, counts; says whether the filtered speed is within the limit.
+    /// Takes a step of the encoder, counts; returns true if the filtered speed is within the limit.
     #[inline(always)]
     pub fn step(&self, state: &mut OverspeedState, counts: i32) -> bool {
         let speed = counts.clamp(-LARGEST_STEP, LARGEST_STEP - 1) << SPEED_FRACTION_BITS;
@@ -57,26 +60,40 @@ const DITHER_COUNTS: u32 = 2;
 /// Watches for an encoder that shows no motion while the output is high. An encoder of which one line is dead dithers by
 /// a count; that is no motion.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Silence<S> {
-    /// The output from which the axis must move, V.
-    pub(crate) level: S,
-    /// Ticks that it may take.
-    pub(crate) ticks: u32,
+pub struct SignalLoss<S> {
+    level: S,
+    ticks: u32,
 }
 
-/// For how long the output has been high, and how far the axis has come since.
+/// The time for which the output has been high, and the distance since.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SilenceState {
+pub struct SignalLossState {
     ticks: u32,
     travelled: i32,
 }
 
-impl<S: Scalar> Silence<S> {
-    /// Takes a step of the encoder, counts, and the output that was in force before it, V; says whether all is well.
+impl<S: Scalar> SignalLoss<S> {
+    /// Finds an axis that does not move within `ticks` while its output is at `level_v` (V) or above. Settings time only.
+    pub fn new(level_v: f64, ticks: u32) -> Self {
+        Self {
+            level: S::quantise(level_v, Quantity::Voltage),
+            ticks,
+        }
+    }
+
+    /// A monitor that finds nothing.
+    pub fn off() -> Self {
+        Self {
+            level: S::ZERO,
+            ticks: u32::MAX,
+        }
+    }
+
+    /// Takes a step of the encoder, counts, and the output that was in force before it, V; returns true if all is well.
     #[inline(always)]
-    pub fn step(&self, state: &mut SilenceState, counts: i32, output: S) -> bool {
+    pub fn step(&self, state: &mut SignalLossState, counts: i32, output: S) -> bool {
         if output.magnitude() >= self.level {
-            self.listen(state, counts)
+            self.watch(state, counts)
         } else {
             state.ticks = 0;
             true
@@ -84,7 +101,7 @@ impl<S: Scalar> Silence<S> {
     }
 
     #[inline(never)]
-    fn listen(&self, state: &mut SilenceState, counts: i32) -> bool {
+    fn watch(&self, state: &mut SignalLossState, counts: i32) -> bool {
         let before = if state.ticks == 0 { 0 } else { state.travelled };
         state.travelled = before.saturating_add(counts);
         if state.travelled.unsigned_abs() > DITHER_COUNTS {
@@ -106,7 +123,7 @@ pub struct IndexSpacing {
     tolerance: u32,
 }
 
-/// Where the last index pulse was, as the low bits of the count.
+/// The low 32 bits of the count at the last index pulse.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct IndexState {
     last: Option<u32>,
@@ -124,7 +141,7 @@ impl IndexSpacing {
         }
     }
 
-    /// What is left of a distance after whole spacings.
+    /// Remainder of a distance after whole spacings, counts.
     #[inline(always)]
     const fn beyond(&self, distance: u32) -> u32 {
         // The quotient from the rounded reciprocal is the true one or one less.
@@ -137,7 +154,7 @@ impl IndexSpacing {
         }
     }
 
-    /// Takes the count at an index pulse, its low 32 bits; says whether it fits the last one.
+    /// Takes the count at an index pulse, its low 32 bits; returns true if it fits the last one.
     #[cold]
     #[inline(never)]
     pub fn step(&self, state: &mut IndexState, count: u32) -> bool {
@@ -161,15 +178,12 @@ impl IndexSpacing {
 /// Watches the tracking error against a limit that grows with the speed of the reference.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Following<S: Scalar> {
-    /// The limit at rest, mm.
-    pub(crate) at_rest: S,
-    /// What it grows by, mm per mm/s.
-    pub(crate) per_speed: S::Gain,
-    /// What it grows to, mm.
-    pub(crate) largest: S,
+    at_rest: S,
+    per_speed: S::Gain,
+    largest: S,
 }
 
-/// The largest error so far, and the limit that it stood against.
+/// The largest error so far, and the limit that it was compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FollowingState<S> {
     error: S,
@@ -189,6 +203,21 @@ impl<S: Scalar> FollowingState<S> {
 }
 
 impl<S: Scalar> Following<S> {
+    /// A limit of `at_rest_mm` that grows by `lag_s` times the speed of the reference, up to `largest_mm`. Settings time
+    /// only.
+    pub fn new(at_rest_mm: f64, lag_s: f64, largest_mm: f64) -> Self {
+        Self {
+            at_rest: S::quantise(at_rest_mm, Quantity::Length),
+            per_speed: S::gain(lag_s, Quantity::Velocity, Quantity::Length),
+            largest: S::quantise(largest_mm, Quantity::Length),
+        }
+    }
+
+    /// The largest limit that the number type holds.
+    pub fn unlimited() -> Self {
+        Self::new(f64::MAX, 0.0, f64::MAX)
+    }
+
     /// A memory without an error.
     #[inline(always)]
     pub fn start(&self) -> FollowingState<S> {
@@ -198,7 +227,7 @@ impl<S: Scalar> Following<S> {
         }
     }
 
-    /// Takes the error (mm) and the reference's speed (mm/s, not negative); says whether the axis follows.
+    /// Takes the error (mm) and the reference's speed (mm/s, not negative); returns true if the axis follows.
     #[inline(always)]
     pub fn step(&self, state: &mut FollowingState<S>, error: S, speed: S) -> bool {
         let grown = self.at_rest + speed.scale(self.per_speed);

@@ -1,7 +1,8 @@
-//! What the board's digital inputs say, as a set of bits. All are active-true: polarity is the board's business, and a
+//! The board's digital inputs as a set of bits. All are active-true: polarity is the board's business, and a
 //! broken wire reads as active.
 
-use crate::law::safety::{AxisName, FaultCode, Obstacle};
+use super::fault::{EnableInterlock, FaultCode};
+use crate::law::axes::AxisName;
 
 /// Bits of each axis.
 const BITS_PER_AXIS: u32 = 5;
@@ -33,19 +34,19 @@ impl AxisSwitches {
     /// The converter's channel read back another word than was written.
     pub const OUTPUT_MISMATCH: Self = Self(OUTPUT_MISMATCH);
 
-    /// Whether all of `others` are active.
+    /// True if all of `others` are active.
     #[inline(always)]
     pub const fn has(self, others: Self) -> bool {
         self.0 & others.0 == others.0
     }
 
-    /// Whether a limit switch is pressed.
+    /// True if a limit switch is pressed.
     #[inline(always)]
     pub const fn at_limit(self) -> bool {
         self.0 & (NEGATIVE_LIMIT | POSITIVE_LIMIT) != 0
     }
 
-    /// These and `others`.
+    /// The union of these and `others`.
     #[must_use]
     pub const fn with(self, others: Self) -> Self {
         Self(self.0 | others.0)
@@ -53,7 +54,7 @@ impl AxisSwitches {
 }
 
 impl Switches {
-    /// Nothing is active.
+    /// The set in which nothing is active.
     pub const NONE: Self = Self(0);
     /// The emergency stop is pressed.
     pub const EMERGENCY_STOP: Self = Self(EMERGENCY_STOP);
@@ -74,7 +75,7 @@ impl Switches {
         self.0
     }
 
-    /// These and `others`.
+    /// The union of these and `others`.
     #[must_use]
     pub const fn with(self, others: Self) -> Self {
         Self(self.0 | others.0)
@@ -92,13 +93,13 @@ impl Switches {
         AxisSwitches(self.0 >> (BITS_PER_AXIS * axis as u32) & ((1 << BITS_PER_AXIS) - 1))
     }
 
-    /// Whether the emergency stop is pressed.
+    /// True if the emergency stop is pressed.
     #[inline(always)]
     pub const fn emergency_stop(self) -> bool {
         self.0 & EMERGENCY_STOP != 0
     }
 
-    /// Whether nothing speaks against enabled outputs. Limit and home switches do not: an axis must be able to leave
+    /// True if nothing speaks against enabled outputs. Limit and home switches do not: an axis must be able to leave
     /// them.
     #[inline(always)]
     pub const fn are_good(self) -> bool {
@@ -107,9 +108,9 @@ impl Switches {
     }
 
     /// The first that speaks against enabled outputs.
-    pub(crate) fn obstacle(self) -> Option<Obstacle> {
+    pub(crate) fn interlock(self) -> Option<EnableInterlock> {
         if self.emergency_stop() {
-            return Some(Obstacle {
+            return Some(EnableInterlock {
                 code: FaultCode::EmergencyStop,
                 axis: None,
             });
@@ -123,7 +124,7 @@ impl Switches {
             } else {
                 continue;
             };
-            return Some(Obstacle {
+            return Some(EnableInterlock {
                 code,
                 axis: Some(axis),
             });

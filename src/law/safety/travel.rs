@@ -1,7 +1,7 @@
 //! The travel of an axis: soft limits of the measured position, and of where a stop would end.
 
+use super::fault::FaultCode;
 use crate::law::reference::{Ramp, Velocity};
-use crate::law::safety::FaultCode;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 
@@ -35,25 +35,26 @@ impl Range {
     }
 }
 
-/// Where an axis may be. In force once the axis is homed.
+/// The soft limits of an axis. In force once it is homed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Travel {
     /// For the measured position, and for where a stop ends.
     allowed: Range,
     /// For the reference: within it a stop from any allowed velocity ends in time.
     clear: Range,
-    /// What the speed may grow by in a tick.
+    /// Largest growth of the speed in a tick, as a displacement.
     growth: Position,
 }
 
-/// Whether the axis has been within its travel since it was enabled: one that was enabled outside may come back.
+/// The memory of the soft limits: an axis that was enabled outside may come back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TravelState {
+    /// The axis has been inside since it was enabled.
     inside: bool,
 }
 
 impl Travel {
-    /// No limits.
+    /// Limits that no machine reaches.
     pub const UNLIMITED: Self = {
         let everywhere = Range::new(Position(i64::MIN / 4), Position(i64::MAX / 4));
         Self {
@@ -64,7 +65,7 @@ impl Travel {
     };
 
     /// From `low` to `high`, for references that move by at most `fastest` in a tick, and by at most `growth` more than in
-    /// the tick before; `ramp` is what a stop follows. Settings time only.
+    /// the tick before, and for stops along `ramp`. Settings time only.
     pub fn new<S: Scalar>(
         low: Position,
         high: Position,
@@ -80,8 +81,8 @@ impl Travel {
         }
     }
 
-    /// Takes the reference, its displacement in this tick, and the measured position; what is found calls for a stop
-    /// along `ramp`.
+    /// Takes the reference, its displacement in this tick, and the measured position. A fault that is found calls for a
+    /// stop along `ramp`.
     #[inline(always)]
     pub fn step<S: Scalar>(
         &self,
@@ -90,10 +91,10 @@ impl Travel {
         reference: Position,
         displacement: Position,
         measured: Position,
-    ) -> Option<FaultCode> {
+    ) -> Result<(), FaultCode> {
         if self.clear.holds(reference) && self.allowed.holds(measured) {
             state.inside = true;
-            return None;
+            return Ok(());
         }
         self.at_the_edge(state, ramp, reference, displacement, measured)
     }
@@ -107,21 +108,25 @@ impl Travel {
         reference: Position,
         displacement: Position,
         measured: Position,
-    ) -> Option<FaultCode> {
+    ) -> Result<(), FaultCode> {
         if self.allowed.holds(measured) {
             state.inside = true;
         } else if state.inside {
-            return Some(FaultCode::TravelExceeded);
+            return Err(FaultCode::TravelExceeded);
         }
         let (room, speed) = if displacement.0 > 0 {
             (self.allowed.high() - reference, displacement)
         } else if displacement.0 < 0 {
             (reference - self.allowed.low, -displacement)
         } else {
-            return None;
+            return Ok(());
         };
         // The stop begins after the next tick, which may be faster by the growth.
-        (stop_from(ramp, speed + self.growth).0 > room.0).then_some(FaultCode::TravelAhead)
+        if stop_from(ramp, speed + self.growth).0 > room.0 {
+            Err(FaultCode::PredictedSoftLimit)
+        } else {
+            Ok(())
+        }
     }
 }
 

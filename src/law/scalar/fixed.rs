@@ -2,7 +2,8 @@
 
 use core::ops::{Add, Neg, Sub};
 
-use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
+use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};
+use super::quantity::Quantity;
 use crate::law::rounding;
 
 /// A saturating 32-bit number. The binary point is the [`Quantity`]'s, known to the code that holds the value.

@@ -1,7 +1,8 @@
 //! `f32` for the target and `f64` for the host. Plain IEEE operations in a fixed order: no fused multiply-add and no
 //! platform library, so that host and target agree to the bit.
 
-use super::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
+use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};
+use super::quantity::Quantity;
 
 /// A sum that keeps what its last rounding lost: terms far below its resolution still add up.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

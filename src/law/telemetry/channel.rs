@@ -1,32 +1,38 @@
-//! What a sample can hold: one number of one axis, or of the stage, by name and by number.
+//! Channels of telemetry: one number of one axis, or of the stage, by name and by number.
 
 use core::fmt;
 use core::str::FromStr;
 
 use serde::{Deserialize, Serialize};
+use strum::{EnumCount, EnumString, IntoStaticStr, VariantArray};
 
-use super::Observation;
+use super::observation::Observation;
+use crate::law::axes::AxisName;
 use crate::law::axis::AxisState;
-use crate::law::safety::{AxisName, SafetyState};
+use crate::law::safety::SafetyState;
 use crate::law::scalar::{Quantity, Scalar};
 
 /// A signal of an axis. The numbers are stable: they cross the link.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumCount, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub enum AxisSignal {
     /// Reference position, 1/256 count; the low 32 bits, so it wraps at +-2^23 counts (4.2 m of half micrometres).
     Reference = 0,
     /// Measured position, counts; the low 32 bits.
     Position = 1,
-    /// Tracking error, mm.
+    /// Tracking error, reference minus measured, mm.
     Error = 2,
     /// Velocity of the reference as far ahead as the feedforward looks, mm/s.
     Velocity = 3,
     /// The feedback's proportional term, V.
+    #[strum(serialize = "p")]
     Proportional = 4,
     /// The feedback's integral, V.
+    #[strum(serialize = "i")]
     Integral = 5,
     /// The feedback's derivative term, V.
+    #[strum(serialize = "d")]
     Derivative = 6,
     /// Feedforward of the static model's level, V.
     Level = 7,
@@ -36,15 +42,16 @@ pub enum AxisSignal {
     Gms = 9,
     /// Feedforward of inertia, V.
     Inertia = 10,
-    /// What remains of a bumpless change's offset, V.
-    Transfer = 11,
+    /// Rest of a bumpless change's offset, V.
+    #[strum(serialize = "transfer")]
+    BumplessOffset = 11,
     /// Output after all limits, V.
     Output = 12,
-    /// The converter's word.
+    /// The word sent to the converter.
     Code = 13,
-    /// What limits the output: 0 nothing, 1 the output limit.
+    /// The limit that acts on the output: 0 none, 1 the output limit.
     LimitedBy = 14,
-    /// What a host adds to the output, V.
+    /// Voltage that a host adds to the output, V.
     Injection = 15,
     /// The sum of the converter's words of all ticks before this one; wraps. The difference from one sample to the next is
     /// the sum over the ticks from the one on, up to the other.
@@ -52,7 +59,8 @@ pub enum AxisSignal {
 }
 
 /// A signal of the stage. The numbers are stable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, EnumCount, EnumString, IntoStaticStr, VariantArray)]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub enum StageSignal {
     /// The number of its [`MachineState`].
@@ -61,13 +69,14 @@ pub enum StageSignal {
     Fault = 1,
     /// The control tick, numbered as in a fault.
     Tick = 2,
-    /// How long the tick before took, in cycles of the board's tick timer.
+    /// Duration of the tick before, cycles of the board's tick timer.
     Elapsed = 3,
 }
 
-/// Who drives the outputs, as it is shown. The numbers are stable.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+/// The safety state as it is shown. The numbers are stable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
 #[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub enum MachineState {
     /// Before the first good inputs.
@@ -76,7 +85,7 @@ pub enum MachineState {
     Disabled = 1,
     /// The homing routine of an axis at least. Samples show [`Enabled`](Self::Enabled) then.
     Homing = 2,
-    /// The control law.
+    /// The control law drives the outputs.
     Enabled = 3,
     /// Nobody, until the fault is reset.
     Fault = 4,
@@ -86,15 +95,8 @@ pub enum MachineState {
 
 impl MachineState {
     /// Its name in lower case.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Start => "start",
-            Self::Disabled => "disabled",
-            Self::Homing => "homing",
-            Self::Enabled => "enabled",
-            Self::Fault => "fault",
-            Self::Stopping => "stopping",
-        }
+    pub fn as_str(self) -> &'static str {
+        self.into()
     }
 }
 
@@ -111,7 +113,7 @@ impl From<SafetyState> for MachineState {
     }
 }
 
-/// How the word of a sample is to be read.
+/// Format of the word of a sample.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WordKind {
     /// The bits of an `f32`.
@@ -120,7 +122,7 @@ pub enum WordKind {
     Integer,
 }
 
-/// What a sample can hold. On the link it is one byte: the source (0, 1, 2: an axis; 3: the stage) times 32, plus the
+/// A number that a sample can hold. On the link it is one byte: the source (0, 1, 2: an axis; 3: the stage) times 32, plus the
 /// signal's number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(try_from = "u8", into = "u8")]
@@ -152,47 +154,11 @@ const STAGE_SOURCE: u8 = 3;
 
 impl AxisSignal {
     /// All signals of an axis, in order of their numbers.
-    pub const ALL: [Self; 17] = [
-        Self::Reference,
-        Self::Position,
-        Self::Error,
-        Self::Velocity,
-        Self::Proportional,
-        Self::Integral,
-        Self::Derivative,
-        Self::Level,
-        Self::Viscous,
-        Self::Gms,
-        Self::Inertia,
-        Self::Transfer,
-        Self::Output,
-        Self::Code,
-        Self::LimitedBy,
-        Self::Injection,
-        Self::CodeSum,
-    ];
+    pub const ALL: [Self; Self::COUNT] = *Self::VARIANTS.first_chunk().unwrap();
 
-    /// Its name.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::Reference => "reference",
-            Self::Position => "position",
-            Self::Error => "error",
-            Self::Velocity => "velocity",
-            Self::Proportional => "p",
-            Self::Integral => "i",
-            Self::Derivative => "d",
-            Self::Level => "level",
-            Self::Viscous => "viscous",
-            Self::Gms => "gms",
-            Self::Inertia => "inertia",
-            Self::Transfer => "transfer",
-            Self::Output => "output",
-            Self::Code => "code",
-            Self::LimitedBy => "limited-by",
-            Self::Injection => "injection",
-            Self::CodeSum => "code-sum",
-        }
+    /// Its name, as in `x.error` behind the dot.
+    pub fn as_str(self) -> &'static str {
+        self.into()
     }
 
     #[inline(always)]
@@ -211,7 +177,7 @@ impl AxisSignal {
             Self::Viscous => volts(seen.feedforward.viscous),
             Self::Gms => volts(seen.feedforward.gms),
             Self::Inertia => volts(seen.feedforward.inertia),
-            Self::Transfer => volts(seen.transfer),
+            Self::BumplessOffset => volts(seen.bumpless_offset),
             Self::Output => volts(seen.output),
             Self::Code => i32::from(seen.code.0) as u32,
             Self::LimitedBy => seen.limited_by as u32,
@@ -223,16 +189,11 @@ impl AxisSignal {
 
 impl StageSignal {
     /// All signals of the stage, in order of their numbers.
-    pub const ALL: [Self; 4] = [Self::State, Self::Fault, Self::Tick, Self::Elapsed];
+    pub const ALL: [Self; Self::COUNT] = *Self::VARIANTS.first_chunk().unwrap();
 
-    /// Its name.
-    pub const fn as_str(self) -> &'static str {
-        match self {
-            Self::State => "state",
-            Self::Fault => "fault",
-            Self::Tick => "tick",
-            Self::Elapsed => "elapsed",
-        }
+    /// Its name, as in `x.error` behind the dot.
+    pub fn as_str(self) -> &'static str {
+        self.into()
     }
 
     #[inline(always)]
@@ -255,7 +216,7 @@ impl Channel {
         (0..=u8::MAX).filter_map(|number| Self::try_from(number).ok())
     }
 
-    /// How its word is to be read.
+    /// Format of its word.
     pub const fn word_kind(self) -> WordKind {
         match self {
             Self::Stage(_)
@@ -299,17 +260,9 @@ impl Channel {
     /// Its word at this tick.
     #[inline(always)]
     pub fn read<S: Scalar, const N: usize>(self, seen: &Observation<'_, S, N>) -> u32 {
-        let [x, y, z] = seen.stage.axes();
         match self {
             Self::Stage(signal) => signal.read(seen),
-            Self::Axis(name, signal) => {
-                let axis = match name {
-                    AxisName::X => x,
-                    AxisName::Y => y,
-                    AxisName::Z => z,
-                };
-                signal.read(axis)
-            }
+            Self::Axis(name, signal) => signal.read(&seen.stage.axes()[name]),
         }
     }
 }
@@ -356,18 +309,10 @@ impl FromStr for Channel {
     fn from_str(name: &str) -> Result<Self, UnknownChannel> {
         let (source, signal) = name.split_once('.').ok_or(UnknownChannel)?;
         let channel = if source == "stage" {
-            StageSignal::ALL
-                .into_iter()
-                .find(|known| known.as_str() == signal)
-                .map(Self::Stage)
+            signal.parse().ok().map(Self::Stage)
         } else {
-            let axis = AxisName::ALL
-                .into_iter()
-                .find(|known| known.as_str() == source);
-            let signal = AxisSignal::ALL
-                .into_iter()
-                .find(|known| known.as_str() == signal);
-            axis.zip(signal)
+            let axis = source.parse().ok();
+            axis.zip(signal.parse().ok())
                 .map(|(axis, signal)| Self::Axis(axis, signal))
         };
         channel.ok_or(UnknownChannel)

@@ -1,71 +1,19 @@
-//! What one tick can show: every term of the law, though none of it is state.
+//! Telemetry: every term of the law at one tick.
 //!
 //! [`AxisTelemetry`] is what the tick leaves behind. A [`Channel`] names one number of it, a [`Selection`] up to
 //! [`MAX_CHANNELS`] of them; the [`Sampler`] reads a selection in the control interrupt, and the [`Packer`] makes blocks of
 //! the samples for the link.
 
 mod channel;
+mod observation;
 mod packer;
 mod sampler;
 mod selection;
 
 pub use channel::{AxisSignal, Channel, MachineState, StageSignal, UnknownChannel, WordKind};
+pub use observation::Observation;
 pub use packer::{BLOCK_BYTES, BLOCK_WORDS, Packer, TelemetryBlock, Words};
 pub use sampler::{Sample, Sampler, SamplerState};
-pub use selection::{MAX_CHANNELS, Observation, Selection, SelectionError};
+pub use selection::{MAX_CHANNELS, Selection, SelectionError};
 
-use serde::{Deserialize, Serialize};
-
-use crate::law::control::feedback::FeedbackTerms;
-use crate::law::feedforward::FeedforwardTerms;
-use crate::law::scalar::{Quantity, Scalar};
-use crate::law::units::{DacCode, EncoderCount, Position};
-
-/// What acts as a limit on an axis' output in this tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub enum LimitedBy {
-    /// Nothing.
-    #[default]
-    Nothing,
-    /// The output limit.
-    OutputLimit,
-}
-
-/// One axis at one tick.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct AxisTelemetry<S> {
-    /// Reference position.
-    pub reference: Position,
-    /// Measured position.
-    pub measured: EncoderCount,
-    /// Tracking error e, reference minus measured, mm.
-    pub error: S,
-    /// Velocity of the reference, mm/s, as far ahead as the feedforward looks.
-    pub velocity: S,
-    /// Feedback, term by term.
-    pub feedback: FeedbackTerms<S>,
-    /// Feedforward, term by term.
-    pub feedforward: FeedforwardTerms<S>,
-    /// What remains of the offset that made the last change of settings bumpless, V.
-    pub transfer: S,
-    /// Output after all limits, V.
-    pub output: S,
-    /// The word sent to the converter.
-    pub code: DacCode,
-    /// The sum of all words so far, this one included; wraps.
-    pub code_sum: i32,
-    /// What limits the output.
-    pub limited_by: LimitedBy,
-}
-
-impl<S: Scalar> AxisTelemetry<S> {
-    /// Tracking error, mm.
-    pub fn error_mm(&self) -> f32 {
-        self.error.to_f32(Quantity::Length)
-    }
-
-    /// Output, V.
-    pub fn output_v(&self) -> f32 {
-        self.output.to_f32(Quantity::Voltage)
-    }
-}
+pub use crate::law::axis::telemetry::{AxisTelemetry, LimitedBy};

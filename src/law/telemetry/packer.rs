@@ -3,7 +3,8 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use super::{Sample, Selection};
+use super::sampler::Sample;
+use super::selection::Selection;
 
 /// Words that a block holds: 14 samples of 8 channels, 112 of one.
 pub const BLOCK_WORDS: usize = 112;
@@ -16,7 +17,7 @@ pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 pub struct Words(Vec<u8, BLOCK_BYTES>);
 
 impl Words {
-    /// No words.
+    /// A block without words.
     pub const fn new() -> Self {
         Self(Vec::new())
     }
@@ -34,12 +35,12 @@ impl Words {
         fits
     }
 
-    /// Number of words.
+    /// Number of words in the block.
     pub fn len(&self) -> usize {
         self.0.len() / 4
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }

@@ -1,9 +1,10 @@
 //! The fast half of telemetry: at most one sample a tick, at most [`MAX_CHANNELS`] reads.
 
-use super::{MAX_CHANNELS, Observation, Selection};
+use super::observation::Observation;
+use super::selection::{MAX_CHANNELS, Selection};
 use crate::law::scalar::Scalar;
 
-/// What is sampled. The slow half makes it and hands it over whole.
+/// The selection that is sampled. The slow half makes it and hands it over whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Sampler {
     selection: Option<Selection>,
@@ -11,7 +12,7 @@ pub struct Sampler {
     generation: u8,
 }
 
-/// The sampler's memory.
+/// The memory of the sampler.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SamplerState {
     generation: u8,

@@ -1,34 +1,15 @@
-//! Which channels are sampled, and how often.
+//! Selections: the channels that are sampled together, and their period.
 
 use core::fmt;
 
 use heapless::Vec;
 
-use super::Channel;
+use super::channel::Channel;
+use super::observation::Observation;
 use crate::law::scalar::Scalar;
-use crate::law::stage::StageState;
 
 /// Channels that a selection holds at most: what bounds the reads of a tick.
 pub const MAX_CHANNELS: usize = 8;
-
-/// What can be read after a tick.
-#[derive(Clone, Copy, Debug)]
-pub struct Observation<'a, S: Scalar, const N: usize> {
-    /// The stage as the tick left it.
-    pub stage: &'a StageState<S, N>,
-    /// How long the tick before took, in cycles of the board's tick timer.
-    pub elapsed_cycles: u32,
-    /// The tick was given a command.
-    pub commanded: bool,
-}
-
-impl<S: Scalar, const N: usize> Observation<'_, S, N> {
-    /// The number of the tick that has just ended, as a fault of that tick has it.
-    #[inline(always)]
-    pub const fn tick(&self) -> u32 {
-        self.stage.tick().wrapping_sub(1)
-    }
-}
 
 /// Channels to sample together, checked.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -37,7 +18,7 @@ pub struct Selection {
     decimation: u16,
 }
 
-/// Why a selection cannot be sampled.
+/// Reason why a selection cannot be sampled.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum SelectionError {
     /// The number of channels, which was none or more than [`MAX_CHANNELS`].

@@ -3,7 +3,7 @@
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
 
 /// Values that one request holds at most: 19 ms at 10 kHz, so that asking once in that time keeps up.
 pub const INJECT_VALUES: usize = 192;

@@ -4,9 +4,9 @@ use heapless::String;
 use serde::{Deserialize, Serialize};
 
 use super::motion::AxisSet;
-use crate::law::axis::CourseMode;
+use crate::law::axes::AxisName;
 use crate::law::capture::CapturePhase;
-use crate::law::safety::AxisName;
+use crate::law::motion::MotionMode;
 use crate::law::telemetry::{LimitedBy, MachineState};
 use crate::link::frame::FrameCounters;
 
@@ -61,16 +61,16 @@ pub enum AxisMode {
     OpenLoop,
 }
 
-impl From<CourseMode> for AxisMode {
-    fn from(mode: CourseMode) -> Self {
+impl From<MotionMode> for AxisMode {
+    fn from(mode: MotionMode) -> Self {
         match mode {
-            CourseMode::Hold => Self::Hold,
-            CourseMode::Plan => Self::Plan,
-            CourseMode::Jog => Self::Jog,
-            CourseMode::Home => Self::Home,
-            CourseMode::Stream => Self::Stream,
-            CourseMode::Stopping => Self::Stopping,
-            CourseMode::OpenLoop => Self::OpenLoop,
+            MotionMode::Hold => Self::Hold,
+            MotionMode::Plan => Self::Plan,
+            MotionMode::Jog => Self::Jog,
+            MotionMode::Home => Self::Home,
+            MotionMode::Stream => Self::Stream,
+            MotionMode::Stopping => Self::Stopping,
+            MotionMode::OpenLoop => Self::OpenLoop,
         }
     }
 }

@@ -26,7 +26,7 @@ pub use text::{Text, text};
 
 use serde::{Deserialize, Serialize};
 
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
 use crate::settings::PlanSettings;
 
 /// What a client asks.

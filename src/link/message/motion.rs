@@ -5,7 +5,7 @@ use core::fmt;
 use heapless::Vec;
 use serde::{Deserialize, Serialize};
 
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
 
 /// Set points that one request holds at most.
 pub const STREAM_POINTS: usize = 8;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::motion::AxisSet;
 use super::text::{Text, text};
 use crate::app::supervisor;
-use crate::law::safety::AxisName;
+use crate::law::axes::AxisName;
 use crate::law::telemetry::TelemetryBlock;
 
 /// What a server tells without being asked.

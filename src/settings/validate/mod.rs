@@ -7,8 +7,8 @@ mod limits;
 mod motion;
 
 use super::{AxisSettings, Reason, SettingsError, StageSettings};
+use crate::law::axes::AxisName;
 use crate::law::rounding;
-use crate::law::safety::AxisName;
 
 /// Where a check stands.
 #[derive(Clone, Copy)]

@@ -1,8 +1,8 @@
 //! Checks of motions against their axes' limits.
 
 use super::{LONGEST_TRAVEL_MM, Place};
+use crate::law::axes::AxisName;
 use crate::law::reference::MotionSettings;
-use crate::law::safety::AxisName;
 use crate::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
 
 /// The longest travel of a motion, in counts: what the references' products hold.

@@ -16,9 +16,11 @@ pub mod page;
 pub mod tracking;
 
 use indicatif::ProgressBar;
+use quadrant::friction::FrictionSettings;
+use quadrant::friction::FrictionSettings;
 use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
-use quadrant::settings::{AxisSettings, FrictionSettings};
+use quadrant::settings::AxisSettings;
 use quadrant_sim::identify::single_state::{presliding_range_mm, with_all_models};
 use quadrant_sim::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 use rayon::prelude::*;

@@ -21,7 +21,7 @@ pub fn tuning_table(laws: &[TunedLaw]) -> Table {
             .map(|(_, cost)| *cost)
             .fold(f64::INFINITY, f64::min);
         let gains = tuned.feedback.linear_gains();
-        let gain = |read: fn(&quadrant::control::popov::PidGains) -> f64, decimals| {
+        let gain = |read: fn(&quadrant::control::pid::PidGains) -> f64, decimals| {
             gains
                 .first()
                 .map_or(Cell::Missing, |gains| Cell::number(read(gains), decimals))

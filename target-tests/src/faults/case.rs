@@ -1,11 +1,12 @@
 //! What goes wrong, for each fault that is found while the machine runs.
 
 use anyhow::{Result, bail, ensure};
+use quadrant::axes::AxisName;
 use quadrant::encoder::EncoderReading;
 use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::link::message::{AxisSet, Body};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{AxisName, AxisSwitches, FaultCode, Switches};
+use quadrant::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::plant::MarkTruth;
 use quadrant_sim::simulated_machine::MemoryFlash;
@@ -100,7 +101,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
                 ))
             },
         },
-        FaultCode::TravelAhead => Case {
+        FaultCode::PredictedSoftLimit => Case {
             how: "a sine of 1 mm starts, travel +-0.3 mm",
             adjust: |configuration| each(configuration, |axis| travel(axis, 0.3)),
             bring: |fixture| {
@@ -125,7 +126,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
                 Box::new(|input, _, _| input.readings[0].valid = false),
             ))
         }),
-        FaultCode::EncoderSilent => Case {
+        FaultCode::EncoderSignalLoss => Case {
             how: "one line of x dead, jog at 10 mm/s, output limit 1 V",
             adjust: |configuration| {
                 each(configuration, |axis| {

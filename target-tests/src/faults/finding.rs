@@ -110,7 +110,7 @@ pub(crate) fn inject(fixture: &mut Fixture, code: FaultCode, case: &Case) -> Res
     Ok(Finding {
         axis: report.axis.map_or("the stage", |axis| axis.as_str()).into(),
         ticks: Some((found + 1).checked_sub(from).context("found too early")?),
-        codes: outputs.codes.map(|code| code.0),
+        codes: outputs.codes.map(|code| code.0).into_array(),
         enabled: outputs.enabled,
         // A converter that is not to be trusted is disabled by its board, a tick before the control law knows.
         ticks_until_off: off.saturating_sub(found),

@@ -6,13 +6,14 @@ mod link;
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
-use quadrant::axis::CourseMode;
+use quadrant::axes::AxisName;
 use quadrant::link::lockstep::{
     END_OF_RUN, FLASH, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
     OutputRecord, PROVOCATION, PROVOCATION_TICK, Provocation, RESETS_LEFT, STARTS, held,
 };
 use quadrant::link::message::{Body, NumberType};
-use quadrant::safety::{AxisName, AxisSwitches, FaultCode};
+use quadrant::motion::MotionMode;
+use quadrant::safety::{AxisSwitches, FaultCode};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
 use quadrant_sim::emulator::{Clock, Emulator, Memory};
@@ -41,7 +42,7 @@ pub(crate) type InputFault = Box<dyn FnMut(&mut InputRecord, &mut SimulatedStage
 /// An application of either number type.
 trait Application {
     fn tick(&mut self, input: &InputRecord, serial: &mut SerialRing) -> Outputs;
-    fn mode_of_x(&self) -> CourseMode;
+    fn mode_of_x(&self) -> MotionMode;
 }
 
 impl<S: Scalar> Application for Running<S> {
@@ -49,7 +50,7 @@ impl<S: Scalar> Application for Running<S> {
         Running::tick(self, input, serial).0
     }
 
-    fn mode_of_x(&self) -> CourseMode {
+    fn mode_of_x(&self) -> MotionMode {
         self.state().axes()[0].mode()
     }
 }
@@ -241,10 +242,10 @@ impl Fixture {
             }
         }
         let told = self.model.tick(&input, &mut self.serial);
-        if self.model.mode_of_x() == CourseMode::Stream {
+        if self.model.mode_of_x() == MotionMode::Stream {
             self.streams_since.get_or_insert(self.tick);
         }
-        let codes = held(told.codes, input.stuck);
+        let codes = held(told.codes.into_array(), input.stuck);
         self.mismatches = [0, 1, 2].map(|axis| codes[axis] != told.codes[axis]);
         Outputs {
             codes,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
-use quadrant::safety::AxisName;
+use quadrant::axes::AxisName;
 use quadrant::telemetry::Channel;
 use quadrant_sim::console::hands;
 

@@ -2,8 +2,9 @@
 
 use anyhow::Context;
 use clap::Args;
+use quadrant::axes::AxisName;
+use quadrant::axes::AxisName;
 use quadrant::link::message::Body;
-use quadrant::safety::AxisName;
 use quadrant_sim::command::output::Output;
 use quadrant_sim::console::rig::{ConnectedRig, room_mm};
 use quadrant_sim::console::{Client, settings};

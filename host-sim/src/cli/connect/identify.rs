@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::{Args, Subcommand};
-use quadrant::safety::AxisName;
+use quadrant::axes::AxisName;
 use quadrant::settings::AxisSettings;
 use quadrant_sim::command::output::share;
 use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings, quiet_settings};

@@ -3,8 +3,8 @@
 use std::fmt::Write as _;
 
 use anyhow::bail;
+use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSet, Body, Status};
-use quadrant::safety::AxisName;
 use quadrant_sim::console::{Client, settle, with_reset};
 use serde_json::json;
 

@@ -240,7 +240,7 @@ fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
 
 /// An event in words.
 fn said(event: &Event) -> String {
-    let fault = |code: &u8, axis: &Option<quadrant::safety::AxisName>| {
+    let fault = |code: &u8, axis: &Option<quadrant::axes::AxisName>| {
         let axis = axis.map(|axis| format!(" of {axis}")).unwrap_or_default();
         format!("fault {code}{axis}")
     };

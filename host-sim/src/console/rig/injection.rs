@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use quadrant::axes::AxisName;
 use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
-use quadrant::safety::AxisName;
 use quadrant::settings::AxisSettings;
 use quadrant::telemetry::MachineState;
 use quadrant::units::DacCode;

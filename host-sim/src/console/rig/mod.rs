@@ -5,9 +5,10 @@ mod recording;
 
 use std::time::Duration;
 
+use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSet, Body, InjectStatus, Status};
 use quadrant::reference::MotionSettings;
-use quadrant::safety::{AxisName, Fault, FaultCode};
+use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
 use quadrant::telemetry::{AxisSignal, Channel, MachineState};
 

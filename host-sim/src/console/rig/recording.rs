@@ -93,7 +93,7 @@ impl Shape<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::safety::AxisName;
+    use quadrant::axes::AxisName;
     use quadrant::settings::x_axis;
     use quadrant::telemetry::{AxisSignal, Channel};
 

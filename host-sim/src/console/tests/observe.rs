@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
+use quadrant::axes::AxisName;
 use quadrant::capture::Trigger;
 use quadrant::link::message::Body;
 use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::safety::AxisName;
 use quadrant::telemetry::{AxisSignal, Channel, StageSignal};
 
 use super::connected;

@@ -3,9 +3,9 @@
 use std::io;
 use std::time::Duration;
 
+use quadrant::axes::AxisName;
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
-use quadrant::safety::AxisName;
 use quadrant::telemetry::MachineState;
 
 use super::connected;

@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::npid::NonlinearGain;
+use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{PidGains, SectorProof};
+use quadrant::control::popov::SectorProof;
 
 use crate::design::pages::loop_figures::step_blocks;
 use crate::design::pages::pid::{step_name, step_table};

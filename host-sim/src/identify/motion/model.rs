@@ -2,10 +2,10 @@
 
 use heapless::Vec as ShortVec;
 use quadrant::control::plant_model::PlantModel;
+use quadrant::friction::FrictionSettings;
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::settings::FrictionSettings;
 
 use crate::identify::single_state::with_all_models;
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};

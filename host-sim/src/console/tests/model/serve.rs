@@ -164,7 +164,7 @@ impl Model {
                     .map_err(|error| invalid(error.to_string()))?;
                 let old =
                     std::mem::replace(&mut self.bench.borrow_mut().in_force, settings.clone());
-                let changed = quadrant::safety::AxisName::ALL
+                let changed = quadrant::axes::AxisName::ALL
                     .into_iter()
                     .filter(|axis| old.axes[*axis as usize] != settings.axes[*axis as usize]);
                 Reply::Applied(Applied {

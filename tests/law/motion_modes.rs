@@ -1,12 +1,16 @@
-//! What the axes follow when asked: stops, single moves and streams through the whole tick.
+//! The motion modes of the axes: stops, single moves and streams through the whole tick.
 
-use quadrant::app::supervisor::{Event, Refusal, StageView, Supervisor};
-use quadrant::axis::CourseMode;
+use quadrant::admission::Refusal;
+use quadrant::admission::StageView;
+use quadrant::app::supervisor::{Event, Supervisor};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::motion::MotionMode;
 use quadrant::reference::{
     AxisPoint, HarmonicSettings, MotionSettings, PointToPointSettings, ReferenceSample, Segment,
     SetPoint, StreamLimits, StreamPlanner, Velocity,
 };
-use quadrant::safety::{AxisName, Command, FaultCode, Reaction, SafetyState};
+use quadrant::safety::{FaultCode, Reaction, SafetyState};
 use quadrant::settings::{LossReaction, PlanSettings, StageSettings};
 use quadrant::units::Position;
 
@@ -90,15 +94,15 @@ fn one_axis_moves_alone_while_another_jogs() {
     rig.command(Command::Jog(AxisName::X, slow));
     rig.command(Command::StartMove(AxisName::Y));
     follow(&mut rig, 3_000);
-    let [x, y, z] = rig.state.axes();
-    assert_eq!(x.mode(), CourseMode::Jog);
+    let [x, y, z] = &**rig.state.axes();
+    assert_eq!(x.mode(), MotionMode::Jog);
     assert_eq!(
         (y.mode(), y.reference()),
-        (CourseMode::Hold, Position::from_mm(3.0, 5e-4))
+        (MotionMode::Hold, Position::from_mm(3.0, 5e-4))
     );
     assert_eq!(
         (z.mode(), z.reference()),
-        (CourseMode::Hold, Position::ZERO)
+        (MotionMode::Hold, Position::ZERO)
     );
 }
 

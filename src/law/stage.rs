@@ -1,0 +1,552 @@
+//! Three axes, one tick: a pure function of settings, memory and inputs.
+//!
+//! ```
+//! use quadrant::axes::PerAxis;
+//! use quadrant::command::Command;
+//! use quadrant::reference::Motion;
+//! use quadrant::settings::StageSettings;
+//! use quadrant::stage::{Inputs, Stage, StageState};
+//!
+//! let stage: Stage<f32> = StageSettings::default().build()?;
+//! let plan = PerAxis::from_fn(|_| Motion::Hold);
+//! let mut state = StageState::default();
+//! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
+//! assert!(stage.tick(&plan, &mut state, &enable).enabled);
+//! # Ok::<(), quadrant::settings::SettingsError>(())
+//! ```
+
+use crate::law::admission::{self, StageView};
+use crate::law::axes::{AxisName, PerAxis};
+use crate::law::axis::{Axis, AxisState};
+use crate::law::command::Command;
+use crate::law::encoder::EncoderReading;
+use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use crate::law::injection::{
+    Coupling, InjectedValue, Injection, InjectionProgress, InjectionState, InjectionStep,
+};
+use crate::law::reference::{Motion, Segment};
+use crate::law::safety::{
+    EnableInterlock, Fault, FaultCode, Reaction, SafetyState, StreamLoss, Switches,
+};
+use crate::law::scalar::Scalar;
+use crate::law::units::DacCode;
+
+/// Ticks from the end of the stop ramps to switching off: the preview has passed, and the axes have caught up.
+const SETTLING_TICKS: u32 = 200;
+
+/// Inputs of one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Inputs {
+    /// Readings of the encoders.
+    pub readings: PerAxis<EncoderReading>,
+    /// The board's digital inputs.
+    pub switches: Switches,
+    /// A command to act on, once.
+    pub command: Option<Command>,
+    /// The axes whose settings were exchanged since the last tick.
+    pub settings_changed: PerAxis<bool>,
+    /// The last tick ended after its deadline.
+    pub deadline_missed: bool,
+    /// The signal of the host whose set points the axes follow is lost.
+    pub link_lost: bool,
+}
+
+impl Inputs {
+    /// Sets fresh and valid raw counts in place of the encoders' readings.
+    #[inline(always)]
+    pub fn set_counts(&mut self, counts: [u32; 3]) {
+        self.readings = counts.map(EncoderReading::of).into();
+    }
+
+    /// Fresh and valid raw counts, and nothing else.
+    #[inline(always)]
+    pub fn of_counts(counts: [u32; 3]) -> Self {
+        Self {
+            readings: counts.map(EncoderReading::of).into(),
+            ..Self::default()
+        }
+    }
+}
+
+/// Outputs of one tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Outputs {
+    /// The converters' words; zero unless enabled.
+    pub codes: PerAxis<DacCode>,
+    /// True if the amplifiers are enabled.
+    pub enabled: bool,
+}
+
+/// The motions that the axes run together.
+pub type Plan<S> = PerAxis<Motion<S>>;
+
+/// The stage ready for the tick; `N` is the room for GMS elements. Made by
+/// [`StageSettings::build`](crate::settings::StageSettings::build).
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stage<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
+    axes: PerAxis<Axis<S, N>>,
+    streaming: StreamLoss,
+}
+
+/// A stage in pieces, so that one axis can be exchanged without moving the others.
+#[derive(Clone, Copy, Debug)]
+pub struct StageRef<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
+    /// The axes x, y and z.
+    pub axes: PerAxis<&'a Axis<S, N>>,
+    /// Reactions to the end of set points.
+    pub streaming: StreamLoss,
+}
+
+/// The memory of the stage.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
+    axes: PerAxis<AxisState<S, N>>,
+    safety: SafetyState,
+    tick: u32,
+    interlock: Option<EnableInterlock>,
+    held: Option<Fault>,
+    /// Ticks since the axes came to rest after a fault.
+    settled: u32,
+    injection: InjectionState<S>,
+}
+
+/// The fault that each axis found in a tick, if any.
+type Findings = PerAxis<Result<(), FaultCode>>;
+
+impl<S: Scalar, const N: usize> Default for StageState<S, N> {
+    fn default() -> Self {
+        Self {
+            axes: PerAxis::from_fn(|_| AxisState::default()),
+            safety: SafetyState::default(),
+            tick: 0,
+            interlock: None,
+            held: None,
+            settled: 0,
+            injection: InjectionState::default(),
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> StageState<S, N> {
+    /// A stage that starts with a fault latched: of the last run, or of the stored settings.
+    pub fn with_fault(code: FaultCode) -> Self {
+        let mut state = Self::default();
+        state.start_faulted(code);
+        state
+    }
+
+    /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet.
+    pub fn start_faulted(&mut self, code: FaultCode) {
+        self.safety = SafetyState::Faulted(Fault {
+            code,
+            axis: None,
+            tick: 0,
+        });
+    }
+
+    /// The memories of x, y and z.
+    pub fn axes(&self) -> &PerAxis<AxisState<S, N>> {
+        &self.axes
+    }
+
+    /// The safety state after the last tick.
+    pub fn safety(&self) -> SafetyState {
+        self.safety
+    }
+
+    /// Control ticks so far; wraps after five days at 10 kHz.
+    pub const fn tick(&self) -> u32 {
+        self.tick
+    }
+
+    /// The bad input that keeps the outputs from being enabled at present, if there is one.
+    pub fn interlock(&self) -> Option<EnableInterlock> {
+        self.interlock
+    }
+
+    /// The last fault that only held the axes ([`Reaction::Hold`]), until the next motion.
+    pub fn held(&self) -> Option<Fault> {
+        self.held
+    }
+
+    /// True while any motion is under way.
+    pub fn is_running(&self) -> bool {
+        self.injection.is_running() || self.axes.iter().any(AxisState::is_running)
+    }
+
+    /// Gives an axis the next segment of a stream; call it when [`AxisState::wants_segment`].
+    #[inline(always)]
+    pub fn offer_segment(&mut self, axis: AxisName, segment: Segment) {
+        self.axes[axis].offer_segment(segment);
+    }
+
+    /// Puts an axis' travel into force, or out of it: for absolute encoders. Homing does it by itself.
+    pub fn set_homed(&mut self, axis: AxisName, homed: bool) {
+        self.axes[axis].set_homed(homed);
+    }
+
+    /// Takes an injection; it begins with [`Command::StartInjection`], once its first value is there.
+    pub fn prepare_injection(&mut self, injection: Injection<S>) {
+        self.injection.prepare(injection);
+    }
+
+    /// True if there is an injection, so that its values are wanted.
+    pub fn has_injection(&self) -> bool {
+        self.injection.is_prepared()
+    }
+
+    /// True if the injection has room for a value.
+    pub fn wants_voltage(&self) -> bool {
+        self.injection.wants_value()
+    }
+
+    /// Gives the injection the next value of a block; call it when [`StageState::wants_voltage`].
+    pub(crate) fn offer_value(&mut self, value: InjectedValue) {
+        self.injection.offer(value);
+    }
+
+    /// Gives the injection its next value, in the converter's words; call it when [`StageState::wants_voltage`]. `last`:
+    /// it ends with this one.
+    pub fn offer_voltage(&mut self, word: i16, last: bool) {
+        self.offer_value(InjectedValue { word, last });
+    }
+
+    /// True if an injection can begin.
+    pub fn is_injection_ready(&self) -> bool {
+        self.injection.is_ready()
+    }
+
+    /// True while an injection is under way.
+    pub fn is_injecting(&self) -> bool {
+        self.injection.is_running()
+    }
+
+    /// Progress of the injection under way, or else of the last one.
+    pub fn injection_progress(&self) -> InjectionProgress {
+        self.injection.progress()
+    }
+}
+
+impl StageView {
+    /// The view of a stage as its last tick left it.
+    pub fn of<S: Scalar, const N: usize>(state: &StageState<S, N>) -> Self {
+        Self {
+            safety: state.safety(),
+            running: state.is_running(),
+            interlock: state.interlock(),
+            held: state.held(),
+            modes: state.axes.by_ref().map(AxisState::mode),
+            homed: state.axes.by_ref().map(AxisState::is_homed),
+            stream_ready: state.axes.iter().all(AxisState::is_stream_ready),
+            injection_ready: state.is_injection_ready(),
+            injecting: state.is_injecting(),
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> Stage<S, N> {
+    /// A stage of three axes.
+    pub fn new(axes: PerAxis<Axis<S, N>>, streaming: StreamLoss) -> Self {
+        Self { axes, streaming }
+    }
+
+    /// The stage in pieces.
+    #[inline(always)]
+    pub fn as_ref(&self) -> StageRef<'_, S, N> {
+        StageRef {
+            axes: self.axes.by_ref(),
+            streaming: self.streaming,
+        }
+    }
+
+    /// The axes themselves, and what belongs to the stage beside them.
+    pub fn into_axes(self) -> (PerAxis<Axis<S, N>>, StreamLoss) {
+        (self.axes, self.streaming)
+    }
+
+    /// One axis, to be put in the place of another in a [`StageRef`].
+    pub fn axis(&self, axis: AxisName) -> &Axis<S, N> {
+        &self.axes[axis]
+    }
+
+    /// One control period; see [`StageRef::tick`].
+    #[inline(always)]
+    pub fn tick(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
+        self.as_ref().tick(plan, state, inputs)
+    }
+}
+
+impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
+    /// One control period.
+    ///
+    /// A fault found in this tick switches the outputs off in this tick, or begins a controlled stop, as its
+    /// [`Reaction`] says. No path panics, allocates, or loops without a bound; every operation saturates.
+    #[inline(always)]
+    pub fn tick(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
+        let tick = state.tick;
+        state.tick = tick.wrapping_add(1);
+        let driven = state.safety.drives();
+        let mut good = inputs.switches.are_good();
+        let mut findings = Findings::splat(Ok(()));
+        for (((axis, memory), reading), finding) in self
+            .axes
+            .into_iter()
+            .zip(&mut state.axes)
+            .zip(&inputs.readings)
+            .zip(&mut findings)
+        {
+            *finding = axis.read_encoder(memory, reading);
+            good &= finding.is_ok();
+        }
+        state.interlock = None;
+        if !good {
+            self.report_bad_inputs(state, inputs.switches, findings, tick);
+        }
+        if inputs.deadline_missed && driven {
+            self.trip(state, FaultCode::DeadlineMissed, None, tick);
+        }
+        if inputs.link_lost && state.is_running() {
+            self.trip(state, FaultCode::LinkLost, None, tick);
+        }
+        if state.safety == SafetyState::Start && state.interlock.is_none() {
+            state.safety = SafetyState::Disabled;
+        }
+        if let Some(command) = inputs.command {
+            self.handle_command(state, command, driven, tick);
+        }
+        if state.injection.is_running() {
+            self.inject(state, tick);
+        }
+        if state.safety.drives() {
+            self.update_references(plan, state, inputs.switches, tick);
+        }
+        if !state.safety.drives() {
+            state.injection.end();
+            for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
+                axis.output_zero(memory);
+            }
+            return Outputs::default();
+        }
+        let mut outputs = Outputs {
+            codes: PerAxis::splat(DacCode::ZERO),
+            enabled: true,
+        };
+        for (((axis, memory), code), changed) in self
+            .axes
+            .into_iter()
+            .zip(&mut state.axes)
+            .zip(&mut outputs.codes)
+            .zip(inputs.settings_changed)
+        {
+            *code = axis.drive(memory, changed);
+        }
+        outputs
+    }
+
+    /// Advances the references of driven axes.
+    #[inline(always)]
+    fn update_references(
+        &self,
+        plan: &Plan<S>,
+        state: &mut StageState<S, N>,
+        switches: Switches,
+        tick: u32,
+    ) {
+        let mut good = true;
+        let mut findings = Findings::splat(Ok(()));
+        for ((((axis, memory), motion), name), finding) in self
+            .axes
+            .into_iter()
+            .zip(&mut state.axes)
+            .zip(plan)
+            .zip(AxisName::ALL)
+            .zip(&mut findings)
+        {
+            *finding = axis.update_reference(memory, motion, switches.axis(name), tick);
+            good &= finding.is_ok();
+        }
+        if !good {
+            self.trip_findings(state, findings, tick);
+        }
+        if let SafetyState::Stopping(fault) = state.safety {
+            settle(state, fault);
+        }
+    }
+
+    /// Keeps the first bad input as the interlock, and makes a fault of it if the outputs are driven.
+    #[cold]
+    #[inline(never)]
+    fn report_bad_inputs(
+        &self,
+        state: &mut StageState<S, N>,
+        switches: Switches,
+        findings: Findings,
+        tick: u32,
+    ) {
+        state.interlock = switches.interlock();
+        for (name, finding) in findings.named() {
+            if let Err(code) = *finding
+                && matches!(code, FaultCode::StaleSample | FaultCode::EncoderInvalid)
+                && state.interlock.is_none()
+            {
+                state.interlock = Some(EnableInterlock {
+                    code,
+                    axis: Some(name),
+                });
+            }
+        }
+        if let Some(EnableInterlock { code, axis }) = switches.interlock() {
+            self.trip(state, code, axis, tick);
+        }
+        self.trip_findings(state, findings, tick);
+    }
+
+    /// Makes faults of what the axes found. One that switches off goes before one that stops.
+    #[cold]
+    #[inline(never)]
+    fn trip_findings(&self, state: &mut StageState<S, N>, findings: Findings, tick: u32) {
+        for first in [Reaction::Off, Reaction::Stop, Reaction::Hold] {
+            for (name, finding) in findings.named() {
+                if let Err(code) = *finding
+                    && self.streaming.reaction(code) == first
+                {
+                    self.trip(state, code, Some(name), tick);
+                }
+            }
+        }
+    }
+
+    /// Reacts to a fault, if the outputs are driven.
+    #[cold]
+    #[inline(never)]
+    fn trip(
+        &self,
+        state: &mut StageState<S, N>,
+        code: FaultCode,
+        axis: Option<AxisName>,
+        tick: u32,
+    ) {
+        if !state.safety.drives() {
+            return;
+        }
+        let fault = Fault { code, axis, tick };
+        let reaction = self.streaming.reaction(code);
+        let was_enabled = state.safety.is_enabled();
+        state.safety.trip(fault, reaction);
+        if !was_enabled || reaction == Reaction::Off {
+            return;
+        }
+        state.settled = 0;
+        if reaction == Reaction::Hold && state.held.is_none() {
+            state.held = Some(fault);
+        }
+        self.end_injection(state);
+        for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
+            axis.stop(memory);
+        }
+    }
+
+    /// Acts on a command. `driven`: the outputs were when the tick began.
+    #[cold]
+    #[inline(never)]
+    fn handle_command(
+        &self,
+        state: &mut StageState<S, N>,
+        command: Command,
+        driven: bool,
+        tick: u32,
+    ) {
+        // A reset is for a fault that was there to be seen, not for one of this tick.
+        if driven && command == Command::ResetFault {
+            return;
+        }
+        if state.safety.apply(command, state.interlock.is_some()) {
+            state.held = None;
+            for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
+                axis.enable(memory);
+            }
+        } else if state.safety.is_enabled()
+            && admission::refusal(StageView::of(state), command).is_none()
+        {
+            self.start(state, command, tick);
+        }
+    }
+
+    /// Starts or ends motions of an enabled stage, as an admitted command says.
+    fn start(&self, state: &mut StageState<S, N>, command: Command, tick: u32) {
+        match command {
+            Command::Enable | Command::Disable | Command::ResetFault => return,
+            Command::Stop => self.end_injection(state),
+            _ => state.held = None,
+        }
+        if command == Command::StartInjection {
+            self.start_injection(state, tick);
+            return;
+        }
+        for ((axis, memory), name) in self
+            .axes
+            .into_iter()
+            .zip(&mut state.axes)
+            .zip(AxisName::ALL)
+        {
+            if command.axis().is_none_or(|only| only == name) {
+                axis.handle_command(memory, command);
+            }
+        }
+    }
+
+    /// Begins the injection that is ready.
+    fn start_injection(&self, state: &mut StageState<S, N>, tick: u32) {
+        let Some(injection) = state.injection.injection() else {
+            return;
+        };
+        let (name, coupling) = (injection.axis(), injection.coupling());
+        state.injection.begin(tick, state.axes[name].measured());
+        match coupling {
+            Coupling::Added => {}
+            Coupling::OpenLoop => self.axes[name].open_loop(&mut state.axes[name]),
+            Coupling::WithPlan => {
+                for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
+                    axis.handle_command(memory, Command::Run);
+                }
+            }
+        }
+    }
+
+    /// Takes the injected voltage of this tick.
+    #[cold]
+    #[inline(never)]
+    fn inject(&self, state: &mut StageState<S, N>, tick: u32) {
+        let Some(name) = state.injection.injection().map(Injection::axis) else {
+            return;
+        };
+        let memory = &mut state.axes[name];
+        match state.injection.step(memory.measured(), memory.speed()) {
+            InjectionStep::Voltage(voltage) => memory.inject(voltage),
+            InjectionStep::Finished => self.end_injection(state),
+            InjectionStep::Fault(code) => self.trip(state, code, Some(name), tick),
+        }
+    }
+
+    /// Ends an injection, if one is under way: no voltage more, and the loop closed, stopping from the motion that the
+    /// axis has.
+    fn end_injection(&self, state: &mut StageState<S, N>) {
+        if let Some(injection) = state.injection.end() {
+            let name = injection.axis();
+            self.axes[name].end_injection(&mut state.axes[name]);
+        }
+    }
+}
+
+/// Latches the fault of a stop once the axes stand.
+#[cold]
+#[inline(never)]
+fn settle<S: Scalar, const N: usize>(state: &mut StageState<S, N>, fault: Fault) {
+    if state.is_running() {
+        return;
+    }
+    state.settled = state.settled.saturating_add(1);
+    if state.settled > SETTLING_TICKS {
+        state.safety = SafetyState::Faulted(fault);
+    }
+}
