@@ -60,12 +60,15 @@ pub mod app;
 pub mod drivers;
 pub mod hal;
 pub mod law;
-pub mod link;
+pub mod lockstep;
 pub mod settings;
 pub mod store;
 
+/// The messages of the link, a crate of their own.
+pub use quadrant_link as link;
+
 #[doc(inline)]
 pub use law::{
-    axis, capture, control, decimal, encoder, feedforward, friction, homing, injection, reference,
-    safety, scalar, stage, table, telemetry, units,
+    axis, control, decimal, encoder, feedforward, friction, homing, injection, reference, safety,
+    scalar, stage, table, telemetry, units,
 };

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, StageView, Supervisor};
-use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
 use quadrant::safety::{AxisName, Command};
 use quadrant::scalar::Scalar;

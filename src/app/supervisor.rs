@@ -1,4 +1,4 @@
-//! The supervising task's decisions: which requests reach the control law, and what a person is told.
+//! The supervising task's decisions: passing or refusing requests, and events for the log.
 //!
 //! Runs every [`PERIOD_TICKS`] control ticks, below the control interrupt. Pure, so that the firmware and the host's
 //! run of the same job decide alike.
@@ -13,31 +13,31 @@ use crate::law::stage::StageState;
 /// Control ticks between two runs of the supervisor: 1 kHz at a control rate of 10 kHz.
 pub const PERIOD_TICKS: u32 = 10;
 
-/// What the supervisor sees of the stage.
+/// The supervisor's view of the stage.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct StageView {
-    /// Who drives the outputs.
+    /// The safety state.
     pub safety: SafetyState,
-    /// Whether a motion is under way.
+    /// True while a motion is under way.
     pub running: bool,
-    /// Why the outputs cannot be enabled.
+    /// The condition that prevents enabling the outputs.
     pub obstacle: Option<Obstacle>,
     /// A fault that only held the axes.
     pub held: Option<Fault>,
-    /// What each axis follows.
+    /// The motion mode of each axis.
     pub modes: [CourseMode; 3],
-    /// Which axes know where they are.
+    /// True for the axes that are homed.
     pub homed: [bool; 3],
-    /// The first segments of a stream are there, and start where the axes rest.
+    /// True if the first segments of a stream are there and start where the axes rest.
     pub stream_ready: bool,
-    /// The first value of an injected voltage is there.
+    /// True if the first value of an injected voltage is there.
     pub injection_ready: bool,
-    /// A voltage is being injected.
+    /// True while a voltage is being injected.
     pub injecting: bool,
 }
 
 impl StageView {
-    /// What there is to see.
+    /// Takes the view of a stage.
     pub fn of<S: Scalar, const N: usize>(state: &StageState<S, N>) -> Self {
         Self {
             safety: state.safety(),
@@ -53,7 +53,7 @@ impl StageView {
     }
 }
 
-/// Why a request did not reach the control law.
+/// The reason for which a request did not reach the control law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Refusal {
     /// A fault is latched; reset it first.
@@ -115,7 +115,7 @@ impl Refusal {
         }
     }
 
-    /// The axis that it is about, if it is about one.
+    /// The axis concerned, if it is one axis' refusal.
     pub const fn axis(&self) -> Option<AxisName> {
         match self {
             Self::BadInput(obstacle) => obstacle.axis,
@@ -134,7 +134,7 @@ impl fmt::Display for Refusal {
     }
 }
 
-/// Something a person should read in the log.
+/// An event for the log and the host.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Event {
     /// The outputs were switched on.
@@ -155,23 +155,23 @@ pub enum Event {
     Refused(Command, Refusal),
 }
 
-/// The supervisor's memory.
+/// The supervisor's state: the view of its last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Supervisor {
     seen: StageView,
 }
 
-/// What one run of the supervisor decides.
+/// The decision of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Decision {
-    /// For the control law's next tick.
+    /// The command for the control law's next tick.
     pub command: Option<Command>,
-    /// For the log: a change of state, a change of motion, a refusal.
+    /// Events: a change of state, a held fault, a change of motion, a refusal.
     pub events: [Option<Event>; 4],
 }
 
 impl Supervisor {
-    /// Looks at the stage and at a request, if there is one.
+    /// Compares the stage with its last view, and judges a request if there is one.
     pub fn step(&mut self, view: StageView, request: Option<Command>) -> Decision {
         let seen = core::mem::replace(&mut self.seen, view);
         let state = match view.safety {
@@ -203,7 +203,7 @@ impl Supervisor {
     }
 }
 
-/// Why the control law would not act on a command now, as far as `view` tells.
+/// Returns the reason for which the control law would not act on a command, as far as `view` tells.
 pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
     let faulted = matches!(view.safety, SafetyState::Faulted(_));
     let stopping = matches!(view.safety, SafetyState::Stopping(_));
@@ -239,7 +239,7 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
     }
 }
 
-/// What an axis follows.
+/// The motion mode of an axis.
 fn mode(view: StageView, axis: AxisName) -> CourseMode {
     let [x, y, z] = view.modes;
     match axis {

@@ -4,7 +4,6 @@
 //! application; a test holds that. Each module is also reachable from the root of the crate: `quadrant::axis`.
 
 pub mod axis;
-pub mod capture;
 pub mod control;
 pub(crate) mod course;
 pub mod decimal;

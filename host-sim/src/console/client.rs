@@ -8,7 +8,7 @@ use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver}
 use quadrant::link::message::{
     Body, FaultReport, Identity, LinkError, Message, Notice, Reply, Request, Status,
 };
-use quadrant::telemetry::{MachineState, TelemetryBlock};
+use quadrant::link::message::{MachineState, TelemetryBlock};
 
 use super::error::ClientError;
 use super::hands::Hands;

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use quadrant::link::message::{AxisMode, AxisSet, Status};
-use quadrant::telemetry::MachineState;
+use quadrant::link::message::MachineState;
 
 use super::client::Client;
 use super::error::ClientError;

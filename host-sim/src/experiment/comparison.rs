@@ -4,7 +4,7 @@
 use indicatif::ProgressBar;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, StageSettings};

@@ -5,7 +5,7 @@
 //! compared is the error over time, and the score.
 
 use indicatif::ProgressBar;
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::scalar::{Fixed, Scalar};
 use rayon::prelude::*;
 

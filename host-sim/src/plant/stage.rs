@@ -1,7 +1,7 @@
 //! The simulated stage: three axes that share nothing but the clock.
 
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::{AxisName, Command, Switches};
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;

@@ -8,7 +8,7 @@ use quadrant::link::message::{
 };
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::safety::{AxisName, FaultCode};
-use quadrant::telemetry::MachineState;
+use quadrant::link::message::MachineState;
 use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings};
 use quadrant_sim::console::rig::ConnectedRig;
 use quadrant_sim::console::{Client, ClientError, SimulatedLink};

@@ -2,7 +2,7 @@
 
 use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{Command, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
@@ -64,7 +64,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         let mut counts = plant.read_counters();
         counts[0] = 0;
         let input =
-            quadrant::link::lockstep::InputRecord::of_counts(counts, operator.request(tick));
+            quadrant::lockstep::InputRecord::of_counts(counts, operator.request(tick));
         let outputs = machine.tick(&input);
         plant.step(&outputs);
         if let SafetyState::Faulted(fault) = machine.state().safety() {
@@ -75,7 +75,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         }
     }
     for _ in 0..20 {
-        machine.tick(&quadrant::link::lockstep::InputRecord::of_counts(
+        machine.tick(&quadrant::lockstep::InputRecord::of_counts(
             [0; 3],
             Some(Command::Run),
         ));

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use quadrant::app::supervisor::{Event, Refusal};
 use quadrant::axis::CourseMode;
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{
     AxisPoint, Motion, MotionSettings, ReferenceSample, SetPoint, StreamPlanner, Velocity,
 };

@@ -7,7 +7,7 @@ use quadrant::link::message::{
 };
 use quadrant::safety::{AxisName, Switches};
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
-use quadrant::telemetry::{Channel, MachineState};
+use quadrant::link::message::{Channel, MachineState};
 use quadrant_sim::experiment::compensator::identified;
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::simulated_machine::SimulatedMachine;

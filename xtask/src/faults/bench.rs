@@ -7,9 +7,9 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
 use quadrant::axis::CourseMode;
-use quadrant::link::lockstep::{
+use quadrant::lockstep::{
     END_OF_RUN, FLASH, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
-    OutputRecord, PROVOCATION, PROVOCATION_TICK, Provocation, RESETS_LEFT, STARTS, held,
+    OutputRecord, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, RESETS_LEFT, STARTS, held,
 };
 use quadrant::link::message::{Body, NumberType};
 use quadrant::safety::{AxisName, AxisSwitches, FaultCode};
@@ -244,10 +244,10 @@ impl Bench {
 
     /// Makes the idle loop of the firmware do something instead of the next tick, and waits until the firmware has started
     /// again. Gives what the firmware has left at the outputs; the twin starts with the fault that it is to find.
-    pub(super) fn provoke(&mut self, what: Provocation, finds: FaultCode) -> Result<Outputs> {
+    pub(super) fn provoke(&mut self, what: InjectedFault, finds: FaultCode) -> Result<Outputs> {
         self.memory.set_word(RESETS_LEFT, 1)?;
-        self.memory.set_word(PROVOCATION_TICK, self.tick + 1)?;
-        self.memory.set_word(PROVOCATION, what as u32)?;
+        self.memory.set_word(INJECTED_FAULT_TICK, self.tick + 1)?;
+        self.memory.set_word(INJECTED_FAULT, what as u32)?;
         self.memory.set_word(INPUT_SEQUENCE, self.tick + 1)?;
         self.await_start()?;
         let mut bytes = [0; OutputRecord::BYTES];

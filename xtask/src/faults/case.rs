@@ -2,7 +2,7 @@
 
 use anyhow::{Result, bail, ensure};
 use quadrant::encoder::EncoderReading;
-use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::lockstep::{InputRecord, Job};
 use quadrant::link::message::{AxisSet, Body};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{AxisName, AxisSwitches, FaultCode, Switches};

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, anyhow, ensure};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{Body, Request, TelemetryRequest};
 use quadrant::safety::{AxisName, Command};
-use quadrant::telemetry::{AxisSignal, Channel, MAX_CHANNELS};
+use quadrant::link::message::{AxisSignal, Channel, MAX_CHANNELS};
 
 use super::bench::Bench;
 use super::case::{moving, setup};

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::capture::{Edge, Level, Trigger};
+use quadrant::link::message::{Edge, Level, Trigger};
 use quadrant::link::message::{CaptureStatus, Event, Notice};
 use quadrant_sim::console::samples::{
     Recording, Samples, arm, capture_state, disarm, least_decimation, read_capture,

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
-use quadrant::safety::AxisName;
+use quadrant::link::message::AxisName;
 use quadrant::settings::AxisSettings;
-use quadrant::telemetry::MachineState;
+use quadrant::link::message::MachineState;
 use quadrant::units::DacCode;
 
 use super::{Injected, LOOK, Stop};

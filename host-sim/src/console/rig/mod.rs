@@ -9,7 +9,7 @@ use quadrant::link::message::{AxisSet, Body, InjectStatus, Status};
 use quadrant::reference::MotionSettings;
 use quadrant::safety::{AxisName, Fault, FaultCode};
 use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
-use quadrant::telemetry::{AxisSignal, Channel, MachineState};
+use quadrant::link::message::{AxisSignal, Channel, MachineState};
 
 use self::injection::Injection;
 use self::recording::Shape;

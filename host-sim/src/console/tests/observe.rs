@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use quadrant::capture::Trigger;
+use quadrant::link::message::Trigger;
 use quadrant::link::message::Body;
 use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::safety::AxisName;
-use quadrant::telemetry::{AxisSignal, Channel, StageSignal};
+use quadrant::link::message::AxisName;
+use quadrant::link::message::{AxisSignal, Channel, StageSignal};
 
 use super::connected;
 use crate::console::columns;

@@ -6,7 +6,7 @@ use std::time::Duration;
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
 use quadrant::safety::AxisName;
-use quadrant::telemetry::MachineState;
+use quadrant::link::message::MachineState;
 
 use super::connected;
 use crate::console::settle;

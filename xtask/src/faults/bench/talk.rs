@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use anyhow::{Context, Result, anyhow, bail, ensure};
 use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
-use quadrant::link::lockstep::{
+use quadrant::lockstep::{
     LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT, LINK_OUT_SHOWN, LINK_OUT_TAKEN,
 };
 use quadrant::link::message::{

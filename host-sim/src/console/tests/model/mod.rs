@@ -9,9 +9,10 @@ use std::time::Duration;
 
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::*;
-use quadrant::link::port::Port;
+use quadrant::link::server::LinkServer;
 use quadrant::settings::StageSettings;
-use quadrant::telemetry::{AxisSignal, Channel, Packer, Sample, Selection, StageSignal};
+use quadrant::link::message::{AxisSignal, Channel, StageSignal};
+use quadrant::app::telemetry::{Packer, Sample, Selection};
 
 use crate::console::transport::Exchange;
 
@@ -46,7 +47,7 @@ pub(super) struct Bench {
 
 pub(super) struct Model {
     pub(super) bench: Rc<RefCell<Bench>>,
-    port: Port,
+    port: LinkServer,
     tick: u32,
     enabled: bool,
     fault: Option<u8>,
@@ -71,7 +72,7 @@ impl Model {
         let bench = Rc::new(RefCell::new(Bench::default()));
         let model = Self {
             bench: Rc::clone(&bench),
-            port: Port::new(),
+            port: LinkServer::new(),
             tick: 0,
             enabled: false,
             fault: None,

@@ -1,10 +1,11 @@
 //! What the model does with each request.
 
 use heapless::String as Bounded;
-use quadrant::capture::{CaptureCause, CapturePhase, CaptureRecord};
+use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
 use quadrant::link::message::*;
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
-use quadrant::telemetry::{LimitedBy, MachineState, Packer, Selection, Words};
+use quadrant::link::message::{LimitedBy, MachineState, Words};
+use quadrant::app::telemetry::{Packer, Selection};
 
 use super::{Model, ROOM, read};
 
