@@ -362,7 +362,7 @@ fn main() {
          Build it:   cargo xtask build --board nucleo-f446re    (or --board mps2)\n\
          Emulate it: cargo xtask emulate\n\
          By hand it takes a target and the feature of a board:\n\
-         cargo build --release --target thumbv7em-none-eabihf --features board-nucleo-f446re"
+         cargo build --profile firmware --target thumbv7em-none-eabihf --features board-nucleo-f446re"
     );
     std::process::exit(2);
 }

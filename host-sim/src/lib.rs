@@ -2,23 +2,31 @@
 //!
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`machine`]: the firmware's application in this process, on the library's own control law;
-//! - [`experiment`]: runs of a machine on a stage, and what they score;
-//! - [`report_parts`]: what `quadrant report` computes, part by part, and keeps;
-//! - [`presentation`]: their tables and pages, made with [`report`];
+//! - [`experiment`]: runs of a machine on a stage, and their scores;
+//! - [`compare`], [`circle`], [`replay`]: the comparison, the circle test, recorded references and part programs, each with
+//!   its tables and figures;
+//! - [`commission`]: from an unknown axis to settings that the firmware runs;
+//! - [`identify`]: from recordings to the parameters of an axis;
+//! - [`design`]: margins, loop shaping, the choice of gains;
 //! - [`record`]: recorded motions from CSV files, checked;
-//! - [`program`]: part programs in G-code, and their motion;
+//! - [`gcode`]: part programs, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
-//! - [`settings_reference`]: what every setting means, as a page;
+//! - [`settings_reference`]: the meaning of every setting, as a page;
 //! - [`scenario`]: the motion that the firmware is emulated with;
 //! - [`console`]: a machine with the firmware on it, or a simulated one, over the link;
 //! - [`emulator`]: QEMU with the firmware in it;
 //! - [`emulated_machine`]: the firmware's image in it on the simulated stage, as [`simulated_machine`] is without it;
 //! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
-//! - [`identify`]: from recordings to the parameters of an axis;
-//! - [`design`]: margins, loop shaping, the choice of gains.
+//! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have;
+//! - [`command`]: options that the commands of this package and of the studies share.
 #![forbid(unsafe_code)]
+// A tool, not a library for others: a comment that only repeats a name is left out.
+#![allow(missing_docs)]
 
+pub mod circle;
+pub mod command;
 pub mod commission;
+pub mod compare;
 pub mod console;
 pub mod design;
 #[cfg(unix)]
@@ -26,14 +34,14 @@ pub mod emulated_machine;
 #[cfg(unix)]
 pub mod emulator;
 pub mod experiment;
+pub mod gcode;
 pub mod identify;
 pub mod machine;
+pub mod pages;
 pub mod plant;
-pub mod presentation;
-pub mod program;
 pub mod record;
+pub mod replay;
 pub use quadrant_report as report;
-pub mod report_parts;
 pub mod rig;
 pub mod scenario;
 pub mod settings_file;

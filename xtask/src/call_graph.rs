@@ -7,23 +7,23 @@ use anyhow::{Context, Result};
 use crate::listing::{Function, Instruction, Listing};
 
 /// A function that can be reached, and from where.
-pub(crate) struct Reached<'a> {
+pub struct Reached<'a> {
     /// The function.
-    pub(crate) function: &'a Function,
+    pub function: &'a Function,
     /// The first caller found, by its first address; none for the root.
-    pub(crate) caller: Option<u32>,
+    pub caller: Option<u32>,
 }
 
 /// Everything reachable from one function.
-pub(crate) struct CallGraph<'a> {
+pub struct CallGraph<'a> {
     /// The functions, by their first address.
-    pub(crate) reached: BTreeMap<u32, Reached<'a>>,
+    pub reached: BTreeMap<u32, Reached<'a>>,
     /// Calls whose target is not in the code: `function: instruction`.
-    pub(crate) indirect: Vec<String>,
+    pub indirect: Vec<String>,
 }
 
 /// Where an instruction may go besides the next one.
-pub(crate) enum Flow {
+pub enum Flow {
     /// Nowhere.
     Onward,
     /// To an address.
@@ -34,7 +34,7 @@ pub(crate) enum Flow {
 
 impl<'a> CallGraph<'a> {
     /// Follows every direct branch from the function at `root`.
-    pub(crate) fn from(listing: &'a Listing, root: u32) -> Result<Self> {
+    pub fn from(listing: &'a Listing, root: u32) -> Result<Self> {
         let mut graph = Self {
             reached: BTreeMap::new(),
             indirect: Vec::new(),
@@ -69,7 +69,7 @@ impl<'a> CallGraph<'a> {
     }
 
     /// The chain of calls that leads to a function, root first.
-    pub(crate) fn chain(&self, start: u32) -> String {
+    pub fn chain(&self, start: u32) -> String {
         let mut names = Vec::new();
         let mut next = Some(start);
         while let Some(reached) = next.and_then(|address| self.reached.get(&address)) {
@@ -82,7 +82,7 @@ impl<'a> CallGraph<'a> {
 }
 
 /// Where the instruction at `index` of a function may go.
-pub(crate) fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flow {
+pub fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flow {
     let Instruction {
         mnemonic, operands, ..
     } = instruction;

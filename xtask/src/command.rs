@@ -7,7 +7,7 @@ use std::process::{Command, Stdio};
 use anyhow::{Context, Result, bail, ensure};
 
 /// The workspace's folder.
-pub(crate) fn root() -> PathBuf {
+pub fn root() -> PathBuf {
     let manifest = std::env::var_os("CARGO_MANIFEST_DIR");
     let here = || std::env::current_dir().unwrap_or_else(|_| PathBuf::from("."));
     // Cargo sets the variable for what it runs; without cargo, the current folder must be the workspace's.
@@ -18,14 +18,14 @@ pub(crate) fn root() -> PathBuf {
 }
 
 /// Whether a program is in the search path.
-pub(crate) fn exists(program: &str) -> bool {
+pub fn exists(program: &str) -> bool {
     std::env::var_os("PATH").is_some_and(|path| {
         std::env::split_paths(&path).any(|folder| folder.join(program).is_file())
     })
 }
 
 /// A command in the workspace's folder, free of what the cargo that started us left in the environment.
-pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
+pub fn command(program: impl AsRef<OsStr>) -> Command {
     let mut command = Command::new(program);
     command.current_dir(root()).stdin(Stdio::null());
     // The libraries and the choice of the outer toolchain would reach into the inner one.
@@ -48,7 +48,7 @@ pub(crate) fn command(program: impl AsRef<OsStr>) -> Command {
 }
 
 /// The command as a person would type it.
-pub(crate) fn spell(command: &Command) -> String {
+pub fn spell(command: &Command) -> String {
     let words = std::iter::once(command.get_program()).chain(command.get_args());
     words
         .map(|word| word.to_string_lossy())
@@ -57,13 +57,13 @@ pub(crate) fn spell(command: &Command) -> String {
 }
 
 /// Says what is run, and runs it; anything but success is an error.
-pub(crate) fn run(command: &mut Command) -> Result<()> {
+pub fn run(command: &mut Command) -> Result<()> {
     println!("$ {}", spell(command));
     run_quietly(command)
 }
 
 /// Runs without saying so; anything but success is an error.
-pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
+pub fn run_quietly(command: &mut Command) -> Result<()> {
     let status = command
         .status()
         .with_context(|| format!("cannot start `{}`", spell(command)))?;
@@ -72,7 +72,7 @@ pub(crate) fn run_quietly(command: &mut Command) -> Result<()> {
 }
 
 /// Runs and returns what was printed.
-pub(crate) fn output(command: &mut Command) -> Result<String> {
+pub fn output(command: &mut Command) -> Result<String> {
     let output = command
         .output()
         .with_context(|| format!("cannot start `{}`", spell(command)))?;

@@ -5,9 +5,9 @@ use std::collections::{BTreeMap, BTreeSet};
 use anyhow::{Context, Result, ensure};
 use object::{Object, ObjectSection};
 
-use crate::call_graph::{Flow, flow};
-use crate::image::Image;
-use crate::listing::{Function, Instruction, Listing};
+use xtask::call_graph::{Flow, flow};
+use xtask::image::Image;
+use xtask::listing::{Function, Instruction, Listing};
 
 /// The function that starts the stack afresh.
 pub(crate) const FRESH: &str = "HardFault";

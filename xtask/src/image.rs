@@ -1,22 +1,24 @@
 //! Building the firmware's images and looking at what came out.
 
 use std::fmt;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use object::{Object, ObjectSymbol};
-use quadrant_sim::emulator::Program;
 
 use crate::command;
 use crate::toolchain::Toolchain;
 
 /// The targets rustup must have.
-pub(crate) const TRIPLES: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv7m-none-eabi"];
+pub const TRIPLES: [&str; 2] = ["thumbv7em-none-eabihf", "thumbv7m-none-eabi"];
+
+/// Other targets for which the library is built: a Cortex-M0 without atomics, and a RISC-V.
+pub const LIBRARY_TRIPLES: [&str; 2] = ["thumbv6m-none-eabi", "riscv32imc-unknown-none-elf"];
 
 /// The machines the firmware is built for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Board {
+pub enum Board {
     /// Arm MPS2, emulated by QEMU
     Mps2,
     /// ST Nucleo-F446RE, the reference board
@@ -26,7 +28,7 @@ pub(crate) enum Board {
 
 /// The firmware's number types.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Scalar {
+pub enum Scalar {
     /// Single-precision floating point
     F32,
     /// Fixed point, for machines without a floating-point unit
@@ -35,16 +37,16 @@ pub(crate) enum Scalar {
 
 /// Which image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) struct Target {
+pub struct Target {
     /// The machine.
-    pub(crate) board: Board,
+    pub board: Board,
     /// The number type.
-    pub(crate) scalar: Scalar,
+    pub scalar: Scalar,
 }
 
 impl Target {
     /// All there are.
-    pub(crate) const ALL: [Self; 4] = [
+    pub const ALL: [Self; 4] = [
         Self {
             board: Board::Mps2,
             scalar: Scalar::F32,
@@ -64,7 +66,7 @@ impl Target {
     ];
 
     /// The Rust target. The emulated machine for fixed point is a Cortex-M3, which has no floating-point unit.
-    pub(crate) fn triple(self) -> &'static str {
+    pub fn triple(self) -> &'static str {
         match (self.board, self.scalar) {
             (Board::Mps2, Scalar::Fixed) => TRIPLES[1],
             _ => TRIPLES[0],
@@ -72,7 +74,7 @@ impl Target {
     }
 
     /// The number type's name.
-    pub(crate) fn scalar_name(self) -> String {
+    pub fn scalar_name(self) -> String {
         self.scalar
             .to_possible_value()
             .expect("no variant is hidden")
@@ -93,13 +95,14 @@ impl Target {
     }
 
     /// Cargo's arguments to select the firmware of this target.
-    pub(crate) fn arguments(self) -> [String; 9] {
+    pub fn arguments(self) -> [String; 10] {
         [
             "--package".into(),
             "quadrant".into(),
             "--bin".into(),
             "quadrant-firmware".into(),
-            "--release".into(),
+            "--profile".into(),
+            "firmware".into(),
             "--target".into(),
             self.triple().into(),
             "--features".into(),
@@ -119,17 +122,22 @@ impl fmt::Display for Target {
 }
 
 /// A linked image.
-pub(crate) struct Image {
+pub struct Image {
     /// What it was built for.
-    pub(crate) target: Target,
+    pub target: Target,
     /// Where it is.
-    pub(crate) path: PathBuf,
+    pub path: PathBuf,
     /// Its bytes.
-    pub(crate) elf: Vec<u8>,
+    pub elf: Vec<u8>,
+    /// The compiler that made it.
+    pub compiler: String,
 }
 
 /// Links the reference board's image with the fallback outputs, and with every line of the log.
-pub(crate) fn link_fallback(toolchain: Toolchain) -> Result<()> {
+///
+/// # Errors
+/// It does not build.
+pub fn link_fallback(toolchain: Toolchain) -> Result<()> {
     let target = Target {
         board: Board::NucleoF446re,
         scalar: Scalar::F32,
@@ -142,8 +150,31 @@ pub(crate) fn link_fallback(toolchain: Toolchain) -> Result<()> {
     command::run(&mut cargo)
 }
 
-/// Builds an image.
-pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
+/// Builds an image, or takes the one that is there if [`BUILT`] says that it was built a moment ago.
+///
+/// # Errors
+/// It does not build.
+pub fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
+    let path = command::root()
+        .join("target/images")
+        .join(target.to_string().replace(' ', "-"))
+        .with_extension("elf");
+    if std::env::var_os(BUILT).is_none() {
+        link(toolchain, target, &path)?;
+    }
+    Ok(Image {
+        elf: std::fs::read(&path).with_context(|| format!("cannot read {}", path.display()))?,
+        compiler: toolchain.compiler()?,
+        target,
+        path,
+    })
+}
+
+/// The variable that says that all images are up to date.
+pub const BUILT: &str = "QUADRANT_IMAGES_BUILT";
+
+/// Builds an image and copies it to a path.
+fn link(toolchain: Toolchain, target: Target, path: &Path) -> Result<()> {
     let mut cargo = toolchain.cargo("build");
     cargo.args(target.arguments());
     command::run_quietly(&mut cargo)
@@ -151,37 +182,23 @@ pub(crate) fn build(toolchain: Toolchain, target: Target) -> Result<Image> {
     let built = command::root()
         .join("target/firmware")
         .join(target.triple())
-        .join("release/quadrant-firmware");
+        .join("firmware/quadrant-firmware");
     // Two boards share a triple: keep each image under a name of its own.
-    let folder = command::root().join("target/images");
-    std::fs::create_dir_all(&folder)
+    let folder = path.parent().context("the image has a folder")?;
+    std::fs::create_dir_all(folder)
         .with_context(|| format!("cannot create {}", folder.display()))?;
-    let path = folder
-        .join(target.to_string().replace(' ', "-"))
-        .with_extension("elf");
-    let elf = std::fs::read(&built).with_context(|| format!("cannot read {}", built.display()))?;
-    std::fs::write(&path, &elf).with_context(|| format!("cannot write {}", path.display()))?;
-    Ok(Image { target, path, elf })
+    std::fs::copy(&built, path).with_context(|| format!("cannot copy {}", built.display()))?;
+    Ok(())
 }
 
 impl Image {
-    /// The image as the emulator takes it.
-    pub(crate) fn program(&self) -> Result<Program> {
-        ensure!(
-            self.target.board == Board::Mps2,
-            "{} is a real board: it is not emulated",
-            self.target
-        );
-        Ok(Program::read(&self.path)?)
-    }
-
     /// The address of a function, without the bit that says Thumb.
-    pub(crate) fn function(&self, name: &str) -> Result<u32> {
+    pub fn function(&self, name: &str) -> Result<u32> {
         Ok(u32::try_from(self.symbol(name)?)? & !1)
     }
 
     /// The address of a variable of the application, by its name in the source: compilers add to it.
-    pub(crate) fn variable(&self, name: &str) -> Result<u32> {
+    pub fn variable(&self, name: &str) -> Result<u32> {
         let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
         let mangled = format!("3app{}{name}", name.len());
         let is_it = |symbol: &object::Symbol| symbol.name().is_ok_and(|n| n.contains(&mangled));
@@ -191,7 +208,7 @@ impl Image {
     }
 
     /// The address of a symbol.
-    pub(crate) fn symbol(&self, name: &str) -> Result<u64> {
+    pub fn symbol(&self, name: &str) -> Result<u64> {
         let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
         let symbol = file.symbols().find(|symbol| symbol.name() == Ok(name));
         let symbol = symbol.with_context(|| format!("the image has no symbol `{name}`"))?;
@@ -199,7 +216,7 @@ impl Image {
     }
 
     /// How much of the machine's memories the image takes.
-    pub(crate) fn footprint(&self) -> Result<Footprint> {
+    pub fn footprint(&self) -> Result<Footprint> {
         use object::ObjectSection;
         let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
         let mut footprint = Footprint {
@@ -236,7 +253,7 @@ impl Image {
 }
 
 /// How much of the machine's memories an image takes, in bytes.
-pub(crate) struct Footprint {
+pub struct Footprint {
     target: Target,
     flash: u64,
     data: u64,
@@ -245,12 +262,12 @@ pub(crate) struct Footprint {
 
 impl Footprint {
     /// Flash: initialised variables are in both memories, as flash holds their first values.
-    pub(crate) fn flash_bytes(&self) -> u64 {
+    pub fn flash_bytes(&self) -> u64 {
         self.flash + self.data
     }
 
     /// RAM without the stack.
-    pub(crate) fn ram_bytes(&self) -> u64 {
+    pub fn ram_bytes(&self) -> u64 {
         self.data + self.zeroed
     }
 }

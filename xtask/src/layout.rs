@@ -11,9 +11,9 @@ use object::read::elf::{FileHeader, ProgramHeader};
 use object::{Endianness, Object, ObjectSection, elf};
 use serde::{Deserialize, Serialize};
 
-use crate::golden::Golden;
-use crate::image::{Board, Image, Target};
-use crate::listing::{Instruction, Listing};
+use xtask::golden::Golden;
+use xtask::image::{Board, Image, Target};
+use xtask::listing::{Instruction, Listing};
 
 /// The reference board's sectors of stored settings.
 const SETTINGS: Range<u64> = 0x0800_4000..0x0800_C000;
@@ -60,9 +60,9 @@ pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
         image.target, sizes.flash, sizes.variables, sizes.stack, sizes.stack_bound
     );
     if overwrite {
-        GOLDEN.store([(key(image.target), sizes)])
+        GOLDEN.store(Some(&image.compiler), [(key(image.target), sizes)])
     } else {
-        compare(image.target, sizes)
+        compare(image.target, &image.compiler, sizes)
     }
 }
 
@@ -150,7 +150,7 @@ fn leaves(instruction: &Instruction, symbol: &str) -> bool {
 
 /// The committed sizes.
 const GOLDEN: Golden = Golden {
-    file: "sizes.toml",
+    path: "xtask/golden/sizes.toml",
     head: "Bytes that the images take, written by `cargo xtask sizes --overwrite-expected`.",
 };
 
@@ -158,10 +158,11 @@ fn key(target: Target) -> String {
     target.to_string().replace(' ', "-")
 }
 
-/// Holds sizes against the committed ones: larger is a failure, smaller a reason to commit.
-fn compare(target: Target, sizes: Sizes) -> Result<()> {
+/// Holds sizes against the committed ones: larger is a failure if the same compiler made both, smaller a reason to commit.
+fn compare(target: Target, compiler: &str, sizes: Sizes) -> Result<()> {
     const REMEDY: &str = "if that is meant, run `cargo xtask sizes --overwrite-expected`";
-    let Some(expected) = GOLDEN.read::<Sizes>()?.remove(&key(target)) else {
+    let recorded = GOLDEN.read::<Sizes>()?.table(&key(target), compiler);
+    let Some((expected, difference)) = recorded else {
         bail!("{target} has no committed sizes; {REMEDY}");
     };
     for (name, size, expected) in [
@@ -171,11 +172,12 @@ fn compare(target: Target, sizes: Sizes) -> Result<()> {
         ("stack bound", sizes.stack_bound, expected.stack_bound),
     ] {
         let limit = (expected as f64 * (1.0 + TOLERANCE)) as u64;
-        ensure!(
-            size <= limit,
-            "{target}: {name} {size} bytes, more than the committed {expected} and {} % on top; {REMEDY}",
-            100.0 * TOLERANCE
-        );
+        difference.ensure(size <= limit, || {
+            format!(
+                "{target}: {name} {size} bytes, more than the committed {expected} and {} % on top; {REMEDY}",
+                100.0 * TOLERANCE
+            )
+        })?;
         if (size as f64) < expected as f64 * (1.0 - TOLERANCE) {
             println!("{target}: {name} is down to {size} from {expected} bytes: worth committing");
         }
@@ -186,7 +188,7 @@ fn compare(target: Target, sizes: Sizes) -> Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::image::Scalar;
+    use xtask::image::Scalar;
 
     #[test]
     fn growth_beyond_the_tolerance_is_refused_and_names_both_sizes() {
@@ -194,10 +196,25 @@ mod tests {
             board: Board::NucleoF446re,
             scalar: Scalar::F32,
         };
-        let expected = GOLDEN.read::<Sizes>().expect("sizes are committed")[&key(target)];
+        let recorded = GOLDEN.read::<Sizes>().expect("sizes are committed");
+        let compiler = recorded.compiler.as_deref().expect("its compiler is named");
+        let expected = recorded.tables[&key(target)];
         let grown = |flash| Sizes { flash, ..expected };
-        assert!(compare(target, grown(expected.flash + expected.flash / 100)).is_ok());
-        let error = compare(target, grown(expected.flash + expected.flash / 10)).unwrap_err();
+        assert!(
+            compare(
+                target,
+                compiler,
+                grown(expected.flash + expected.flash / 100)
+            )
+            .is_ok()
+        );
+        let error = compare(
+            target,
+            compiler,
+            grown(expected.flash + expected.flash / 10),
+        )
+        .unwrap_err();
+        assert!(compare(target, "another", grown(2 * expected.flash)).is_ok());
         let text = error.to_string();
         assert!(
             text.contains("flash") && text.contains(&expected.flash.to_string()),
@@ -234,7 +251,7 @@ mod tests {
     fn every_image_has_committed_sizes() {
         let golden = GOLDEN.read::<Sizes>().expect("sizes are committed");
         for target in Target::ALL {
-            assert!(golden.contains_key(&key(target)), "{target}");
+            assert!(golden.tables.contains_key(&key(target)), "{target}");
         }
     }
 }

@@ -9,35 +9,35 @@ use crate::command;
 use crate::image::Image;
 
 /// One instruction.
-pub(crate) struct Instruction {
+pub struct Instruction {
     /// Where it is.
-    pub(crate) address: u32,
+    pub address: u32,
     /// Its name, without a width suffix.
-    pub(crate) mnemonic: String,
+    pub mnemonic: String,
     /// The rest of the line.
-    pub(crate) operands: String,
+    pub operands: String,
 }
 
 /// One function.
-pub(crate) struct Function {
+pub struct Function {
     /// Its linker symbol.
-    pub(crate) symbol: String,
+    pub symbol: String,
     /// Its name as a person would write it.
-    pub(crate) name: String,
+    pub name: String,
     /// The addresses it covers.
-    pub(crate) range: Range<u32>,
+    pub range: Range<u32>,
     /// Its instructions in order of address.
-    pub(crate) instructions: Vec<Instruction>,
+    pub instructions: Vec<Instruction>,
 }
 
 /// All functions of an image, by their first address.
-pub(crate) struct Listing {
+pub struct Listing {
     functions: BTreeMap<u32, Function>,
 }
 
 impl Listing {
     /// Disassembles an image.
-    pub(crate) fn of(image: &Image) -> Result<Self> {
+    pub fn of(image: &Image) -> Result<Self> {
         let mut objdump = command::command("arm-none-eabi-objdump");
         objdump
             .args(["--disassemble", "--no-show-raw-insn"])
@@ -54,7 +54,7 @@ impl Listing {
     }
 
     /// Disassembles what an image keeps among its variables: code that runs from RAM, and data that means nothing.
-    pub(crate) fn of_ram(image: &Image) -> Result<Self> {
+    pub fn of_ram(image: &Image) -> Result<Self> {
         let mut objdump = command::command("arm-none-eabi-objdump");
         objdump
             .args(["--disassemble-all", "--section=.data", "--no-show-raw-insn"])
@@ -95,19 +95,19 @@ impl Listing {
     }
 
     /// The function of a linker symbol.
-    pub(crate) fn named(&self, symbol: &str) -> Option<&Function> {
+    pub fn named(&self, symbol: &str) -> Option<&Function> {
         self.functions
             .values()
             .find(|function| function.symbol == symbol)
     }
 
     /// All functions, in order of their addresses.
-    pub(crate) fn functions(&self) -> impl Iterator<Item = &Function> {
+    pub fn functions(&self) -> impl Iterator<Item = &Function> {
         self.functions.values()
     }
 
     /// The function that covers an address.
-    pub(crate) fn at(&self, address: u32) -> Option<&Function> {
+    pub fn at(&self, address: u32) -> Option<&Function> {
         let (_, function) = self.functions.range(..=address).next_back()?;
         function.range.contains(&address).then_some(function)
     }

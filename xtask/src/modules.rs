@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use anyhow::{Context, Result};
 use object::{Object, ObjectSymbol, SymbolKind};
 
-use crate::image::Image;
+use xtask::image::Image;
 
 /// Crates whose modules are told apart.
 const OURS: [&str; 2] = ["quadrant", "quadrant_firmware"];

@@ -9,7 +9,7 @@ use crate::listing::{Function, Listing};
 use crate::toolchain::Toolchain;
 
 /// The control interrupt's handler.
-pub(crate) const ROOT: &str = "CONTROL_TICK";
+pub const ROOT: &str = "CONTROL_TICK";
 
 /// Parts of names of functions that must not be reachable, and why.
 const FORBIDDEN_NAMES: [(&str, &str); 8] = [
@@ -44,13 +44,13 @@ const FORBIDDEN_SYMBOLS: [(&str, &str); 13] = [
 const FORBIDDEN_INSTRUCTIONS: [&str; 4] = ["sdiv", "udiv", "vdiv", "vsqrt"];
 
 /// Builds the image and proves it.
-pub(crate) fn run(toolchain: Toolchain, target: Target) -> Result<()> {
+pub fn run(toolchain: Toolchain, target: Target) -> Result<()> {
     let image = image::build(toolchain, target)?;
     prove(&image)
 }
 
 /// Proves an image.
-pub(crate) fn prove(image: &Image) -> Result<()> {
+pub fn prove(image: &Image) -> Result<()> {
     let listing = Listing::of(image)?;
     let graph = CallGraph::from(&listing, image.function(ROOT)?)?;
     println!(

@@ -5,9 +5,9 @@ use std::process::Command;
 
 use anyhow::{Context, Result, bail};
 
-use crate::command;
-use crate::image::TRIPLES;
-use crate::toolchain::{Choice, Toolchain};
+use xtask::command;
+use xtask::image::{LIBRARY_TRIPLES, TRIPLES};
+use xtask::toolchain::{Choice, Toolchain};
 
 /// Something that must be there, how to see it, and the Debian package it comes in.
 struct Tool {
@@ -53,19 +53,7 @@ pub(crate) fn run(choice: Choice) -> Result<Toolchain> {
         Choice::Debian => Toolchain::Debian,
         Choice::Auto => choose()?,
     };
-    let mut missing: Vec<&str> = TOOLS
-        .iter()
-        .filter(|tool| !command::exists(tool.program))
-        .map(|tool| tool.package)
-        .collect();
-    if toolchain == Toolchain::Debian {
-        missing.extend(
-            COMPILER
-                .iter()
-                .filter(|(file, _)| !Path::new(file).exists())
-                .map(|(_, package)| package),
-        );
-    }
+    let missing = missing(toolchain);
     if missing.is_empty() {
         println!("setup: QEMU, binutils and Chromium are installed");
     } else {
@@ -80,6 +68,19 @@ pub(crate) fn run(choice: Choice) -> Result<Toolchain> {
     }
     toolchain.remember()?;
     Ok(toolchain)
+}
+
+/// Lists the packages that are to be installed.
+pub(crate) fn missing(toolchain: Toolchain) -> Vec<&'static str> {
+    let tools = TOOLS
+        .iter()
+        .filter(|tool| !command::exists(tool.program))
+        .map(|tool| tool.package);
+    let compiler = COMPILER
+        .iter()
+        .filter(|(file, _)| toolchain == Toolchain::Debian && !Path::new(file).exists())
+        .map(|(_, package)| *package);
+    tools.chain(compiler).collect()
 }
 
 /// Rustup if it has the targets or can get them, else Debian.
@@ -103,6 +104,7 @@ fn add_targets() -> Result<()> {
         command::output(command::command("rustup").args(["target", "list", "--installed"]))?;
     let missing: Vec<&str> = TRIPLES
         .into_iter()
+        .chain(LIBRARY_TRIPLES)
         .filter(|triple| !installed.lines().any(|line| line == *triple))
         .collect();
     if missing.is_empty() {

@@ -19,7 +19,7 @@ use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
 
 use crate::frames::{FRESH, Frames, Node};
-use crate::image::Image;
+use xtask::image::Image;
 
 /// Of a floating-point unit's context, the words to align it included: what the processor saves for a handler.
 const EXCEPTION_FRAME_BYTES: u32 = 4 * 27;

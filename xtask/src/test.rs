@@ -1,25 +1,24 @@
-//! `cargo xtask test`: every check there is, one after the other.
+//! `cargo xtask test`: every check there is.
+//!
+//! What is built for a microcontroller is checked by a process of its own beside the host's tests: linking an image keeps one
+//! core busy. What is emulated comes last and alone, as lockstep needs both.
 
-use std::path::Path;
+use std::fs::{self, File};
+use std::process::{Child, Command};
 use std::time::Instant;
 
-use anyhow::Result;
+use anyhow::{Context, Result, bail};
 
-use crate::image::{self, Board, Scalar, Target};
-use crate::toolchain::{Choice, Toolchain};
-use crate::{
-    board_smoke, combinations, command, count, emulate, faults, layout, prove, setup, story, twin,
-};
+use xtask::image::{self, LIBRARY_TRIPLES, TRIPLES, Target};
+use xtask::toolchain::{self, Choice, Toolchain};
+use xtask::{command, prove};
 
-/// Ticks of the counting run.
-const COUNTED_TICKS: u32 = 250;
-/// Ticks of the counting run of each law and each feedforward.
-const TICKS_EACH: u32 = 60;
-/// Seconds of firmware time of the emulated runs.
-const EMULATED_SECONDS: f64 = 10.0;
+use crate::{layout, setup, transcript};
+
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
-const COMMISSIONED_SECONDS: f64 = 2.0;
+/// Output of the checks beside the host's tests.
+const FIRMWARE_LOG: &str = "target/xtask/firmware.log";
 
 /// What was checked, and how it went.
 #[derive(Default)]
@@ -61,121 +60,252 @@ impl Report {
 
 /// Sets up and checks everything, and returns whether all went well.
 pub(crate) fn run(choice: Choice) -> Result<bool> {
+    let started = Instant::now();
+    announce(choice)?;
     let mut report = Report::default();
     // Without its tools nothing else can be expected to work.
-    let started = Instant::now();
-    println!("== setup");
+    println!("\n== setup");
     let toolchain = setup::run(choice)?;
     report
         .steps
         .push(("setup".into(), started.elapsed().as_secs_f64(), Ok(())));
 
-    host(&mut report);
-    firmware(&mut report, toolchain);
+    let firmware = Beside::start(toolchain)?;
+    host(&mut report)?;
+    firmware.finish(&mut report)?;
     emulated(&mut report, toolchain);
-    Ok(report.finish())
+    let is_good = report.finish();
+    println!("{:.1} min", started.elapsed().as_secs_f64() / 60.0);
+    Ok(is_good)
+}
+
+/// Says which compiler builds what, what is going to be installed, and how long it takes.
+fn announce(choice: Choice) -> Result<()> {
+    let host = toolchain::host_compiler()?;
+    println!("host:     Rust {host}, {}", lints(&host));
+    let toolchain = match choice {
+        Choice::Auto => Toolchain::remembered(),
+        Choice::Rustup => Some(Toolchain::Rustup),
+        Choice::Debian => Some(Toolchain::Debian),
+    };
+    let Some(toolchain) = toolchain else {
+        println!(
+            "firmware: the same if rustup can add {}, else Debian's",
+            TRIPLES.join(", ")
+        );
+        println!(
+            "duration: on two cores about 15 min from a fresh clone, 5 min when little has changed"
+        );
+        return Ok(());
+    };
+    match toolchain.compiler() {
+        Ok(firmware) => println!(
+            "firmware: Rust {firmware} ({}), {}; counts and sizes are held where the same compiler recorded them",
+            toolchain.name(),
+            lints(&firmware)
+        ),
+        Err(_) => println!("firmware: Debian's compiler, which is not installed"),
+    }
+    let missing = setup::missing(toolchain);
+    if !missing.is_empty() {
+        println!("to be installed: {}", missing.join(", "));
+    }
+    println!(
+        "duration: on two cores about 15 min from a fresh clone, 5 min when little has changed"
+    );
+    Ok(())
+}
+
+/// What becomes of a compiler's warnings.
+fn lints(compiler: &str) -> &'static str {
+    if toolchain::denies_warnings(compiler) {
+        "warnings are errors"
+    } else {
+        "warnings are printed"
+    }
+}
+
+/// The flags that deny warnings, for a compiler whose warnings are known.
+fn deny(compiler: &str) -> &'static [&'static str] {
+    if toolchain::denies_warnings(compiler) {
+        &["--deny", "warnings"]
+    } else {
+        &[]
+    }
 }
 
 /// What runs on the host alone.
-fn host(report: &mut Report) {
-    let cargo = |arguments: &[&str]| command::run(command::command("cargo").args(arguments));
-    report.step("format", || cargo(&["fmt", "--all", "--check"]));
-    report.step("clippy", || {
-        cargo(&[
-            "clippy",
-            "--workspace",
-            "--all-targets",
-            "--",
-            "--deny",
-            "warnings",
-        ])
+fn host(report: &mut Report) -> Result<()> {
+    let deny = deny(&toolchain::host_compiler()?);
+    let cargo = || command::command("cargo");
+    report.step("format", || {
+        command::run(cargo().args(["fmt", "--all", "--check"]))
     });
     report.step("host tests", || {
-        let mut test = command::command("cargo");
         // Setup has installed the browser: the tests that open pages in it must not skip.
-        test.args(["test", "--workspace"])
-            .env("QUADRANT_BROWSER_TESTS", "required");
-        command::run(&mut test)
+        command::run(
+            cargo()
+                .args(["test", "--workspace"])
+                .env("QUADRANT_BROWSER_TESTS", "required"),
+        )
+    });
+    report.step("clippy", || {
+        command::run(
+            cargo()
+                .args(["clippy", "--workspace", "--all-targets", "--"])
+                .args(deny),
+        )
     });
     report.step("documentation", || {
-        let mut doc = command::command("cargo");
-        doc.args([
-            "doc",
-            "--workspace",
-            "--no-deps",
-            "--document-private-items",
-        ]);
-        command::run(doc.env("RUSTDOCFLAGS", "--deny warnings"))
+        command::run(
+            cargo()
+                .args(["doc", "--workspace", "--no-deps"])
+                .arg("--document-private-items")
+                .env("RUSTDOCFLAGS", deny.join(" ")),
+        )
     });
+    Ok(())
 }
 
-/// What is built for a microcontroller.
-fn firmware(report: &mut Report, toolchain: Toolchain) {
+/// The checks of what is built for a microcontroller, in a process of their own.
+struct Beside(Child);
+
+impl Beside {
+    fn start(toolchain: Toolchain) -> Result<Self> {
+        let path = command::root().join(FIRMWARE_LOG);
+        let folder = path.parent().context("the file has a folder")?;
+        fs::create_dir_all(folder)?;
+        let log = File::create(&path)?;
+        let child = Command::new(std::env::current_exe()?)
+            .current_dir(command::root())
+            .args(["--toolchain", toolchain.name(), "test", "--firmware-only"])
+            .stdout(log.try_clone()?)
+            .stderr(log)
+            .spawn()
+            .context("cannot start a second xtask")?;
+        println!(
+            "\nbeside what follows: lints, images and proofs of the firmware, into {FIRMWARE_LOG}"
+        );
+        Ok(Self(child))
+    }
+
+    /// Waits, prints what it said, and takes over its steps.
+    fn finish(mut self, report: &mut Report) -> Result<()> {
+        let status = self.0.wait()?;
+        let log = fs::read_to_string(command::root().join(FIRMWARE_LOG))?;
+        println!("\n{log}");
+        let before = report.steps.len();
+        for line in log.lines() {
+            report.steps.extend(summary_line(line));
+        }
+        let is_bad = report.steps[before..].iter().any(|step| step.2.is_err());
+        if before == report.steps.len() || status.success() == is_bad {
+            bail!("the firmware's checks ended with {status}");
+        }
+        Ok(())
+    }
+}
+
+/// `passed    12.3 s  firmware image, mps2 f32`
+fn summary_line(line: &str) -> Option<(String, f64, Result<()>)> {
+    let (verdict, rest) = line.split_once(' ')?;
+    let result = match verdict {
+        "passed" => Ok(()),
+        "FAILED" => Err(anyhow::anyhow!("see above")),
+        _ => return None,
+    };
+    let (seconds, name) = rest.trim_start().split_once(" s  ")?;
+    Some((name.to_owned(), seconds.parse().ok()?, result))
+}
+
+/// Checks what is built for a microcontroller, and returns whether all went well.
+pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
+    let mut report = Report::default();
+    let deny = deny(&toolchain.compiler()?);
     for target in Target::ALL {
-        report.step(format!("firmware clippy, {target}"), || {
-            let mut clippy = toolchain.cargo("clippy");
-            // The most talkative level, so that every line of the log is compiled.
-            clippy
-                .args(target.arguments())
-                .args(["--", "--deny", "warnings"])
-                .env("DEFMT_LOG", "trace");
-            command::run(&mut clippy)
+        report.step(format!("firmware image, {target}"), || {
+            layout::check(&image::build(toolchain, target)?, false)
+        });
+        report.step(format!("no panic in the control tick, {target}"), || {
+            prove::prove(&image::build(toolchain, target)?)
         });
     }
     report.step("firmware image, fallback outputs, log at trace", || {
         image::link_fallback(toolchain)
     });
     for target in Target::ALL {
-        report.step(format!("firmware image, {target}"), || {
-            layout::check(&image::build(toolchain, target)?, false)
-        });
-        report.step(format!("no panic in the control tick, {target}"), || {
-            prove::run(toolchain, target)
+        report.step(format!("firmware clippy, {target}"), || {
+            let mut clippy = toolchain.cargo("clippy");
+            // The most talkative level, so that every line of the log is compiled.
+            clippy
+                .args(target.arguments())
+                .arg("--")
+                .args(deny)
+                .env("DEFMT_LOG", "trace");
+            command::run(&mut clippy)
         });
     }
+    for triple in [TRIPLES[0]].into_iter().chain(LIBRARY_TRIPLES) {
+        report.step(format!("library for {triple}"), || {
+            let mut check = toolchain.cargo("check");
+            check.args(["--package", "quadrant", "--lib", "--profile", "firmware"]);
+            command::run(check.args(["--target", triple]))
+        });
+    }
+    Ok(report.finish())
 }
 
 /// What is emulated.
 fn emulated(report: &mut Report, toolchain: Toolchain) {
-    report.step(
+    let mut step = |name: &str, verb: &[&str]| {
+        report.step(name, || {
+            let mut cargo = command::command("cargo");
+            cargo
+                .args(["run", "--quiet", "--package", "quadrant-target-tests", "--"])
+                .args(["--toolchain", toolchain.name()])
+                .args(verb)
+                .env(image::BUILT, "1");
+            command::run(&mut cargo)
+        });
+    };
+    step(
         "the reference board's image starts, ticks, and meets the end of its stack",
-        || board_smoke::run(toolchain),
+        &["board-smoke"],
     );
-    report.step("a machine's story, through the console", || {
-        story::run(toolchain, false)
-    });
-    for scalar in [Scalar::F32, Scalar::Fixed] {
-        let target = Target {
-            board: Board::Mps2,
-            scalar,
-        };
-        report.step(format!("emulation in lockstep, {target}"), || {
-            emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, false)
-        });
-        report.step(
-            format!("emulation on commissioned settings, {target}"),
-            || {
-                let job = twin::job_with(Path::new(COMMISSIONED))?;
-                emulate::run(toolchain, scalar, job, COMMISSIONED_SECONDS, false)
-            },
+    for scalar in ["f32", "fixed"] {
+        let of = |verb: &str| format!("{verb}, mps2 {scalar}");
+        let s = ["--scalar", scalar];
+        let verb = |words: &[&'static str]| [words, &s].concat();
+        step(&of("lockstep"), &verb(&["emulate"]));
+        step(
+            &of("lockstep on commissioned settings"),
+            &verb(&["emulate", "--seconds", "2", "--settings", COMMISSIONED]),
         );
-        report.step(format!("emulation paced by the timer, {target}"), || {
-            emulate::run(toolchain, scalar, twin::job(), EMULATED_SECONDS, true)
-        });
-        report.step(format!("every fault provoked, {target}"), || {
-            faults::run(toolchain, scalar, None, false)
-        });
-        report.step(format!("instructions per tick, {target}"), || {
-            count::run(toolchain, scalar, COUNTED_TICKS, false)
-        });
-        report.step(format!("every law and feedforward, {target}"), || {
-            combinations::lockstep(toolchain, scalar)
-        });
-        report.step(format!("instructions of each, {target}"), || {
-            combinations::count(toolchain, scalar, TICKS_EACH, false)
-        });
+        step(&of("paced by the timer"), &verb(&["emulate", "--paced"]));
+        step(&of("every fault injected"), &verb(&["faults"]));
+        step(&of("instructions per tick"), &verb(&["count"]));
+        step(
+            &of("every law and feedforward, and instructions of each"),
+            &verb(&["combinations"]),
+        );
     }
-    report.step("control under overload, mps2 f32", || {
-        faults::saturation::run(toolchain, Scalar::F32)
+    step("control under overload, mps2 f32", &["saturation"]);
+    report.step("a session through the console, end to end", || {
+        transcript::run(toolchain, false)
     });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_of_the_summary_is_read_back() {
+        let (name, seconds, result) =
+            summary_line("passed    12.3 s  firmware image, mps2 f32").unwrap();
+        assert_eq!((name.as_str(), seconds), ("firmware image, mps2 f32", 12.3));
+        assert!(result.is_ok());
+        assert!(summary_line("FAILED     1.0 s  x").unwrap().2.is_err());
+        assert!(summary_line("6 passed, 0 failed").is_none());
+    }
 }

@@ -10,9 +10,18 @@ use serde::{Deserialize, Serialize};
 
 use crate::command;
 
+/// Releases whose warnings are errors: those that the tree was last checked with. Newer ones warn of more.
+const LINTED_WITH: [&str; 2] = ["1.95.0", "1.96.0"];
+
+/// True if the warnings of a compiler are errors, by what [`compiler`] says.
+pub fn denies_warnings(compiler: &str) -> bool {
+    let release = compiler.split(' ').next();
+    release.is_some_and(|release| LINTED_WITH.contains(&release))
+}
+
 /// What the user asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(crate) enum Choice {
+pub enum Choice {
     /// rustup if it can add the targets, else Debian
     Auto,
     /// The active Rust toolchain, with targets that rustup adds
@@ -24,7 +33,7 @@ pub(crate) enum Choice {
 /// What it comes down to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(crate) enum Toolchain {
+pub enum Toolchain {
     /// The active Rust toolchain.
     Rustup,
     /// Debian's.
@@ -41,7 +50,7 @@ impl Toolchain {
     /// The toolchain asked for, or the one setup chose last.
     ///
     /// Installing is for `setup` and `test`: no other verb changes the machine it runs on.
-    pub(crate) fn chosen(choice: Option<Choice>) -> Result<Self> {
+    pub fn chosen(choice: Option<Choice>) -> Result<Self> {
         match choice {
             Some(Choice::Rustup) => Ok(Self::Rustup),
             Some(Choice::Debian) => Ok(Self::Debian),
@@ -50,8 +59,16 @@ impl Toolchain {
         }
     }
 
+    /// Its name on the command line.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rustup => "rustup",
+            Self::Debian => "debian",
+        }
+    }
+
     /// What setup chose last.
-    pub(crate) fn remembered() -> Option<Self> {
+    pub fn remembered() -> Option<Self> {
         // A file that is missing or spoilt only costs another setup.
         let text = fs::read_to_string(memory()).ok()?;
         toml::from_str::<Memory>(&text)
@@ -60,7 +77,7 @@ impl Toolchain {
     }
 
     /// Leaves the choice for later runs.
-    pub(crate) fn remember(self) -> Result<()> {
+    pub fn remember(self) -> Result<()> {
         if Self::remembered() == Some(self) {
             return Ok(());
         }
@@ -72,9 +89,20 @@ impl Toolchain {
         fs::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 
+    /// Returns the compiler that builds the firmware.
+    ///
+    /// # Errors
+    /// It cannot be started.
+    pub fn compiler(self) -> Result<String> {
+        match self {
+            Self::Rustup => host_compiler(),
+            Self::Debian => version("/usr/bin/rustc"),
+        }
+    }
+
     /// Cargo, for the firmware: with this toolchain, and in a target folder of its own, so that neither compiler
     /// rebuilds what the other built.
-    pub(crate) fn cargo(self, verb: &str) -> Command {
+    pub fn cargo(self, verb: &str) -> Command {
         let mut cargo = command::command("cargo");
         if self == Self::Debian {
             cargo.arg("+debian");
@@ -86,6 +114,34 @@ impl Toolchain {
         }
         cargo
     }
+}
+
+/// Returns the compiler that builds for the host.
+///
+/// # Errors
+/// It cannot be started.
+pub fn host_compiler() -> Result<String> {
+    version("rustc")
+}
+
+fn version(rustc: &str) -> Result<String> {
+    let mut rustc = command::command(rustc);
+    Ok(compiler(&command::output(rustc.arg("-vV"))?))
+}
+
+/// A compiler in a few words, from what `rustc -vV` says: release, commit, LLVM.
+fn compiler(verbose: &str) -> String {
+    let field = |name: &str| {
+        let line = verbose.lines().find_map(|line| line.strip_prefix(name));
+        line.map_or("?", str::trim)
+    };
+    let commit = field("commit-hash:");
+    format!(
+        "{} {}, LLVM {}",
+        field("release:"),
+        commit.get(..9).unwrap_or(commit),
+        field("LLVM version:")
+    )
 }
 
 fn memory() -> PathBuf {

@@ -1,11 +1,8 @@
 //! Values by category, with their spread: means over seeds, say, of several configurations.
 
-use super::mark::{Entry, Mark, Sample};
-
-use super::{Colour, ReportError, Scale, figure, palette};
-use plotly::common::{ErrorData, ErrorType, HoverInfo, Marker, Mode};
-use plotly::layout::{DragMode, HoverMode, TicksDirection};
-use plotly::{Plot as Plotly, Scatter};
+use super::drawing::{Axis, Curve, Drawing, Shape};
+use super::mark::Mark;
+use super::{Colour, ReportError, Scale};
 use serde::{Deserialize, Serialize};
 
 /// Share of a category's height over which its series are spread.
@@ -79,18 +76,6 @@ impl Spread {
 }
 
 impl Dots {
-    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
-        self.series
-            .iter()
-            .enumerate()
-            .map(|(index, series)| Entry {
-                name: &series.name,
-                colour: series.colour,
-                sample: Sample::Mark(Mark::nth(index)),
-            })
-            .collect()
-    }
-
     pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
         for series in &self.series {
             if series.values.len() != self.categories.len() {
@@ -118,7 +103,7 @@ impl Dots {
     }
 
     /// Where the dot of a series lies below the top category's middle, in categories.
-    pub(super) fn place(&self, category: usize, series: usize) -> f64 {
+    fn place(&self, category: usize, series: usize) -> f64 {
         let count = self.series.len() as f64;
         category as f64 + ((series as f64 + 0.5) / count - 0.5) * DODGE
     }
@@ -129,7 +114,7 @@ impl Dots {
     }
 
     /// Everything that must lie within the horizontal axis.
-    pub(super) fn extent(&self) -> impl Iterator<Item = f64> {
+    fn extent(&self) -> impl Iterator<Item = f64> {
         let zero = (self.scale == Scale::Linear).then_some(0.0);
         let values = self.series.iter().flat_map(|series| &series.values);
         values
@@ -138,7 +123,7 @@ impl Dots {
     }
 
     /// A category's name in lines that fit beside the drawing.
-    pub(super) fn name_lines(category: &str) -> Vec<String> {
+    fn name_lines(category: &str) -> Vec<String> {
         let mut lines: Vec<String> = Vec::new();
         for word in category.split_whitespace() {
             match lines.last_mut() {
@@ -152,76 +137,59 @@ impl Dots {
         lines
     }
 
-    pub(super) fn to_plotly(&self) -> Plotly {
-        let mut plot = Plotly::new();
+    pub(super) fn drawing(&self) -> Drawing {
         let step = 1e-6 * self.scale.span(self.extent());
-        let short = |value: f64| self.scale.shortened(value, step);
-        for (index, series) in self.series.iter().enumerate() {
-            let mark = Mark::nth(index);
-            let bar = |end: fn(&Spread) -> f64| -> Vec<f64> {
-                let length = |value: &Spread| (short(end(value)) - short(value.mean)).abs();
-                series.values.iter().map(length).collect()
+        let curves = self.series.iter().enumerate().map(|(index, series)| {
+            let ends = |end: fn(&Spread) -> f64| {
+                let values: Vec<f64> = series.values.iter().map(end).collect();
+                self.scale.shortened(&values, step)
             };
-            let spread: Vec<String> = series
-                .values
-                .iter()
-                .map(|v| format!("{} to {}", short(v.low), short(v.high)))
-                .collect();
-            let x: Vec<f64> = series.values.iter().map(|v| short(v.mean)).collect();
-            let y: Vec<f64> = (0..x.len()).map(|c| -self.place(c, index)).collect();
-            plot.add_trace(
-                Scatter::new(x, y)
-                    .name(&series.name)
-                    .mode(Mode::Markers)
-                    .marker(
-                        Marker::new()
-                            .size(8)
-                            .symbol(mark.plotly())
-                            .color(series.colour.light()),
-                    )
-                    .error_x(
-                        ErrorData::new(ErrorType::Data)
-                            .array(bar(|value| value.high))
-                            .array_minus(bar(|value| value.low))
-                            .symmetric(false)
-                            .color(series.colour.light())
-                            .thickness(1.4)
-                            .width(3),
-                    )
-                    .custom_data(spread)
-                    .hover_info(HoverInfo::All)
-                    .hover_template("%{x} (%{customdata})"),
-            );
-        }
-        let count = self.categories.len();
-        let names = self.categories.iter().map(|name| {
-            // The drawing takes markup in its texts.
-            Self::name_lines(name).join("<br>").replace('&', "&amp;")
+            let shape = Shape::Spread {
+                mark: Mark::nth(index).outline(4.0),
+                index,
+                low: ends(|value| value.low),
+                high: ends(|value| value.high),
+            };
+            let x = ends(|value| value.mean);
+            let y = (0..x.len()).map(|c| -self.place(c, index)).collect();
+            Curve::new(&series.name, series.colour, shape, (x, y))
         });
-        let value_axis = self.scale.apply(
-            figure::axis(&self.value_label)
-                .zero_line_color(palette::RULE.0)
-                .show_grid(true)
-                .ticks(TicksDirection::Outside),
-        );
-        let value_axis = match self.scale {
-            Scale::Linear => value_axis.range_mode(plotly::layout::RangeMode::ToZero),
-            Scale::Logarithmic => value_axis,
+        let x = Axis {
+            range: self.range(),
+            grid: true,
+            ..Axis::new(&self.value_label, self.scale)
         };
-        plot.set_layout(
-            figure::layout()
-                .x_axis(value_axis)
-                .y_axis(
-                    figure::axis("")
-                        .show_grid(false)
-                        .zero_line(false)
-                        .range(vec![0.5 - count as f64, 0.5])
-                        .tick_values((0..count).map(|c| -(c as f64)).collect())
-                        .tick_text(names.collect()),
-                )
-                .drag_mode(DragMode::Zoom)
-                .hover_mode(HoverMode::Closest),
-        );
-        plot
+        let names = self.categories.iter().enumerate();
+        let y = Axis {
+            range: Some((0.5 - self.categories.len() as f64, 0.5)),
+            ticks: names
+                .map(|(i, name)| (-(i as f64), Self::name_lines(name).join("\n")))
+                .collect(),
+            zero: false,
+            ..Axis::new("", Scale::Linear)
+        };
+        Drawing {
+            caption: String::new(),
+            x,
+            y,
+            equal: false,
+            curves: curves.collect(),
+            circles: Vec::new(),
+            texts: Vec::new(),
+        }
+    }
+
+    /// Ends of the horizontal axis: everything that must lie within it, and room for the marks.
+    fn range(&self) -> Option<(f64, f64)> {
+        let (low, high) = self
+            .scale
+            .reach(self.extent())
+            .filter(|(low, high)| low < high)?;
+        let pad = 0.04 * (high - low);
+        // Zero is an end where all values are on one side of it.
+        let is_zero = |end: f64| self.scale == Scale::Linear && end == 0.0;
+        let low = if is_zero(low) { low } else { low - pad };
+        let high = if is_zero(high) { high } else { high + pad };
+        Some((self.scale.value(low), self.scale.value(high)))
     }
 }

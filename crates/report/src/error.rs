@@ -85,8 +85,8 @@ pub enum ReportError {
         expected: &'static str,
     },
     /// An image that cannot be drawn.
-    #[error("the picture cannot be drawn: {reason}; the image as SVG can be written")]
-    Picture {
+    #[error("the image cannot be drawn: {reason}")]
+    Image {
         /// Why.
         reason: String,
     },
@@ -101,8 +101,8 @@ pub enum ReportError {
 }
 
 impl ReportError {
-    pub(super) fn picture(reason: impl std::fmt::Display) -> Self {
-        Self::Picture {
+    pub(super) fn image(reason: impl std::fmt::Display) -> Self {
+        Self::Image {
             reason: reason.to_string(),
         }
     }

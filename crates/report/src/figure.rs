@@ -1,14 +1,12 @@
-//! Figures, and their translation into plotly's description.
+//! Figures: a caption and one of the kinds of drawing.
+
+use serde::{Deserialize, Serialize};
 
 use super::dots::Dots;
+use super::drawing::Drawing;
 use super::lines::Lines;
-use super::mark::Entry;
 use super::polar::PolarDeviation;
-use super::{Colour, ReportError, palette};
-use plotly::Plot as Plotly;
-use plotly::common::{Anchor, DashType, Font, Line, Orientation, Title};
-use plotly::layout::{Axis, Layout, Legend, Margin};
-use serde::{Deserialize, Serialize};
+use super::{Colour, ReportError};
 
 /// A drawing with its caption.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -95,12 +93,12 @@ impl Style {
 }
 
 impl Figure {
-    /// Name and sample of everything drawn, in drawing order.
-    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
+    /// Number of entries in the legend.
+    pub(super) fn curve_count(&self) -> usize {
         match &self.plot {
-            Plot::Lines(lines) => lines.legend(),
-            Plot::PolarDeviation(circle) => circle.legend(),
-            Plot::Dots(dots) => dots.legend(),
+            Plot::Lines(lines) => lines.bands.len() + lines.series.len(),
+            Plot::PolarDeviation(circle) => circle.traces.len(),
+            Plot::Dots(dots) => dots.series.len(),
         }
     }
 
@@ -135,13 +133,15 @@ impl Figure {
         }
     }
 
-    /// The figure as plotly's JSON, with every sample.
-    pub(super) fn to_plotly(&self) -> Plotly {
-        match &self.plot {
-            Plot::Lines(lines) => lines.to_plotly(),
-            Plot::PolarDeviation(circle) => circle.to_plotly(),
-            Plot::Dots(dots) => dots.to_plotly(),
-        }
+    /// The figure as it is drawn, with every sample.
+    pub(super) fn drawing(&self) -> Drawing {
+        let mut drawing = match &self.plot {
+            Plot::Lines(lines) => lines.drawing(),
+            Plot::PolarDeviation(circle) => circle.drawing(),
+            Plot::Dots(dots) => dots.drawing(),
+        };
+        drawing.caption.clone_from(&self.caption);
+        drawing
     }
 }
 
@@ -168,78 +168,9 @@ pub(super) fn same_length(
     })
 }
 
-/// A text as it is printed: with the micro sign, which plain text does without. The word "us" is taken for a unit.
-pub(super) fn typeset(label: &str) -> String {
-    label
-        .split_inclusive(|c: char| !c.is_alphanumeric())
-        .map(|word| match word.strip_prefix('u') {
-            Some(rest)
-                if matches!(
-                    rest.trim_end_matches(|c: char| !c.is_alphanumeric()),
-                    "m" | "V" | "s"
-                ) =>
-            {
-                format!("µ{rest}")
-            }
-            _ => word.to_owned(),
-        })
-        .collect()
-}
-
-/// The line of a curve.
-pub(super) fn trace_line(style: Style) -> Line {
-    let dash = match style.dash {
-        Dash::Solid | Dash::Points => DashType::Solid,
-        Dash::Dashed => DashType::Dash,
-        Dash::Dotted => DashType::Dot,
-    };
-    Line::new()
-        .width(1.3)
-        .color(style.colour.light())
-        .dash(dash)
-        // Curves are thinned here, and to the eye; the library's own thinning makes smooth ones angular.
-        .simplify(false)
-}
-
-/// What all axes share.
-pub(super) fn axis(label: &str) -> Axis {
-    Axis::new()
-        .title(Title::with_text(typeset(label)).font(Font::new().size(13).color(palette::INK.0)))
-        .tick_font(Font::new().size(11).color(palette::LABEL.0))
-        .tick_color(palette::RULE.0)
-        .grid_color(palette::GRID.0)
-        .show_line(true)
-        .line_color(palette::RULE.0)
-        .auto_margin(true)
-}
-
-/// What all drawings share.
-pub(super) fn layout() -> Layout {
-    Layout::new()
-        .font(
-            Font::new()
-                .family("system-ui, -apple-system, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif")
-                .color(palette::INK.0),
-        )
-        .paper_background_color("rgba(0,0,0,0)")
-        .plot_background_color("rgba(0,0,0,0)")
-        .margin(Margin::new().left(56).right(12).top(8).bottom(44))
-        // The page has a legend of its own, which wraps on a narrow screen; saved images get this one.
-        .show_legend(false)
-        .legend(
-            Legend::new()
-                .orientation(Orientation::Horizontal)
-                .x(0.0)
-                .x_anchor(Anchor::Left)
-                .y(1.02)
-                .y_anchor(Anchor::Bottom)
-                .font(Font::new().size(12).color(palette::INK.0)),
-        )
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Dash, Figure, Plot, Style, typeset};
+    use super::{Dash, Figure, Plot, Style};
     use crate::{Colour, Lines, ReportError, Series};
 
     fn figure(x: Vec<f64>, y: Vec<f64>) -> Figure {
@@ -272,12 +203,11 @@ mod tests {
 
     #[test]
     fn numbers_are_short_and_gaps_are_null() {
-        let json = figure(
+        let figure = figure(
             vec![0.0, 0.1 + 0.2, 1.0],
             vec![0.123_456_789, f64::NAN, 1.0],
-        )
-        .to_plotly()
-        .to_json();
+        );
+        let json = serde_json::to_string(&figure.drawing()).unwrap();
         assert!(json.contains("\"x\":[0.0,0.3,1.0]"), "{json}");
         assert!(json.contains("\"y\":[0.123457,null,1.0]"), "{json}");
     }
@@ -295,13 +225,5 @@ mod tests {
                 dash: Dash::Solid
             }
         );
-    }
-
-    #[test]
-    fn micro_is_printed_in_units_only() {
-        assert_eq!(typeset("tracking error (um)"), "tracking error (µm)");
-        assert_eq!(typeset("um/s"), "µm/s");
-        assert_eq!(typeset("sum of um, uV"), "sum of µm, µV");
-        assert_eq!(typeset("us per umbra"), "µs per umbra");
     }
 }

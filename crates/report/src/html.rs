@@ -1,9 +1,8 @@
 //! The page as HTML, with everything a browser needs in one file.
 
-use super::figure::typeset;
-use super::mark::SAMPLE;
+use super::drawing::{Curve, Drawing, Shape, typeset};
 use super::page::{Content, Numbered, Part};
-use super::{Figure, Page, Plot, Provenance, ReportError, Table, palette};
+use super::{Figure, Page, Plot, Provenance, ReportError, Table};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 use percent_encoding::{NON_ALPHANUMERIC, utf8_percent_encode};
 use std::path::Path;
@@ -17,6 +16,16 @@ const UNFOLDED: usize = 30;
 /// Settles the colours before anything is drawn; storage may be closed to pages from files.
 const THEME: &str = "try{const t=localStorage.getItem('quadrant-theme');\
                      if(t==='light'||t==='dark')document.documentElement.dataset.theme=t}catch{}";
+
+/// Draws the figures, and does what the page does beyond them.
+const SCRIPT: &str = concat!(
+    "\"use strict\";\n",
+    include_str!("chart.js"),
+    include_str!("page.js")
+);
+
+/// The box a sample of a legend fills, px.
+const SAMPLE: (f64, f64) = (26.0, 10.0);
 
 impl Page {
     /// The page as HTML. The same data give the same bytes.
@@ -60,9 +69,7 @@ impl Page {
                              kept, so that no spike is lost. Drag over a figure to zoom, double-click to go back."
                         }
                     }
-                    (json(Some("palette"), &palette_json()))
-                    (PreEscaped(plotting_library()))
-                    script { (PreEscaped(include_str!("page.js"))) }
+                    script { (PreEscaped(SCRIPT)) }
                 }
             }
         };
@@ -160,10 +167,11 @@ impl Numbered<'_> {
                 }
             },
             Content::Figure(figure) => html! {
+                @let drawn = figure.decimated(points_per_series).drawing();
                 figure.plot id=(figure.id) {
                     (drawing(figure))
-                    (legend_markup(figure))
-                    (json(None, &figure.decimated(points_per_series).to_plotly().to_json()))
+                    (legend(&drawn.curves))
+                    (json(&drawn))
                     figcaption { (caption(figure.note())) }
                     (short_provenance(made))
                 }
@@ -185,20 +193,30 @@ fn drawing(figure: &Figure) -> Markup {
 }
 
 /// The curves' names beside a sample of each line; a press hides the curve and shows it again.
-fn legend_markup(figure: &Figure) -> Markup {
+fn legend(curves: &[Curve]) -> Markup {
     let (width, height) = SAMPLE;
     html! {
         div.legend {
-            @for entry in figure.legend() {
-                @let (light, dark) = (entry.colour.light(), entry.colour.dark());
+            @for curve in curves {
+                @let (light, dark) = curve.colour;
                 button type="button" aria-pressed="true" {
-                    svg viewBox={ "0 0 " (width) " " (height) } width=(width) height=(height) aria-hidden="true"
-                        style={ "color:" (light) ";color:light-dark(" (light) "," (dark) ")" } {
-                        (entry.sample.markup("currentColor"))
-                    }
-                    span { (whole_words(&typeset(entry.name))) }
+                    svg.chart viewBox={ "0 0 " (width) " " (height) } width=(width) height=(height) aria-hidden="true"
+                        style={ "color:" (light) ";color:light-dark(" (light) "," (dark) ")" } { (sample(&curve.shape)) }
+                    span { (whole_words(&typeset(&curve.name))) }
                 }
             }
+        }
+    }
+}
+
+fn sample(shape: &Shape) -> Markup {
+    let (width, height) = SAMPLE;
+    let middle = height / 2.0;
+    html! {
+        @match shape {
+            Shape::Line { dash, .. } => path.stroke d={ "M0 " (middle) "H" (width) } stroke-dasharray=[*dash] {},
+            Shape::Band { .. } => path.band d={ "M0 0H" (width) "V" (height) "H0Z" } {},
+            Shape::Points { mark } | Shape::Spread { mark, .. } => path.mark d={ "M" (width / 2.0) " " (middle) (mark) } {},
         }
     }
 }
@@ -247,21 +265,7 @@ fn download(table: &Table) -> Markup {
 }
 
 /// Data for the page's script. JSON may hold "</", which would end the element; "<" can be escaped in JSON.
-fn json(id: Option<&str>, json: &str) -> Markup {
-    html! { script type="application/json" id=[id] { (PreEscaped(json.replace('<', "\\u003c"))) } }
-}
-
-fn palette_json() -> String {
-    let pairs = palette::PAIRS.map(|(light, dark)| format!("\"{light}\":\"{dark}\""));
-    format!("{{{}}}", pairs.join(","))
-}
-
-/// plotly.js as a script element, without the formula renderer that comes with it: 2 MB which no figure uses.
-fn plotting_library() -> String {
-    const END: &str = "</script>";
-    let mut scripts = plotly::Plot::offline_js_sources();
-    if let Some(end) = scripts.find(END) {
-        scripts.truncate(end + END.len());
-    }
-    scripts
+fn json(drawing: &Drawing) -> Markup {
+    let json = serde_json::to_string(drawing).expect("a drawing has nothing JSON cannot hold");
+    html! { script type="application/json" { (PreEscaped(json.replace('<', "\\u003c"))) } }
 }

@@ -1,11 +1,9 @@
 //! Curves over a common axis, and paths in a plane.
 
-use super::figure::{axis, layout, pick, same_length, trace_line};
-use super::mark::{BAND_OPACITY, Entry, Sample};
-use super::{Colour, Dash, ReportError, Scale, Style, decimate, palette};
-use plotly::common::{Fill, HoverInfo, Line, Marker, Mode};
-use plotly::layout::{DragMode, HoverMode, TicksDirection};
-use plotly::{Plot as Plotly, Scatter};
+use super::drawing::{Axis, Curve, Drawing, Shape};
+use super::figure::{pick, same_length};
+use super::mark::Mark;
+use super::{Colour, Dash, ReportError, Scale, Style, decimate};
 use serde::{Deserialize, Serialize};
 
 /// Curves over a common axis, or paths in a plane.
@@ -79,42 +77,9 @@ impl Band {
             colour: self.colour,
         }
     }
-
-    /// Outlines of the parts between gaps: along the lower edge, and back along the upper one.
-    pub(super) fn outlines(&self, x: Scale, y: Scale) -> Vec<Vec<(f64, f64)>> {
-        let has_place = |&i: &usize| {
-            x.place(self.x[i]).is_finite()
-                && y.place(self.low[i]).is_finite()
-                && y.place(self.high[i]).is_finite()
-        };
-        let samples: Vec<usize> = (0..self.x.len()).collect();
-        samples
-            .split(|i| !has_place(i))
-            .filter(|part| part.len() > 1)
-            .map(|part| {
-                let low = part.iter().map(|&i| (self.x[i], self.low[i]));
-                let high = part.iter().rev().map(|&i| (self.x[i], self.high[i]));
-                low.chain(high).collect()
-            })
-            .collect()
-    }
 }
 
 impl Lines {
-    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
-        let bands = self.bands.iter().map(|band| Entry {
-            name: &band.name,
-            colour: band.colour,
-            sample: Sample::Band,
-        });
-        let series = self.series.iter().map(|series| Entry {
-            name: &series.name,
-            colour: series.style.colour,
-            sample: Sample::Line(series.style.dash),
-        });
-        bands.chain(series).collect()
-    }
-
     pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
         for band in &self.bands {
             same_length(figure, &band.name, band.x.len(), band.low.len())?;
@@ -163,66 +128,60 @@ impl Lines {
             .copied()
     }
 
-    pub(super) fn to_plotly(&self) -> Plotly {
-        let mut plot = Plotly::new();
+    pub(super) fn drawing(&self) -> Drawing {
         // A hundred-thousandth of what an axis spans is a hundredth of a pixel: digits beyond it only cost bytes. The
         // abscissas keep one digit more, for zooming into a long run.
         let x_step = 1e-6 * self.x_scale.span(self.abscissas());
         let y_step = 1e-5 * self.y_scale.span(self.ordinates());
-        let short_x = |&x: &f64| self.x_scale.shortened(x, x_step);
-        let short_y = |&y: &f64| self.y_scale.shortened(y, y_step);
-        for band in &self.bands {
-            let mut outline: Vec<(f64, f64)> = Vec::new();
-            for part in band.outlines(self.x_scale, self.y_scale) {
-                outline.extend(part.iter().map(|(x, y)| (short_x(x), short_y(y))));
-                outline.push((f64::NAN, f64::NAN));
-            }
-            let (x, y): (Vec<f64>, Vec<f64>) = outline.into_iter().unzip();
-            plot.add_trace(
-                Scatter::new(x, y)
-                    .name(&band.name)
-                    .mode(Mode::Lines)
-                    .line(Line::new().width(0.0).simplify(false))
-                    .fill(Fill::ToSelf)
-                    .fill_color(band.colour.light())
-                    .opacity(BAND_OPACITY)
-                    .hover_info(HoverInfo::Skip),
-            );
-        }
-        for series in &self.series {
-            let x: Vec<f64> = series.x.iter().map(short_x).collect();
-            let y: Vec<f64> = series.y.iter().map(short_y).collect();
-            let trace = Scatter::new(x, y).name(&series.name);
-            plot.add_trace(match series.style.dash {
-                Dash::Points => trace
-                    .mode(Mode::Markers)
-                    .marker(Marker::new().size(5).color(series.style.colour.light())),
-                Dash::Solid | Dash::Dashed | Dash::Dotted => {
-                    trace.mode(Mode::Lines).line(trace_line(series.style))
-                }
-            });
-        }
-        let x_axis = axis(&self.x_label)
-            .show_grid(self.x_scale == Scale::Logarithmic)
-            .zero_line_color(palette::RULE.0)
-            .ticks(TicksDirection::Outside);
-        let y_axis = axis(&self.y_label).zero_line_color(palette::RULE.0);
-        let y_axis = if self.equal_units {
-            y_axis.scale_anchor("x")
-        } else {
-            y_axis
+        let short_x = |values: &[f64]| self.x_scale.shortened(values, x_step);
+        let short_y = |values: &[f64]| self.y_scale.shortened(values, y_step);
+        let bands = self.bands.iter().map(|band| {
+            let shape = Shape::Band {
+                high: short_y(&band.high),
+            };
+            let edge = (short_x(&band.x), short_y(&band.low));
+            Curve::new(&band.name, band.colour, shape, edge)
+        });
+        let series = self.series.iter().map(|series| {
+            let shape = match series.style.dash {
+                Dash::Points => Shape::Points {
+                    mark: Mark::Circle.outline(2.4),
+                },
+                dash => Shape::Line {
+                    dash: dash.pattern(),
+                    deviation: None,
+                },
+            };
+            let samples = (short_x(&series.x), short_y(&series.y));
+            Curve::new(&series.name, series.style.colour, shape, samples)
+        });
+        let curves = bands.chain(series).collect();
+        let has_points = self.series.iter().any(|s| s.style.dash == Dash::Points);
+        let x = Axis {
+            // Curves over time begin at the axis; marks, and paths in a plane, need room on all sides.
+            margin: if self.equal_units || has_points {
+                0.03
+            } else {
+                0.0
+            },
+            grid: self.equal_units || self.x_scale == Scale::Logarithmic,
+            ..Axis::new(&self.x_label, self.x_scale)
         };
-        let y_axis = match self.y_range {
-            Some((low, high)) => y_axis.range(vec![low, high]),
-            None => y_axis,
+        let y = Axis {
+            range: self.y_range,
+            margin: 0.05,
+            grid: true,
+            ..Axis::new(&self.y_label, self.y_scale)
         };
-        let layout = layout()
-            .x_axis(self.x_scale.apply(x_axis))
-            .y_axis(self.y_scale.apply(y_axis))
-            .drag_mode(DragMode::Zoom)
-            .hover_mode(HoverMode::Closest);
-        plot.set_layout(layout);
-        plot
+        Drawing {
+            caption: String::new(),
+            x,
+            y,
+            equal: self.equal_units,
+            curves,
+            circles: Vec::new(),
+            texts: Vec::new(),
+        }
     }
 }
 
@@ -232,7 +191,7 @@ mod tests {
     use crate::{Colour, Scale, Style};
 
     fn json(lines: Lines) -> String {
-        lines.decimated(100).to_plotly().to_json()
+        serde_json::to_string(&lines.decimated(100).drawing()).unwrap()
     }
 
     fn lines(style: Style) -> Lines {
@@ -265,13 +224,13 @@ mod tests {
         });
         assert!(json.contains("\"x\":[null,1.0,10.0]"), "{json}");
         assert!(json.contains("123.457"), "{json}");
-        assert!(json.contains("\"type\":\"log\""), "{json}");
+        assert!(json.contains("\"log\":true"), "{json}");
     }
 
     #[test]
     fn points_are_marks_and_not_joined() {
         let json = json(lines(Style::points(Colour::Blue)));
-        assert!(json.contains("\"mode\":\"markers\""), "{json}");
+        assert!(json.contains("\"kind\":\"points\""), "{json}");
     }
 
     #[test]
@@ -280,7 +239,7 @@ mod tests {
             equal_units: true,
             ..lines(Style::solid(Colour::Blue))
         });
-        assert!(json.contains("\"scaleanchor\":\"x\""), "{json}");
+        assert!(json.contains("\"equal\":true"), "{json}");
     }
 
     #[test]
@@ -301,13 +260,16 @@ mod tests {
         let thin = band.decimated(200);
         assert!(thin.x.len() <= 200, "{}", thin.x.len());
         assert!(thin.low.contains(&-9.0) && thin.high.contains(&9.0));
-        let outlines = thin.outlines(Scale::Linear, Scale::Linear);
-        assert_eq!(outlines.len(), 2);
+        let lines = Lines {
+            bands: vec![thin],
+            ..Lines::default()
+        };
+        let runs = lines.drawing().curves[0].runs();
+        assert_eq!(runs.len(), 2);
         assert!(
-            outlines
+            runs.concat()
                 .iter()
-                .flatten()
-                .all(|(x, y)| x.is_finite() && y.is_finite())
+                .all(|&i| lines.bands[0].high[i].is_finite())
         );
     }
 }

@@ -1,15 +1,9 @@
 //! The circle test, drawn as a ball-bar instrument draws it.
 
-use super::figure::{Style, pick, same_length, trace_line};
-use super::mark::{Entry, Sample};
+use super::drawing::{Axis, Circle, Curve, Drawing, Shape, Text};
+use super::figure::{Style, pick, same_length};
 use super::scale::rounded;
-use super::{ReportError, decimate, palette};
-use plotly::common::{Anchor, DashType, Font, HoverInfo, Mode};
-use plotly::layout::{
-    Annotation, Axis, DragMode, HoverMode, Layout, Shape, ShapeLayer, ShapeLine, ShapeType,
-    TicksDirection,
-};
-use plotly::{Plot as Plotly, Scatter};
+use super::{ReportError, Scale, decimate};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
@@ -18,7 +12,7 @@ const DEVIATION_SHARE: f64 = 0.3;
 /// Most division circles on either side of the nominal circle.
 const DIVISIONS: f64 = 3.0;
 /// Where divisions are labelled: on the diagonal, away from the axes, where the quadrant glitches are; rad.
-pub(super) const LABEL_ANGLE: f64 = TAU / 8.0;
+const LABEL_ANGLE: f64 = TAU / 8.0;
 
 /// Radial deviation from a circle, magnified.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -82,17 +76,6 @@ impl PolarDeviation {
         }
     }
 
-    pub(super) fn legend(&self) -> Vec<Entry<'_>> {
-        self.traces
-            .iter()
-            .map(|trace| Entry {
-                name: &trace.name,
-                colour: trace.style.colour,
-                sample: Sample::Line(trace.style.dash),
-            })
-            .collect()
-    }
-
     pub(super) fn check(&self, figure: &str) -> Result<(), ReportError> {
         if !(self.radius_mm.is_finite() && self.radius_mm > 0.0) {
             return Err(ReportError::Radius {
@@ -141,55 +124,81 @@ impl PolarDeviation {
         )
     }
 
-    pub(super) fn to_plotly(&self) -> Plotly {
+    pub(super) fn drawing(&self) -> Drawing {
         let scale = self.magnification();
-        let mut plot = Plotly::new();
-        for trace in &self.traces {
-            let (x, y): (Vec<f64>, Vec<f64>) = (0..trace.angle_rad.len())
-                .map(|i| self.drawn(scale, trace.angle_rad[i], trace.deviation_um[i]))
-                .map(|(x, y)| {
-                    let short = |place| rounded(place, self.radius_mm * 1e-5);
-                    (short(x), short(y))
-                })
+        let curves = self.traces.iter().map(|trace| {
+            let samples = trace.angle_rad.iter().zip(&trace.deviation_um);
+            let short = |place| rounded(place, self.radius_mm * 1e-5);
+            let places = samples
+                .map(|(&angle, &deviation)| self.drawn(scale, angle, deviation))
+                .map(|(x, y)| (short(x), short(y)))
                 .unzip();
-            let deviation: Vec<f64> = trace
-                .deviation_um
-                .iter()
-                .map(|deviation| rounded(*deviation, scale.division_um * 1e-3))
-                .collect();
-            plot.add_trace(
-                Scatter::new(x, y)
-                    .mode(Mode::Lines)
-                    .name(&trace.name)
-                    .line(trace_line(trace.style))
-                    .custom_data(deviation)
-                    .hover_info(HoverInfo::All)
-                    .hover_template("%{customdata} µm"),
-            );
+            let deviation = Scale::Linear.shortened(&trace.deviation_um, scale.division_um * 1e-3);
+            let shape = Shape::Line {
+                dash: trace.style.dash.pattern(),
+                deviation: Some(deviation),
+            };
+            Curve::new(&trace.name, trace.style.colour, shape, places)
+        });
+        let divisions = self.divisions(scale);
+        let circles = divisions.iter().map(|&(radius, um)| Circle {
+            radius,
+            nominal: um == 0.0,
+        });
+        // The scale stands where ball-bar plots have it: in the empty centre.
+        let centre = scale.lines().into_iter().zip([-5.0, 14.0]);
+        let centre = centre.map(|(text, dy)| Text {
+            x: 0.0,
+            y: 0.0,
+            dy,
+            anchor: "middle",
+            text,
+        });
+        let ends = [divisions.first(), divisions.last()].into_iter().flatten();
+        let labels = ends.map(|&(radius, um)| {
+            let is_inside = um < 0.0;
+            Text {
+                x: radius * LABEL_ANGLE.cos(),
+                y: radius * LABEL_ANGLE.sin(),
+                dy: if is_inside { 12.0 } else { -4.0 },
+                anchor: if is_inside { "end" } else { "start" },
+                text: division_label(um),
+            }
+        });
+        let reach = self.reach_mm(scale);
+        let axis = |label: &str| Axis {
+            range: Some((-reach, reach)),
+            ticks: [-self.radius_mm, 0.0, self.radius_mm]
+                .map(|at| (at, at.to_string().replace('-', "\u{2212}")))
+                .into(),
+            zero: false,
+            ..Axis::new(label, Scale::Linear)
+        };
+        Drawing {
+            caption: String::new(),
+            x: axis(&self.x_label),
+            y: axis(&self.y_label),
+            equal: true,
+            curves: curves.collect(),
+            circles: circles.collect(),
+            texts: centre.chain(labels).collect(),
         }
-        plot.set_layout(self.layout(scale));
-        plot
     }
 
     /// Where a sample is drawn, mm from the centre.
-    pub(super) fn drawn(
-        &self,
-        scale: Magnification,
-        angle_rad: f64,
-        deviation_um: f64,
-    ) -> (f64, f64) {
+    fn drawn(&self, scale: Magnification, angle_rad: f64, deviation_um: f64) -> (f64, f64) {
         let radius = self.radius_mm + scale.factor * deviation_um * 1e-3;
         (radius * angle_rad.cos(), radius * angle_rad.sin())
     }
 
     /// What is drawn of the plane on either side of the centre, mm.
-    pub(super) fn reach_mm(&self, scale: Magnification) -> f64 {
+    fn reach_mm(&self, scale: Magnification) -> f64 {
         let reach_um = scale.divisions as f64 * scale.division_um;
         1.06 * (self.radius_mm + scale.factor * reach_um * 1e-3)
     }
 
     /// Radii of the division circles, mm as drawn, with the deviation they stand for, um; from the innermost.
-    pub(super) fn divisions(&self, scale: Magnification) -> Vec<(f64, f64)> {
+    fn divisions(&self, scale: Magnification) -> Vec<(f64, f64)> {
         let reach = scale.divisions as isize;
         (-reach..=reach)
             .map(|division| {
@@ -198,76 +207,11 @@ impl PolarDeviation {
             })
             .collect()
     }
-
-    fn layout(&self, scale: Magnification) -> Layout {
-        let divisions = self.divisions(scale);
-        let circles = divisions.iter().map(|&(r, um)| {
-            let line = if um == 0.0 {
-                ShapeLine::new()
-                    .color(palette::LABEL.0)
-                    .width(1.0)
-                    .dash(DashType::Dash)
-            } else {
-                ShapeLine::new().color(palette::GRID.0).width(1.0)
-            };
-            Shape::new()
-                .shape_type(ShapeType::Circle)
-                .layer(ShapeLayer::Below)
-                .x0(-r)
-                .x1(r)
-                .y0(-r)
-                .y1(r)
-                .line(line)
-        });
-        // The scale stands where ball-bar plots have it: in the empty centre.
-        let centre = Annotation::new()
-            .text(scale.lines().join("<br>"))
-            .x(0.0)
-            .y(0.0)
-            .show_arrow(false)
-            .font(Font::new().size(12).color(palette::LABEL.0));
-        let ends = [divisions.first(), divisions.last()];
-        let labels = ends.into_iter().flatten().map(|&(radius, um)| {
-            let is_inside = um < 0.0;
-            Annotation::new()
-                .text(division_label(um))
-                .x(radius * LABEL_ANGLE.cos())
-                .y(radius * LABEL_ANGLE.sin())
-                .x_anchor(if is_inside {
-                    Anchor::Right
-                } else {
-                    Anchor::Left
-                })
-                .y_anchor(if is_inside {
-                    Anchor::Top
-                } else {
-                    Anchor::Bottom
-                })
-                .show_arrow(false)
-                .font(Font::new().size(10).color(palette::LABEL.0))
-        });
-        let range = self.reach_mm(scale);
-        let axis = |label: &str| {
-            super::figure::axis(label)
-                .range(vec![-range, range])
-                .show_grid(false)
-                .ticks(TicksDirection::Outside)
-                .tick_values(vec![-self.radius_mm, 0.0, self.radius_mm])
-                .zero_line_color(palette::GRID.0)
-        };
-        super::figure::layout()
-            .x_axis(axis(&self.x_label))
-            .y_axis(Axis::scale_anchor(axis(&self.y_label), "x"))
-            .drag_mode(DragMode::Zoom)
-            .hover_mode(HoverMode::Closest)
-            .shapes(circles.collect())
-            .annotations(std::iter::once(centre).chain(labels).collect())
-    }
 }
 
 impl Magnification {
     /// What stands in the centre.
-    pub(super) fn lines(&self) -> [String; 2] {
+    fn lines(&self) -> [String; 2] {
         [
             format!("× {}", self.factor),
             format!("{} µm/div", self.division_um),
@@ -276,7 +220,7 @@ impl Magnification {
 }
 
 /// What a division circle is called.
-pub(super) fn division_label(um: f64) -> String {
+fn division_label(um: f64) -> String {
     format!("{um:+} µm").replace('-', "\u{2212}")
 }
 

@@ -1,6 +1,5 @@
 //! Scales of axes.
 
-use plotly::layout::{Axis, AxisType};
 use serde::{Deserialize, Serialize};
 
 /// The scale of an axis.
@@ -20,6 +19,14 @@ impl Scale {
             Self::Linear => value,
             Self::Logarithmic if value > 0.0 => value.log10(),
             Self::Logarithmic => f64::NAN,
+        }
+    }
+
+    /// The value at a place.
+    pub(super) fn value(self, place: f64) -> f64 {
+        match self {
+            Self::Linear => place,
+            Self::Logarithmic => 10f64.powf(place),
         }
     }
 
@@ -44,21 +51,15 @@ impl Scale {
         self.reach(values).map_or(0.0, |(low, high)| high - low)
     }
 
-    /// `value` with no more digits than a drawing needs that resolves `step` of the axis.
-    pub(super) fn shortened(self, value: f64, step: f64) -> f64 {
-        match self {
+    /// The values with no more digits than a drawing needs that resolves `step` of the axis.
+    pub(super) fn shortened(self, values: &[f64], step: f64) -> Vec<f64> {
+        let short = |&value: &f64| match self {
             Self::Linear => rounded(value, step),
             // On decades a step is a share of the value.
             Self::Logarithmic if value > 0.0 => rounded(value, step * value),
             Self::Logarithmic => f64::NAN,
-        }
-    }
-
-    pub(super) fn apply(self, axis: Axis) -> Axis {
-        match self {
-            Self::Linear => axis,
-            Self::Logarithmic => axis.type_(AxisType::Log),
-        }
+        };
+        values.iter().map(short).collect()
     }
 }
 

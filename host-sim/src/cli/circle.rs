@@ -5,13 +5,13 @@ use std::path::PathBuf;
 use anyhow::{Context, ensure};
 use clap::{Args, ValueEnum};
 use quadrant::reference::Plane;
-use quadrant_sim::experiment::circle::{CircleRequest, run_circle_tests};
-use quadrant_sim::experiment::comparison::Configuration;
-use quadrant_sim::experiment::compensator::{Setup, identified};
-use quadrant_sim::presentation::{circle_page, circle_tables, provenance};
+use quadrant_sim::circle::page::{circle_page, circle_tables};
+use quadrant_sim::circle::{CircleRequest, run_circle_tests};
+use quadrant_sim::command::output::{Output, command_line, progress};
+use quadrant_sim::experiment::configuration::Configuration;
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::settings_file::SettingsFile;
-
-use super::output::{Output, command_line, progress};
 
 /// A plane, as G17 to G19 select it.
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -75,9 +75,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let stage = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => identified()?.stage,
+        None => identified_settings()?.stage,
     };
-    let setup = Setup::virtual_machine(stage);
+    let setup = RunConfiguration::identified(stage);
     let last_seed = output.seed.checked_add(arguments.seeds - 1);
     let last_seed =
         last_seed.context("--seed plus --seeds is beyond 2^64; choose a smaller one")?;

@@ -7,18 +7,18 @@ use std::time::Duration;
 use clap::Args;
 use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant_sim::commission::page::{commission_page, gains_table, verdict_table};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
-use quadrant_sim::presentation::{
-    commission_page, friction_table, gains_table, gms_table, motor_constant_table, plant_tables,
-    provenance, revise_table, verdict_table,
-};
+use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
+use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
+use quadrant_sim::identify::pages::revise::revise_table;
+use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
 use quadrant_sim::rig::Rig;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
-
-use super::identify::rig::Axis;
-use super::output::{Output, command_line, share};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]

@@ -6,21 +6,14 @@ mod compare;
 mod completions;
 mod connect;
 mod design;
-mod friction;
 mod identify;
-mod laws;
-mod numerics;
-mod output;
-mod outputs;
 mod replay;
 mod replay_program;
-mod report;
-mod robustness;
 mod settings;
 
 use clap::{Parser, Subcommand};
 
-/// Servo control that removes friction's quadrant glitches: the simulated stage and the experiments on it.
+/// Servo control that removes friction's quadrant glitches: identify, design, commission, test and talk to a machine.
 ///
 /// Without a command, `compare` runs.
 #[derive(Debug, Parser)]
@@ -46,27 +39,12 @@ enum Command {
     /// Design a controller on a model of the axis or on a measured frequency response.
     #[command(subcommand)]
     Design(design::Command),
-    /// Show what each friction model can do, on the same motions: loops, memory, drift, lag.
-    Friction(friction::Arguments),
     /// Identify an axis: its linear model, its friction, from experiments or from recordings.
     #[command(subcommand)]
     Identify(identify::Command),
-    /// Compare all feedback laws, tuned with equal effort at equal robustness, and see what feedforward is worth when its
-    /// model is wrong.
-    Laws(laws::Arguments),
-    /// Say what the number type costs: f32 and fixed point against f64 over the whole comparison.
-    Numerics(numerics::Arguments),
-    /// Say what the amplifiers' outputs cost: 16 bits against 12 bits, plain and with the error shaped.
-    Outputs(outputs::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did, or along a part program in
     /// G-code.
     Replay(replay::Arguments),
-    /// Every table and figure of the thesis' chapters 3 to 5 on the simulated stage, in one page: under five minutes on two
-    /// cores. An interrupted report goes on where it stopped.
-    Report(report::Arguments),
-    /// Say what becomes of tracking when mass, friction, delay, amplifier, encoder or drive change, or a tool cuts: named
-    /// scenarios on the simulated stage.
-    Robustness(robustness::Arguments),
     /// Say what every setting of the firmware means: its path, unit, range and default.
     Settings(settings::Arguments),
 }
@@ -81,14 +59,8 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Completions(arguments)) => completions::run(&arguments),
         Some(Command::Connect(arguments)) => connect::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
-        Some(Command::Friction(arguments)) => friction::run(&arguments),
         Some(Command::Identify(command)) => identify::run(&command),
-        Some(Command::Laws(arguments)) => laws::run(&arguments),
-        Some(Command::Numerics(arguments)) => numerics::run(&arguments),
-        Some(Command::Outputs(arguments)) => outputs::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
-        Some(Command::Report(arguments)) => report::run(&arguments),
-        Some(Command::Robustness(arguments)) => robustness::run(&arguments),
         Some(Command::Settings(arguments)) => settings::run(&arguments),
     }
 }

@@ -4,13 +4,17 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use clap::Args;
-use quadrant_sim::experiment::compensator::Setup;
-use quadrant_sim::experiment::recorded::{self, RecordedAxis};
-use quadrant_sim::presentation::{provenance, recorded_page, recorded_table};
+use quadrant_sim::command::output::{Output, progress};
+use quadrant_sim::experiment::run_configuration::{
+    ModelKnowledge, RunConfiguration, identified_settings,
+};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Record;
+use quadrant_sim::replay::recorded;
+use quadrant_sim::replay::recorded::RecordedAxis;
+use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
 use quadrant_sim::settings_file::SettingsFile;
 
-use super::output::{Output, progress};
 use super::replay_program::{self, ProgramOptions};
 
 /// Options of `quadrant replay`.
@@ -31,8 +35,12 @@ pub(super) struct Arguments {
     axis: Option<RecordedAxis>,
     #[command(flatten)]
     program: ProgramOptions,
-    /// Settings of the simulated stage's control law, as `quadrant commission` leaves them; the stage then has
-    /// everything a real one has. Without them the law knows the stage's own parameters.
+    /// Model that the law has of the simulated stage: as identified, on a stage with noise, offset and ripple, or exact, on
+    /// one without. The controllers are the same.
+    #[arg(long, value_enum, default_value = "identified")]
+    model: ModelKnowledge,
+    /// Settings of the simulated stage's control law, as `quadrant commission` leaves them; without them, those that
+    /// commissioning the simulated stage gave.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     #[command(flatten)]
@@ -44,6 +52,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         reference,
         axis,
         program,
+        model,
         settings,
         output,
     } = arguments;
@@ -51,10 +60,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         settings.is_none() || *axis != Some(RecordedAxis::Emps),
         "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
     );
-    let setup = match settings {
-        Some(path) => Setup::virtual_machine(SettingsFile::read(path)?.stage),
-        None => Setup::matched(),
+    let stage = match settings {
+        Some(path) => SettingsFile::read(path)?.stage,
+        None => identified_settings()?.stage,
     };
+    let setup = RunConfiguration::new(*model, stage);
     if let Some(path) = &program.gcode {
         return replay_program::run(path, program, &setup, output);
     }
@@ -74,8 +84,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let settings = settings.map_or_else(String::new, |path| {
         format!(" --settings {}", path.display())
     });
+    let model = match model {
+        ModelKnowledge::Identified => "",
+        ModelKnowledge::Exact => " --model exact",
+    };
     let command = format!(
-        "quadrant replay --reference {} --axis {}{settings} --seed {}",
+        "quadrant replay --reference {} --axis {}{model}{settings} --seed {}",
         reference
             .file_name()
             .unwrap_or(reference.as_os_str())

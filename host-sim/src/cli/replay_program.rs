@@ -3,14 +3,14 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use quadrant_sim::experiment::comparison::Configuration;
-use quadrant_sim::experiment::compensator::Setup;
-use quadrant_sim::experiment::part_program::{ProgramOutcome, ProgramTables, run_program};
-use quadrant_sim::presentation::{motion_summary_table, program_page, program_table, provenance};
-use quadrant_sim::program::{Limits, Program, Trajectory};
+use quadrant_sim::command::output::{Output, command_line, progress};
+use quadrant_sim::experiment::configuration::Configuration;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::gcode::{Limits, Program, Trajectory};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::record::write_trace;
-
-use super::output::{Output, command_line, progress};
+use quadrant_sim::replay::part_program::{ProgramOutcome, ProgramTables, run_program};
+use quadrant_sim::replay::part_program_page::{motion_summary_table, program_page, program_table};
 
 /// Options of `quadrant replay --gcode`.
 #[derive(Clone, Debug, Args)]
@@ -40,7 +40,7 @@ const TRACE_TICKS: usize = 10;
 pub(super) fn run(
     path: &Path,
     options: &ProgramOptions,
-    setup: &Setup,
+    setup: &RunConfiguration,
     output: &Output,
 ) -> anyhow::Result<()> {
     let program = Program::read(path)?;

@@ -23,10 +23,10 @@ use crate::identify::static_friction::{
 use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveError, VirginCurveSettings};
 use crate::rig::{Recording, Rig, approach};
 
-/// What a commissioning is asked for.
+/// Parameters of a commissioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommissionSettings {
-    /// What the PID is designed for, on the continuous loop.
+    /// Design target of the PID, on the continuous loop.
     pub target: Target,
     /// Share of the Popov bound that the nonlinear gain may take, 0 to 1.
     pub sector_share: f64,
@@ -62,7 +62,6 @@ pub struct Commissioned {
     pub motor: MotorConstant,
     /// The response of the sliding axis.
     pub response: FrfMeasurement,
-    /// The linear model.
     pub plant: PlantFit,
     /// Margins of the PID with sampling at the control rate.
     pub margins: Result<Margins, MarginError>,
@@ -72,9 +71,8 @@ pub struct Commissioned {
     pub presliding: (GmsFit, Recording),
     /// The Popov bound of the nonlinear gain.
     pub sector_bound: f64,
-    /// The finished settings.
     pub settings: AxisSettings,
-    /// What they achieve on the axis.
+    /// Results of the sine tests on the axis.
     pub verdicts: Vec<Verdict>,
 }
 
@@ -88,9 +86,9 @@ const STEPS: [(&str, f64); 6] = [
     ("verdict", 0.14),
 ];
 
-/// Where the experiments begin, mm: where the axis stood when it was switched on, in the middle of its travel.
+/// Position at which the experiments begin, mm: that of the axis when it was switched on, in the middle of its travel.
 const HOME_MM: f64 = 0.0;
-/// How often the excitation is halved before the response is given up.
+/// Number of times the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
 /// Elements that find their own knots.
 const FEW_ELEMENTS: usize = 4;

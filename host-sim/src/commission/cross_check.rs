@@ -1,4 +1,5 @@
-//! What a finished commissioning is held against: the response at rest, which friction bends, and an ordinary motion.
+//! Cross-checks of a finished commissioning: against the response at rest, which friction bends, and against an
+//! ordinary motion.
 
 use quadrant::settings::AxisSettings;
 
@@ -11,7 +12,7 @@ use crate::identify::response::FrequencyResponse;
 use crate::identify::revise::{ReviseError, Revision};
 use crate::rig::{Recording, Rig, approach};
 
-/// What the checks found.
+/// Results of the cross-checks.
 #[derive(Clone, Debug)]
 pub struct CrossCheck {
     /// The response at rest.

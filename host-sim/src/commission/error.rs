@@ -1,4 +1,4 @@
-//! Why a commissioning ends early.
+//! Errors that end a commissioning.
 
 use quadrant::settings::SettingsError;
 
@@ -13,34 +13,28 @@ use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
 use crate::rig::RigError;
 
-/// Why a commissioning ends early.
+/// Errors that end a commissioning.
 #[derive(Debug, thiserror::Error)]
 pub enum CommissionError {
     /// Settings that the firmware refuses.
     #[error("settings refused: {0}")]
     Settings(#[from] SettingsError),
-    /// The open-loop test.
     #[error("motor constant: {0}")]
     Motor(#[from] MotorConstantError),
-    /// The response.
     #[error("frequency response: {0}")]
     Response(#[from] FrfError),
-    /// The linear model.
     #[error("linear model: {0}")]
     Plant(#[from] PlantError),
-    /// The PID.
     #[error("PID: {0}")]
     Pid(#[from] DesignError),
     /// The runs at constant velocity.
     #[error("friction at constant velocity: {0}")]
     Friction(#[from] StaticFrictionError),
-    /// Their model.
     #[error("friction model: {0}")]
     FrictionFit(#[from] FrictionFitError),
     /// A run of the slow sine.
     #[error("pre-sliding friction: {0}")]
     Sine(#[from] RigError),
-    /// The GMS model.
     #[error("pre-sliding friction: {0}")]
     Presliding(#[from] VirginCurveError),
     /// The GMS model does not predict what was measured.
@@ -48,17 +42,12 @@ pub enum CommissionError {
         "the GMS model misses the measured hysteresis by {percent:.1} % of the breakaway level: the axis' friction changes with \
          position or time; look for a bent screw, a tight guide, a cold machine"
     )]
-    Hysteresis {
-        /// The miss.
-        percent: f64,
-    },
+    Hysteresis { percent: f64 },
     /// The response at rest.
     #[error("linear model with friction: {0}")]
     Revise(#[from] ReviseError),
-    /// The ordinary motion.
     #[error("ordinary motion: {0}")]
     Motion(#[from] MotionFitError),
-    /// The verdict.
     #[error("verdict: {0}")]
     Verify(#[from] VerifyError),
 }

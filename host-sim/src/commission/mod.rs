@@ -9,6 +9,7 @@ pub mod bootstrap;
 mod chain;
 mod cross_check;
 mod error;
+pub mod page;
 pub mod verify;
 
 pub use chain::{CommissionSettings, Commissioned, commission};

@@ -1,4 +1,4 @@
-//! What the commissioned settings achieve on the axis itself, by its own encoder.
+//! Sine tests of the commissioned settings on the axis itself, measured by its own encoder.
 
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -27,25 +27,22 @@ impl Default for Trial {
     }
 }
 
-/// What one law scored.
+/// Result of one law's sine test.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// The law.
     pub law: &'static str,
     /// Its score, on the measured position.
     pub score: Score,
-    /// The scored cycles.
     pub recording: Recording,
 }
 
 /// Cycles at full speed, of which the last [`SCORED_CYCLES`] count.
 const CYCLES: f64 = 3.25;
-/// Cycles that count.
 const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-/// Why a verdict cannot be had.
+/// Errors of a sine test.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The settings are refused.

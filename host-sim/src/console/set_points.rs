@@ -9,7 +9,7 @@ use quadrant::link::message::{
 
 use super::client::Client;
 use super::error::ClientError;
-use crate::program::{Trajectory, Vector};
+use crate::gcode::{Trajectory, Vector};
 
 /// Set points at rest after the last one that moves.
 const REST_POINTS: usize = 2;

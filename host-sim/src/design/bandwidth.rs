@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use quadrant::control::popov::PidGains;
 
+use super::form::Form;
 use super::margins::Margins;
-use super::process::{Form, Process};
+use super::process::Process;
 use super::shaping::{
     LARGEST_RATIO, SMALLEST_RATIO, ShapingError, proportional_derivative, scale_to_gain_margin,
 };
@@ -20,14 +21,14 @@ pub(super) struct PeakBounds {
 }
 
 impl PeakBounds {
-    /// By which factor the worse of the two is exceeded; one and less is within.
+    /// Returns the factor by which the worse of the two is exceeded; 1 and less is within.
     fn excess(&self, margins: &Margins) -> f64 {
         (margins.sensitivity_peak / self.sensitivity)
             .max(margins.complementary_peak / self.complementary)
     }
 }
 
-/// Why there is no such loop.
+/// Reasons for which no such loop exists.
 pub(super) enum NoLoop {
     /// The process turns too little.
     Shaping(ShapingError),

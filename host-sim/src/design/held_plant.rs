@@ -11,9 +11,9 @@ use quadrant::control::plant_model::PlantModel;
 pub struct HeldPlant {
     /// Position and velocity, from one sample to the next.
     transition: Matrix2<f64>,
-    /// What the output written `whole_periods` ago adds.
+    /// Contribution of the output written `whole_periods` ago.
     recent_input: Vector2<f64>,
-    /// What the output written one period before that adds.
+    /// Contribution of the output written one period before that.
     older_input: Vector2<f64>,
     whole_periods: f64,
 }
@@ -74,7 +74,7 @@ impl HeldPlantRun {
         }
     }
 
-    /// Where the axis is, mm.
+    /// Position of the axis, mm.
     pub fn position_mm(&self) -> f64 {
         self.state[0]
     }

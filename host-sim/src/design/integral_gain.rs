@@ -1,4 +1,4 @@
-//! How much integral action a design bears: as much as leaves its margins standing.
+//! Integral action of a design: the most that leaves its margins standing.
 //!
 //! Integral action is there against slow disturbances; loop shaping decides everything else. The criterion takes the
 //! largest Ki that a stated set of margins does not notice, rounded down to two significant digits, so that it can be
@@ -6,20 +6,20 @@
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
+use super::form::Form;
 use super::margins::{Margins, bisect};
-use super::process::{Form, Process};
+use super::process::Process;
 
 /// A figure as a publication prints it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Printed {
-    /// The printed value.
     pub value: f64,
     /// Digits after the decimal point.
     pub decimals: usize,
 }
 
 impl Printed {
-    /// Whether an exact value would be printed the same.
+    /// Returns true if an exact value would be printed the same.
     pub fn reads(&self, exact: f64) -> bool {
         format!("{:.*}", self.decimals, exact) == format!("{:.*}", self.decimals, self.value)
     }
@@ -59,7 +59,7 @@ impl PrintedMargins {
         },
     };
 
-    /// Whether exact margins would be printed the same.
+    /// Returns true if exact margins would be printed the same.
     pub fn read(&self, exact: &Margins) -> bool {
         self.gain_margin_db.reads(exact.gain_margin_db)
             && self.phase_crossover_hz.reads(exact.phase_crossover_hz)
@@ -113,7 +113,7 @@ pub fn largest_integral_gain(
 ///         && (with.phase_margin_deg - without.phase_margin_deg).abs() <= 0.05
 /// });
 /// assert_eq!(ki, Some(8.0));
-/// # Ok::<(), quadrant_sim::design::MarginError>(())
+/// # Ok::<(), crate::design::MarginError>(())
 /// ```
 pub fn largest_integral_gain_where(
     process: &Process,

@@ -28,9 +28,7 @@ fn crossover_scale(plant: &PlantModel, gains: &PidGains) -> f64 {
 /// Plant and PID in continuous time: the form the thesis' margins are printed for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ContinuousLoop {
-    /// The axis.
     pub plant: PlantModel,
-    /// The controller.
     pub gains: PidGains,
 }
 

@@ -7,16 +7,16 @@ use num_complex::Complex64;
 
 use super::loop_shape::OpenLoop;
 
-/// How far a stable loop is from instability.
+/// Stability margins of a stable loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Margins {
     /// The smallest factor on the loop's gain that makes it unstable, dB. Above zero.
     pub gain_margin_db: f64,
-    /// Where: the frequency at which the loop then oscillates, Hz.
+    /// Phase crossover: the frequency at which the loop then oscillates, Hz.
     pub phase_crossover_hz: f64,
     /// The smallest turn of the loop's phase that makes it unstable, deg. Above zero.
     pub phase_margin_deg: f64,
-    /// Where: the frequency at which the loop's gain is one, Hz.
+    /// Gain crossover: the frequency at which the loop's gain is one, Hz.
     pub gain_crossover_hz: f64,
     /// The peak of `|S| = |1 / (1 + L)|`, dimensionless.
     pub sensitivity_peak: f64,
@@ -28,7 +28,7 @@ pub struct Margins {
     pub complementary_peak_hz: f64,
 }
 
-/// Why a loop has no margins.
+/// Reasons for which a loop has no margins.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum MarginError {
     /// The gain is above one, or below one, in the whole band.
@@ -160,7 +160,7 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
             .collect()
     }
 
-    /// Whether the phase rises (+1) or falls (-1) through -180 degrees at a phase crossover.
+    /// Returns +1 if the phase rises through -180 degrees at a phase crossover, -1 if it falls.
     fn direction(&self, omega: f64) -> i32 {
         let above = self.open_loop.response(omega * (1.0 + 1e-7));
         if above.im > 0.0 { -1 } else { 1 }
@@ -206,7 +206,7 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
     }
 }
 
-/// Where `below`, true at `low` and false at `high`, changes, to the last bit but a few.
+/// Finds the point at which `below`, true at `low` and false at `high`, changes, to the last bit but a few.
 pub(super) fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..80 {
         let middle = 0.5 * (low + high);

@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use quadrant::control::popov::PidGains;
 
+use super::form::Form;
 use super::loop_shape::{OpenLoop, controller_response};
-use super::process::Form;
 use crate::identify::response::{FrequencyResponse, ResponsePoint};
 
 /// A measured response of which the trustworthy lines are kept, to be read at any frequency of its band.
@@ -17,7 +17,7 @@ pub struct MeasuredResponse {
     phase_rad: Vec<f64>,
 }
 
-/// Why a measured response carries no design.
+/// Reasons for which a measured response carries no design.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum MeasuredError {
     /// Too few coherent lines.
@@ -26,7 +26,6 @@ pub enum MeasuredError {
          more excitation or more averages"
     )]
     Incoherent {
-        /// Lines that do.
         lines: usize,
         /// The coherence asked for.
         least_coherence: f64,
@@ -43,7 +42,6 @@ pub enum MeasuredError {
     },
 }
 
-/// Fewest lines.
 const LEAST_LINES: usize = 20;
 /// The largest ratio of neighbouring frequencies above the lowest few lines, which lie far apart on a log scale.
 const LARGEST_RATIO: f64 = 1.6;
@@ -92,7 +90,6 @@ impl MeasuredResponse {
         (first / TAU, last / TAU)
     }
 
-    /// How many lines there are.
     pub fn lines(&self) -> usize {
         self.omega_rad_s.len()
     }
@@ -137,8 +134,8 @@ impl<'a> MeasuredLoop<'a> {
         }
     }
 
-    /// Whether the loop's gain has fallen at the upper end of the band, so that nothing is to be feared above it but
-    /// a resonance that was not measured.
+    /// True if the loop's gain has fallen at the upper end of the band, so that nothing is to be feared above it but a
+    /// resonance that was not measured.
     pub fn has_fallen(&self) -> bool {
         self.response(self.band_rad_s().1).norm() < FALLEN
     }

@@ -3,13 +3,12 @@
 use quadrant::control::npid::NonlinearGain;
 use quadrant::control::popov::PidGains;
 
-/// How ko and emax are chosen.
+/// Rule by which ko and emax are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct NonlinearRule {
     /// Largest gain as a share of the Popov bound k_max; above zero, at most one. What is left is for the axis to
     /// change: the bound falls in proportion as A grows.
     pub sector_share: f64,
-    /// emax.
     pub range: Range,
 }
 

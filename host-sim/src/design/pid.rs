@@ -3,12 +3,13 @@
 use quadrant::control::popov::PidGains;
 
 use super::bandwidth::{NoLoop, PeakBounds, stiffest};
+use super::form::Form;
 use super::integral_gain::largest_integral_gain_where;
 use super::margins::{MarginError, Margins};
-use super::process::{Form, Process};
+use super::process::Process;
 use super::shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
-/// What a PID is designed for.
+/// Design target of a PID.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Target {
     /// A gain margin and a phase margin; the crossover follows from them.
@@ -45,9 +46,8 @@ pub enum Target {
 /// A design to make.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidRequest {
-    /// What for.
     pub target: Target,
-    /// On which form of the loop.
+    /// Form of the loop.
     pub form: Form,
     /// Time constant of the derivative's filter, s; above zero, and zero allowed in continuous time.
     pub derivative_filter_s: f64,
@@ -58,13 +58,12 @@ pub struct PidRequest {
 /// Gains and the margins they have.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PidDesign {
-    /// The gains.
     pub gains: PidGains,
     /// Margins of the loop in the form designed on.
     pub margins: Margins,
 }
 
-/// Why there is no such PID.
+/// Reasons for which no such PID exists.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum DesignError {
     /// The margins exclude each other, or the process has none.
@@ -79,9 +78,9 @@ pub enum DesignError {
          one of the three out"
     )]
     Crossover {
-        /// Where it lies, Hz.
+        /// Crossover found, Hz.
         found_hz: f64,
-        /// Where it should, Hz.
+        /// Crossover asked for, Hz.
         asked_hz: f64,
     },
     /// The crossover asked for leaves too small a gain margin.
@@ -92,9 +91,9 @@ pub enum DesignError {
     GainMargin {
         /// The crossover, Hz.
         crossover_hz: f64,
-        /// What is left, dB.
+        /// Margin left, dB.
         found_db: f64,
-        /// What was asked for, dB.
+        /// Margin asked for, dB.
         least_db: f64,
     },
     /// No crossover meets the bounds.
@@ -106,19 +105,19 @@ pub enum DesignError {
         sensitivity_peak: f64,
         /// Bound on `|T|`.
         complementary_peak: f64,
-        /// By how much the nearest misses.
+        /// Deviation of the nearest, %.
         percent: f64,
     },
 }
 
-/// What integral action may cost of the margins, dB and deg.
+/// Cost of integral action, as a loss of margin, dB and deg.
 const INTEGRAL_COST: f64 = 0.05;
-/// How near a crossover must come to the one asked for, Hz: half of the last digit that is printed of it.
+/// Tolerance of a crossover, Hz: half of the last digit that is printed of it.
 const CROSSOVER_TOLERANCE_HZ: f64 = 0.05;
 /// The usual share of the bounds for integral action: little, for the stiffest loop.
 pub const INTEGRAL_SHARE: f64 = 0.02;
 
-/// Whether a target still holds with integral action.
+/// Returns true if a target still holds with integral action.
 type Acceptance = Box<dyn Fn(&Margins) -> bool>;
 
 /// Designs a PID: proportional and derivative gain for the target, then as much integral action as the target does not

@@ -1,4 +1,4 @@
-//! What the Popov bound becomes when the model is not quite the axis.
+//! Popov bound of an axis that differs from its model.
 
 use nalgebra::{Matrix4, Vector4};
 use quadrant::control::plant_model::PlantModel;
@@ -8,7 +8,7 @@ use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
 
-/// How uncertain a model is: A, B, C, Td in this order.
+/// Relative uncertainty of a model: A, B, C, Td in this order.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Uncertainty {
     /// Standard deviations, as shares of the values.
@@ -18,7 +18,6 @@ pub struct Uncertainty {
 }
 
 impl Uncertainty {
-    /// Independent parameters.
     pub fn independent(deviations: [f64; 4]) -> Self {
         Self {
             deviations,
@@ -47,7 +46,7 @@ impl Robustness {
     }
 }
 
-/// Why there is no answer.
+/// Errors of the analysis.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum RobustnessError {
     /// The correlations exclude each other.
@@ -55,7 +54,6 @@ pub enum RobustnessError {
         "the correlations of A, B, C and Td are those of no random variable: the matrix is not positive definite"
     )]
     Correlation,
-    /// Nothing to draw.
     #[error("at least one draw is needed")]
     NoDraws,
 }

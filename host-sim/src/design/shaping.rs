@@ -6,11 +6,12 @@ use std::fmt;
 use num_complex::Complex64;
 use quadrant::control::popov::PidGains;
 
+use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::margins::{MarginError, bisect, falling_phase_crossover};
-use super::process::{Form, Process};
+use super::process::Process;
 
-/// Why no gains have the margins asked for.
+/// Reasons for which no gains have the margins asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ShapingError {
     /// The phase of the process never reaches -180 degrees, so that no gain margin is finite.

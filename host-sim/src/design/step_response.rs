@@ -49,14 +49,14 @@ pub struct StepResponse {
     pub voltage_v: Vec<f64>,
 }
 
-/// What is read off a step response. Times count from the step.
+/// Properties read off a step response. Times count from the step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StepProperties {
     /// From 10 to 90 % of the height, s.
     pub rise_time_s: f64,
-    /// When the highest point is reached, s.
+    /// Time of the highest point, s.
     pub peak_time_s: f64,
-    /// What the highest point exceeds the height by, %.
+    /// Overshoot of the highest point over the height, %.
     pub overshoot_percent: f64,
     /// From when on the position stays within 2 % of the height, s.
     pub settling_time_s: f64,

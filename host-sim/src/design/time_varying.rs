@@ -28,7 +28,7 @@ pub enum Switching {
     /// Largest where error and rate have a phase, once each half turn of their plane: when
     /// `sin(2 phi - 2 angle) > 0` with `phi = atan2(rate / omega, error)`.
     Turning {
-        /// Where the quadrant begins, rad.
+        /// Beginning of the quadrant, rad.
         angle_rad: f64,
         /// The frequency that rate is scaled by, Hz.
         frequency_hz: f64,
@@ -40,16 +40,13 @@ pub enum Switching {
 pub struct Destabiliser {
     /// The largest value of the switching gain.
     pub gain: f64,
-    /// How it switches.
     pub switching: Switching,
 }
 
 /// A sampled loop, at rest but for an error, with a varying gain on the error.
 #[derive(Clone, Copy, Debug)]
 pub struct VaryingLoop {
-    /// The axis.
     pub plant: PlantModel,
-    /// The controller.
     pub gains: PidGains,
     /// Control period, s.
     pub sample_time_s: f64,

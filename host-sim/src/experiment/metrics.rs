@@ -10,12 +10,10 @@
 /// Half the width of the window around a reversal, and the width of each shoulder, as a fraction of the cycle.
 pub const GLITCH_WINDOW: f64 = 0.02;
 
-/// What a run of whole cycles scores; mm.
+/// Score of a run of whole cycles; mm.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Score {
-    /// Largest |e|.
     pub largest_mm: f64,
-    /// RMS of e.
     pub rms_mm: f64,
     /// Mean glitch over the reversals; NaN without a reversal.
     pub glitch_mm: f64,
@@ -76,6 +74,35 @@ pub fn score(reference: &[f64], errors: &[f64], cycle: usize) -> Score {
 /// The relative change from `before` to `after`, %.
 pub fn change_percent(before: f64, after: f64) -> f64 {
     (after / before - 1.0) * 100.0
+}
+
+/// One number of a score.
+#[derive(Clone, Copy, Debug)]
+pub struct Metric {
+    /// Its name in tables.
+    pub name: &'static str,
+    /// Reads it, mm.
+    pub read: fn(&Score) -> f64,
+}
+
+impl Metric {
+    /// Largest magnitude of the tracking error.
+    pub const LARGEST: Self = Self {
+        name: "Largest",
+        read: |score| score.largest_mm,
+    };
+    /// RMS of the tracking error.
+    pub const RMS: Self = Self {
+        name: "RMS",
+        read: |score| score.rms_mm,
+    };
+    /// Quadrant glitch.
+    pub const GLITCH: Self = Self {
+        name: "Glitch",
+        read: |score| score.glitch_mm,
+    };
+    /// The tracking error.
+    pub const TRACKING: [Self; 2] = [Self::LARGEST, Self::RMS];
 }
 
 #[cfg(test)]

@@ -8,7 +8,7 @@ use quadrant::telemetry::AxisTelemetry;
 use crate::machine::{Machine, Operator};
 use crate::plant::SimulatedStage;
 
-/// What one axis did, a sample a control period from the start of the motion.
+/// Trace of one axis, a sample a control period from the start of the motion.
 #[derive(Clone, Debug, Default)]
 pub struct AxisTrace {
     /// Reference, mm.
@@ -21,12 +21,7 @@ pub struct AxisTrace {
 
 impl AxisTrace {
     /// Adds a tick: what the law says of it, and where the axis truly was, mm. `resolution_mm` is the encoder's.
-    pub(super) fn push<S: Scalar>(
-        &mut self,
-        seen: &AxisTelemetry<S>,
-        resolution_mm: f64,
-        place_mm: f64,
-    ) {
+    pub fn push<S: Scalar>(&mut self, seen: &AxisTelemetry<S>, resolution_mm: f64, place_mm: f64) {
         let reference = seen.reference.to_mm(resolution_mm);
         self.reference_mm.push(reference);
         self.error_mm.push(reference - place_mm);
@@ -44,7 +39,7 @@ impl AxisTrace {
     }
 }
 
-/// Why a run gives no traces.
+/// Reasons for which a run gives no traces.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum RunError {
     /// The settings are refused.

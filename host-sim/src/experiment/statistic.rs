@@ -1,6 +1,6 @@
 //! Mean and spread of a quantity over repeated runs.
 
-/// What repeated runs gave for one quantity, in its unit.
+/// Mean and spread of one quantity over repeated runs, in its unit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Statistic {
     /// Mean over the runs.

@@ -16,12 +16,10 @@ use crate::rig::{Drive, Experiment, Recording, Rig};
 /// An excitation at rest, and what it gave.
 #[derive(Clone, Debug)]
 pub struct AtRest {
-    /// The excitation.
     pub excitation: Excitation,
     /// The settings in force: the axis' own feedback, without feedforward.
     settings: AxisSettings,
     experiment: Experiment,
-    /// What was recorded.
     pub recording: Recording,
 }
 

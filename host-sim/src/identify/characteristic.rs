@@ -10,7 +10,7 @@ use quadrant::control::nctf::{CharacteristicPoint, MAX_POINTS};
 
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
-/// How the axis is driven.
+/// Parameters of the test that finds the NCTF trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CharacteristicSettings {
     /// Speed to coast from, mm/s.
@@ -37,7 +37,7 @@ impl Default for CharacteristicSettings {
     }
 }
 
-/// What the passes showed.
+/// Result of the passes.
 #[derive(Clone, Debug)]
 pub struct Characteristic {
     /// Distance to the place of rest, mm, and the mean speed there, mm/s; both rising.
@@ -46,11 +46,10 @@ pub struct Characteristic {
     pub scatter: f64,
     /// Voltage that the axis was driven with, V.
     pub voltage_v: f64,
-    /// The recording.
     pub recording: Recording,
 }
 
-/// Why there is no trajectory.
+/// Reasons for which no trajectory was found.
 #[derive(Debug, thiserror::Error)]
 pub enum CharacteristicError {
     /// The axis stays slow.
@@ -59,11 +58,11 @@ pub enum CharacteristicError {
          or allow more voltage"
     )]
     Slow {
-        /// What it reached, mm/s.
+        /// Velocity reached, mm/s.
         reached_mm_s: f64,
         /// With which voltage, V.
         voltage_v: f64,
-        /// What was asked for, mm/s.
+        /// Velocity asked for, mm/s.
         wanted_mm_s: f64,
     },
     /// The axis does not come to rest.
@@ -71,19 +70,16 @@ pub enum CharacteristicError {
         "the axis still moves at {velocity_mm_s:.2} mm/s at the end of a pass: let it coast for longer than {coast_s} s"
     )]
     Coasting {
-        /// How fast, mm/s.
+        /// Velocity, mm/s.
         velocity_mm_s: f64,
-        /// How long it had, s.
+        /// Time given to coast, s.
         coast_s: f64,
     },
     /// The recording is no test.
     #[error(
         "the recording has {passes} passes in which the axis is driven and then left alone; the trajectory takes 2"
     )]
-    NoPasses {
-        /// Passes found.
-        passes: usize,
-    },
+    NoPasses { passes: usize },
     /// The run was stopped.
     #[error(transparent)]
     Rig(#[from] RigError),
@@ -273,8 +269,8 @@ fn speed_at(curve: &[(f64, f64)], distance: f64) -> f64 {
 }
 
 impl Characteristic {
-    /// Where the measured trajectory falls below a straight line through the origin of slope `slope_per_s`, mm; nothing
-    /// where it never does.
+    /// Returns the error at which the measured trajectory falls below a straight line through the origin of slope
+    /// `slope_per_s`, mm; `None` if it never does.
     pub fn knee_mm(&self, slope_per_s: f64) -> Option<f64> {
         let above = |&(distance, speed): &(f64, f64)| speed > slope_per_s * distance;
         let last = self.trajectory.iter().rposition(above)?;

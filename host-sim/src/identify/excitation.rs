@@ -32,10 +32,8 @@ impl fmt::Display for Waveform {
     }
 }
 
-/// An excitation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Excitation {
-    /// Its kind.
     pub waveform: Waveform,
     /// RMS, V; above zero.
     pub rms_v: f64,

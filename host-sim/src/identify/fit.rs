@@ -14,23 +14,22 @@ use nalgebra::{DMatrix, DVector, Dyn, Owned};
 pub struct Parameter {
     /// Its name in messages and tables.
     pub name: &'static str,
-    /// Where the search starts; within the bounds.
+    /// Start of the search; within the bounds.
     pub start: f64,
     /// Smallest and largest value, both finite.
     pub bounds: (f64, f64),
 }
 
-/// How residuals are weighed.
+/// Loss function: the weight of residuals.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Loss {
-    /// By their squares.
     #[default]
     Squares,
     /// By their squares up to 1.345 standard deviations, by their magnitudes beyond: 95 % as efficient on normal noise.
     Huber,
 }
 
-/// What a fit found.
+/// Result of a fit.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
     /// Names, as given.
@@ -43,7 +42,7 @@ pub struct Fit {
     pub correlation: DMatrix<f64>,
     /// RMS of the residuals at the optimum, corrected for the number of parameters.
     pub residual_rms: f64,
-    /// Which values ended at a bound: their standard errors mean nothing.
+    /// True for values that ended at a bound: their standard errors mean nothing.
     pub at_bound: Vec<bool>,
 }
 
@@ -66,21 +65,13 @@ impl Fit {
     }
 }
 
-/// Why there is no fit.
+/// Reasons for which a fit fails.
 #[derive(Clone, Debug, PartialEq)]
 pub enum FitError {
     /// Fewer residuals than parameters.
-    TooFewData {
-        /// Residuals.
-        residuals: usize,
-        /// Parameters.
-        parameters: usize,
-    },
+    TooFewData { residuals: usize, parameters: usize },
     /// A start outside its bounds, or bounds that are not finite.
-    BadStart {
-        /// The parameter.
-        parameter: &'static str,
-    },
+    BadStart { parameter: &'static str },
     /// A residual is not a number at the start.
     NotFinite,
     /// The search did not come to an end.
@@ -205,7 +196,7 @@ fn search(
     Ok(problem.summary())
 }
 
-/// Whether no value moved by more than a millionth of its range between two rounds.
+/// True if no value moved by more than a millionth of its range between two rounds.
 fn settled(parameters: &[Parameter], before: &[f64], after: &[f64]) -> bool {
     parameters
         .iter()
@@ -225,7 +216,7 @@ struct Problem<'a, F> {
     parameters: &'a [Parameter],
     residuals: &'a F,
     step: f64,
-    /// Whether the search may end without having converged.
+    /// True if the search may end without having converged.
     nearest: bool,
     angles: DVector<f64>,
     /// Square roots of the residuals' weights.

@@ -7,6 +7,7 @@
 //! - [`frf`]: that response, measured;
 //! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which the steps share;
 //! - [`motor_constant`]: acceleration per volt from a square wave;
+//! - [`pages`]: the steps' tables and figures;
 //! - [`plant`]: the linear model of a response;
 //! - [`response`]: measured frequency responses, in memory and as CSV;
 //! - [`revise`]: the linear model once friction stands beside it;
@@ -21,6 +22,7 @@ pub mod fit;
 pub mod frf;
 pub mod motion;
 pub mod motor_constant;
+pub mod pages;
 pub mod plant;
 pub mod response;
 pub mod revise;

@@ -8,7 +8,7 @@ use nalgebra::{DMatrix, DVector};
 
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
-/// How the axis is driven.
+/// Parameters of the test of acceleration per volt.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MotorConstantSettings {
     /// Lower level of the first test, V; it is raised until the axis slides.
@@ -35,7 +35,7 @@ impl Default for MotorConstantSettings {
     }
 }
 
-/// What the test found.
+/// Result of the test.
 #[derive(Clone, Debug)]
 pub struct MotorConstant {
     /// A, acceleration per volt, mm/(V s^2).
@@ -46,7 +46,6 @@ pub struct MotorConstant {
     pub damping_per_s: f64,
     /// Lower level of the voltage, V.
     pub level_v: f64,
-    /// The recording.
     pub recording: Recording,
 }
 
@@ -57,7 +56,7 @@ impl MotorConstant {
     }
 }
 
-/// Why there is no motor constant.
+/// Reasons for which no motor constant was found.
 #[derive(Debug, thiserror::Error)]
 pub enum MotorConstantError {
     /// The axis does not slide.
@@ -74,24 +73,15 @@ pub enum MotorConstantError {
          feedback it would run away"
     )]
     Reversed,
-    /// The passes disagree.
     #[error(
         "the passes give {gain:.0} +- {standard_error:.0} mm/(V s^2): too uncertain; raise the levels' number or dwell"
     )]
-    Uncertain {
-        /// Their mean.
-        gain: f64,
-        /// Its standard deviation.
-        standard_error: f64,
-    },
+    Uncertain { gain: f64, standard_error: f64 },
     /// The recording is no test.
     #[error(
         "the recording has {passes} passes in which the voltage steps between levels of one sign while the axis slides; the test takes 2"
     )]
-    NoPasses {
-        /// Passes found.
-        passes: usize,
-    },
+    NoPasses { passes: usize },
     /// The run was stopped.
     #[error(transparent)]
     Rig(#[from] RigError),

@@ -13,7 +13,7 @@ use quadrant::control::plant_model::PlantModel;
 use super::fit::{Fit, FitError, Loss, Parameter, fit};
 use super::response::{FrequencyResponse, ResponsePoint};
 
-/// Whether the model has a spring to ground.
+/// Spring to ground in the model.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Stiffness {
     /// C is fitted: a response at standstill shows pre-sliding friction as a small spring.
@@ -31,14 +31,14 @@ impl std::fmt::Display for Stiffness {
     }
 }
 
-/// What a fit looks at.
+/// Parameters of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PlantFitSettings {
     /// Lowest coherence of a line that counts.
     pub least_coherence: f64,
     /// Lowest and highest frequency that count, Hz.
     pub band_hz: (f64, f64),
-    /// Whether C is fitted.
+    /// Treatment of C, the spring to ground.
     pub stiffness: Stiffness,
 }
 
@@ -52,16 +52,13 @@ impl Default for PlantFitSettings {
     }
 }
 
-/// A fitted model.
 #[derive(Clone, Debug)]
 pub struct PlantFit {
-    /// The model.
     pub plant: PlantModel,
     /// A, B, Td and, if it was free, C, with standard errors and correlations; Td in s.
     pub fit: Fit,
     /// Distance of the model from the response, by thirds of the lines from low to high frequency.
     pub bands: Vec<BandMisfit>,
-    /// Lines that counted.
     pub lines: usize,
 }
 
@@ -76,7 +73,7 @@ pub struct BandMisfit {
     pub phase_deg: f64,
 }
 
-/// Why a response supports no model.
+/// Reasons for which a response supports no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PlantError {
     /// Too few lines can be trusted.
@@ -84,27 +81,18 @@ pub enum PlantError {
         "only {lines} lines have a coherence of {least_coherence} or more; a model takes {LEAST_LINES}: raise the excitation, \
          average longer, or lower the demand on coherence"
     )]
-    Incoherent {
-        /// Lines that can.
-        lines: usize,
-        /// The least coherence.
-        least_coherence: f64,
-    },
+    Incoherent { lines: usize, least_coherence: f64 },
     /// The corner that separates damping from mass is not in the band.
     #[error(
         "the response from {low_hz:.1} to {high_hz:.1} Hz misses the corner at {corner_hz:.1} Hz, where damping gives way to mass, \
          so that A and B cannot be told apart; measure from {wanted_low_hz:.1} to {wanted_high_hz:.1} Hz at least"
     )]
     MissesCorner {
-        /// The band.
         low_hz: f64,
-        /// The band.
         high_hz: f64,
         /// B / (2 pi) as far as it is known.
         corner_hz: f64,
-        /// What would do.
         wanted_low_hz: f64,
-        /// What would do.
         wanted_high_hz: f64,
     },
     /// A parameter is not determined.
@@ -112,11 +100,8 @@ pub enum PlantError {
         "the response does not determine {parameter}: {value:.4} +- {standard_error:.4}; widen the band or average longer"
     )]
     Undetermined {
-        /// Which.
         parameter: &'static str,
-        /// Its value.
         value: f64,
-        /// One standard deviation.
         standard_error: f64,
     },
     /// The model is not what was measured.
@@ -130,7 +115,6 @@ pub enum PlantError {
         /// RMS of the phase's error.
         phase_deg: f64,
     },
-    /// The search failed.
     #[error(transparent)]
     Fit(#[from] FitError),
 }
@@ -294,7 +278,7 @@ fn refine(
     Ok(found.no_better_than_stated())
 }
 
-/// Whether the data determine what was fitted.
+/// Checks that the data determine what was fitted.
 fn check_support(
     lines: &[ResponsePoint],
     plant: &PlantModel,

@@ -20,51 +20,31 @@ pub struct ResponsePoint {
 /// A measured frequency response of an axis, position over amplifier voltage, at ascending frequencies.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct FrequencyResponse {
-    /// Its lines.
     pub points: Vec<ResponsePoint>,
 }
 
-/// Why a file holds no frequency response.
+/// Reasons for which a file holds no frequency response.
 #[derive(Debug, thiserror::Error)]
 pub enum ResponseError {
     /// The file cannot be read or written, or is no CSV.
     #[error("{}: {source}", path.display())]
-    Csv {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: csv::Error,
-    },
+    Csv { path: PathBuf, source: csv::Error },
     /// A column is missing.
     #[error("{}: no column {name}; a frequency response has the columns {}", path.display(), COLUMNS.join(", "))]
-    Column {
-        /// The file.
-        path: PathBuf,
-        /// The column.
-        name: &'static str,
-    },
+    Column { path: PathBuf, name: &'static str },
     /// A value that cannot be.
     #[error("{}, row {row}, column {name}: {value:?} is not {expected}", path.display())]
     Value {
-        /// The file.
         path: PathBuf,
         /// Row of data, from 1.
         row: usize,
-        /// The column.
         name: &'static str,
-        /// What stands there.
         value: String,
-        /// What should.
         expected: &'static str,
     },
     /// Too few lines to be of use.
     #[error("{}: {rows} rows; a frequency response takes at least {MIN_POINTS}", path.display())]
-    TooShort {
-        /// The file.
-        path: PathBuf,
-        /// Rows.
-        rows: usize,
-    },
+    TooShort { path: PathBuf, rows: usize },
 }
 
 const COLUMNS: [&str; 5] = [
@@ -75,7 +55,7 @@ const COLUMNS: [&str; 5] = [
     "relative_deviation",
 ];
 
-/// What each column's values must be.
+/// Values allowed in each column.
 const EXPECTED: [&str; 5] = [
     "a frequency above that of the row before",
     "a number above zero",

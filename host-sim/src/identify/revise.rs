@@ -20,7 +20,7 @@ use super::response::FrequencyResponse;
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 use crate::rig::{Experiment, Recording, Rig, RigError, SimulatedRig};
 
-/// Which friction models stand beside the linear model, as in the thesis.
+/// Friction models beside the linear model, as in the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ExplicitFriction {
     /// None: the linear model alone.
@@ -55,7 +55,6 @@ pub struct Measurement<'a> {
     pub experiment: &'a Experiment,
     /// The settings in force during the experiment.
     pub settings: &'a AxisSettings,
-    /// What was recorded.
     pub recording: &'a Recording,
     /// The estimator that made, and makes, a response of a recording.
     pub estimate: &'a (dyn Fn(&Recording) -> Option<FrequencyResponse> + Sync),
@@ -66,9 +65,7 @@ pub struct Measurement<'a> {
 /// A linear model revised for one kind of explicit friction.
 #[derive(Clone, Debug)]
 pub struct Revision {
-    /// Which friction stands beside it.
     pub friction: ExplicitFriction,
-    /// The revised model.
     pub plant: PlantModel,
     /// A, B, C as fitted; standard errors are those of the lines' scatter about the model.
     pub fit: Fit,
@@ -78,7 +75,7 @@ pub struct Revision {
     pub responses: (FrequencyResponse, FrequencyResponse),
 }
 
-/// How far a response lies from the measured one: RMS over the lines that count.
+/// Distance of a response from the measured one: RMS over the lines that count.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Misfit {
     /// Of the gain, dB.
@@ -87,7 +84,7 @@ pub struct Misfit {
     pub phase_deg: f64,
 }
 
-/// Why a model is not revised.
+/// Reasons for which a model is not revised.
 #[derive(Debug, thiserror::Error)]
 pub enum ReviseError {
     /// The recording gives no response.
@@ -97,29 +94,18 @@ pub enum ReviseError {
     #[error(
         "the recording has {recorded_hz:.1} samples a second and the settings a control rate of {rate_hz} Hz: record every tick"
     )]
-    Rate {
-        /// Of the recording.
-        recorded_hz: f64,
-        /// Of the settings.
-        rate_hz: f64,
-    },
+    Rate { recorded_hz: f64, rate_hz: f64 },
     /// Too little of the response can be trusted.
     #[error(
         "only {lines} lines have a coherence of {least_coherence} or more; a revision takes {LEAST_LINES}: raise the excitation"
     )]
-    Incoherent {
-        /// Lines that can.
-        lines: usize,
-        /// The least coherence.
-        least_coherence: f64,
-    },
+    Incoherent { lines: usize, least_coherence: f64 },
     /// The model cannot be run as the axis was.
     #[error(transparent)]
     Rig(#[from] RigError),
     /// The settings are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// The search failed.
     #[error(transparent)]
     Fit(#[from] FitError),
 }

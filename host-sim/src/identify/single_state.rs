@@ -27,7 +27,6 @@ const SOFTEST: f64 = 1e-3;
 /// A single-state model and how well it does.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SingleState<P> {
-    /// The parameters.
     pub parameters: P,
     /// RMS of the difference to the GMS's hysteresis over the breakaway level.
     pub relative_error: f64,
@@ -164,7 +163,6 @@ mod tests {
 
     use super::{fit_dahl, fit_lugre, with_all_models};
 
-    /// To four digits.
     fn rounded(value: f64) -> String {
         format!("{value:.3e}")
     }

@@ -84,7 +84,7 @@ impl SimulatedAxis {
         self.load_v = load_v;
     }
 
-    /// What the encoder's 32-bit counter shows: noisy, quantised, wrapped.
+    /// Reads the encoder's 32-bit counter: noisy, quantised, wrapped.
     pub fn read_counter(&mut self) -> u32 {
         let deviation = self.truth.imperfections.encoder_noise_mm;
         let noise = if deviation > 0.0 {

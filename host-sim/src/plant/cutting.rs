@@ -33,9 +33,7 @@ pub struct Milling {
 /// A direction in the plane of the cut.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Component {
-    /// Along the feed.
     Feed,
-    /// Across it.
     Normal,
 }
 

@@ -1,4 +1,4 @@
-//! What lies between an axis' motor and its table. Every default number here is chosen, none measured.
+//! Drive train between an axis' motor and its table. Every default number here is chosen, none measured.
 
 use std::f64::consts::TAU;
 
@@ -32,7 +32,7 @@ impl Cogging {
     }
 }
 
-/// Which side of the backlash the encoder is on.
+/// Side of the backlash that the encoder is on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum EncoderSide {
     /// On the motor: it does not see the backlash.
@@ -56,7 +56,7 @@ pub struct Backlash {
     pub damping_v_s_per_mm: f64,
     /// The motor's share of the moving mass, 0 to 1, both excluded.
     pub motor_share: f64,
-    /// Where the encoder is.
+    /// Side that the encoder is on.
     pub encoder: EncoderSide,
 }
 

@@ -10,14 +10,12 @@ use quadrant::friction::stribeck::SlidingTable;
 
 use super::{AxisTruth, TRUTH_ELEMENTS};
 
-/// Which model the friction of a simulated axis follows. The levels are those of its static friction, the elements those
-/// of its GMS parameters.
+/// Friction model of a simulated axis. The levels are those of its static friction, the elements those of its GMS
+/// parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum FrictionTruth {
-    /// The GMS.
     #[default]
     Gms,
-    /// The smoothed GMS.
     Smoothed(SmoothedGmsParameters),
     /// LuGre; its viscous friction is the static model's.
     Lugre(LugreParameters),
@@ -25,13 +23,16 @@ pub enum FrictionTruth {
     Dahl(DahlParameters),
 }
 
-/// A model with its memory.
+/// Pre-sliding friction of an axis: its model, and the model's state.
+#[derive(Clone, Debug)]
+pub struct Presliding(Model);
+
 #[allow(
     clippy::large_enum_variant,
     reason = "tables of like size, one an axis, used in every substep"
 )]
 #[derive(Clone, Debug)]
-pub(crate) enum Presliding {
+enum Model {
     Gms(
         Gms<f64, TRUTH_ELEMENTS>,
         SlidingTable<f64>,
@@ -48,11 +49,11 @@ pub(crate) enum Presliding {
 
 impl Presliding {
     /// The axis' model at rest, springs slack; `step_s` is the time between evaluations.
-    pub(crate) fn new(truth: &AxisTruth, step_s: f64) -> Self {
+    pub fn new(truth: &AxisTruth, step_s: f64) -> Self {
         let curves = truth.friction.map(|model| model.curve);
         let surface = || SlidingTable::build(&curves, truth.gms.attraction_v_s, step_s);
-        match &truth.model {
-            FrictionTruth::Gms => Self::Gms(
+        Self(match &truth.model {
+            FrictionTruth::Gms => Model::Gms(
                 Gms::build(&truth.gms.elements),
                 surface(),
                 GmsState::default(),
@@ -60,39 +61,39 @@ impl Presliding {
             FrictionTruth::Smoothed(parameters) => {
                 let breakaway_v = 0.5 * (curves.positive.breakaway_v + curves.negative.breakaway_v);
                 let model = SmoothedGms::build(&truth.gms.elements, parameters, breakaway_v);
-                Self::Smoothed(model, surface(), GmsState::default())
+                Model::Smoothed(model, surface(), GmsState::default())
             }
-            FrictionTruth::Lugre(parameters) => Self::Lugre(
+            FrictionTruth::Lugre(parameters) => Model::Lugre(
                 Lugre::build(parameters, &curves, step_s),
                 Bristle::default(),
             ),
-            FrictionTruth::Dahl(parameters) => Self::Dahl(
+            FrictionTruth::Dahl(parameters) => Model::Dahl(
                 Dahl::build(parameters, curves.map(|curve| curve.coulomb_v)),
                 Bristle::default(),
             ),
-        }
+        })
     }
 
     /// The friction in V without its viscous part, after a displacement (mm) that ended at a speed (mm/s) and took
     /// `step_s`.
-    pub(crate) fn step(&mut self, displacement: f64, speed: f64, step_s: f64) -> f64 {
+    pub fn step(&mut self, displacement: f64, speed: f64, step_s: f64) -> f64 {
         let direction = if displacement < 0.0 {
             Direction::Negative
         } else {
             Direction::Positive
         };
-        match self {
-            Self::Gms(model, surface, state) => {
+        match &mut self.0 {
+            Model::Gms(model, surface, state) => {
                 model.step(state, displacement, surface.at(speed, direction))
             }
-            Self::Smoothed(model, surface, state) => {
+            Model::Smoothed(model, surface, state) => {
                 model.step(state, displacement, surface.at(speed, direction))
             }
             // At the mean speed of the step: the bristles must bend by what the mass moves.
-            Self::Lugre(model, bristle) => {
+            Model::Lugre(model, bristle) => {
                 model.step(bristle, displacement, displacement.abs() / step_s)
             }
-            Self::Dahl(model, bristle) => model.step(bristle, displacement),
+            Model::Dahl(model, bristle) => model.step(bristle, displacement),
         }
     }
 }

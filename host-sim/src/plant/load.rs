@@ -1,4 +1,4 @@
-//! What pushes on the table besides drive and friction: a load over time, in volts at the amplifier's input.
+//! Load on the table besides drive and friction, over time, in volts at the amplifier's input.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -8,10 +8,8 @@ use super::cutting::{Component, Milling};
 /// A load over time.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub enum Load {
-    /// Nothing.
     #[default]
     None,
-    /// A sine.
     Sine {
         /// Amplitude, V.
         amplitude_v: f64,
@@ -20,11 +18,10 @@ pub enum Load {
     },
     /// Milling, while the tool is engaged.
     Milling {
-        /// The cut.
         cut: Milling,
-        /// Which of its forces acts along the axis.
+        /// Component of its forces that acts along the axis.
         component: Component,
-        /// When the tool enters and when it has left, s.
+        /// Times at which the tool enters and has left, s.
         engaged_s: (f64, f64),
         /// Force of a volt, N/V; above zero.
         newtons_per_volt: f64,

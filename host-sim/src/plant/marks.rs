@@ -1,9 +1,9 @@
-//! What tells a simulated axis where it is: limit switches, a home switch, and the index pulses of its encoder.
+//! Limit switches, home switch and index pulses of a simulated axis.
 
 use quadrant::encoder::EncoderReading;
 use quadrant::safety::AxisSwitches;
 
-/// Where the marks of an axis truly are. Every number is chosen, none measured.
+/// True positions of an axis' switches and index pulses. Every number is chosen, none measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MarkTruth {
     /// The negative limit switch is pressed below this, mm.
@@ -12,9 +12,9 @@ pub struct MarkTruth {
     pub positive_limit_mm: f64,
     /// The home switch is pressed below this, mm.
     pub home_mm: f64,
-    /// How much later than they are pressed the switches let go, mm.
+    /// Hysteresis of the switches, mm: how much later they let go than they are pressed.
     pub hysteresis_mm: f64,
-    /// Where one of the index pulses is, counts.
+    /// Position of one of the index pulses, counts.
     pub index_count: i64,
     /// Counts between two of them.
     pub counts_per_index: i64,
@@ -53,7 +53,7 @@ impl Marks {
         }
     }
 
-    /// What the board reads: the counter with what it latched at an index pulse on the way, and the switches.
+    /// Returns the board's readings: the counter with what it latched at an index pulse on the way, and the switches.
     pub fn read(&mut self, counter: u32, position_mm: f64) -> (EncoderReading, AxisSwitches) {
         let truth = self.truth;
         let last = self.count;

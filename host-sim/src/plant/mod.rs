@@ -16,8 +16,7 @@ mod variation;
 
 pub use axis::SimulatedAxis;
 pub use drive::{Backlash, Cogging, Drive, EncoderSide};
-pub use friction::FrictionTruth;
-pub(crate) use friction::Presliding;
+pub use friction::{FrictionTruth, Presliding};
 pub use marks::{MarkTruth, Marks};
 pub use stage::SimulatedStage;
 pub use transmission::{Body, Forcing};

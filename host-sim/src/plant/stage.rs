@@ -13,7 +13,7 @@ use super::{MarkTruth, Marks, SimulatedAxis, StageTruth};
 pub struct SimulatedStage {
     axes: [SimulatedAxis; 3],
     marks: [Marks; 3],
-    /// What makes 12-bit words of codes, and what it remembers of each axis; nothing, where the converters have 16 bits.
+    /// Noise shaper that makes 12-bit words of codes, with its state for each axis; `None` for 16-bit converters.
     converters: Option<(NoiseShaper, [NoiseShaperState; 3])>,
 }
 
@@ -41,7 +41,6 @@ impl SimulatedStage {
         self
     }
 
-    /// The axes.
     pub fn axes(&self) -> &[SimulatedAxis; 3] {
         &self.axes
     }
@@ -51,7 +50,7 @@ impl SimulatedStage {
         &mut self.axes
     }
 
-    /// What the encoders' counters show.
+    /// Reads the encoders' counters.
     pub fn read_counters(&mut self) -> [u32; 3] {
         self.axes.each_mut().map(SimulatedAxis::read_counter)
     }
@@ -61,7 +60,8 @@ impl SimulatedStage {
         self.marks = truths.map(Marks::new);
     }
 
-    /// What the board reads: counters with their index pulses, and switches; with a request that comes at the same time.
+    /// Returns the board's inputs: counters with their index pulses, and switches; with a request that comes at the
+    /// same time.
     pub fn read_inputs(&mut self, request: Option<Command>) -> InputRecord {
         let mut inputs = InputRecord::of_counts(self.read_counters(), request);
         let mut switches = Switches::NONE;
@@ -75,7 +75,6 @@ impl SimulatedStage {
         inputs
     }
 
-    /// One control period.
     pub fn step(&mut self, outputs: &Outputs) {
         let mut codes = outputs.codes;
         if let Some((shaper, states)) = &mut self.converters {

@@ -14,7 +14,7 @@ pub struct Body {
     pub velocity_mm_s: f64,
 }
 
-/// What acts on a mass besides the teeth, constant over a step.
+/// Forces on a mass besides the teeth's, constant over a step.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Forcing {
     /// Acceleration by a volt on this mass alone, mm/(V s^2); above zero.

@@ -1,4 +1,4 @@
-//! What the simulated axes really are. Every number here is chosen, none measured.
+//! Parameters of the simulated axes. Every number here is chosen, none measured.
 
 use std::f64::consts::TAU;
 
@@ -34,13 +34,13 @@ pub struct AxisTruth {
     pub resolution_mm: f64,
     /// Voltage of the converter's largest code, V; the amplifier saturates there.
     pub full_scale_v: f64,
-    /// What a real axis has and its model leaves out.
+    /// Imperfections of a real axis that its model leaves out.
     pub imperfections: Imperfections,
-    /// What lies between motor and table.
+    /// Drive train between motor and table.
     pub drive: Drive,
 }
 
-/// What a real axis has and its model leaves out; all zero for an ideal one.
+/// Imperfections of a real axis that its model leaves out; all zero for an ideal one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Imperfections {
     /// Standard deviation of the encoder's noise, mm, before it is quantised.
@@ -64,7 +64,7 @@ pub struct Imperfections {
 }
 
 impl Imperfections {
-    /// What the encoder's interpolation adds to a position, mm.
+    /// Returns the error that the encoder's interpolation adds to a position, mm.
     pub fn interpolation_error_mm(&self, position_mm: f64) -> f64 {
         if self.interpolation_mm > 0.0 {
             self.interpolation_mm * (TAU * position_mm / self.grating_mm).sin()
@@ -131,7 +131,7 @@ fn directed(mean: &StaticFriction, factor: f64) -> StaticFriction {
     }
 }
 
-/// What tells one simulated axis from another.
+/// Parameters in which the simulated axes differ.
 struct Character {
     gain_mm_per_v_s2: f64,
     linear_damping_per_s: f64,

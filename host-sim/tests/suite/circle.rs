@@ -1,14 +1,13 @@
 //! The circle test on the simulated stage, and the command `quadrant circle`.
 
-use crate::command;
 use indicatif::ProgressBar;
 use quadrant::reference::Plane;
-use quadrant_sim::experiment::circle::{
-    CircleRefusal, CircleRequest, CircleResult, run_circle_tests,
-};
-use quadrant_sim::experiment::comparison::Configuration;
-use quadrant_sim::experiment::compensator::{Setup, identified};
-use quadrant_sim::presentation::circle_tables;
+use quadrant_sim::circle::page::circle_tables;
+use quadrant_sim::circle::{CircleRefusal, CircleRequest, CircleResult, run_circle_tests};
+use quadrant_sim::experiment::configuration::Configuration;
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+
+use crate::command;
 
 fn request(configurations: &[Configuration]) -> CircleRequest {
     CircleRequest {
@@ -21,7 +20,7 @@ fn request(configurations: &[Configuration]) -> CircleRequest {
 }
 
 fn results(request: &CircleRequest) -> Vec<CircleResult> {
-    let setup = Setup::virtual_machine(identified().unwrap().stage);
+    let setup = RunConfiguration::identified(identified_settings().unwrap().stage);
     run_circle_tests(request, &setup, &ProgressBar::hidden())
 }
 

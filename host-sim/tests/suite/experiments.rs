@@ -6,17 +6,18 @@ use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{Command, FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant_sim::experiment::circle::run_circles;
-use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
-use quadrant_sim::experiment::compensator::Setup;
-use quadrant_sim::experiment::recorded::{RecordedAxis, replay};
+use quadrant_sim::circle::run_circles;
+use quadrant_sim::compare::sine::run_configuration;
+use quadrant_sim::experiment::configuration::Configuration;
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::record::Record;
+use quadrant_sim::replay::recorded::{RecordedAxis, replay};
 
 #[test]
 fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_an_identified_model() {
-    for setup in Setup::both().unwrap() {
+    for setup in RunConfiguration::both(&identified_settings().unwrap().stage) {
         let pid = run_configuration::<f32>(Configuration::PID, &setup, 1).unwrap();
         let best = run_configuration::<f32>(Configuration::BEST, &setup, 1).unwrap();
         for (pid, best) in pid.iter().zip(&best) {
@@ -29,7 +30,7 @@ fn combined_feedforward_removes_most_of_the_error_and_the_glitch_also_with_an_id
 
 #[test]
 fn the_same_seed_gives_the_same_outcome() {
-    let [_, setup] = Setup::both().unwrap();
+    let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
     let run = |seed| {
         run_configuration::<f32>(Configuration::BEST, &setup, seed)
             .unwrap()
@@ -41,7 +42,7 @@ fn the_same_seed_gives_the_same_outcome() {
 
 #[test]
 fn combined_feedforward_makes_the_circle_rounder() {
-    let [_, setup] = Setup::both().unwrap();
+    let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
     let circles = run_circles::<f32>(&Configuration::EXTREMES, &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
@@ -105,8 +106,14 @@ fn our_controllers_follow_the_recorded_emps_reference() {
     }
     let axis = RecordedAxis::Emps;
     let record = Record::read(file, &axis.limits()).unwrap();
-    let outcomes =
-        replay::<f32>(&record, axis, &Setup::matched(), 1, &ProgressBar::hidden()).unwrap();
+    let outcomes = replay::<f32>(
+        &record,
+        axis,
+        &RunConfiguration::exact(StageSettings::default()),
+        1,
+        &ProgressBar::hidden(),
+    )
+    .unwrap();
     let rms = |configuration| {
         let found = outcomes
             .iter()

@@ -1,4 +1,4 @@
-//! The settings of the virtual machine are what commissioning its axes gives, and as good as the truth.
+//! The committed settings are what commissioning its axes gives, and as good as the truth.
 
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
@@ -6,9 +6,10 @@ use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, commission};
-use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
-use quadrant_sim::experiment::compensator::{Setup, identified};
+use quadrant_sim::compare::sine::run_configuration;
+use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
+use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::rig::SimulatedRig;
 use quadrant_sim::settings_file::SettingsFile;
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 
 #[test]
 fn commissioning_the_axes_again_gives_the_committed_settings() {
-    let committed = identified().unwrap();
+    let committed = identified_settings().unwrap();
     let mut again = SettingsFile::new(StageSettings::default());
     again
         .stage
@@ -34,14 +35,14 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
     assert_eq!(again.stage, committed.stage);
 }
 
-/// N-PID with the combined feedforward on the x axis of the virtual machine: largest and RMS tracking error, and glitch, mean over
+/// N-PID with the combined feedforward on the x axis with the identified model: largest and RMS tracking error, and glitch, mean over
 /// three velocities and three seeds, mm.
 fn performance(stage: &StageSettings) -> [f64; 3] {
     let best = Configuration {
         controller: LawKind::NPid,
         feedforward: FeedforwardKind::Combined,
     };
-    let setup = Setup::virtual_machine(stage.clone());
+    let setup = RunConfiguration::identified(stage.clone());
     let outcomes: Vec<_> = [1, 2, 3]
         .into_par_iter()
         .flat_map(|seed| run_configuration::<f32>(best, &setup, seed).unwrap())
@@ -59,7 +60,7 @@ fn performance(stage: &StageSettings) -> [f64; 3] {
 
 /// The committed settings, but the feedforward of x told the truth, on the given elements.
 fn truth_told(elements: &GmsParameters) -> StageSettings {
-    let mut stage = identified().unwrap().stage;
+    let mut stage = identified_settings().unwrap().stage;
     let [truth, _, _] = StageTruth::real().axes;
     let axis = &mut stage.axes[0];
     let damping_v = truth.damping_per_s / truth.gain_mm_per_v_s2;
@@ -80,7 +81,7 @@ fn truth_told(elements: &GmsParameters) -> StageSettings {
 /// The true virgin curve, cut at the knots of the committed elements.
 fn truth_on_the_same_knots() -> GmsParameters {
     let [truth, _, _] = StageTruth::real().axes;
-    let axis = &identified().unwrap().stage.axes[0];
+    let axis = &identified_settings().unwrap().stage.axes[0];
     let level_v = 0.15;
     let knots: Vec<f64> = axis
         .friction
@@ -117,7 +118,7 @@ fn truth_on_the_same_knots() -> GmsParameters {
 
 #[test]
 fn identified_settings_do_as_well_as_the_truth_on_as_many_elements() {
-    let identified = performance(&identified().unwrap().stage);
+    let identified = performance(&identified_settings().unwrap().stage);
     let told = performance(&truth_told(&truth_on_the_same_knots()));
     println!("identified {identified:?}, told the truth {told:?}");
     for (found, exact) in identified.iter().zip(&told) {

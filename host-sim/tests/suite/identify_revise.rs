@@ -1,7 +1,7 @@
 //! The linear model revised for explicit friction, on the simulated x axis at rest.
 
 use quadrant::settings::AxisSettings;
-use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::identify::at_rest::AtRest;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::response::FrequencyResponse;
@@ -10,7 +10,7 @@ use quadrant_sim::plant::StageTruth;
 use quadrant_sim::rig::{Recording, SimulatedRig};
 
 fn excited(rms_v: f64) -> (AtRest, AxisSettings) {
-    let settings = identified().unwrap().stage.axes[0].clone();
+    let settings = identified_settings().unwrap().stage.axes[0].clone();
     let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
     let excitation = Excitation {
         waveform: Waveform::Multisine,

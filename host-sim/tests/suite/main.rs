@@ -2,8 +2,6 @@
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
-mod browser;
-mod chapter5;
 mod circle;
 mod command;
 mod commission;
@@ -15,7 +13,7 @@ mod design_commands;
 mod design_npid;
 mod design_pid;
 mod experiments;
-mod friction_models;
+mod hostile_link;
 mod identified_stage;
 mod identify_commands;
 mod identify_frf;
@@ -26,7 +24,6 @@ mod identify_plant;
 mod identify_revise;
 mod identify_static_friction;
 mod identify_virgin_curve;
-mod laws;
 mod machine_motion;
 mod npid_lasting_error;
 mod part_program;
@@ -37,15 +34,17 @@ mod plant_unchanged;
 mod record_bad_input;
 mod record_emps;
 mod record_experiment;
+#[cfg(target_os = "linux")]
+mod record_large;
 mod record_refusals;
 mod record_trace;
-mod report_browser;
-mod report_command;
-mod report_formats;
-mod report_page;
-mod report_parts;
 mod rig;
-mod robustness;
-mod robustness_command;
-mod sample;
 mod simulated_machine;
+mod transcript;
+
+#[allow(dead_code, reason = "the law's tests use the rest")]
+#[path = "../../../tests/law/common.rs"]
+mod common;
+#[allow(dead_code, reason = "the law's tests use the rest")]
+#[path = "../../../tests/law/link_traffic.rs"]
+mod link_traffic;

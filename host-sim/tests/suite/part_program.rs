@@ -1,12 +1,13 @@
 //! Part programs: their geometry, the limits of their motion, and `quadrant replay --gcode` from end to end.
 
-use crate::command;
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use quadrant::settings::StageSettings;
-use quadrant_sim::program::{Limits, Program, ProgramError, Trajectory, Vector};
+use quadrant_sim::gcode::{Limits, Program, ProgramError, Trajectory, Vector};
+
+use crate::command;
 
 fn limits() -> Limits {
     Limits::of(&StageSettings::default())

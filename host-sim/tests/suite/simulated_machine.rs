@@ -7,8 +7,8 @@ use quadrant::link::message::{
 };
 use quadrant::safety::{AxisName, Switches};
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
-use quadrant::link::message::{Channel, MachineState};
-use quadrant_sim::experiment::compensator::identified;
+use quadrant::telemetry::{Channel, MachineState};
+use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::simulated_machine::SimulatedMachine;
 
@@ -21,7 +21,7 @@ struct Session {
 
 impl Session {
     fn open() -> Self {
-        let mut settings = identified().unwrap().stage;
+        let mut settings = identified_settings().unwrap().stage;
         // Commissioning does not say where the switches are.
         for (axis, default) in settings.axes.iter_mut().zip(StageSettings::default().axes) {
             axis.homing = default.homing;

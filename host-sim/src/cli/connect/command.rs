@@ -296,9 +296,6 @@ pub(super) struct ScopeOptions {
     /// Write what was sampled as a figure for print.
     #[arg(long, value_name = "FILE")]
     pub(super) svg: Option<PathBuf>,
-    /// The same as a picture.
-    #[arg(long, value_name = "FILE")]
-    pub(super) png: Option<PathBuf>,
     /// Write what was sampled as CSV.
     #[arg(long, value_name = "FILE")]
     pub(super) csv: Option<PathBuf>,

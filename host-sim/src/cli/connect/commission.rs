@@ -4,6 +4,7 @@ use anyhow::Context;
 use clap::Args;
 use quadrant::link::message::Body;
 use quadrant::safety::AxisName;
+use quadrant_sim::command::output::Output;
 use quadrant_sim::console::rig::{ConnectedRig, room_mm};
 use quadrant_sim::console::{Client, settings};
 use quadrant_sim::settings_file::SettingsFile;
@@ -12,7 +13,6 @@ use serde_json::json;
 use super::command::axis_parser;
 use super::drive::Answer;
 use crate::cli::commission::Request;
-use crate::cli::output::Output;
 
 /// Options of `commission`.
 #[derive(Clone, Debug, Args)]

@@ -138,6 +138,6 @@ pub(super) fn seconds(what: &str, seconds: f64) -> anyhow::Result<Duration> {
 fn explained(error: &anyhow::Error) -> String {
     match error.downcast_ref::<ClientError>() {
         Some(error) => error.to_string(),
-        None => crate::explained(error),
+        None => quadrant_sim::command::explained(error),
     }
 }

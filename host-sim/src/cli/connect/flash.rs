@@ -10,7 +10,7 @@ use clap::Args;
 /// Options of `flash`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
-    /// The firmware: the ELF file that `cargo build --release` leaves in target/thumbv7em-none-eabihf/release.
+    /// The firmware: the ELF file that `cargo build --profile firmware` leaves in target/thumbv7em-none-eabihf/firmware.
     elf: PathBuf,
     /// The chip, as probe-rs calls it.
     #[arg(long, default_value = "STM32F446RETx")]

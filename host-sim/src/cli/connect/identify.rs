@@ -6,16 +6,19 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use quadrant::safety::AxisName;
 use quadrant::settings::AxisSettings;
+use quadrant_sim::command::output::share;
 use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings, quiet_settings};
 use quadrant_sim::console::Client;
 use quadrant_sim::console::rig::ConnectedRig;
 use quadrant_sim::identify::frf::{self, FrfSettings};
 use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended, shuttle};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
+use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
+use quadrant_sim::identify::pages::linear::plant_tables;
+use quadrant_sim::identify::pages::motion::motion_table;
 use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::identify::static_friction::{self, Exponent, StaticFrictionSettings, fit_map};
 use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
-use quadrant_sim::presentation::{friction_table, gms_table, motion_table, plant_tables};
 use quadrant_sim::report::Table;
 use quadrant_sim::rig::Rig;
 use serde_json::json;
@@ -23,7 +26,6 @@ use serde_json::json;
 use super::command::axis_parser;
 use super::commission::{travel, travel_mm};
 use super::drive::Answer;
-use crate::cli::output::share;
 
 /// The measurements.
 #[derive(Clone, Debug, Subcommand)]
@@ -148,7 +150,7 @@ fn measure(
             let found =
                 motor_constant::measure(rig, &MotorConstantSettings::default(), &mut progress)?;
             found.recording.write_csv(&options.out)?;
-            Ok(quadrant_sim::presentation::motor_constant_table(
+            Ok(quadrant_sim::identify::pages::linear::motor_constant_table(
                 &found, None,
             ))
         }

@@ -11,7 +11,7 @@ use quadrant::reference::{Plane, Sense, circle};
 use quadrant::settings::PlanSettings;
 use quadrant_sim::console::set_points::{references_mm, set_points, stream};
 use quadrant_sim::console::{Client, settings, settle};
-use quadrant_sim::program::{Limits, Program, Trajectory};
+use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use serde_json::json;
 
 use super::command::{CircleOptions, StreamOptions};

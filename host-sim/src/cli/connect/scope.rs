@@ -33,14 +33,14 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
         );
     }
     let unit = columns::unit(options.channels[0]);
-    if (options.svg.is_some() || options.png.is_some())
+    if options.svg.is_some()
         && let Some(other) = options
             .channels
             .iter()
             .find(|channel| columns::unit(**channel) != unit)
     {
         bail!(
-            "--svg, --png: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
+            "--svg: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
             options.channels[0],
             columns::unit(*other)
         );
@@ -76,10 +76,6 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
     }
     if let Some(path) = &options.svg {
         write(path, figure(&samples, &resolutions_mm).to_svg()?.as_bytes())?;
-        files.push(path.clone());
-    }
-    if let Some(path) = &options.png {
-        write(path, &figure(&samples, &resolutions_mm).to_png()?)?;
         files.push(path.clone());
     }
     let data = json!({

@@ -4,15 +4,16 @@ use anyhow::bail;
 use clap::Args;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::sector_proof;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear};
+use quadrant_sim::design::pages::npid::NonlinearPage;
 use quadrant_sim::design::robustness::{Uncertainty, robustness};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::time_varying::VaryingLoop;
 use quadrant_sim::design::{Form, Process};
-use quadrant_sim::presentation::{NonlinearPage, provenance};
+use quadrant_sim::pages::provenance;
 
 use super::process::Model;
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant design npid`.
 #[derive(Clone, Debug, Args)]

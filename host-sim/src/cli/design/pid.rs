@@ -4,14 +4,15 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::{Args, ValueEnum};
+use quadrant_sim::command::output::{Output, command_line};
 use quadrant_sim::design::measured::MeasuredResponse;
+use quadrant_sim::design::pages::pid::PidPage;
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::{Form, INTEGRAL_SHARE, PidRequest, Process, Target, design_pid};
 use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::presentation::{PidPage, provenance};
+use quadrant_sim::pages::provenance;
 
 use super::process::Model;
-use crate::cli::output::{Output, command_line};
 
 /// Options of `quadrant design pid`.
 #[derive(Clone, Debug, Args)]

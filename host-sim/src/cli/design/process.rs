@@ -6,11 +6,10 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::Output;
 use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
-
-use crate::cli::identify::rig::Axis;
-use crate::cli::output::Output;
 
 /// Options that name a model of an axis: numbers, or settings that hold one.
 #[derive(Clone, Debug, Args)]

@@ -3,15 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::frf::{
     FrfMeasurement, FrfSettings, SavedSettings, measure, response_of,
 };
-use quadrant_sim::presentation::{provenance, response_section};
+use quadrant_sim::identify::pages::linear::response_section;
+use quadrant_sim::pages::provenance;
 
-use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// The settling time of a fresh measurement, s.
 const SETTLING_S: f64 = 0.7;

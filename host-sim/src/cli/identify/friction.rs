@@ -3,14 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant_sim::identify::pages::friction::{friction_section, friction_table};
 use quadrant_sim::identify::static_friction::{
     Exponent, FrictionMap, StaticFrictionSettings, fit_map, measure,
 };
-use quadrant_sim::presentation::{friction_section, friction_table, provenance};
+use quadrant_sim::pages::provenance;
 
-use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]

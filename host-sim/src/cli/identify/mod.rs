@@ -8,11 +8,10 @@ mod nctf;
 mod plant;
 mod recorded;
 mod revise;
-pub(super) mod rig;
-mod validate;
 mod virgin_curve;
 
 use clap::Subcommand;
+use quadrant_sim::command::axis::Axis;
 use quadrant_sim::report::{Page, Provenance, Section};
 
 /// The steps from measurements to parameters.
@@ -32,8 +31,6 @@ pub(super) enum Command {
     Revise(revise::Arguments),
     /// Measure friction at constant velocity, both ways, and fit the static model (thesis, Table 3.2).
     StaticFriction(friction::Arguments),
-    /// Judge identification on the simulated stage by the truth that it does not know: a table of errors and honesty.
-    Validate(validate::Arguments),
     /// Measure the hysteresis of a slow sine and identify the GMS model (thesis, Table 3.3).
     VirginCurve(virgin_curve::Arguments),
 }
@@ -47,7 +44,6 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Nctf(arguments) => nctf::run(arguments),
         Command::Revise(arguments) => revise::run(arguments),
         Command::StaticFriction(arguments) => friction::run(arguments),
-        Command::Validate(arguments) => validate::run(arguments),
         Command::VirginCurve(arguments) => virgin_curve::run(arguments),
     }
 }
@@ -63,6 +59,6 @@ fn page(title: &str, axis: &str, sections: Vec<Section>, provenance: Provenance)
 }
 
 /// What an axis of the simulated stage is called.
-fn simulated(axis: rig::Axis) -> String {
+fn simulated(axis: Axis) -> String {
     format!("{} axis of the simulated stage", axis.name())
 }

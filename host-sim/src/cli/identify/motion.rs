@@ -4,17 +4,18 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::identify::motion::{
     CascadeLoop, MotionFitSettings, MotionModel, fit_motion, recommended, replay_closed_loop,
     replay_open_loop, shuttle,
 };
-use quadrant_sim::presentation::{Reruns, candidates_table, motion_page, motion_table, provenance};
+use quadrant_sim::identify::pages::motion::{Reruns, candidates_table, motion_page, motion_table};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::rig::Recording;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
-use super::rig::Axis;
 use super::{recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]

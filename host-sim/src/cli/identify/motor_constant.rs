@@ -3,14 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantSettings, evaluate, measure,
 };
-use quadrant_sim::presentation::{motor_constant_section, motor_constant_table, provenance};
+use quadrant_sim::identify::pages::linear::motor_constant_table;
+use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
+use quadrant_sim::pages::provenance;
 
-use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]

@@ -4,15 +4,16 @@ use std::path::PathBuf;
 
 use clap::Args;
 use quadrant::control::surface::SurfaceGains;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::identify::characteristic::{
     Characteristic, CharacteristicSettings, evaluate, measure,
 };
-use quadrant_sim::presentation::{characteristic_section, characteristic_table, provenance};
+use quadrant_sim::identify::pages::characteristic::{characteristic_section, characteristic_table};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
-use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify nctf`.
 #[derive(Clone, Debug, Args)]

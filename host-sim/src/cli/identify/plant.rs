@@ -3,17 +3,18 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line};
+use quadrant_sim::identify::pages::linear::{
+    fitted_response_section, plant_tables, response_section,
+};
 use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::presentation::{
-    fitted_response_section, plant_tables, provenance, response_section,
-};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Block;
 
 use super::frf::Measurement;
-use super::rig::Axis;
 use super::{page, simulated};
-use crate::cli::output::{Output, command_line};
 
 /// Options of `quadrant identify plant`.
 #[derive(Clone, Debug, Args)]

@@ -4,9 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressDrawTarget;
+use quadrant_sim::command::output::share;
 use quadrant_sim::rig::Recording;
-
-use crate::cli::output::share;
 
 /// Reading that is done sooner needs no bar.
 const PATIENCE: Duration = Duration::from_secs(2);

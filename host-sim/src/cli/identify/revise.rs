@@ -7,16 +7,17 @@ use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::commission::{CommissionSettings, commission};
 use quadrant_sim::identify::at_rest::AtRest;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
+use quadrant_sim::identify::pages::revise::{AmplitudeResponse, revise_page, revise_table};
 use quadrant_sim::identify::revise::ExplicitFriction;
-use quadrant_sim::presentation::{AmplitudeResponse, provenance, revise_page, revise_table};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::settings_file::SettingsFile;
 
-use super::rig::Axis;
 use super::{recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify revise`.
 #[derive(Clone, Debug, Args)]

@@ -5,15 +5,16 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use quadrant::settings::AxisSettings;
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::commission::bootstrap::quiet_settings;
+use quadrant_sim::identify::pages::friction::{gms_table, presliding_section};
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveSettings, identify, measure};
-use quadrant_sim::presentation::{gms_table, presliding_section, provenance};
+use quadrant_sim::pages::provenance;
 use quadrant_sim::rig::{Recording, Rig};
 use quadrant_sim::settings_file::SettingsFile;
 
-use super::rig::Axis;
 use super::{page, recorded, simulated};
-use crate::cli::output::{Output, command_line, share};
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]

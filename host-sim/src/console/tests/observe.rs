@@ -13,7 +13,7 @@ use crate::console::columns;
 use crate::console::rig::ConnectedRig;
 use crate::console::samples::{Recording, Samples, arm, least_decimation, read_capture};
 use crate::console::set_points::{set_points, stream};
-use crate::program::{Limits, Program, Trajectory};
+use crate::gcode::{Limits, Program, Trajectory};
 use crate::record::{AxisLimits, Record};
 use crate::rig::{Drive, Experiment, Rig};
 

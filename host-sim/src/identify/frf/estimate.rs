@@ -12,7 +12,7 @@ use rustfft::{Fft, FftPlanner};
 use super::super::response::{FrequencyResponse, ResponsePoint};
 use crate::rig::Recording;
 
-/// Which quotient of spectra is the response.
+/// Estimator of the response: the quotient of spectra that it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Estimator {
     /// `S_yr / S_ur` with the injected excitation as instrument: free of bias under feedback.
@@ -21,10 +21,9 @@ pub enum Estimator {
     H1,
 }
 
-/// What the blocks showed.
+/// Result of averaging over the blocks.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// The response.
     pub response: FrequencyResponse,
     /// Blocks that were averaged.
     pub blocks: usize,

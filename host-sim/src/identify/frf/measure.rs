@@ -9,10 +9,9 @@ use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::setting::SettingError;
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
-/// How a frequency response is measured.
+/// Parameters of a frequency response measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FrfSettings {
-    /// What is injected.
     pub excitation: Excitation,
     /// Blocks of two periods, overlapping by half, that are averaged; at least 2.
     pub periods: usize,
@@ -50,11 +49,11 @@ pub struct FrfMeasurement {
     pub estimate: Estimate,
     /// The response by H1: under feedback, for comparison only.
     pub plain: Estimate,
-    /// Whether a feedback law was at work.
+    /// True if a feedback law was at work.
     pub closed_loop: bool,
 }
 
-/// Why there is no response.
+/// Reasons for which a response cannot be measured.
 #[derive(Debug, thiserror::Error)]
 pub enum FrfError {
     /// A setting that cannot be.
@@ -66,13 +65,10 @@ pub enum FrfError {
          {travel_mm:.0} mm: lower the velocity or the period"
     )]
     Travel {
-        /// The velocity.
         velocity_mm_s: f64,
-        /// What one period takes.
+        /// Travel that one period takes, mm.
         needed_mm: f64,
-        /// What there is.
         travel_mm: f64,
-        /// The period.
         period_s: f64,
     },
     /// The excitation slowed the axis so far that friction is not linear.
@@ -332,7 +328,7 @@ fn steady_range(recording: &Recording, bias_velocity_mm_s: f64) -> Range<usize> 
     }
 }
 
-/// Whether the axis kept moving all the time.
+/// Checks that the axis kept moving all the time.
 fn check_sliding(
     recording: &Recording,
     steady: &Range<usize>,

@@ -12,7 +12,7 @@ use super::{Estimator, FrfMeasurement, estimate};
 use crate::identify::setting::SettingError;
 use crate::rig::Recording;
 
-/// How recordings are turned into a response.
+/// Parameters of the conversion of recordings into a response.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SavedSettings {
     /// Period of the excitation, or half a block of a random one, s; at least 16 samples.
@@ -23,7 +23,7 @@ pub struct SavedSettings {
     pub settling_s: f64,
 }
 
-/// Why recordings give no response.
+/// Reasons for which recordings give no response.
 #[derive(Debug, thiserror::Error)]
 pub enum SavedError {
     /// A setting that cannot be.
@@ -34,34 +34,22 @@ pub enum SavedError {
         "recording {index} has a sample time of {found_s} s, the first one {expected_s} s; resample it, or take it by itself"
     )]
     SampleTime {
-        /// Which, from 1.
+        /// Number of the recording, from 1.
         index: usize,
-        /// Its sample time.
         found_s: f64,
         /// That of the first.
         expected_s: f64,
     },
-    /// Nothing was injected.
     #[error(
         "the recordings hold no injected voltage between {low_hz} and {high_hz} Hz; a response needs an excitation"
     )]
-    NoExcitation {
-        /// The band.
-        low_hz: f64,
-        /// The band.
-        high_hz: f64,
-    },
+    NoExcitation { low_hz: f64, high_hz: f64 },
     /// Not enough to average.
     #[error(
         "{blocks} blocks of two periods of {period_s} s are steady, and a response takes at least 2: record longer, state a \
          shorter period, or give the column reference_mm of an axis that moved"
     )]
-    TooShort {
-        /// Blocks found.
-        blocks: usize,
-        /// The period.
-        period_s: f64,
-    },
+    TooShort { blocks: usize, period_s: f64 },
 }
 
 /// Periods in a block: the window then leaves the lines of a periodic excitation apart.
@@ -186,7 +174,7 @@ fn check(recordings: &[Recording], settings: &SavedSettings) -> Result<f64, Save
     Ok(sample_time_s)
 }
 
-/// Whether the voltage is more than the injection.
+/// True if the voltage is more than the injection.
 fn is_closed_loop(recording: &Recording) -> bool {
     let square: f64 = recording
         .voltage_v

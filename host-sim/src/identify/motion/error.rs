@@ -1,60 +1,44 @@
-//! Why a record yields no model.
+//! Errors of a fit to a motion record.
 
 use crate::identify::fit::FitError;
 use crate::identify::setting::SettingError;
 
-/// Why a record yields no model.
+/// Reasons for which a record yields no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MotionFitError {
     /// A setting that cannot be.
     #[error(transparent)]
     Setting(#[from] SettingError),
-    /// Too short.
     #[error(
         "{rows} rows are left of the record, and a fit takes {LEAST_ROWS}: record longer, raise the row rate, or cut less at the edges"
     )]
-    TooShort {
-        /// Rows left.
-        rows: usize,
-    },
+    TooShort { rows: usize },
     /// It moves one way only.
     #[error(
         "only {percent:.1} % of the record moves in one of the directions: friction and offset cannot be told apart without motion both \
          ways, {LEAST_PERCENT} % at least"
     )]
-    OneWay {
-        /// The smaller share.
-        percent: f64,
-    },
+    OneWay { percent: f64 },
     /// It holds too little of something.
     #[error(
         "the record does not tell the parameters of \"{structure}\" apart: it needs several velocities, accelerations and reversals"
     )]
-    Dependent {
-        /// The model.
-        structure: String,
-    },
+    Dependent { structure: String },
     /// The fit makes no sense of mass or friction.
     #[error(
         "the fit of \"{structure}\" gives {name} = {value:.4} {unit}: are position and voltage of the same axis, and the voltage positive \
          towards larger positions?"
     )]
     Unphysical {
-        /// The model.
         structure: String,
-        /// The parameter.
         name: String,
-        /// Its value.
         value: f64,
-        /// Its unit.
         unit: &'static str,
     },
-    /// The search failed.
     #[error(transparent)]
     Fit(#[from] FitError),
 }
 
-/// Fewest rows.
 pub(super) const LEAST_ROWS: usize = 200;
 /// Share of the rows that must move each way, %.
 pub(super) const LEAST_PERCENT: f64 = 5.0;

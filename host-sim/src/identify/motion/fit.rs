@@ -7,6 +7,7 @@ use super::model::{MotionModel, Structure};
 use super::regressors::Regression;
 use super::signals::{MotionFitSettings, Signals};
 use super::solution::{MOST_DEAD_TIME_S, Solution};
+use super::uncertainty::estimates;
 use crate::identify::setting::SettingError;
 use crate::rig::Recording;
 
@@ -22,7 +23,7 @@ pub struct Candidate {
     pub rows: Rows,
 }
 
-/// What a fit explains, row by row.
+/// Voltage explained by a fit, row by row.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Rows {
     /// Time, s.
@@ -31,7 +32,7 @@ pub struct Rows {
     pub velocity_mm_s: Vec<f64>,
     /// Voltage that was commanded a dead time before, V.
     pub voltage_v: Vec<f64>,
-    /// What the model leaves unexplained of it, V.
+    /// Residual of the model, V.
     pub residual_v: Vec<f64>,
     /// Voltage without inertia and offset, V: the friction.
     pub friction_v: Vec<f64>,
@@ -150,7 +151,8 @@ fn candidate(
     let whole = Solution::find(&regression, structure, &all)?;
     let residual = whole.residual(&regression, &all);
     let row_s = signals.sample_time_s * settings.decimation(signals.sample_time_s) as f64;
-    let model = whole.model(&regression, structure, settings, &residual)?;
+    let estimates = estimates(&whole, &regression, structure, settings, &residual);
+    let model = whole.model(&regression, structure, settings, &residual, estimates)?;
     let acceleration = signals.decimated(&signals.acceleration_mm_s2, settings);
     let voltage = regression.voltage_at(whole.dead_time_s);
     let friction = voltage

@@ -1,4 +1,4 @@
-//! What a motion record yields.
+//! Models identified from a motion record.
 
 use heapless::Vec as ShortVec;
 use quadrant::control::plant_model::PlantModel;
@@ -10,7 +10,7 @@ use quadrant::settings::FrictionSettings;
 use crate::identify::single_state::with_all_models;
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 
-/// What a model holds beside mass, viscous friction, Coulomb friction and offset.
+/// Structure of a model: its terms beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Structure {
     /// A viscous friction for each sense of motion.
@@ -53,7 +53,7 @@ impl Structure {
         [four, directed, delayed, presliding, stribeck]
     };
 
-    /// What it holds more than the model before it in [`ALL`](Self::ALL), for a table.
+    /// Returns the terms added to those of the model before it in [`ALL`](Self::ALL), for a table.
     pub fn addition(&self) -> String {
         let name = self.name();
         name.rfind('+')
@@ -80,22 +80,19 @@ impl Structure {
 /// A parameter as a table shows it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Estimate {
-    /// Its name.
     pub name: String,
-    /// Its unit.
     pub unit: &'static str,
-    /// Its value.
     pub value: f64,
     /// One standard deviation, over blocks of the record.
     pub standard_error: f64,
-    /// What turns the value into newtons, metres and seconds, but for the force per volt; and the unit it then has.
+    /// Factor that turns the value into newtons, metres and seconds, but for the force per volt; and the unit it then
+    /// has.
     pub to_si: (f64, &'static str),
 }
 
 /// A model of an axis' inertia and friction, as seen at the amplifier's input.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionModel {
-    /// What it holds.
     pub structure: Structure,
     /// M' = 1/A, V s²/mm.
     pub inertia_v_s2_per_mm: f64,
@@ -145,7 +142,7 @@ impl MotionModel {
         }
     }
 
-    /// Whether the friction does not rise with the velocity but for its viscous part: what the firmware's model can hold.
+    /// True if the friction does not rise with the velocity but for its viscous part, as the firmware's model requires.
     pub fn is_stribeck(&self) -> bool {
         let curve = &self.friction.positive.curve;
         curve.breakaway_v >= curve.coulomb_v

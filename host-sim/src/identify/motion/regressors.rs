@@ -25,16 +25,13 @@ pub(super) enum Term {
 /// A sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Way {
-    /// Both alike.
     Both,
-    /// To larger positions.
     Positive,
-    /// To smaller positions.
     Negative,
 }
 
 impl Term {
-    /// Whether a negative coefficient would be no friction.
+    /// True if a negative coefficient would be no friction.
     fn is_level(self) -> bool {
         matches!(self, Self::Element(_))
     }
@@ -131,7 +128,6 @@ impl<'a> Regression<'a> {
         self.signals.hold_s
     }
 
-    /// Rows.
     pub(super) fn rows(&self) -> usize {
         self.columns.nrows()
     }

@@ -3,7 +3,7 @@
 use super::zero_phase::low_pass;
 use crate::rig::Recording;
 
-/// How a motion record is prepared and what may be fitted to it.
+/// Parameters of the preparation of a motion record, and of the models fitted to it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct MotionFitSettings {
     /// Cut-off of the position's low-pass, Hz: well above the motion, well below the noise of its second difference.

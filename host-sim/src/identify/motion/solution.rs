@@ -4,10 +4,9 @@ use nalgebra::DVector;
 use quadrant::friction::PerDirection;
 
 use super::error::MotionFitError;
-use super::model::{MotionModel, Structure, sliding};
+use super::model::{Estimate, MotionModel, Structure, sliding};
 use super::regressors::{Regression, Term, Way, solve};
 use super::signals::MotionFitSettings;
-use super::uncertainty::estimates;
 use crate::identify::fit::{Loss, Parameter, fit};
 
 /// Largest dead time, s.
@@ -94,13 +93,14 @@ impl Solution {
         (voltage - columns * &self.coefficients).select_rows(rows)
     }
 
-    /// The model, in its own terms.
+    /// The model, in its own terms; `estimates` are its parameters with their standard errors.
     pub(super) fn model(
         &self,
         regression: &Regression<'_>,
         structure: Structure,
         settings: &MotionFitSettings,
         residual: &DVector<f64>,
+        estimates: Vec<Estimate>,
     ) -> Result<MotionModel, MotionFitError> {
         let sum = |wanted: &dyn Fn(Term) -> bool| -> f64 {
             let terms = regression.terms.iter().zip(self.coefficients.iter());
@@ -149,7 +149,7 @@ impl Solution {
             dead_time_s: self.dead_time_s,
             hold_s: regression.hold_s(),
             elements: elements.collect(),
-            estimates: estimates(self, regression, structure, settings, residual),
+            estimates,
             relative_error: residual.norm() / voltage.norm(),
         })
     }

@@ -6,12 +6,11 @@ use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use super::map::{FrictionMap, FrictionRun};
 use crate::identify::fit::{Fit, FitError, Loss, Parameter, fit};
 
-/// What is done about delta, the exponent of the Stribeck curve.
+/// Treatment of delta, the exponent of the Stribeck curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Exponent {
     /// It has this value.
     Fixed(f64),
-    /// It is fitted.
     Free,
 }
 
@@ -31,7 +30,6 @@ pub struct DirectionFit {
 /// The models of both directions.
 #[derive(Clone, Debug)]
 pub struct FrictionFit {
-    /// Each direction's.
     pub directions: PerDirection<DirectionFit>,
     /// Half the difference of the directions' Coulomb levels, V: the amplifier's offset if the friction is the same in both,
     /// positive when the axis is pushed to larger positions.
@@ -41,7 +39,6 @@ pub struct FrictionFit {
 }
 
 impl FrictionFit {
-    /// The models alone.
     pub fn models(&self) -> PerDirection<StaticFriction> {
         self.directions.map(|direction| direction.model)
     }
@@ -57,18 +54,15 @@ impl FrictionFit {
     }
 }
 
-/// Why a map supports no model.
+/// Reasons for which a map supports no model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FrictionFitError {
-    /// Too few runs.
     #[error(
         "{runs} runs in the {direction} direction moved evenly; the model takes {LEAST_RUNS}: measure more velocities, or \
          faster ones if the axis sticks and slips"
     )]
     TooFewRuns {
-        /// "positive" or "negative".
         direction: &'static str,
-        /// Runs that count.
         runs: usize,
     },
     /// The friction has the wrong sign.
@@ -77,14 +71,10 @@ pub enum FrictionFitError {
          signs of voltage and position alike, and is the axis free of load?"
     )]
     Sign {
-        /// "positive" or "negative".
         direction: &'static str,
-        /// The voltage.
         voltage_v: f64,
-        /// The velocity.
         velocity_mm_s: f64,
     },
-    /// The search failed.
     #[error(transparent)]
     Fit(#[from] FitError),
 }

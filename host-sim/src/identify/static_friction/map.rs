@@ -22,37 +22,23 @@ pub struct FrictionMap {
     pub runs: Vec<FrictionRun>,
 }
 
-/// Why a file holds no map.
+/// Reasons for which a file holds no map.
 #[derive(Debug, thiserror::Error)]
 pub enum MapError {
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
-    Csv {
-        /// The file.
-        path: PathBuf,
-        /// Why.
-        source: csv::Error,
-    },
+    Csv { path: PathBuf, source: csv::Error },
     /// A column is missing.
     #[error("{}: no column {name}; a friction map has the columns {}", path.display(), COLUMNS.join(", "))]
-    Column {
-        /// The file.
-        path: PathBuf,
-        /// The column.
-        name: &'static str,
-    },
+    Column { path: PathBuf, name: &'static str },
     /// A value that cannot be.
     #[error("{}, row {row}, column {name}: {value:?} is not {expected}", path.display())]
     Value {
-        /// The file.
         path: PathBuf,
         /// Row of data, from 1.
         row: usize,
-        /// The column.
         name: &'static str,
-        /// What stands there.
         value: String,
-        /// What should.
         expected: &'static str,
     },
 }

@@ -6,12 +6,12 @@ use super::map::{FrictionMap, FrictionRun};
 use crate::identify::setting::SettingError;
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
-/// How the friction-velocity map is measured.
+/// Parameters of the measurement of the friction-velocity map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StaticFrictionSettings {
     /// Slowest and fastest velocity, mm/s.
     pub velocities_mm_s: (f64, f64),
-    /// How many velocities, even on a log scale.
+    /// Number of velocities, even on a log scale.
     pub count: usize,
     /// Length over which the voltage is averaged, mm: a whole number of turns of the screw, whose ripple then cancels.
     pub stretch_mm: f64,
@@ -30,7 +30,7 @@ impl Default for StaticFrictionSettings {
     }
 }
 
-/// Why there is no map.
+/// Reasons for which no map was measured.
 #[derive(Debug, thiserror::Error)]
 pub enum StaticFrictionError {
     /// A setting that cannot be.
@@ -42,11 +42,9 @@ pub enum StaticFrictionError {
          stretch or the settling time"
     )]
     Travel {
-        /// The velocity.
         velocity_mm_s: f64,
-        /// What a run takes.
+        /// Travel that a run takes, mm.
         needed_mm: f64,
-        /// What there is.
         travel_mm: f64,
     },
     /// A run was stopped.
@@ -191,7 +189,7 @@ pub fn measure(
     Ok((map, recordings))
 }
 
-/// What a run at a velocity shows over the stretch, the last before it slows down.
+/// Evaluates a run at a velocity over the stretch, the last before it slows down.
 pub(super) fn evaluate(
     recording: &Recording,
     settings: &StaticFrictionSettings,
@@ -250,7 +248,7 @@ pub(super) fn evaluate(
     })
 }
 
-/// Whether the velocity over a few counts falls to a share of its mean somewhere, and rises to a multiple elsewhere.
+/// True if the velocity over a few counts falls to a share of its mean somewhere, and rises to a multiple elsewhere.
 fn sticks_and_slips(
     positions: &[f64],
     velocity_mm_s: f64,

@@ -15,7 +15,6 @@ use crate::rig::Recording;
 /// An identified GMS model.
 #[derive(Clone, Debug)]
 pub struct GmsFit {
-    /// The virgin curve.
     pub curve: VirginCurve,
     /// The elements as the knots on the virgin curve give them, and the attraction rate as it was assumed.
     pub from_curve: GmsParameters,
@@ -25,7 +24,7 @@ pub struct GmsFit {
     pub knots_mm: Vec<f64>,
     /// Refined parameters: knots unless they were given, shares, C, with standard errors and correlations.
     pub fit: Fit,
-    /// Whether the record determines C; if not, it is as assumed.
+    /// True if the record determines C; if not, it is as assumed.
     pub attraction_determined: bool,
     /// Measured and predicted hysteresis.
     pub prediction: Prediction,
@@ -42,7 +41,7 @@ const ROUGH_STEP: f64 = 1e-3;
 /// Relative standard error of C beyond which it is not determined.
 const MOST_UNCERTAIN: f64 = 0.3;
 
-/// Which knots the elements have.
+/// Knots of the elements.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Knots {
     /// So many, where they fit the curve best.

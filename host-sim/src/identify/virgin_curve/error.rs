@@ -1,10 +1,10 @@
-//! Why a recording gives no GMS model.
+//! Errors of the identification of pre-sliding friction.
 
 use quadrant::friction::gms::MAX_ELEMENTS;
 
 use crate::identify::fit::FitError;
 
-/// Why a recording gives no GMS model.
+/// Reasons for which a recording gives no GMS model.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum VirginCurveError {
     /// The axis did not turn round often enough.
@@ -13,9 +13,9 @@ pub enum VirginCurveError {
          axis hardly moved ({travel_um:.1} um)"
     )]
     TooFewReversals {
-        /// How often it did.
+        /// Number of reversals found.
         reversals: usize,
-        /// How far it moved.
+        /// Distance moved, um.
         travel_um: f64,
     },
     /// The friction never reached its plateau.
@@ -24,9 +24,8 @@ pub enum VirginCurveError {
          is unknown. A sine of about {needed_um:.0} um would reach the plateau"
     )]
     NoPlateau {
-        /// How far it moved.
+        /// Distance moved, um.
         travel_um: f64,
-        /// The friction reached.
         reached_v: f64,
         /// The amplitude that would do.
         needed_um: f64,
@@ -36,10 +35,9 @@ pub enum VirginCurveError {
         "{count} elements; a GMS model has 1 to {MAX_ELEMENTS}, with knots that rise from above zero"
     )]
     Elements {
-        /// How many were asked for.
+        /// Number of elements asked for.
         count: usize,
     },
-    /// The search failed.
     #[error(transparent)]
     Fit(#[from] FitError),
 }

@@ -4,7 +4,7 @@ use quadrant::reference::{HarmonicSettings, MotionSettings};
 
 use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 
-/// How the hysteresis is measured.
+/// Parameters of the hysteresis measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VirginCurveSettings {
     /// Amplitude of the reference, mm: it must carry the axis through its pre-sliding range and, before that, the

@@ -11,7 +11,7 @@ use crate::rig::Recording;
 /// Slope at the end of the curve over its slope at the beginning below which it is flat.
 const FLAT: f64 = 0.04;
 
-/// Whether the curve has become flat; an exponential through it says how far it would have to go.
+/// Checks that the curve has become flat; an exponential through it estimates how far it would have to go.
 pub(super) fn check_plateau(
     curve: &VirginCurve,
     recording: &Recording,

@@ -1,0 +1,194 @@
+//! The page of a commissioning.
+
+use crate::commission::verify::Verdict;
+use crate::commission::{Commissioned, CrossCheck};
+use crate::identify::motion::recommended;
+use crate::identify::pages::friction::{friction_section, presliding_section};
+use crate::identify::pages::linear::{motor_constant_table, plant_tables, response_section};
+use crate::identify::pages::motion::motion_table;
+use crate::identify::pages::revise::revise_sections;
+use crate::pages::{UM_PER_MM, error_curve};
+use crate::report::{
+    Block, Cell, Column, Figure, Lines, Page, Plot, Provenance, Section, Style, Table,
+};
+
+/// The gains (thesis, Table 4.1), with margins at the control rate.
+pub fn gains_table(found: &Commissioned) -> Table {
+    let pid = &found.settings.feedback.pid;
+    let nonlinear = found.settings.feedback.nonlinear;
+    let mut rows = vec![
+        ("Kp", "V/mm", pid.kp_v_per_mm, 4),
+        ("Ki", "V/(mm s)", pid.ki_v_per_mm_s, 2),
+        ("Kd", "V s/mm", pid.kd_v_s_per_mm, 6),
+        ("derivative filter", "us", 1e6 * pid.derivative_filter_s, 1),
+        ("Popov bound on k(e)", "", found.sector_bound, 3),
+    ];
+    if let Some(gain) = nonlinear {
+        rows.push(("ko", "1/mm", gain.rate_per_mm, 2));
+        rows.push(("emax", "mm", gain.range_mm, 4));
+        rows.push(("largest k(e)", "", gain.largest(), 3));
+    }
+    if let Ok(margins) = &found.margins {
+        rows.extend([
+            ("gain margin, sampled", "dB", margins.gain_margin_db, 2),
+            ("at", "Hz", margins.phase_crossover_hz, 1),
+            ("phase margin, sampled", "deg", margins.phase_margin_deg, 2),
+            ("at", "Hz", margins.gain_crossover_hz, 1),
+            ("largest |S|", "", margins.sensitivity_peak, 3),
+            ("largest |T|", "", margins.complementary_peak, 3),
+        ]);
+    }
+    Table {
+        id: "gains".to_owned(),
+        caption: "Controller, and its margins with sampling at the control rate".to_owned(),
+        columns: vec![
+            Column::new("Quantity"),
+            Column::new("Unit"),
+            Column::new("Value"),
+        ],
+        rows: rows
+            .into_iter()
+            .map(|(name, unit, value, decimals)| {
+                vec![
+                    Cell::text(name),
+                    Cell::text(unit),
+                    Cell::number(value, decimals),
+                ]
+            })
+            .collect(),
+    }
+}
+
+/// Returns the table of each law's sine tests on the axis, by its own encoder.
+pub fn verdict_table(verdicts: &[Verdict]) -> Table {
+    let baseline = verdicts.first().map(|verdict| verdict.score);
+    Table {
+        id: "verdict".to_owned(),
+        caption: "Tracking error on the trial's sine, by the axis' own encoder, over two cycles; change against the PID"
+            .to_owned(),
+        columns: vec![
+            Column::new("Law"),
+            Column::with_unit("Largest", "um"),
+            Column::with_unit("RMS", "um"),
+            Column::with_unit("Change of largest", "%"),
+            Column::with_unit("Change of RMS", "%"),
+        ],
+        rows: verdicts
+            .iter()
+            .map(|verdict| {
+                let change = |from: Option<f64>, to: f64| {
+                    from.map_or(Cell::Missing, |from| Cell::number(100.0 * (to / from - 1.0), 1))
+                };
+                vec![
+                    Cell::text(verdict.law),
+                    Cell::number(UM_PER_MM * verdict.score.largest_mm, 2),
+                    Cell::number(UM_PER_MM * verdict.score.rms_mm, 3),
+                    change(baseline.map(|score| score.largest_mm), verdict.score.largest_mm),
+                    change(baseline.map(|score| score.rms_mm), verdict.score.rms_mm),
+                ]
+            })
+            .collect(),
+    }
+}
+
+/// The whole commissioning of one axis.
+pub fn commission_page(
+    axis: &str,
+    found: &Commissioned,
+    checked: Option<&CrossCheck>,
+    provenance: Provenance,
+) -> Page {
+    let verdict_curves = found
+        .verdicts
+        .iter()
+        .enumerate()
+        .map(|(index, verdict)| {
+            let recording = &verdict.recording;
+            let errors: Vec<f64> = recording
+                .reference_mm
+                .iter()
+                .zip(&recording.position_mm)
+                .map(|(reference, position)| reference - position)
+                .collect();
+            error_curve(
+                verdict.law.to_owned(),
+                &errors,
+                recording.sample_time_s,
+                Style::nth(index),
+            )
+        })
+        .collect();
+    let [parameters, bands] = plant_tables(&found.plant);
+    let (map, friction, _) = &found.friction;
+    let (gms, _) = &found.presliding;
+    let mut response = response_section(&found.response, Some(&found.plant.plant));
+    response
+        .blocks
+        .insert(0, Block::Table(motor_constant_table(&found.motor, None)));
+    response
+        .blocks
+        .extend([parameters, bands].map(Block::Table));
+    let mut sections = vec![
+        Section {
+            provenance: None,
+            id: "result".to_owned(),
+            heading: "What it achieves".to_owned(),
+            prose: Vec::new(),
+            blocks: vec![
+                Block::Table(verdict_table(&found.verdicts)),
+                Block::Figure(Figure {
+                    id: "verdict-errors".to_owned(),
+                    caption: "Tracking error, by the axis' own encoder".to_owned(),
+                    plot: Plot::Lines(Lines {
+                        x_label: "time (s)".to_owned(),
+                        y_label: "tracking error (um)".to_owned(),
+                        series: verdict_curves,
+                        ..Lines::default()
+                    }),
+                }),
+                Block::Table(gains_table(found)),
+            ],
+        },
+        response,
+        friction_section(map, friction),
+        presliding_section(gms, friction.mean_levels_v().1),
+    ];
+    sections.extend(
+        checked
+            .into_iter()
+            .flat_map(|checked| check_sections(found, checked)),
+    );
+    Page {
+        title: format!("Commissioning of {axis}"),
+        subtitle: "From an unknown axis to settings, every step measured on the axis itself"
+            .to_owned(),
+        provenance,
+        sections,
+    }
+}
+
+/// The cross-checks: the model revised for explicit friction, and an ordinary motion.
+fn check_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
+    let mut sections = revise_sections(
+        &checked.at_rest,
+        &found.plant.plant,
+        &checked.revisions,
+        &[],
+    );
+    if let Some(chosen) = recommended(&checked.motion) {
+        let agreement = checked
+            .inertia_agreement(&found.settings)
+            .unwrap_or(f64::NAN);
+        sections.push(Section {
+            provenance: None,
+            id: "motion".to_owned(),
+            heading: "An ordinary motion".to_owned(),
+            prose: vec![format!(
+                "Inertia and friction of an ordinary motion, by inverse dynamics, the dead time taken from the linear model: its A is {agreement:.3} \
+                 times that of the frequency response. A motion record cannot tell much of the pre-sliding friction."
+            )],
+            blocks: vec![Block::Table(motion_table(&chosen.model, None))],
+        });
+    }
+    sections
+}

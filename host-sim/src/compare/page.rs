@@ -1,0 +1,221 @@
+//! The comparison's tables and page.
+
+use crate::circle::CircleOutcome;
+use crate::circle::single_page::{circle_figures, circle_table};
+use crate::compare::comparison::Comparison;
+use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
+use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
+use crate::experiment::configuration::Configuration;
+use crate::experiment::metrics::{GLITCH_WINDOW, Score};
+use crate::experiment::run_configuration::ModelKnowledge;
+use crate::pages::{UM_PER_MM, error_curve};
+use crate::report::{
+    Block, Cell, Column, Figure, Lines, Page, Plot, Provenance, Section, Style, Table,
+};
+
+/// Control period of the outcomes' traces, s.
+const PERIOD_S: f64 = 1e-4;
+
+/// A score's name, what it is, and how it is read.
+struct Reading {
+    id: &'static str,
+    caption: &'static str,
+    read: fn(&Score) -> f64,
+}
+
+const READINGS: [Reading; 3] = [
+    Reading {
+        id: "tracking-error-largest",
+        caption: "Tracking error, largest magnitude over two cycles",
+        read: |score| score.largest_mm,
+    },
+    Reading {
+        id: "tracking-error-rms",
+        caption: "Tracking error, RMS over two cycles",
+        read: |score| score.rms_mm,
+    },
+    Reading {
+        id: "quadrant-glitch",
+        caption: "Quadrant glitch, mean over the reversals of two cycles",
+        read: |score| score.glitch_mm,
+    },
+];
+
+/// The comparison's tables: one for each score, the headlines, the circles.
+pub fn comparison_tables(comparison: &Comparison, circles: &[CircleOutcome]) -> Vec<Table> {
+    READINGS
+        .iter()
+        .map(|reading| score_table(reading, comparison))
+        .chain([headline_table(comparison), circle_table(circles)])
+        .collect()
+}
+
+fn score_table(reading: &Reading, comparison: &Comparison) -> Table {
+    let mut columns = vec![Column::new("Configuration")];
+    for knowledge in ModelKnowledge::ALL {
+        for velocity in VELOCITIES_MM_S {
+            let heading = format!("{} {velocity} mm/s", knowledge.short());
+            columns.push(Column::with_unit(heading, "um"));
+        }
+        let heading = format!("{} mean change", knowledge.short());
+        columns.push(Column::with_unit(heading, "%"));
+    }
+    let value = |configuration, knowledge, velocity| {
+        comparison
+            .find(configuration, knowledge, AMPLITUDE_MM, velocity)
+            .map(|entry| entry.statistic(reading.read).mean * UM_PER_MM)
+    };
+    let rows = Configuration::all()
+        .into_iter()
+        .map(|configuration| {
+            let mut row = vec![Cell::text(configuration.name())];
+            for knowledge in ModelKnowledge::ALL {
+                let mut changes = Vec::new();
+                for velocity in VELOCITIES_MM_S {
+                    let own = value(configuration, knowledge, velocity);
+                    let baseline = value(Configuration::PID, knowledge, velocity);
+                    row.push(own.map_or(Cell::Missing, |um| Cell::number(um, 2)));
+                    changes.extend(
+                        own.zip(baseline)
+                            .map(|(own, from)| (own / from - 1.0) * 100.0),
+                    );
+                }
+                row.push(
+                    if configuration == Configuration::PID || changes.is_empty() {
+                        Cell::Missing
+                    } else {
+                        Cell::number(changes.iter().sum::<f64>() / changes.len() as f64, 1)
+                    },
+                );
+            }
+            row
+        })
+        .collect();
+    Table {
+        id: reading.id.to_owned(),
+        caption: format!("{}; change against PID alone", reading.caption),
+        columns,
+        rows,
+    }
+}
+
+/// The comparison's page.
+pub fn comparison_page(
+    comparison: &Comparison,
+    circles: &[CircleOutcome],
+    provenance: Provenance,
+) -> Page {
+    let mut tables = comparison_tables(comparison, circles).into_iter();
+    let mut next_tables = |count| {
+        tables
+            .by_ref()
+            .take(count)
+            .map(Block::Table)
+            .collect::<Vec<_>>()
+    };
+    let scores = next_tables(READINGS.len());
+    let headlines = next_tables(1);
+    let circle_tables = next_tables(1);
+    let errors = |knowledge: ModelKnowledge| {
+        VELOCITIES_MM_S
+            .iter()
+            .map(|&velocity| Block::Figure(error_figure(comparison, knowledge, velocity)))
+            .collect::<Vec<_>>()
+    };
+    Page {
+        title: "Friction compensation on the simulated stage".to_owned(),
+        subtitle: "PID and N-PID, each with no, static, GMS and combined feedforward; simulated, not measured"
+            .to_owned(),
+        provenance,
+        sections: vec![
+            Section {
+                provenance: None,
+                id: "summary".to_owned(),
+                heading: "The thesis' headlines".to_owned(),
+                prose: vec![HEADLINE_PROSE.to_owned(), experiment_prose()],
+                blocks: headlines,
+            },
+            Section {
+                provenance: None,
+                id: "scores".to_owned(),
+                heading: "Tracking error and quadrant glitch".to_owned(),
+                prose: vec![metric_prose()],
+                blocks: scores,
+            },
+            Section {
+                provenance: None,
+                id: "exact-model".to_owned(),
+                heading: "Error over time, exact model".to_owned(),
+                prose: vec![],
+                blocks: errors(ModelKnowledge::Exact),
+            },
+            Section {
+                provenance: None,
+                id: "identified-model".to_owned(),
+                heading: "Error over time, identified model".to_owned(),
+                prose: vec![],
+                blocks: errors(ModelKnowledge::Identified),
+            },
+            Section {
+                provenance: None,
+                id: "circle".to_owned(),
+                heading: "Circle in XY".to_owned(),
+                prose: vec![],
+                blocks: circle_tables
+                    .into_iter()
+                    .chain(circle_figures(circles).into_iter().map(Block::Figure))
+                    .collect(),
+            },
+        ],
+    }
+}
+
+fn experiment_prose() -> String {
+    format!(
+        "The x axis follows a sine of {AMPLITUDE_MM} mm amplitude whose largest velocity is 5, 10 or 15 mm/s. The \
+         control law is the firmware's, in f32, at 10 kHz; the stage is simulated. The controllers are those that \
+         commissioning the simulated stage designed."
+    )
+}
+
+fn metric_prose() -> String {
+    format!(
+        "Tracking error is the reference minus the true position. The glitch of a reversal is the largest error \
+         magnitude within {window} % of the cycle on either side of it, over the mean error magnitude in the shoulders of \
+         the same width next to that window.",
+        window = GLITCH_WINDOW * 100.0
+    )
+}
+
+fn error_figure(comparison: &Comparison, knowledge: ModelKnowledge, velocity_mm_s: f64) -> Figure {
+    let series = Configuration::all()
+        .into_iter()
+        .enumerate()
+        .filter_map(|(index, configuration)| {
+            let entry = comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)?;
+            let error = &entry.last_cycle.error_mm;
+            Some(error_curve(
+                configuration.name(),
+                error,
+                PERIOD_S,
+                Style::nth(index),
+            ))
+        })
+        .collect();
+    Figure {
+        id: format!(
+            "error-{}-{velocity_mm_s}",
+            knowledge.name().replace(' ', "-")
+        ),
+        caption: format!(
+            "Tracking error over the last cycle at {velocity_mm_s} mm/s, {}",
+            knowledge.name()
+        ),
+        plot: Plot::Lines(Lines {
+            x_label: "time (s)".to_owned(),
+            y_label: "tracking error (um)".to_owned(),
+            series,
+            ..Lines::default()
+        }),
+    }
+}

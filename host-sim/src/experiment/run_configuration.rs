@@ -1,0 +1,127 @@
+//! Stage and settings of a run: what the law knows of the plant.
+//!
+//! *Exact model*: the plant without noise, offset and ripple; the feedforward has the plant's own friction: the thesis'
+//! simulation. *Identified model*: the plant with all its imperfections; the law knows no more than a commissioning of it
+//! found: the thesis' experiment.
+//!
+//! Both run the same controllers, those that the commissioning designed by its one criterion. Between the two only the
+//! model and the imperfections differ, and between two configurations only the law and its feedforward: no change is the
+//! effect of a gain that one side was denied.
+
+use std::path::Path;
+
+use quadrant::friction::stribeck::StaticFriction;
+use quadrant::settings::StageSettings;
+
+use crate::identify::single_state::with_all_models;
+use crate::plant::{AxisTruth, StageTruth};
+use crate::settings_file::{SettingsFile, SettingsFileError};
+
+/// The stage as `quadrant commission` found it, on x, then y, then z; a test commissions it again and compares.
+const IDENTIFIED: &str = include_str!("../../data/identified-stage.toml");
+
+/// The settings that commissioning the simulated stage gave.
+///
+/// # Errors
+/// Settings that this version refuses.
+pub fn identified_settings() -> Result<SettingsFile, SettingsFileError> {
+    SettingsFile::parse(IDENTIFIED, Path::new("host-sim/data/identified-stage.toml"))
+}
+
+/// The law's knowledge of the plant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+pub enum ModelKnowledge {
+    /// The plant's own friction, on a plant without imperfections.
+    Exact,
+    /// Identified parameters, on a plant with all its imperfections.
+    Identified,
+}
+
+impl ModelKnowledge {
+    /// Both, simulation first.
+    pub const ALL: [Self; 2] = [Self::Exact, Self::Identified];
+
+    /// Its name in a column's head.
+    pub const fn short(self) -> &'static str {
+        match self {
+            Self::Exact => "exact",
+            Self::Identified => "identified",
+        }
+    }
+
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Exact => "exact model",
+            Self::Identified => "identified model",
+        }
+    }
+}
+
+/// A simulated stage, and the settings of the law that runs on it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RunConfiguration {
+    /// What the settings know of the stage.
+    pub knowledge: ModelKnowledge,
+    /// The settings.
+    pub stage: StageSettings,
+    pub truth: StageTruth,
+}
+
+impl RunConfiguration {
+    /// The stage without imperfections, and these settings with its own friction.
+    pub fn exact(mut stage: StageSettings) -> Self {
+        let truth = StageTruth::ideal();
+        set_exact_friction(&mut stage, &truth);
+        Self {
+            knowledge: ModelKnowledge::Exact,
+            stage,
+            truth,
+        }
+    }
+
+    /// The stage with everything a real one has, and these settings as they are.
+    pub fn identified(stage: StageSettings) -> Self {
+        Self {
+            knowledge: ModelKnowledge::Identified,
+            stage,
+            truth: StageTruth::real(),
+        }
+    }
+
+    /// Both, with the controllers of these settings.
+    pub fn both(stage: &StageSettings) -> [Self; 2] {
+        [Self::exact(stage.clone()), Self::identified(stage.clone())]
+    }
+
+    /// The one of the two that a person names.
+    pub fn new(knowledge: ModelKnowledge, stage: StageSettings) -> Self {
+        match knowledge {
+            ModelKnowledge::Exact => Self::exact(stage),
+            ModelKnowledge::Identified => Self::identified(stage),
+        }
+    }
+
+    /// Gives the law the plant's own friction.
+    pub fn know_friction(&mut self) {
+        set_exact_friction(&mut self.stage, &self.truth);
+    }
+}
+
+fn set_exact_friction(stage: &mut StageSettings, truth: &StageTruth) {
+    for (axis, truth) in stage.axes.iter_mut().zip(&truth.axes) {
+        axis.friction = with_all_models(
+            truth.friction.map(|model| with_total_damping(model, truth)),
+            truth.gms.clone(),
+        );
+    }
+}
+
+/// What a run at constant velocity shows as viscous friction: sigma, and the linear damping B / A, which no motion
+/// can tell from it.
+fn with_total_damping(model: &StaticFriction, truth: &AxisTruth) -> StaticFriction {
+    StaticFriction {
+        viscous_v_s_per_mm: model.viscous_v_s_per_mm + truth.damping_per_s / truth.gain_mm_per_v_s2,
+        ..*model
+    }
+}

@@ -1,0 +1,102 @@
+//! A trial: an axis on a sine, scored over its last whole cycles.
+
+use quadrant::lockstep::Job;
+use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::settings::{AxisSettings, PlanSettings, StageSettings, StreamingSettings};
+
+use crate::experiment::configuration::ELEMENTS;
+use crate::experiment::metrics::{Score, score};
+use crate::experiment::run::{RunError, run};
+use crate::machine::Machine;
+use crate::plant::{AxisTruth, SimulatedStage, StageTruth};
+
+/// A sine to try an axis on.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Trial {
+    /// Amplitude, mm.
+    pub amplitude_mm: f64,
+    /// Largest velocity, mm/s.
+    pub velocity_mm_s: f64,
+}
+
+/// Result of a sine test.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrialOutcome {
+    /// Tracking error and glitch.
+    pub score: Score,
+    /// RMS of the output's change from tick to tick, V: chatter.
+    pub chatter_v: f64,
+}
+
+/// Cycles at full speed, and those of them that count.
+const CYCLES: f64 = 2.25;
+const SCORED_CYCLES: usize = 2;
+/// Lead-in and lead-out, s.
+const LEAD_S: f64 = 0.5;
+
+impl Trial {
+    fn cycle_s(self) -> f64 {
+        std::f64::consts::TAU * self.amplitude_mm / self.velocity_mm_s
+    }
+
+    fn motion(self) -> MotionSettings {
+        MotionSettings::Harmonic(HarmonicSettings::with_velocity(
+            self.amplitude_mm,
+            self.velocity_mm_s,
+            CYCLES,
+            LEAD_S,
+        ))
+    }
+}
+
+/// Tries three settings of one axis, each on its sine, side by side; f32, as on the target. `seed` decides the noise.
+///
+/// # Errors
+/// Refused settings or a fault.
+pub fn try_three(
+    settings: [AxisSettings; 3],
+    truth: &AxisTruth,
+    trials: [Trial; 3],
+    rate_hz: f64,
+    seed: u64,
+) -> Result<[TrialOutcome; 3], RunError> {
+    let resolution_mm = settings.each_ref().map(|axis| axis.encoder.resolution_mm);
+    let job = Job {
+        stage: StageSettings {
+            rate_hz,
+            streaming: StreamingSettings::default(),
+            axes: settings,
+        },
+        plan: PlanSettings {
+            motions: trials.map(Trial::motion),
+        },
+    };
+    let slowest_s = trials.map(Trial::cycle_s).into_iter().fold(0.0, f64::max);
+    let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * slowest_s;
+    let mut machine = Machine::<f32, ELEMENTS>::new(&job)?;
+    let truth = StageTruth {
+        axes: [truth.clone(), truth.clone(), truth.clone()],
+    };
+    let traces = run(
+        &mut machine,
+        &mut SimulatedStage::new(&truth, rate_hz, seed),
+        resolution_mm,
+        (longest_s * rate_hz) as usize,
+    )?;
+    let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
+    let mut of = trials.into_iter();
+    Ok(traces.map(|trace| {
+        let cycle_s = of.next().map_or(1.0, Trial::cycle_s);
+        let cycle = samples(cycle_s);
+        let end = samples(LEAD_S) + samples(CYCLES * cycle_s);
+        let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
+        let changes = scored
+            .output_v
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]).powi(2));
+        TrialOutcome {
+            score: score(&scored.reference_mm, &scored.error_mm, cycle),
+            chatter_v: (changes.sum::<f64>() / scored.output_v.len() as f64).sqrt(),
+        }
+    }))
+}

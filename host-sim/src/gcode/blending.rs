@@ -1,0 +1,129 @@
+//! Corners between straight lines, rounded by an arc that is tangent to both.
+
+use crate::gcode::interpret::Move;
+use crate::gcode::segment::{Element, Vector};
+use crate::gcode::speeds::TANGENT_RAD;
+
+/// Sharper turns than this, rad (175 degrees), are no corners but ways back: they are stopped at.
+const MOST_TURN_RAD: f64 = 175.0 / 180.0 * std::f64::consts::PI;
+/// Shortest rest of a line between two rounded corners, mm; below this it counts as nothing.
+const LEAST_LINE_MM: f64 = 1e-9;
+
+/// An arc in the place of a corner.
+struct Rounding {
+    arc: Move,
+    /// Length that it takes from either line, mm.
+    taken_mm: f64,
+}
+
+impl Rounding {
+    /// The arc that leaves the corner of two lines by `deviation_mm`, or by less if it would take more than half of the
+    /// shorter line; nothing where there is no such corner. A rapid move is not rounded into a cutting one.
+    fn between(before: &Move, after: &Move, deviation_mm: f64) -> Option<Self> {
+        let (_, arriving) = before.element.as_line()?;
+        let (corner, leaving) = after.element.as_line()?;
+        let feed_mm_s = match (before.feed_mm_s, after.feed_mm_s) {
+            (Some(one), Some(other)) => Some(one.min(other)),
+            (None, None) => None,
+            _ => return None,
+        };
+        let (sin, cos) = (arriving.cross(&leaving).norm(), arriving.dot(&leaving));
+        let turn = sin.atan2(cos);
+        if !(TANGENT_RAD..=MOST_TURN_RAD).contains(&turn) {
+            return None;
+        }
+        let half = (0.5 * turn).tan();
+        let wanted = deviation_mm / (1.0 / (0.5 * turn).cos() - 1.0) * half;
+        let shorter = before.element.length_mm().min(after.element.length_mm());
+        let taken_mm = wanted.min(0.5 * shorter);
+        let radius_mm = taken_mm / half;
+        let inwards = (leaving - arriving * cos) / sin;
+        let centre = corner - arriving * taken_mm + inwards * radius_mm;
+        Some(Self {
+            arc: Move {
+                element: Element::arc(
+                    centre,
+                    [-inwards, arriving],
+                    radius_mm,
+                    turn,
+                    Vector::zeros(),
+                ),
+                feed_mm_s,
+                line: after.line,
+            },
+            taken_mm,
+        })
+    }
+}
+
+/// Rounds every corner between straight lines by at most `deviation_mm`.
+pub(super) fn round(moves: Vec<Move>, deviation_mm: f64) -> Vec<Move> {
+    if deviation_mm <= 0.0 {
+        return moves;
+    }
+    let mut rounded = Vec::with_capacity(2 * moves.len());
+    let mut taken_mm = 0.0;
+    for (index, step) in moves.iter().enumerate() {
+        let after = moves.get(index + 1);
+        let corner = after.and_then(|after| Rounding::between(step, after, deviation_mm));
+        let given_mm = corner.as_ref().map_or(0.0, |corner| corner.taken_mm);
+        if taken_mm == 0.0 && given_mm == 0.0 {
+            rounded.push(step.clone());
+        } else {
+            let left = step.element.length_mm() - taken_mm - given_mm;
+            let from = step.element.point(taken_mm);
+            let to = step.element.point(step.element.length_mm() - given_mm);
+            if let Some(element) = Element::line(from, to).filter(|_| left > LEAST_LINE_MM) {
+                rounded.push(Move {
+                    element,
+                    ..step.clone()
+                });
+            }
+        }
+        rounded.extend(corner.map(|corner| corner.arc));
+        taken_mm = given_mm;
+    }
+    rounded
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Program;
+    use super::*;
+
+    #[test]
+    fn a_right_angle_is_left_by_the_deviation_asked_for() {
+        let program = Program::parse("G1 X10 F600\nY10").unwrap();
+        let rounded = round(program.moves, 0.05);
+        assert_eq!(rounded.len(), 3);
+        let arc = &rounded[1].element;
+        let middle = arc.point(0.5 * arc.length_mm());
+        let from_corner = (middle - Vector::new(10.0, 0.0, 0.0)).norm();
+        assert!((from_corner - 0.05).abs() < 1e-9, "{from_corner}");
+        for pair in rounded.windows(2) {
+            let length = pair[0].element.length_mm();
+            let gap = pair[1].element.point(0.0) - pair[0].element.point(length);
+            let kink = pair[1].element.tangent(0.0) - pair[0].element.tangent(length);
+            assert!(gap.norm() < 1e-12 && kink.norm() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn short_lines_are_shared_by_their_two_corners() {
+        let program = Program::parse("G1 X10 F600\nY0.1\nX20").unwrap();
+        let rounded = round(program.moves, 1.0);
+        let lengths: Vec<f64> = rounded
+            .iter()
+            .map(|step| step.element.length_mm())
+            .collect();
+        // The line of 0.1 mm has gone into its two arcs of 0.05 mm radius.
+        assert_eq!(lengths.len(), 4, "{lengths:?}");
+        assert!((rounded[1].element.curvature_per_mm() - 20.0).abs() < 1e-6);
+    }
+
+    #[test]
+    fn the_way_back_and_the_joint_with_an_arc_stay_as_they_are() {
+        let program = Program::parse("G1 X10 F600\nX0\nG2 X-10 I-5").unwrap();
+        assert_eq!(round(program.moves.clone(), 0.05), program.moves);
+    }
+}

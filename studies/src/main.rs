@@ -1,0 +1,57 @@
+//! The command `quadrant-studies`.
+#![forbid(unsafe_code)]
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+use quadrant_sim::command::explained;
+use quadrant_studies::{
+    friction_models, identification, laws, numerics, outputs, report, robustness,
+};
+
+/// The thesis' tables and figures, and the comparative studies, on the simulated stage.
+#[derive(Debug, Parser)]
+#[command(name = "quadrant-studies", version, about)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Compare the friction models on the same motions: loops, memory, drift, lag.
+    Friction(friction_models::command::Arguments),
+    /// Compare identification with the plant's parameters, which it does not know: errors, and whether the stated
+    /// uncertainties hold.
+    Identification(identification::command::Arguments),
+    /// Compare all feedback laws, tuned with equal effort at equal robustness, and feedforward whose model is wrong.
+    Laws(laws::command::Arguments),
+    /// Compare f32 and fixed point with f64 over the whole comparison.
+    Numerics(numerics::command::Arguments),
+    /// Compare amplifier outputs of 16 bits with 12 bits, plain and with the error shaped.
+    Outputs(outputs::command::Arguments),
+    /// Make every table and figure of the thesis' chapters 3 to 5 and the studies in one page: under five minutes on two
+    /// cores. An interrupted report goes on where it stopped.
+    Report(report::command::Arguments),
+    /// Run the laws with a changed mass, friction, delay, amplifier, encoder or drive, and while a tool cuts.
+    Robustness(robustness::command::Arguments),
+}
+
+fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Friction(arguments) => friction_models::command::run(&arguments),
+        Command::Identification(arguments) => identification::command::run(&arguments),
+        Command::Laws(arguments) => laws::command::run(&arguments),
+        Command::Numerics(arguments) => numerics::command::run(&arguments),
+        Command::Outputs(arguments) => outputs::command::run(&arguments),
+        Command::Report(arguments) => report::command::run(&arguments),
+        Command::Robustness(arguments) => robustness::command::run(&arguments),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            eprintln!("error: {}", explained(&error));
+            ExitCode::FAILURE
+        }
+    }
+}

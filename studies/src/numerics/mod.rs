@@ -1,0 +1,146 @@
+//! Cost of the number type: `f32` and fixed point against `f64`, over the whole comparison.
+//!
+//! *Output*: all three laws read the same counts, those of the stage under the `f64` law, so the difference is the
+//! arithmetic's alone. *Tracking error*: each law runs its own stage in closed loop with the same noise, and the error
+//! over time and the score are compared.
+
+pub mod command;
+pub mod page;
+
+use indicatif::ProgressBar;
+use quadrant::lockstep::InputRecord;
+use quadrant::scalar::{Fixed, Scalar};
+use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_configuration};
+use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
+use quadrant_sim::experiment::run::RunError;
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::machine::Machine;
+use rayon::prelude::*;
+
+/// Deviation of a number type from `f64`: the worst over all velocities and both kinds of model knowledge.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Deviation {
+    /// Output on the same counts, V.
+    pub output_v: f64,
+    /// Converter words on the same counts that differ, and words in all.
+    pub words: (u64, u64),
+    /// Tracking error at the same time in closed loop, mm.
+    pub error_mm: f64,
+    /// Score in closed loop: largest tracking error, mm.
+    pub largest_mm: f64,
+    /// Score in closed loop: RMS tracking error, mm.
+    pub rms_mm: f64,
+}
+
+impl Deviation {
+    fn worst(self, other: Self) -> Self {
+        Self {
+            output_v: self.output_v.max(other.output_v),
+            words: (self.words.0 + other.words.0, self.words.1 + other.words.1),
+            error_mm: self.error_mm.max(other.error_mm),
+            largest_mm: self.largest_mm.max(other.largest_mm),
+            rms_mm: self.rms_mm.max(other.rms_mm),
+        }
+    }
+}
+
+/// Deviations of the number types under one configuration.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Numerics {
+    pub configuration: Configuration,
+    /// `f32`.
+    pub single: Deviation,
+    pub fixed: Deviation,
+}
+
+/// Number of runs in [`run_all`].
+pub const RUNS: u64 = 8;
+
+/// Runs the whole comparison in all number types, in parallel; the deviations of each configuration.
+///
+/// # Errors
+/// The first refused setting or fault.
+pub fn run_all(
+    setups: &[RunConfiguration],
+    seed: u64,
+    progress: &ProgressBar,
+) -> Result<Vec<Numerics>, RunError> {
+    Configuration::all()
+        .into_par_iter()
+        .map(|configuration| {
+            let mut numerics = Numerics {
+                configuration,
+                single: Deviation::default(),
+                fixed: Deviation::default(),
+            };
+            for setup in setups {
+                shadow(&mut numerics, setup, seed)?;
+                let exact = run_configuration::<f64>(configuration, setup, seed)?;
+                let single = run_configuration::<f32>(configuration, setup, seed)?;
+                let fixed = run_configuration::<Fixed>(configuration, setup, seed)?;
+                numerics.single = numerics.single.worst(closed_loop(&exact, &single));
+                numerics.fixed = numerics.fixed.worst(closed_loop(&exact, &fixed));
+            }
+            progress.inc(1);
+            Ok(numerics)
+        })
+        .collect()
+}
+
+/// Lets the `f64` law drive the stage, and the others compute from the same counts.
+fn shadow(numerics: &mut Numerics, setup: &RunConfiguration, seed: u64) -> Result<(), RunError> {
+    let Bench {
+        job,
+        mut plant,
+        most_ticks,
+        mut operator,
+    } = Bench::new(numerics.configuration, setup, AMPLITUDE_MM, seed);
+    let mut exact = Machine::<f64, ELEMENTS>::new(&job)?;
+    let mut single = Machine::<f32, ELEMENTS>::new(&job)?;
+    let mut fixed = Machine::<Fixed, ELEMENTS>::new(&job)?;
+    for tick in 0..most_ticks {
+        let input = InputRecord::of_counts(plant.read_counters(), operator.request(tick as u32));
+        let outputs = exact.tick(&input);
+        single.tick(&input);
+        fixed.tick(&input);
+        differ(&exact, &single, &mut numerics.single);
+        differ(&exact, &fixed, &mut numerics.fixed);
+        plant.step(&outputs);
+    }
+    Ok(())
+}
+
+fn differ<S: Scalar>(
+    exact: &Machine<f64, ELEMENTS>,
+    other: &Machine<S, ELEMENTS>,
+    deviation: &mut Deviation,
+) {
+    let axes = exact.state().axes().iter().zip(other.state().axes());
+    for (exact, other) in axes {
+        let (exact, other) = (exact.telemetry(), other.telemetry());
+        let output_v = other.output.to_f64(quadrant::scalar::Quantity::Voltage);
+        deviation.output_v = deviation.output_v.max((output_v - exact.output).abs());
+        deviation.words.0 += u64::from(exact.code != other.code);
+        deviation.words.1 += 1;
+    }
+}
+
+fn closed_loop(exact: &[Outcome; 3], other: &[Outcome; 3]) -> Deviation {
+    exact
+        .iter()
+        .zip(other)
+        .map(|(exact, other)| {
+            let errors = exact
+                .last_cycle
+                .error_mm
+                .iter()
+                .zip(&other.last_cycle.error_mm);
+            Deviation {
+                error_mm: errors.fold(0.0, |worst, (a, b)| (a - b).abs().max(worst)),
+                largest_mm: (exact.score.largest_mm - other.score.largest_mm).abs(),
+                rms_mm: (exact.score.rms_mm - other.score.rms_mm).abs(),
+                ..Deviation::default()
+            }
+        })
+        .fold(Deviation::default(), Deviation::worst)
+}

@@ -1,0 +1,128 @@
+//! Chapter 3, what a commissioning of the x axis finds; and chapter 4, the controllers of the settings.
+
+use anyhow::Context as _;
+use quadrant::control::plant_model::PlantModel;
+use quadrant::control::popov::sector_proof;
+use quadrant::settings::StageSettings;
+use quadrant_sim::commission::{CommissionSettings, CrossCheck, commission};
+use quadrant_sim::design::pages::npid::NonlinearPage;
+use quadrant_sim::design::pages::pid::PidPage;
+use quadrant_sim::design::robustness::{Uncertainty, robustness};
+use quadrant_sim::design::step_response::{StepRequest, step_response};
+use quadrant_sim::design::time_varying::VaryingLoop;
+use quadrant_sim::design::{Form, Process};
+use quadrant_sim::plant::StageTruth;
+use quadrant_sim::report::Section;
+use quadrant_sim::rig::SimulatedRig;
+
+use crate::report::{Context, Progress};
+use crate::thesis::chapter3::chapter3_sections;
+use crate::thesis::chapter4::{chapter4_sections, data_section};
+
+/// Share of chapter 3's time after which the commissioning is done and the cross-checks begin.
+const COMMISSIONED: f64 = 0.7;
+/// Standard deviations of A, B, C and Td, as shares, and draws: as `quadrant design npid` has them.
+const DEVIATIONS: [f64; 4] = [0.05, 0.10, 0.30, 0.05];
+const DRAWS: usize = 2000;
+/// Heights of the steps, mm: within the encoder's noise, across emax, as `quadrant design npid` has them.
+const STEPS_MM: [f64; 2] = [0.01, 0.1];
+
+/// Commissions the x axis from nothing known, and cross-checks the result.
+pub(super) fn identification(
+    context: &Context,
+    progress: &Progress,
+) -> anyhow::Result<Vec<Section>> {
+    let [truth, ..] = StageTruth::real().axes;
+    let mut rig = SimulatedRig::new(0, truth, context.seed);
+    let found = commission(
+        &mut rig,
+        &StageSettings::default().axes[0],
+        &CommissionSettings::default(),
+        &mut |_, done| progress.at(COMMISSIONED * done),
+    )?;
+    let checked = CrossCheck::run(&mut rig, &found.settings, context.seed, &mut |_, _| {
+        progress.at(COMMISSIONED)
+    })?;
+    Ok(chapter3_sections(&found, &checked))
+}
+
+/// Examines the settings' PID and nonlinear gain on the settings' model of the x axis.
+pub(super) fn controllers(context: &Context, progress: &Progress) -> anyhow::Result<Vec<Section>> {
+    let stage = &context.settings.stage;
+    let [x, ..] = &stage.axes;
+    let plant = x
+        .plant
+        .context("the settings hold no model of the x axis: commission it with `quadrant commission --axis x`")?;
+    let gain = x
+        .feedback
+        .nonlinear
+        .context("the settings hold no nonlinear gain for the x axis: design one with `quadrant design npid`")?;
+    let gains = x.feedback.pid;
+    let sample_time_s = 1.0 / stage.rate_hz;
+    let sampled = Form::Sampled {
+        sample_time_s,
+        computation_delay_s: 0.0,
+    };
+    let process = Process::Model(plant);
+    let answer = |height_mm, nonlinear| {
+        let request = StepRequest {
+            sample_time_s,
+            height_mm,
+            limit_v: x.amplifier.output_limit_v,
+            ..StepRequest::default()
+        };
+        step_response(&plant, &gains, nonlinear, &request)
+    };
+    let [small_mm, _] = STEPS_MM;
+    let pid = PidPage {
+        subject: String::new(),
+        gains,
+        forms: [("continuous", Form::Continuous), ("as it runs", sampled)]
+            .map(|(name, form)| {
+                (
+                    name.to_owned(),
+                    process.open_loop(&gains, form),
+                    process.margins(&gains, form),
+                )
+            })
+            .into(),
+        step: Some(answer(small_mm, None)),
+    };
+    let margins = process.margins(&gains, sampled)?;
+    let destabiliser = VaryingLoop {
+        plant,
+        gains,
+        sample_time_s,
+    }
+    .worst(1.0, margins.gain_crossover_hz);
+    progress.at(0.5);
+    let nonlinear = NonlinearPage {
+        subject: String::new(),
+        plant: PlantModel {
+            delay_s: plant.delay_s + 0.5 * sample_time_s,
+            ..plant
+        },
+        gains,
+        proof: sector_proof(&plant, &gains, sample_time_s),
+        gain,
+        destabiliser,
+        robustness: robustness(
+            &plant,
+            &gains,
+            sample_time_s,
+            &Uncertainty::independent(DEVIATIONS),
+            DRAWS,
+            context.seed,
+        )?,
+        steps: STEPS_MM
+            .into_iter()
+            .flat_map(|height_mm| {
+                [("PID", None), ("N-PID", Some(&gain))]
+                    .map(|(law, nonlinear)| (law, answer(height_mm, nonlinear)))
+            })
+            .collect(),
+    };
+    let [truth, ..] = &StageTruth::real().axes;
+    let data = data_section(stage, truth, context.seeds);
+    Ok(chapter4_sections(&pid, &nonlinear, data))
+}

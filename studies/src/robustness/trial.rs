@@ -1,0 +1,215 @@
+//! One run: a law on one axis, with a load, on a task.
+
+use std::f64::consts::TAU;
+
+use quadrant::lockstep::{InputRecord, Job};
+use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant::safety::{Fault, SafetyState};
+use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_sim::compare::sine::AMPLITUDE_MM;
+use quadrant_sim::experiment::configuration::ELEMENTS;
+use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
+use quadrant_sim::experiment::run::AxisTrace;
+use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::plant::load::Load;
+use quadrant_sim::plant::{AxisTruth, SimulatedAxis};
+
+use crate::robustness::RobustnessError;
+
+/// Task of an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Task {
+    /// The comparison's sine of 30 mm at 10 mm/s; its last two cycles are scored.
+    Sine,
+    /// A move of 10 mm at 2 mm/s, scored from its start to its end.
+    SlowFeed,
+    Hold {
+        /// For how long, s.
+        seconds: f64,
+        /// Share of that time after which scoring begins, 0 to below 1.
+        scored_from: f64,
+    },
+}
+
+/// Largest velocity of the sine, mm/s.
+pub(super) const SINE_MM_S: f64 = 10.0;
+/// Length of the slow move, mm.
+pub(super) const FEED_MM: f64 = 10.0;
+/// Its velocity, mm/s.
+pub(super) const FEED_MM_S: f64 = 2.0;
+/// Cycles at full speed, of which the last [`SCORED_CYCLES`] count; lead-in and lead-out, s: the comparison's.
+const CYCLES: f64 = 2.25;
+const SCORED_CYCLES: usize = 2;
+const LEAD_S: f64 = 0.5;
+/// Time from the enabling to the start of a hold, s: the bumpless transfer has faded.
+const SETTLING_S: f64 = 0.3;
+
+impl Task {
+    /// Its name in tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sine => "sine",
+            Self::SlowFeed => "slow feed",
+            Self::Hold { .. } => "hold",
+        }
+    }
+
+    fn motion(self) -> MotionSettings {
+        match self {
+            Self::Sine => MotionSettings::Harmonic(HarmonicSettings::with_velocity(
+                AMPLITUDE_MM,
+                SINE_MM_S,
+                CYCLES,
+                LEAD_S,
+            )),
+            Self::SlowFeed => MotionSettings::PointToPoint(PointToPointSettings {
+                distance_mm: FEED_MM,
+                max_velocity_mm_s: FEED_MM_S,
+                max_acceleration_mm_s2: 50.0,
+                max_jerk_mm_s3: 1000.0,
+            }),
+            Self::Hold { .. } => MotionSettings::Hold,
+        }
+    }
+
+    /// Time after which it must have ended, from the first tick, s: enabling and settling take less than one.
+    fn longest_s(self) -> f64 {
+        let task = match self {
+            Self::Sine => CYCLES * TAU * AMPLITUDE_MM / SINE_MM_S + 2.0 * LEAD_S,
+            Self::SlowFeed => FEED_MM / FEED_MM_S,
+            Self::Hold { seconds, .. } => seconds,
+        };
+        task + 2.0
+    }
+
+    fn score(self, trace: &AxisTrace, rate_hz: f64) -> (Score, AxisTrace) {
+        let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
+        match self {
+            Self::Sine => {
+                let cycle_s = TAU * AMPLITUDE_MM / SINE_MM_S;
+                let cycle = samples(cycle_s);
+                let end = samples(LEAD_S) + samples(CYCLES * cycle_s);
+                let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
+                (
+                    score(&scored.reference_mm, &scored.error_mm, cycle),
+                    trace.slice(end - cycle..end),
+                )
+            }
+            Self::SlowFeed => (without_reversals(&trace.error_mm), trace.clone()),
+            Self::Hold { scored_from, .. } => {
+                let first = (scored_from * trace.error_mm.len() as f64) as usize;
+                (without_reversals(&trace.error_mm[first..]), trace.clone())
+            }
+        }
+    }
+}
+
+fn without_reversals(errors: &[f64]) -> Score {
+    Score {
+        largest_mm: largest(errors),
+        rms_mm: rms(errors),
+        glitch_mm: f64::NAN,
+    }
+}
+
+/// A run to make; the axis under test is the first of the stage, the others stand still.
+pub(super) struct Trial<'a> {
+    pub(super) stage: &'a StageSettings,
+    pub(super) truth: &'a AxisTruth,
+    pub(super) load: &'a Load,
+    pub(super) task: Task,
+    pub(super) seed: u64,
+}
+
+/// End of a run.
+pub(super) struct Ended {
+    /// Its score, or what switched the stage off.
+    pub(super) score: Result<Score, Fault>,
+    /// Trace, where it is worth showing, if the run ended well.
+    pub(super) trace: Option<AxisTrace>,
+}
+
+/// Reasons for which a run has no result.
+pub(super) enum Stopped {
+    Settings(SettingsError),
+    Endless(usize),
+}
+
+impl Stopped {
+    pub(super) fn named(self, competitor: &str, scenario: &str) -> RobustnessError {
+        let (competitor, scenario) = (competitor.to_owned(), scenario.to_owned());
+        match self {
+            Self::Settings(source) => RobustnessError::Settings {
+                competitor,
+                scenario,
+                source,
+            },
+            Self::Endless(ticks) => RobustnessError::Endless {
+                competitor,
+                scenario,
+                ticks,
+            },
+        }
+    }
+}
+
+impl Trial<'_> {
+    pub(super) fn run(&self) -> Result<Ended, Stopped> {
+        // The idle axes are like it, so that none waits for another.
+        let [axis, ..] = &self.stage.axes;
+        let mut machine = Machine::<f32, ELEMENTS>::new(&Job {
+            stage: StageSettings {
+                axes: [axis.clone(), axis.clone(), axis.clone()],
+                ..self.stage.clone()
+            },
+            plan: PlanSettings {
+                motions: [
+                    self.task.motion(),
+                    MotionSettings::Hold,
+                    MotionSettings::Hold,
+                ],
+            },
+        })
+        .map_err(Stopped::Settings)?;
+        let rate_hz = self.stage.rate_hz;
+        let resolution_mm = self.stage.axes[0].encoder.resolution_mm;
+        let mut plant = SimulatedAxis::new(self.truth.clone(), rate_hz, self.seed);
+        let mut operator = Operator::runs_the_plan();
+        let most_ticks = (self.task.longest_s() * rate_hz) as usize;
+        let mut trace = AxisTrace::default();
+        let mut enabled_ticks = 0.0;
+        for tick in 0..most_ticks {
+            let outputs = machine.tick(&InputRecord::of_counts(
+                [plant.read_counter(), 0, 0],
+                operator.request(tick as u32),
+            ));
+            let state = machine.state();
+            if let SafetyState::Faulted(fault) = state.safety() {
+                return Ok(Ended {
+                    score: Err(fault),
+                    trace: None,
+                });
+            }
+            enabled_ticks += if outputs.enabled { 1.0 } else { 0.0 };
+            let under_way = match self.task {
+                Task::Sine | Task::SlowFeed => state.is_running(),
+                Task::Hold { seconds, .. } => {
+                    (SETTLING_S..SETTLING_S + seconds).contains(&(enabled_ticks / rate_hz))
+                }
+            };
+            if under_way {
+                plant.set_load_v(self.load.at_v(trace.error_mm.len() as f64 / rate_hz));
+                let seen = state.axes()[0].telemetry();
+                trace.push(seen, resolution_mm, plant.position_mm());
+            } else if !trace.error_mm.is_empty() {
+                let (score, shown) = self.task.score(&trace, rate_hz);
+                return Ok(Ended {
+                    score: Ok(score),
+                    trace: Some(shown),
+                });
+            }
+            plant.step(outputs.codes[0], outputs.enabled);
+        }
+        Err(Stopped::Endless(most_ticks))
+    }
+}

@@ -1,0 +1,119 @@
+//! Chapter 3 of the thesis on our stage: from experiments to a plant model with friction.
+
+use quadrant_sim::commission::{Commissioned, CrossCheck};
+use quadrant_sim::identify::pages::friction::{friction_section, presliding_section};
+use quadrant_sim::identify::pages::linear::{plant_tables, response_section};
+use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
+use quadrant_sim::identify::pages::revise::revise_sections;
+use quadrant_sim::pages::{lines, series};
+use quadrant_sim::report::{Block, Colour, Figure, Section, Style};
+use quadrant_sim::rig::Recording;
+
+use crate::thesis::numbers::{Number, number};
+
+/// The thesis' numbers. Of 3.16 to 3.21 it lists two for each kind of friction.
+const NUMBERS: [Number; 19] = [
+    ("response-gain", "Figure 3.5a"),
+    ("response-phase", "Figure 3.5b"),
+    ("voltage", "Figure 3.7a"),
+    ("velocity", "Figure 3.7b"),
+    ("constant-velocity", "Figure 3.8"),
+    ("friction-map", "Figure 3.9 and 3.10"),
+    ("hysteresis-measured", "Figure 3.11"),
+    ("virgin-curve", "Figure 3.12"),
+    ("hysteresis", "Figure 3.13"),
+    ("revised-static-gain", "Figure 3.16"),
+    ("revised-static-phase", "Figure 3.17"),
+    ("revised-gms-gain", "Figure 3.18"),
+    ("revised-gms-phase", "Figure 3.19"),
+    ("revised-both-gain", "Figure 3.20"),
+    ("revised-both-phase", "Figure 3.21"),
+    ("linear-model", "Table 3.1"),
+    ("static-friction", "Table 3.2"),
+    ("slip-blocks", "Table 3.3"),
+    ("revised-model", "Table 3.4"),
+];
+
+/// Velocity of Figure 3.8, mm/s.
+const SHOWN_VELOCITY_MM_S: f64 = 2.0;
+
+/// Tables 3.1 to 3.4 and Figures 3.5 to 3.21, from a commissioning and its cross-checks.
+pub fn chapter3_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Section> {
+    let (map, friction, runs) = &found.friction;
+    let (gms, slow_sine) = &found.presliding;
+    let plant = &found.plant.plant;
+
+    let mut response = response_section(&found.response, Some(plant));
+    response
+        .blocks
+        .extend(plant_tables(&found.plant).map(Block::Table));
+    let mut constant_velocity = friction_section(map, friction);
+    if let Some(run) = nearest(runs, SHOWN_VELOCITY_MM_S) {
+        let figure = Block::Figure(constant_velocity_figure(run));
+        constant_velocity.blocks.insert(0, figure);
+    }
+    let mut presliding = presliding_section(gms, friction.mean_levels_v().1);
+    presliding
+        .blocks
+        .insert(1, Block::Figure(hysteresis_figure(slow_sine)));
+    let mut sections = vec![
+        response,
+        motor_constant_section(&found.motor, None),
+        constant_velocity,
+        presliding,
+    ];
+    sections.extend(revise_sections(
+        &checked.at_rest,
+        plant,
+        &checked.revisions,
+        &[],
+    ));
+    number(sections, "chapter-3", &NUMBERS)
+}
+
+/// The mean velocity of the reference over the middle fifth of a run, mm/s.
+fn velocity_mm_s(run: &Recording) -> f64 {
+    let (from, to) = (2 * run.len() / 5, 3 * run.len() / 5);
+    let distance = |reference: &[f64]| Some(reference.get(to)? - reference.get(from)?);
+    distance(&run.reference_mm).map_or(f64::NAN, |mm| mm / ((to - from) as f64 * run.sample_time_s))
+}
+
+/// The run whose velocity is nearest.
+fn nearest(runs: &[Recording], wanted_mm_s: f64) -> Option<&Recording> {
+    let distance = |run: &Recording| (velocity_mm_s(run) / wanted_mm_s).ln().abs();
+    runs.iter()
+        .filter(|run| velocity_mm_s(run) > 0.0)
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+fn constant_velocity_figure(run: &Recording) -> Figure {
+    let time = (0..run.len()).map(|index| index as f64 * run.sample_time_s);
+    lines(
+        "constant-velocity",
+        &format!(
+            "Voltage of the run at {:.2} mm/s, on the way there and back to rest",
+            velocity_mm_s(run)
+        ),
+        ("time (s)", "voltage (V)"),
+        vec![series(
+            "voltage",
+            time.collect(),
+            run.voltage_v.clone(),
+            Style::solid(Colour::Blue),
+        )],
+    )
+}
+
+fn hysteresis_figure(recording: &Recording) -> Figure {
+    lines(
+        "hysteresis-measured",
+        "Voltage against position during the slow sine, where the voltage is the friction",
+        ("position (um)", "voltage (V)"),
+        vec![series(
+            "measured",
+            recording.position_mm.iter().map(|mm| 1e3 * mm).collect(),
+            recording.voltage_v.clone(),
+            Style::solid(Colour::Ink),
+        )],
+    )
+}

@@ -1,0 +1,10 @@
+//! The studies, tested on the simulated stage.
+
+mod chapter5;
+mod command;
+mod friction_models;
+mod laws;
+mod report_command;
+mod report_parts;
+mod robustness;
+mod robustness_command;

@@ -1,0 +1,90 @@
+//! `cargo xtask combinations`: every feedback law with every feedforward on the emulated target, bit for bit, and what
+//! each law and each feedforward costs.
+
+use anyhow::{Result, ensure};
+use quadrant::control::feedback::LawKind;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::lockstep::Job;
+
+use crate::reference_model::{self, ReferenceModel};
+use crate::{count, lockstep};
+use xtask::image::{self, Board, Scalar, Target};
+use xtask::toolchain::Toolchain;
+
+/// A law and a feedforward.
+type Combination = (LawKind, FeedforwardKind);
+
+/// Control ticks of each comparison.
+const TICKS: u32 = 4_000;
+
+/// All of them.
+fn all() -> Vec<Combination> {
+    let kinds = |law| FeedforwardKind::ALL.map(|kind| (law, kind));
+    LawKind::ALL.into_iter().flat_map(kinds).collect()
+}
+
+/// The job of an emulated run, each axis with a combination of its own.
+fn job(axes: [Combination; 3]) -> Job {
+    let mut job = reference_model::job();
+    for (axis, (law, kind)) in job.stage.axes.iter_mut().zip(axes) {
+        axis.feedback.law = law;
+        axis.feedforward.kind = kind;
+    }
+    job
+}
+
+/// Runs every combination in lockstep, one on each axis and three at a time, and fails on any difference.
+pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
+    let image = image::build(
+        toolchain,
+        Target {
+            board: Board::Mps2,
+            scalar,
+        },
+    )?;
+    let combinations = all();
+    let (mut words, mut moving) = (0, 0);
+    for three in combinations.chunks(3) {
+        // A short chunk runs its last combination again.
+        let axes = [0, 1, 2].map(|index: usize| three[index.min(three.len() - 1)]);
+        let tally =
+            lockstep::lockstep(&image, ReferenceModel::of(scalar, job(axes))?, TICKS)?.tally;
+        if let Some((tick, model, firmware)) = &tally.first {
+            println!(
+                "{axes:?}: first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware"
+            );
+        }
+        ensure!(tally.differ == 0, "{axes:?}: {} words differ", tally.differ);
+        words += tally.words;
+        moving += tally.moving;
+    }
+    println!(
+        "{} combinations of law and feedforward, {words} words compared, 0 differ, {moving} of them not zero",
+        combinations.len()
+    );
+    ensure!(2 * moving > words, "the stage did not move");
+    Ok(())
+}
+
+/// Counts the instructions of every law with combined feedforward, and of every feedforward with the PID, on all axes.
+pub(crate) fn count(
+    toolchain: Toolchain,
+    scalar: Scalar,
+    ticks: u32,
+    overwrite: bool,
+) -> Result<()> {
+    let laws = LawKind::ALL.map(|law| (law, FeedforwardKind::Combined));
+    let kinds = FeedforwardKind::ALL
+        .into_iter()
+        .filter(|kind| *kind != FeedforwardKind::Combined)
+        .map(|kind| (LawKind::Pid, kind));
+    let jobs: Vec<(String, Job)> = laws
+        .into_iter()
+        .chain(kinds)
+        .map(|combination| {
+            let (law, kind) = combination;
+            (format!("{law:?}, {kind:?}"), job([combination; 3]))
+        })
+        .collect();
+    count::run_all(toolchain, scalar, jobs, ticks, overwrite)
+}

@@ -1,0 +1,193 @@
+//! `cargo xtask count`: the instructions of a control tick, from the interrupt's entry to its return, by stage.
+//!
+//! QEMU logs every instruction executed. These are instructions, not cycles.
+
+use std::collections::BTreeMap;
+
+use anyhow::{Context, Result, bail, ensure};
+use quadrant::lockstep::{Job, Mode};
+use quadrant_sim::emulator::Memory;
+use serde::{Deserialize, Serialize};
+
+use crate::lockstep;
+use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
+use crate::trace::{Tick, Trace};
+use xtask::golden::Golden;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
+
+/// How much more than expected is accepted, in percent.
+const TOLERANCE_PERCENT: f64 = 5.0;
+
+/// Instructions per tick of one stage or of all.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+struct Figure {
+    mean: f64,
+    min: u32,
+    max: u32,
+}
+
+/// What was counted.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+struct Count {
+    ticks: u32,
+    total: Figure,
+    /// Empty where only the whole is held.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    stages: BTreeMap<String, Figure>,
+}
+
+/// What is expected.
+const GOLDEN: Golden = Golden {
+    path: "target-tests/golden/instructions.toml",
+    head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",
+};
+
+/// Counts the default job stage by stage, prints, and holds the figures against the committed ones.
+pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
+    let image = emulated(toolchain, scalar)?;
+    let count = count(&image, reference_model::job(), ticks)?;
+    println!(
+        "{}: instructions per control tick over {ticks} ticks",
+        image.target
+    );
+    println!("  {:<20} {:>9} {:>6} {:>6}", "stage", "mean", "min", "max");
+    let rows = count
+        .stages
+        .iter()
+        .map(|(stage, figure)| (stage.as_str(), figure));
+    for (stage, figure) in rows.chain([("total", &count.total)]) {
+        println!(
+            "  {stage:<20} {:>9.1} {:>6} {:>6}",
+            figure.mean, figure.min, figure.max
+        );
+    }
+    let key = image.target.scalar_name();
+    if overwrite {
+        GOLDEN.store(Some(&image.compiler), [(key, count)])
+    } else {
+        compare(&key, &count, &image.compiler)
+    }
+}
+
+/// Counts some jobs, prints a line for each, and holds the figures against the committed ones.
+pub(crate) fn run_all(
+    toolchain: Toolchain,
+    scalar: Scalar,
+    jobs: Vec<(String, Job)>,
+    ticks: u32,
+    overwrite: bool,
+) -> Result<()> {
+    let image = emulated(toolchain, scalar)?;
+    println!(
+        "{}: instructions per control tick, three axes, over {ticks} ticks",
+        image.target
+    );
+    println!(
+        "  {:<28} {:>9} {:>6} {:>6}",
+        "law, feedforward", "mean", "min", "max"
+    );
+    let mut counts = Vec::new();
+    for (name, job) in jobs {
+        let count = count(&image, job, ticks)?;
+        let Figure { mean, min, max } = count.total;
+        println!("  {name:<28} {mean:>9.1} {min:>6} {max:>6}");
+        let whole = Count {
+            stages: BTreeMap::new(),
+            ..count
+        };
+        counts.push((format!("{}, {name}", image.target.scalar_name()), whole));
+    }
+    if overwrite {
+        return GOLDEN.store(Some(&image.compiler), counts);
+    }
+    counts
+        .iter()
+        .try_for_each(|(key, count)| compare(key, count, &image.compiler))
+}
+
+/// The image that is emulated.
+fn emulated(toolchain: Toolchain, scalar: Scalar) -> Result<Image> {
+    let target = Target {
+        board: Board::Mps2,
+        scalar,
+    };
+    image::build(toolchain, target)
+}
+
+/// Runs the image and counts.
+fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
+    let trace = Trace::of(image)?;
+    let memory = Memory::create()?;
+    // The rehearsal's beginning is spent at rest and is not counted.
+    let (inputs, _) =
+        ReferenceModel::of(image.target.scalar, job.clone())?.run_alone(SETTLING_TICKS + ticks);
+    lockstep::load(&memory, Mode::Unpaced, &job, &inputs)?;
+    let (mut emulator, mut tracer) = trace.start(image, &memory)?;
+    let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
+    tracer.trace_from(trace.root())?;
+    let closed = trace.read(image, lines)?;
+    emulator.wait()?;
+    let Some(counted) = closed.get(SETTLING_TICKS as usize..) else {
+        bail!("only {} control ticks seen in the trace", closed.len());
+    };
+    ensure!(
+        counted.len() == ticks as usize,
+        "{} control ticks seen in the trace instead of {ticks}",
+        counted.len()
+    );
+    Ok(summary(ticks, counted))
+}
+
+fn summary(ticks: u32, closed: &[Tick]) -> Count {
+    let figure = |of: &dyn Fn(&Tick) -> u32| {
+        let values = closed.iter().map(of);
+        let sum: u64 = values.clone().map(u64::from).sum();
+        Figure {
+            // To a tenth, so that the file stays readable.
+            mean: (sum as f64 * 10.0 / f64::from(ticks)).round() / 10.0,
+            min: values.clone().min().unwrap_or(0),
+            max: values.max().unwrap_or(0),
+        }
+    };
+    let names: std::collections::BTreeSet<&'static str> = closed
+        .iter()
+        .flat_map(|tick| tick.keys().copied())
+        .collect();
+    Count {
+        ticks,
+        total: figure(&|tick| tick.values().sum()),
+        stages: names
+            .into_iter()
+            .map(|name| {
+                (
+                    name.to_owned(),
+                    figure(&|tick| tick.get(name).copied().unwrap_or(0)),
+                )
+            })
+            .collect(),
+    }
+}
+
+fn compare(key: &str, count: &Count, compiler: &str) -> Result<()> {
+    let Some((expected, difference)) = GOLDEN.read::<Count>()?.table(key, compiler) else {
+        bail!(
+            "no figure is committed for {key}: `cargo xtask count --overwrite-expected` makes one"
+        );
+    };
+    let pairs = [
+        ("mean", count.total.mean, expected.total.mean),
+        ("max", count.total.max.into(), expected.total.max.into()),
+    ];
+    for (name, counted, expected) in pairs {
+        let growth = 100.0 * (counted / expected - 1.0);
+        println!("  {key}: {name} {counted} against {expected} expected, {growth:+.1} %");
+        difference.ensure(growth <= TOLERANCE_PERCENT, || {
+            format!(
+                "{key}: the {name} has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
+                 `cargo xtask count --overwrite-expected` accepts it"
+            )
+        })?;
+    }
+    Ok(())
+}

@@ -1,0 +1,147 @@
+//! Faults that need a clock: the hardware timer paces the firmware, on recorded inputs, and instructions are its time.
+
+use anyhow::{Context, Result, ensure};
+use quadrant::lockstep::{
+    HANGS_FROM, HANGS_UNTIL, InputRecord, Mode, OutputRecord, INJECTED_FAULT, INJECTED_FAULT_TICK,
+    InjectedFault, RECORDED_OUTPUTS,
+};
+use quadrant::safety::FaultCode;
+use quadrant::stage::Outputs;
+
+use super::finding::{Finding, are_off, log_contains};
+use crate::lockstep;
+use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
+use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use xtask::image::Image;
+
+/// Ticks of the runs.
+const TICKS: u32 = SETTLING_TICKS + 250;
+/// Cycles of the emulated timers in a control period.
+const PERIOD_CYCLES: u32 = 2_500;
+
+/// A run of recorded inputs, and what came of it.
+struct Run {
+    expected: Vec<Outputs>,
+    memory: Memory,
+    log: Vec<String>,
+}
+
+impl Run {
+    /// Runs the circle; `adjust` changes what the firmware reads, `prepare` the memory.
+    fn of(
+        image: &Image,
+        adjust: impl FnOnce(&mut [InputRecord]),
+        prepare: impl FnOnce(&Memory) -> Result<()>,
+    ) -> Result<Self> {
+        let model = ReferenceModel::of(image.target.scalar, reference_model::job())?;
+        let job = model.job().clone();
+        let (mut inputs, expected) = model.run_alone(TICKS);
+        adjust(&mut inputs);
+        let memory = Memory::create()?;
+        lockstep::load(&memory, Mode::Paced, &job, &inputs)?;
+        prepare(&memory)?;
+        let log = Emulator::start(
+            &reference_model::program(image)?,
+            &memory,
+            Clock::Instructions,
+            |_| {},
+        )?
+        .wait()?;
+        Ok(Self {
+            expected,
+            memory,
+            log,
+        })
+    }
+
+    /// The outputs of the firmware that started as number `start`, from zero.
+    fn outputs(&self, start: u32) -> Result<Vec<Outputs>> {
+        let mut bytes = vec![0; TICKS as usize * OutputRecord::BYTES];
+        let at = RECORDED_OUTPUTS + start as usize * bytes.len();
+        self.memory.read(at, &mut bytes)?;
+        let (records, _) = bytes.as_chunks();
+        Ok(records
+            .iter()
+            .map(|record| OutputRecord::decode(record).outputs)
+            .collect())
+    }
+}
+
+/// An encoder interface that takes a whole control period to be read, once.
+pub(crate) fn deadline_missed(image: &Image) -> Result<Finding> {
+    let slow = SETTLING_TICKS as usize;
+    let run = Run::of(image, |inputs| inputs[slow].slow = true, |_| Ok(()))?;
+    let outputs = run.outputs(0)?;
+    let found = outputs
+        .iter()
+        .skip(slow)
+        .position(|outputs| !outputs.enabled)
+        .context("the outputs stay enabled")?
+        + slow;
+    let (before, after) = outputs.split_at(found);
+    ensure!(
+        before == &run.expected[..found],
+        "the outputs before the fault are not the reference model's"
+    );
+    ensure!(are_off(after), "the outputs were enabled again");
+    log_contains(
+        &run.log,
+        &format!(
+            "fault {} on the stage at tick {found}",
+            FaultCode::DeadlineMissed.number()
+        ),
+    )?;
+    log_contains(&run.log, " 1 overruns")?;
+    let how = "reading the encoders takes a control period, once, 15 mm/s";
+    Ok(Finding {
+        ticks: Some(u32::try_from(found - slow)? + 1),
+        compared: (3 * u64::from(TICKS), 0),
+        ..Finding::at_start(how, FaultCode::DeadlineMissed)
+    })
+}
+
+/// An idle loop that masks all interrupts and does nothing any more; gives the time to the reset in control periods, too.
+pub(crate) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
+    let run = Run::of(
+        image,
+        |_| {},
+        |memory| {
+            memory.set_word(INJECTED_FAULT, InjectedFault::Hang as u32)?;
+            memory.set_word(INJECTED_FAULT_TICK, SETTLING_TICKS)?;
+            Ok(())
+        },
+    )?;
+    let hung = SETTLING_TICKS as usize;
+    let first = run.outputs(0)?;
+    ensure!(
+        first[..hung] == run.expected[..hung] && first[hung - 1].enabled,
+        "the outputs before the fault are not the reference model's"
+    );
+    ensure!(
+        are_off(&first[hung..]),
+        "a firmware that hangs put out something"
+    );
+    let second = run.outputs(1)?;
+    // The same requests to enable and to run as before.
+    ensure!(are_off(&second), "the next firmware could be enabled");
+    log_contains(
+        &run.log,
+        &format!(
+            "fault {} on the stage at tick 0",
+            FaultCode::WatchdogReset.number()
+        ),
+    )?;
+    log_contains(&run.log, &format!("finished: {TICKS} ticks"))?;
+    let cycles = run
+        .memory
+        .word(HANGS_FROM)?
+        .wrapping_sub(run.memory.word(HANGS_UNTIL)?);
+    let finding = Finding {
+        compared: (3 * u64::from(SETTLING_TICKS) + 3 * u64::from(TICKS), 0),
+        ..Finding::at_start(
+            "the idle loop masks interrupts and hangs, 15 mm/s",
+            FaultCode::WatchdogReset,
+        )
+    };
+    Ok((finding, f64::from(cycles) / f64::from(PERIOD_CYCLES)))
+}

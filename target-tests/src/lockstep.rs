@@ -1,0 +1,192 @@
+//! `cargo xtask emulate`: the image in QEMU against the simulated stage, word by word beside the reference model in this process.
+
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail, ensure};
+use indicatif::{ProgressBar, ProgressStyle};
+use quadrant::lockstep::{
+    InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+};
+use quadrant_sim::emulator::{Clock, Emulator, Lockstep, Memory};
+
+use crate::reference_model::{self, ReferenceModel, Tally};
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
+
+/// Control ticks per second of the firmware's time.
+const RATE_HZ: f64 = 10_000.0;
+/// How late, in us of firmware time, the last tick may look at the clock: the interrupt's latency.
+const LATENCY_US: u64 = 10;
+/// Ticks between two steps of the progress bar.
+const PROGRESS_TICKS: u32 = 10_000;
+
+/// What came of a run.
+pub(crate) struct Run {
+    /// How the words compare.
+    pub(crate) tally: Tally,
+    /// How long the ticks took.
+    elapsed: Duration,
+}
+
+/// Runs the image for some seconds of its time and fails on any difference.
+pub(crate) fn run(
+    toolchain: Toolchain,
+    scalar: Scalar,
+    job: Job,
+    seconds: f64,
+    paced: bool,
+) -> Result<()> {
+    let ticks = seconds * RATE_HZ;
+    ensure!(
+        (1.0..f64::from(u32::MAX)).contains(&ticks),
+        "{seconds} s is not a time to run"
+    );
+    let ticks = ticks as u32;
+    let image = image::build(
+        toolchain,
+        Target {
+            board: Board::Mps2,
+            scalar,
+        },
+    )?;
+    println!("{}", image.footprint()?);
+    let model = ReferenceModel::of(scalar, job)?;
+    let Run { tally, elapsed, .. } = if paced {
+        recorded(&image, model, ticks)?
+    } else {
+        lockstep(&image, model, ticks)?
+    };
+    if let Some((tick, model, firmware)) = &tally.first {
+        println!("first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware");
+    }
+    let rate = f64::from(ticks) / elapsed.as_secs_f64();
+    println!(
+        "{} words compared, {} differ, {} of them not zero, {rate:.0} ticks/s, {:.1} times real time",
+        tally.words,
+        tally.differ,
+        tally.moving,
+        rate / RATE_HZ
+    );
+    ensure!(tally.differ == 0, "{} words differ", tally.differ);
+    ensure!(
+        2 * tally.moving > tally.words || seconds < 1.0,
+        "the stage did not move: only {} words were not zero",
+        tally.moving
+    );
+    Ok(())
+}
+
+/// Exchanges with the firmware tick by tick. The time starts with the first answer: compiling tables is not a tick.
+pub(crate) fn lockstep(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run> {
+    let memory = Memory::create()?;
+    memory.prepare(Mode::Lockstep, 0, &reference_model::encode(model.job())?)?;
+    let mut firmware = Lockstep::start(reference_model::program(image)?, memory, show)?;
+    let bar = progress(ticks);
+    let mut started = None;
+    for tick in 1..=ticks {
+        let input = model.input();
+        firmware.ask(&input)?;
+        // The reference model computes while the firmware does.
+        model.compute(&input);
+        let answer = firmware
+            .answer()?
+            .with_context(|| format!("the firmware ended before it answered tick {tick}"))?;
+        started.get_or_insert_with(Instant::now);
+        model.compare(answer);
+        model.step(&answer);
+        if tick % PROGRESS_TICKS == 0 {
+            bar.inc(1);
+            firmware.new_lines()?;
+        }
+    }
+    let elapsed = started.map_or(Duration::ZERO, |started| started.elapsed());
+    bar.finish_and_clear();
+    firmware.finish()?;
+    Ok(Run {
+        tally: *model.tally(),
+        elapsed,
+    })
+}
+
+/// Prints a line of the firmware's log.
+pub(crate) fn show(line: &str) {
+    println!("  firmware: {line}");
+}
+
+/// A bar over seconds of firmware time; hidden where nobody watches.
+fn progress(ticks: u32) -> ProgressBar {
+    let style =
+        ProgressStyle::with_template("{wide_bar} {pos}/{len} s of firmware time, {eta} left")
+            .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new((ticks / PROGRESS_TICKS).into()).with_style(style)
+}
+
+/// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
+fn recorded(image: &Image, model: ReferenceModel, ticks: u32) -> Result<Run> {
+    let memory = Memory::create()?;
+    let job = model.job().clone();
+    let (inputs, expected) = model.run_alone(ticks);
+    load(&memory, Mode::Paced, &job, &inputs)?;
+    let started = Instant::now();
+    let log = Emulator::start(
+        &reference_model::program(image)?,
+        &memory,
+        Clock::Instructions,
+        show,
+    )?
+    .wait()?;
+    let elapsed = started.elapsed();
+    check_paced(&log, ticks)?;
+    let mut bytes = vec![0; inputs.len() * OutputRecord::BYTES];
+    memory.read(RECORDED_OUTPUTS, &mut bytes)?;
+    let (records, _) = bytes.as_chunks();
+    let mut tally = Tally::default();
+    for ((tick, expected), record) in (0..).zip(expected).zip(records) {
+        tally.add(tick, expected, OutputRecord::decode(record).outputs);
+    }
+    Ok(Run { tally, elapsed })
+}
+
+/// Prepares a run of recorded inputs.
+pub(crate) fn load(memory: &Memory, mode: Mode, job: &Job, inputs: &[InputRecord]) -> Result<()> {
+    ensure!(
+        inputs.len() <= RECORDED_TICKS,
+        "{} ticks asked for, but a recorded run holds at most {RECORDED_TICKS}",
+        inputs.len()
+    );
+    let ticks = u32::try_from(inputs.len())?;
+    let bytes: Vec<u8> = inputs.iter().flat_map(InputRecord::encode).collect();
+    memory.write(RECORDED_INPUTS, &bytes)?;
+    Ok(memory.prepare(mode, ticks, &reference_model::encode(job)?)?)
+}
+
+/// Checks what the firmware says of a paced run: all ticks, no overrun, and the time they should take.
+fn check_paced(lines: &[String], ticks: u32) -> Result<()> {
+    let numbers = lines.iter().rev().find_map(|line| {
+        let (_, line) = line.split_once("finished: ")?;
+        let words = line
+            .split(|c: char| !c.is_ascii_digit())
+            .filter(|word| !word.is_empty());
+        words
+            .map(|word| word.parse::<u64>().ok())
+            .collect::<Option<Vec<_>>>()
+    });
+    let numbers = numbers.context("the firmware has not said how the run went")?;
+    let [ran, overruns, _longest, microseconds] = numbers[..] else {
+        bail!("the firmware's account of the run is not as expected: {numbers:?}");
+    };
+    ensure!(
+        ran == u64::from(ticks),
+        "{ran} ticks ran instead of {ticks}"
+    );
+    ensure!(
+        overruns == 0,
+        "{overruns} control ticks overran their deadline"
+    );
+    let expected = (f64::from(ticks) * 1e6 / RATE_HZ) as u64;
+    ensure!(
+        microseconds.abs_diff(expected) <= LATENCY_US,
+        "{ticks} ticks took {microseconds} us of firmware time instead of {expected}"
+    );
+    Ok(())
+}

@@ -1,0 +1,173 @@
+//! The reference model of the emulated firmware: the same job in this process, on the simulated stage.
+
+use std::marker::PhantomData;
+use std::path::Path;
+
+use anyhow::{Context, Result, ensure};
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::lockstep::{InputRecord, Job};
+use quadrant::scalar::{Fixed, Scalar};
+use quadrant::stage::Outputs;
+use quadrant_sim::emulator::Program;
+use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::scenario::circle_and_sine;
+use quadrant_sim::settings_file::SettingsFile;
+
+use xtask::image::{self, Image};
+
+/// Seed of the simulated stage's noise.
+const SEED: u64 = 1;
+
+/// Lead-in of the motions, s: short, because counting traces every instruction of it.
+const LEAD_S: f64 = 0.05;
+/// Ticks after which the motions of [`job`] have reached their speed.
+pub(crate) const SETTLING_TICKS: u32 = 750;
+
+/// The job of an emulated run, on the default settings.
+pub(crate) fn job() -> Job {
+    circle_and_sine(LEAD_S)
+}
+
+/// The job of an emulated run, on the settings of a file.
+pub(crate) fn job_with(settings: &Path) -> Result<Job> {
+    Ok(Job {
+        stage: SettingsFile::read(settings)?.stage,
+        ..job()
+    })
+}
+
+/// An image as the emulator takes it.
+pub(crate) fn program(image: &Image) -> Result<Program> {
+    ensure!(
+        image.target.board == image::Board::Mps2,
+        "{} is a real board: it is not emulated",
+        image.target
+    );
+    Ok(Program::read(&image.path)?)
+}
+
+/// A job as the firmware reads it.
+pub(crate) fn encode(job: &Job) -> Result<Vec<u8>> {
+    postcard::to_allocvec(job).context("cannot encode the job")
+}
+
+/// A machine of either number type.
+pub(crate) trait Law {
+    /// One control period.
+    fn tick(&mut self, input: &InputRecord) -> Outputs;
+}
+
+impl<S: Scalar> Law for Machine<S, FIRMWARE_ELEMENTS> {
+    fn tick(&mut self, input: &InputRecord) -> Outputs {
+        Machine::tick(self, input)
+    }
+}
+
+/// How the firmware's words compare with the reference model's.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Tally {
+    /// Converter words compared.
+    pub(crate) words: u64,
+    /// Words that differ; a differing enable line counts as one more.
+    pub(crate) differ: u64,
+    /// Words that were not zero: a comparison of zeros proves nothing.
+    pub(crate) moving: u64,
+    /// Ticks with the outputs enabled.
+    pub(crate) enabled: u64,
+    /// The first difference: tick, the reference model's outputs, the firmware's.
+    pub(crate) first: Option<(u32, Outputs, Outputs)>,
+}
+
+/// Law and stage in this process.
+pub(crate) struct ReferenceModel {
+    job: Job,
+    law: Box<dyn Law>,
+    plant: SimulatedStage,
+    operator: Operator,
+    tick: u32,
+    expected: Outputs,
+    tally: Tally,
+}
+
+impl ReferenceModel {
+    /// the reference model of a firmware of a number type that runs a job.
+    pub(crate) fn of(scalar: image::Scalar, job: Job) -> Result<Self> {
+        fn law<S: Scalar>(job: &Job, _: PhantomData<S>) -> Result<Box<dyn Law>> {
+            Ok(Box::new(Machine::<S, FIRMWARE_ELEMENTS>::new(job)?))
+        }
+        Ok(Self {
+            law: match scalar {
+                image::Scalar::F32 => law(&job, PhantomData::<f32>)?,
+                image::Scalar::Fixed => law(&job, PhantomData::<Fixed>)?,
+            },
+            plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, SEED),
+            operator: Operator::runs_the_plan(),
+            tick: 0,
+            expected: Outputs::default(),
+            tally: Tally::default(),
+            job,
+        })
+    }
+
+    /// What it runs.
+    pub(crate) fn job(&self) -> &Job {
+        &self.job
+    }
+
+    /// What firmware and reference model read in the next tick.
+    pub(crate) fn input(&mut self) -> InputRecord {
+        let counts = self.plant.read_counters();
+        InputRecord::of_counts(counts, self.operator.request(self.tick))
+    }
+
+    /// The reference model's own answer.
+    pub(crate) fn compute(&mut self, input: &InputRecord) -> Outputs {
+        self.expected = self.law.tick(input);
+        self.tick += 1;
+        self.expected
+    }
+
+    /// Moves the stage by one control period.
+    pub(crate) fn step(&mut self, outputs: &Outputs) {
+        self.plant.step(outputs);
+    }
+
+    /// Compares an answer of the firmware with the reference model's last.
+    pub(crate) fn compare(&mut self, firmware: Outputs) {
+        self.tally.add(self.tick, self.expected, firmware);
+    }
+
+    /// How the comparison stands.
+    pub(crate) fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// The reference model alone in closed loop, for `ticks` ticks: what it read and what it answered.
+    pub(crate) fn run_alone(mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
+        (0..ticks)
+            .map(|_| {
+                let input = self.input();
+                let outputs = self.compute(&input);
+                self.step(&outputs);
+                (input, outputs)
+            })
+            .unzip()
+    }
+}
+
+impl Tally {
+    /// Compares the outputs of one tick.
+    pub(crate) fn add(&mut self, tick: u32, expected: Outputs, firmware: Outputs) {
+        for (ours, theirs) in expected.codes.iter().zip(firmware.codes) {
+            self.words += 1;
+            self.differ += u64::from(*ours != theirs);
+            self.moving += u64::from(ours.0 != 0);
+        }
+        self.enabled += u64::from(expected.enabled);
+        self.differ += u64::from(expected.enabled != firmware.enabled);
+        if expected != firmware {
+            self.first.get_or_insert((tick, expected, firmware));
+        }
+    }
+}

@@ -1,0 +1,251 @@
+//! `cargo xtask saturation`: what a control tick costs while everything around it is overloaded, tick by tick against the
+//! same motion in quiet.
+
+use anyhow::{Context, Result, anyhow, ensure};
+use quadrant::link::frame::{self, FRAME_BYTES};
+use quadrant::link::message::{Body, Request, TelemetryRequest};
+use quadrant::safety::{AxisName, Command};
+use quadrant::link::message::{AxisSignal, Channel, MAX_CHANNELS};
+
+use crate::faults::case::{configuration, moving};
+use crate::faults::fixture::Fixture;
+use crate::interrupt_latency;
+use crate::trace::{Trace, Tracer};
+use quadrant_sim::emulator::{Emulator, Memory};
+use std::process::ChildStderr;
+use xtask::image::{self, Board, Image, Scalar, Target};
+use xtask::toolchain::Toolchain;
+
+/// Tick at which the motion is under way and the load has reached its height.
+const FROM: u32 = 1_600;
+/// Tick before which it has been asked for.
+const LOADED: u32 = 1_500;
+/// Ticks counted.
+const TICKS: u32 = 200;
+/// What it costs a tick to take a request of the operator to its queue: the emulated board's own way in, which is counted
+/// here because a real one would cost as much.
+const REQUEST: i64 = 25;
+
+/// What is done to the firmware.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Load {
+    /// Telemetry of as many channels as there may be, at every tick.
+    telemetry: bool,
+    /// Nobody takes what the firmware sends: its queue of samples is full.
+    stops_reading: bool,
+    /// Status requests and garbage, as fast as the port takes them.
+    flood: bool,
+    /// A request of the operator in every tick, all of them refused and logged: their queue is full, and so is the log's.
+    requests: bool,
+}
+
+impl Load {
+    /// By how much a tick may exceed the same tick with what it was asked to do, but without load.
+    fn tolerance(self) -> i64 {
+        if self.requests { REQUEST } else { 0 }
+    }
+}
+
+/// The loads, and which of the runs before is the one without load.
+const LOADS: [(&str, Load, usize); 6] = [
+    (
+        "in quiet",
+        Load {
+            telemetry: false,
+            stops_reading: false,
+            flood: false,
+            requests: false,
+        },
+        0,
+    ),
+    (
+        "frames and garbage without a pause",
+        Load {
+            telemetry: false,
+            stops_reading: false,
+            flood: true,
+            requests: false,
+        },
+        0,
+    ),
+    (
+        "a request in every tick, refused and logged",
+        Load {
+            telemetry: false,
+            stops_reading: false,
+            flood: false,
+            requests: true,
+        },
+        0,
+    ),
+    (
+        "telemetry of 8 channels in every tick",
+        Load {
+            telemetry: true,
+            stops_reading: false,
+            flood: false,
+            requests: false,
+        },
+        3,
+    ),
+    (
+        "the same, and nobody takes it",
+        Load {
+            telemetry: true,
+            stops_reading: true,
+            flood: false,
+            requests: false,
+        },
+        3,
+    ),
+    (
+        "all of it at once",
+        Load {
+            telemetry: true,
+            stops_reading: true,
+            flood: true,
+            requests: true,
+        },
+        3,
+    ),
+];
+
+/// Counts under every load, prints the table, and fails if a load lengthens a tick.
+pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
+    let board = Board::Mps2;
+    let image = image::build(toolchain, Target { board, scalar })?;
+    println!(
+        "{}: instructions of {TICKS} control ticks, each against the same tick of the motion without the load",
+        image.target
+    );
+    println!("| load | mean | largest | most added to a tick |");
+    println!("|---|---|---|---|");
+    let mut runs: Vec<Vec<u32>> = Vec::new();
+    for (index, (name, load, without)) in LOADS.into_iter().enumerate() {
+        let counted = count(&image, load).context(name)?;
+        let base = if without == index {
+            &counted
+        } else {
+            &runs[without]
+        };
+        let added = counted
+            .iter()
+            .zip(base)
+            .map(|(loaded, quiet)| i64::from(*loaded) - i64::from(*quiet))
+            .max()
+            .context("there are ticks")?;
+        let sum: u64 = counted.iter().copied().map(u64::from).sum();
+        let largest = counted.iter().max().context("there are ticks")?;
+        println!(
+            "| {name} | {:.1} | {largest} | {added} |",
+            sum as f64 / f64::from(TICKS)
+        );
+        ensure!(
+            added <= load.tolerance(),
+            "{name}: a tick takes {added} instructions more"
+        );
+        runs.push(counted);
+    }
+    println!(
+        "longest stretches with interrupts masked, in instructions, with a line for the log in every millisecond:"
+    );
+    for (place, length) in interrupt_latency::longest(&image)? {
+        println!("  {length:>6}  {place}");
+    }
+    Ok(())
+}
+
+/// The instructions of each tick under a load.
+fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
+    let trace = Trace::of(image)?;
+    let ticks = traced(
+        image,
+        |memory| trace.start(image, memory),
+        |fixture, tracer| drive(fixture, tracer, load),
+        |lines| trace.read(image, lines),
+    )?;
+    let counted = ticks
+        .get(..TICKS as usize)
+        .context("the trace ends too early")?;
+    Ok(counted.iter().map(|tick| tick.values().sum()).collect())
+}
+
+/// Runs a fixture while its trace is read.
+pub(crate) fn traced<T: Send>(
+    image: &Image,
+    start: impl FnOnce(&Memory) -> Result<(Emulator, Tracer)>,
+    drive: impl FnOnce(Fixture, &mut Tracer) -> Result<()>,
+    read: impl FnOnce(ChildStderr) -> Result<T> + Send,
+) -> Result<T> {
+    std::thread::scope(|scope| {
+        let mut begun = None;
+        let fixture = Fixture::start_with(image, configuration(), |memory| {
+            let (mut emulator, mut tracer) = start(memory)?;
+            let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
+            tracer.run()?;
+            begun = Some((tracer, scope.spawn(move || read(lines))));
+            Ok(emulator)
+        })?;
+        let (mut tracer, reader) = begun.context("it was started")?;
+        drive(fixture, &mut tracer)?;
+        match reader.join() {
+            Ok(read) => read,
+            Err(_) => Err(anyhow!("the thread that reads the trace panicked")),
+        }
+    })
+}
+
+/// Runs the motion, and the load from [`LOADED`] on.
+fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
+    moving(&mut fixture, 1.0)?;
+    if load.telemetry {
+        let signals = [AxisSignal::Error, AxisSignal::Output, AxisSignal::Position];
+        let channels = signals
+            .into_iter()
+            .flat_map(|signal| AxisName::ALL.map(|axis| Channel::Axis(axis, signal)))
+            .take(MAX_CHANNELS)
+            .collect();
+        fixture.done(Body::Telemetry(TelemetryRequest::Select {
+            channels,
+            decimation: 1,
+        }))?;
+    }
+    if load.stops_reading {
+        fixture.stop_reading();
+    }
+    if load.requests {
+        fixture.inject(Box::new(|input, _, _| input.request = Some(Command::Run)));
+    }
+    ensure!(fixture.tick() < LOADED, "tick {} already", fixture.tick());
+    while fixture.tick() < FROM + TICKS + 1 {
+        if fixture.tick() == FROM {
+            tracer.trace()?;
+        }
+        while load.flood && fixture.unsent() < 2 * FRAME_BYTES {
+            let flood = flood(fixture.tick())?;
+            fixture.send_bytes(&flood);
+        }
+        fixture.run(1)?;
+    }
+    fixture.end().map(drop)
+}
+
+/// A few requests and some garbage, which depends on the tick.
+fn flood(tick: u32) -> Result<Vec<u8>> {
+    let mut buffer = [0; FRAME_BYTES];
+    let request = Request {
+        id: tick as u16,
+        body: Body::Status,
+    };
+    let frame = frame::encode(&request, &mut buffer).map_err(|error| anyhow!("{error}"))?;
+    let mut bytes = frame.repeat(8);
+    let mut noise = tick | 1;
+    for _ in 0..256 {
+        noise ^= noise << 13;
+        noise ^= noise >> 17;
+        noise ^= noise << 5;
+        bytes.push(noise as u8);
+    }
+    bytes.push(frame::DELIMITER);
+    Ok(bytes)
+}

@@ -1,0 +1,73 @@
+//! Which function belongs to which stage of the control tick.
+
+/// The stages, each by the beginning of the path of its functions. Of an instruction's inlined frames, the outermost
+/// one found here decides: friction evaluated for the feedforward is feedforward.
+const STAGES: [(&str, &str); 11] = [
+    ("quadrant_firmware::board::", "inputs and outputs"),
+    ("quadrant::law::encoder::", "encoders"),
+    ("quadrant::law::reference::", "reference"),
+    ("quadrant::law::control::", "feedback"),
+    ("quadrant::law::feedforward::", "feedforward"),
+    ("quadrant::law::friction::", "friction"),
+    ("quadrant::law::safety::", "safety"),
+    ("quadrant::law::telemetry::", "telemetry"),
+    ("quadrant::law::units::", "units"),
+    ("heapless::", "queues"),
+    ("quadrant_firmware::app::__rtic_internal_", "spawning"),
+];
+
+/// What holds the stages together, innermost first; it counts only where no stage does.
+const FRAMES: [(&str, &str); 4] = [
+    ("quadrant::law::axis::", "axis"),
+    ("quadrant::law::stage::", "stage"),
+    ("quadrant_firmware::", "interrupt"),
+    ("rtic::", "interrupt"),
+];
+
+/// What no table knows.
+pub(crate) const OTHER: &str = "other";
+
+/// The stage of an instruction, from the functions it was inlined into, outermost first.
+pub(crate) fn of<'a>(functions: impl Iterator<Item = &'a str> + Clone) -> Option<&'static str> {
+    let stage = functions.clone().find_map(|function| {
+        STAGES
+            .iter()
+            .find(|(prefix, _)| path(function).starts_with(prefix))
+    });
+    let frame = || {
+        FRAMES.iter().find(|(prefix, _)| {
+            functions
+                .clone()
+                .any(|function| path(function).starts_with(prefix))
+        })
+    };
+    stage.or_else(frame).map(|(_, name)| *name)
+}
+
+/// `<quadrant::law::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
+fn path(function: &str) -> &str {
+    function.trim_start_matches(['<', '&', '[', '('])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_outermost_stage_decides() {
+        let frames = [
+            "CONTROL_TICK",
+            "<quadrant::law::axis::Axis<f32>>::tick",
+            "quadrant::law::feedforward::f",
+            "quadrant::law::friction::g",
+        ];
+        assert_eq!(of(frames.into_iter()), Some("feedforward"));
+        assert_eq!(of(frames[..2].iter().copied()), Some("axis"));
+        let frames = [
+            "quadrant_firmware::app::control",
+            "quadrant::law::axis::Axis::drive",
+        ];
+        assert_eq!(of(frames.into_iter()), Some("axis"));
+        assert_eq!(of(["core::ptr::read"].into_iter()), None);
+    }
+}
