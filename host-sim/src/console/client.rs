@@ -216,7 +216,7 @@ impl Client {
                 what,
                 code: fault.code,
                 name: fault.name.as_str().to_owned(),
-                axis: fault.axis,
+                axis: fault.axis.map(Into::into),
                 tick: fault.tick,
                 cause: fault.cause.as_str().to_owned(),
                 remedy: fault.remedy.as_str().to_owned(),

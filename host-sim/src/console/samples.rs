@@ -3,8 +3,8 @@
 use std::time::Duration;
 
 use heapless::Vec as Bounded;
-use quadrant::link::message::{CapturePhase, CaptureRecord, Trigger};
 use quadrant::link::message::{Body, CaptureRequest, CaptureStatus, Reply, TelemetryRequest};
+use quadrant::link::message::{CapturePhase, CaptureRecord, Trigger};
 use quadrant::link::message::{Channel, MAX_CHANNELS, TelemetryBlock, WordKind};
 
 use super::client::Client;

@@ -13,8 +13,8 @@ use quadrant::app::{
 };
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
-use quadrant::lockstep::InputRecord;
 use quadrant::link::message::NumberType;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::{Command, FaultCode, Switches};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
@@ -252,7 +252,10 @@ impl<S: Scalar> Running<S> {
                 Default::default()
             }
         };
-        let resolution_mm = settings.axes.each_ref().map(|axis| axis.encoder.resolution_mm);
+        let resolution_mm = settings
+            .axes
+            .each_ref()
+            .map(|axis| axis.encoder.resolution_mm);
         let stage = settings.build::<S, FIRMWARE_ELEMENTS>()?;
         let plan = start.plan.build(settings)?;
         let (axes, streaming) = stage.into_axes();
@@ -304,11 +307,14 @@ impl<S: Scalar> Running<S> {
         self.seen = seen;
         let supervised = self.supervision.run(&seen, self.requests.pop_front());
         self.command = supervised.command;
-        self.control.show_glitches(self.supervision.glitch_readings());
+        self.control
+            .show_glitches(self.supervision.glitch_readings());
         for event in supervised.events.into_iter().flatten() {
             self.server.push_event(seen.tick, event);
         }
-        let after = self.server.poll(serial, &self.seen, TimingStatistics::default());
+        let after = self
+            .server
+            .poll(serial, &self.seen, TimingStatistics::default());
         (outputs, after)
     }
 

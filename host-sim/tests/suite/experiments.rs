@@ -64,8 +64,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         // The encoder of x stands still, as if the axis were clamped.
         let mut counts = plant.read_counters();
         counts[0] = 0;
-        let input =
-            quadrant::lockstep::InputRecord::of_counts(counts, operator.request(tick));
+        let input = quadrant::lockstep::InputRecord::of_counts(counts, operator.request(tick));
         let outputs = machine.tick(&input);
         plant.step(&outputs);
         if let SafetyState::Faulted(fault) = machine.state().safety() {

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow, ensure};
 use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
-use quadrant::lockstep::{Mode, OUTPUT, OutputRecord, InjectedFault};
+use quadrant::lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
 use quadrant::safety::FaultCode;
 use quadrant::settings::StageSettings;
 use quadrant::stage::Outputs;

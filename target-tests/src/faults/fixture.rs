@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
 use quadrant::axis::CourseMode;
-use quadrant::lockstep::{
-    END_OF_RUN, FLASH, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
-    OutputRecord, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, RESETS_LEFT, STARTS, held,
-};
 use quadrant::link::message::{Body, NumberType};
+use quadrant::lockstep::{
+    END_OF_RUN, FLASH, INJECTED_FAULT, INJECTED_FAULT_TICK, INPUT, INPUT_SEQUENCE, InjectedFault,
+    InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE, OutputRecord, RESETS_LEFT, STARTS, held,
+};
 use quadrant::safety::{AxisName, AxisSwitches, FaultCode};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
@@ -254,7 +254,11 @@ impl Fixture {
 
     /// Makes the idle loop of the firmware do something instead of the next tick, and waits until the firmware has started
     /// again. Gives what the firmware has left at the outputs; the reference model starts with the fault that it is to find.
-    pub(crate) fn inject_fault(&mut self, what: InjectedFault, finds: FaultCode) -> Result<Outputs> {
+    pub(crate) fn inject_fault(
+        &mut self,
+        what: InjectedFault,
+        finds: FaultCode,
+    ) -> Result<Outputs> {
         self.memory.set_word(RESETS_LEFT, 1)?;
         self.memory.set_word(INJECTED_FAULT_TICK, self.tick + 1)?;
         self.memory.set_word(INJECTED_FAULT, what as u32)?;

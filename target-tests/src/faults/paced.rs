@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, ensure};
 use quadrant::lockstep::{
-    HANGS_FROM, HANGS_UNTIL, InputRecord, Mode, OutputRecord, INJECTED_FAULT, INJECTED_FAULT_TICK,
-    InjectedFault, RECORDED_OUTPUTS,
+    HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, InputRecord, Mode,
+    OutputRecord, RECORDED_OUTPUTS,
 };
 use quadrant::safety::FaultCode;
 use quadrant::stage::Outputs;

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
-use quadrant::safety::AxisName;
 use quadrant::link::message::Channel;
+use quadrant::safety::AxisName;
 use quadrant_sim::console::hands;
 
 /// One thing to ask of the machine.

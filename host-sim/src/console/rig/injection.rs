@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
 use quadrant::link::message::AxisName;
-use quadrant::settings::AxisSettings;
 use quadrant::link::message::MachineState;
+use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
+use quadrant::settings::AxisSettings;
 use quadrant::units::DacCode;
 
 use super::{Injected, LOOK, Stop};

@@ -94,8 +94,8 @@ impl Shape<'_> {
 #[cfg(test)]
 mod tests {
     use quadrant::link::message::AxisName;
-    use quadrant::settings::x_axis;
     use quadrant::link::message::{AxisSignal, Channel};
+    use quadrant::settings::x_axis;
 
     use super::*;
 

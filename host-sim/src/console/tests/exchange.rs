@@ -1,8 +1,8 @@
 //! Settings to and from the machine.
 
 use quadrant::control::feedback::LawKind;
+use quadrant::link::message::AxisName;
 use quadrant::link::message::AxisSet;
-use quadrant::safety::AxisName;
 use quadrant::settings::StageSettings;
 
 use super::connected;

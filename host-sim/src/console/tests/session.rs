@@ -4,9 +4,9 @@ use std::io;
 use std::time::Duration;
 
 use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
-use quadrant::safety::AxisName;
+use quadrant::link::message::AxisName;
 use quadrant::link::message::MachineState;
+use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
 
 use super::connected;
 use crate::console::settle;
