@@ -1,16 +1,16 @@
-//! What the firmware starts with: settings, and what the last run left.
+//! The start: settings, static storage, and the crash record of the last run.
 
 use core::mem::MaybeUninit;
 
 use embedded_storage::nor_flash::NorFlash;
-use quadrant::app::last_words::Death;
+use quadrant::app::capture::CAPTURE_WORDS;
+use quadrant::app::crash_record::CrashCause;
 use quadrant::app::{Axis, Control, ControlEnds, Queues, Server, ServerParts};
 use quadrant::axes::AxisName;
-use quadrant::capture::CAPTURE_WORDS;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::ResetCause;
-use quadrant::link::lockstep::Job;
 use quadrant::link::message::{NumberType, Provenance};
+use quadrant::lockstep::Job;
 use quadrant::safety::{FaultCode, StreamLoss};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
@@ -19,8 +19,8 @@ use quadrant::store::{BUFFER_BYTES, Finding, Store};
 
 use crate::{board, log};
 
-/// Where all that is large is made, and stays: the stack has no room for it.
-pub(crate) struct Places<S: Scalar + 'static, F: 'static> {
+/// Static storage for all large objects: the stack has no room for them.
+pub(crate) struct StaticStorage<S: Scalar + 'static, F: 'static> {
     settings: MaybeUninit<StageSettings>,
     draft: MaybeUninit<StageSettings>,
     axes: [MaybeUninit<Axis<S>>; 4],
@@ -31,8 +31,8 @@ pub(crate) struct Places<S: Scalar + 'static, F: 'static> {
     server: MaybeUninit<Server<'static, 'static, S, F>>,
 }
 
-impl<S: Scalar, F> Places<S, F> {
-    /// Before the start.
+impl<S: Scalar, F> StaticStorage<S, F> {
+    /// Returns the storage before the start.
     pub(crate) const fn new() -> Self {
         Self {
             settings: MaybeUninit::uninit(),
@@ -49,73 +49,80 @@ impl<S: Scalar, F> Places<S, F> {
 
 /// The two halves of the machine, ready for the first tick.
 pub(crate) struct Machine<S: Scalar + 'static, F: 'static> {
-    /// The control interrupt's.
+    /// The fast half, of the control interrupt.
     pub(crate) control: &'static mut Control<'static, 'static, S>,
-    /// The slow one.
+    /// The slow half, of the lowest task.
     pub(crate) server: &'static mut Server<'static, 'static, S, F>,
     /// Control rate, Hz.
     pub(crate) rate_hz: u32,
+    /// Lengths of the encoders' counts, mm.
+    pub(crate) resolution_mm: [f64; 3],
 }
 
-/// Loads the settings and makes the machine of them. `remains` is what the last run left; `cycle_hz` is the rate of the
+/// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
 /// timer that measures ticks.
 pub(crate) fn machine<S: Scalar, F: NorFlash>(
-    places: &'static mut Places<S, F>,
+    storage: &'static mut StaticStorage<S, F>,
     flash: F,
-    remains: Option<FaultCode>,
+    crashed: Option<FaultCode>,
     cycle_hz: u32,
     number: NumberType,
 ) -> Machine<S, F> {
-    let settings = defaults(&mut places.settings);
+    let settings = defaults(&mut storage.settings);
     let Loaded {
         plan,
         provenance,
         store,
         fault,
-    } = load(flash, settings, &mut places.buffer);
-    // What the spare holds does not matter: it is built over before it is used.
-    let [x, y, z, spare] = places.axes.each_mut().map(blank_axis);
+    } = load(flash, settings, &mut storage.buffer);
+    // The back buffer's content does not matter: it is built over before it is used.
+    let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
     let mut axes = [x, y, z];
     // Tables are filled and bounds are searched before the first tick is due.
     for (name, axis) in AxisName::ALL.into_iter().zip(&mut axes) {
         settings.build_axis_into(name, axis);
     }
     let rate_hz = settings.rate_hz as u32;
+    let resolution_mm = settings
+        .axes
+        .each_ref()
+        .map(|axis| axis.encoder.resolution_mm);
     let streaming = settings.streaming.build();
-    let (control_ends, ends) = places.queues.split();
-    let control = place_control(&mut places.control, axes, streaming, plan, control_ends);
-    if let Some(code) = remains.or(fault) {
+    let (control_ends, ends) = storage.queues.split();
+    let control = place_control(&mut storage.control, axes, streaming, plan, control_ends);
+    if let Some(code) = crashed.or(fault) {
         control.start_faulted(code);
     }
     let parts = ServerParts {
         ends,
-        spare,
+        back_buffer,
         settings,
-        draft: defaults(&mut places.draft),
+        draft: defaults(&mut storage.draft),
         provenance,
         store,
-        buffer: &mut places.buffer,
-        capture: &mut places.capture,
+        buffer: &mut storage.buffer,
+        capture: &mut storage.capture,
         board: board::NAME,
         cycle_hz,
         number,
     };
     Machine {
         control,
-        server: place_server(&mut places.server, parts),
+        server: place_server(&mut storage.server, parts),
         rate_hz,
+        resolution_mm,
     }
 }
 
-/// What is in force from the first tick on, beside the settings.
+/// Results of loading the settings.
 struct Loaded<S: Scalar, F> {
-    /// The motions.
+    /// The motions of the axes.
     plan: Plan<S>,
-    /// Where the settings come from.
+    /// The origin of the settings.
     provenance: Provenance,
-    /// Where they are stored.
+    /// The store that holds them.
     store: Store<F>,
-    /// Stored settings were refused.
+    /// The fault, if stored settings were refused.
     fault: Option<FaultCode>,
 }
 
@@ -167,19 +174,19 @@ fn load<S: Scalar, F: NorFlash>(
     }
 }
 
-/// What the last run left: logged, and as a fault if it did not end of its own accord.
-pub(crate) fn remains(cause: ResetCause) -> Option<FaultCode> {
+/// Logs the crash record of the last run; returns its fault, or that of a watchdog reset.
+pub(crate) fn report_crash(cause: ResetCause) -> Option<FaultCode> {
     log::started(cause);
-    if let Some(words) = board::remains::take() {
+    if let Some(record) = board::crash_record::take() {
         defmt::error!(
             "the firmware before this one ended in tick {=u32} by {=str}: {=str}",
-            words.tick,
-            words.death.as_str(),
-            words.text()
+            record.tick,
+            record.cause.as_str(),
+            record.text()
         );
-        return Some(match words.death {
-            Death::Panic => FaultCode::Panic,
-            Death::HardFault | Death::StrayInterrupt => FaultCode::HardFault,
+        return Some(match record.cause {
+            CrashCause::Panic => FaultCode::Panic,
+            CrashCause::HardFault | CrashCause::StrayInterrupt => FaultCode::HardFault,
         });
     }
     (cause == ResetCause::Watchdog).then_some(FaultCode::WatchdogReset)
@@ -239,7 +246,10 @@ fn place_server<S: Scalar, F: NorFlash>(
     place.write(Server::new(parts))
 }
 
-/// What was built, if the settings were accepted.
+/// Unwraps a build.
+///
+/// # Panics
+/// When settings were refused.
 fn built<T>(result: Result<T, SettingsError>) -> T {
     match result {
         Ok(built) => built,

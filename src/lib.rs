@@ -61,12 +61,15 @@ pub mod app;
 pub mod drivers;
 pub mod hal;
 pub mod law;
-pub mod link;
+pub mod lockstep;
 pub mod settings;
 pub mod store;
 
+/// The messages of the link, a crate of their own.
+pub use quadrant_link as link;
+
 #[doc(inline)]
 pub use law::{
-    admission, axes, axis, capture, command, control, decimal, encoder, feedforward, friction,
-    homing, injection, motion, reference, safety, scalar, stage, table, telemetry, units,
+    admission, axes, axis, command, control, decimal, encoder, feedforward, friction, homing,
+    injection, motion, reference, safety, scalar, stage, table, telemetry, units,
 };

@@ -1,4 +1,4 @@
-//! What the firmware tells a person, through defmt: one line per event.
+//! The event logger: one line per event, through defmt.
 //!
 //! `error`: the outputs are off, or will be. `warn`: somebody should look. `info`: something was done. `debug`: how it goes.
 //! `trace`: every command. `docs/log.md` shows a run and says what the lines mean.
@@ -6,9 +6,10 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use embedded_storage::nor_flash::NorFlash;
+use quadrant::app::glitch_monitor::GlitchEvent;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
-use quadrant::app::{Journal, Meters, News, Server, Snapshot};
+use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::hal::ResetCause;
@@ -26,18 +27,20 @@ const SECOND_TICKS: u32 = 10_000;
 /// Lines for which the queue to the log had no room.
 static LOST: AtomicU32 = AtomicU32::new(0);
 
-/// What the supervising task has to say to a person.
+/// An entry of the supervising task for the log.
 #[derive(Clone, Copy)]
-pub(crate) enum Line<S> {
-    /// Something happened.
+pub(crate) enum LogEntry<S> {
+    /// An event of the supervisor.
     Event(Event),
+    /// A glitch or a circle has ended.
+    Glitch(GlitchEvent),
     /// A command went to the control law.
     Command(Command),
-    /// All is as it was; the tracking errors.
+    /// The tracking errors, once a second.
     Status([S; 3]),
 }
 
-/// Says who starts, on what, and why.
+/// Logs version, board and reset cause.
 pub(crate) fn started(cause: ResetCause) {
     defmt::info!(
         "quadrant {=str} on {=str}, started by {=str}",
@@ -53,7 +56,7 @@ pub(crate) fn started(cause: ResetCause) {
     }
 }
 
-/// Says which settings are in force.
+/// Logs the origin of the settings in force.
 pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance: &str) {
     let mut paths = 0_usize;
     // An error of the tree would end the visit early, and show as a number that is too small.
@@ -66,7 +69,7 @@ pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance:
     );
 }
 
-/// Counts a line that found no room.
+/// Counts an entry that found no room.
 pub(crate) fn lose_line() {
     LOST.store(
         LOST.load(Ordering::Relaxed).wrapping_add(1),
@@ -74,7 +77,7 @@ pub(crate) fn lose_line() {
     );
 }
 
-/// What lines are about: each has its own share of the log.
+/// The topic of a line: each has its own share of the log.
 #[derive(Clone, Copy)]
 enum Topic {
     State,
@@ -84,9 +87,10 @@ enum Topic {
     Link,
     Settings,
     Losses,
+    Glitches,
 }
 
-const TOPICS: [&str; 7] = [
+const TOPICS: [&str; 8] = [
     "the outputs",
     "refusals",
     "faults",
@@ -94,21 +98,22 @@ const TOPICS: [&str; 7] = [
     "the link",
     "settings and captures",
     "losses",
+    "glitches",
 ];
 
-/// Thins what a task prints.
-struct Thinner {
+/// Limits the lines that a task prints.
+struct LogLimiter {
     limiter: RateLimiter<{ TOPICS.len() }>,
 }
 
-impl Thinner {
+impl LogLimiter {
     const fn new() -> Self {
         Self {
             limiter: RateLimiter::new(SECOND_TICKS, LINES),
         }
     }
 
-    /// Says how many lines were left out, when their time is over.
+    /// Logs the number of lines left out, when their window is over.
     fn settle(&mut self, tick: u32) {
         while let Some((topic, left_out)) = self.limiter.overdue(tick) {
             let about = TOPICS.get(topic).copied().unwrap_or("");
@@ -126,23 +131,23 @@ impl Thinner {
     }
 }
 
-/// Prints what the supervising task found.
+/// Prints the entries of the supervising task.
 pub(crate) struct Printer {
-    thinner: Thinner,
+    limiter: LogLimiter,
     lost: u32,
 }
 
 impl Printer {
     pub(crate) const fn new() -> Self {
         Self {
-            thinner: Thinner::new(),
+            limiter: LogLimiter::new(),
             lost: 0,
         }
     }
 
-    pub(crate) fn print<S: Scalar>(&mut self, tick: u32, line: Line<S>) {
+    pub(crate) fn print<S: Scalar>(&mut self, tick: u32, line: LogEntry<S>) {
         let lost = LOST.load(Ordering::Relaxed);
-        if lost != self.lost && self.thinner.admits(Topic::Losses, tick) {
+        if lost != self.lost && self.limiter.admits(Topic::Losses, tick) {
             defmt::warn!(
                 "{=u32} lines were lost: they came faster than they are printed",
                 lost.wrapping_sub(self.lost)
@@ -150,14 +155,19 @@ impl Printer {
             self.lost = lost;
         }
         match line {
-            Line::Event(event) => {
-                if self.thinner.admits(topic(event), tick) {
+            LogEntry::Event(event) => {
+                if self.limiter.admits(topic(event), tick) {
                     print_event(event);
                 }
             }
-            Line::Command(command) => print_command(command),
-            Line::Status(errors) => {
-                self.thinner.settle(tick);
+            LogEntry::Glitch(event) => {
+                if self.limiter.admits(Topic::Glitches, tick) {
+                    print_glitch(event);
+                }
+            }
+            LogEntry::Command(command) => print_command(command),
+            LogEntry::Status(errors) => {
+                self.limiter.settle(tick);
                 let [x, y, z] = errors.map(|error| 1e3 * error.to_f32(Quantity::Length));
                 defmt::debug!(
                     "tracking error x {=f32} um, y {=f32} um, z {=f32} um",
@@ -201,6 +211,32 @@ fn print_event(event: Event) {
     }
 }
 
+/// Micrometres and degrees to one digit.
+fn tenths(value: f32) -> f32 {
+    let rounding = if value < 0.0 { -0.5 } else { 0.5 };
+    (10.0 * value + rounding) as i32 as f32 / 10.0
+}
+
+fn print_glitch(event: GlitchEvent) {
+    match event {
+        GlitchEvent::Reversal {
+            axis,
+            tick,
+            height_um,
+        } => defmt::info!(
+            "{=str}: reversal at tick {=u32}: glitch {=f32} um",
+            axis.as_str(),
+            tick,
+            tenths(height_um)
+        ),
+        GlitchEvent::Circle(circle) => defmt::info!(
+            "circle: worst {=f32} um at {=f32} deg",
+            tenths(circle.deviation_um),
+            tenths(circle.angle_deg)
+        ),
+    }
+}
+
 fn print_fault(fault: Fault, reaction: &str) {
     defmt::error!(
         "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}; {=str}",
@@ -228,92 +264,101 @@ fn print_command(command: Command) {
     }
 }
 
-/// Prints what the server went through.
-pub(crate) struct Narrator {
-    journal: Journal,
-    thinner: Thinner,
+/// Logs the changes of the slow half.
+pub(crate) struct EventLogger {
+    changes: ChangeDetector,
+    limiter: LogLimiter,
 }
 
-impl Narrator {
+impl EventLogger {
     pub(crate) fn new() -> Self {
         Self {
-            journal: Journal::default(),
-            thinner: Thinner::new(),
+            changes: ChangeDetector::default(),
+            limiter: LogLimiter::new(),
         }
     }
 
-    /// Tells what has changed since the last time. Once a poll of the server.
-    pub(crate) fn tell<S: Scalar, F: NorFlash>(
+    /// Logs the changes since the last call. Once a poll of the server.
+    pub(crate) fn log<S: Scalar, F: NorFlash>(
         &mut self,
         server: &Server<'_, '_, S, F>,
         seen: &Snapshot<S>,
-        meters: Meters,
+        timing: TimingStatistics,
     ) {
         let tick = seen.tick;
-        self.thinner.settle(tick);
-        for news in self.journal.look(tick, &seen.view, server.vitals(), meters) {
-            if !self.thinner.admits(topic_of(news), tick) {
+        self.limiter.settle(tick);
+        for change in self
+            .changes
+            .compare(tick, &seen.view, server.statistics(), timing)
+        {
+            if !self.limiter.admits(topic_of(change), tick) {
                 continue;
             }
-            match news {
+            match change {
                 // The sum of what there is to say of settings needs the server.
-                News::Stored => defmt::info!(
+                StateChange::Stored => defmt::info!(
                     "settings stored: {=usize} paths, from {=str}",
                     server.paths(),
                     server.provenance().as_str()
                 ),
-                News::LateTicks(ticks) => defmt::warn!(
+                StateChange::LateTicks(ticks) => defmt::warn!(
                     "{=u32} control ticks ended late; the longest took {=u32} cycles of its timer",
                     ticks,
-                    meters.longest_tick_cycles
+                    timing.longest_tick_cycles
                 ),
-                other => print_news(other),
+                other => print_change(other),
             }
         }
     }
 }
 
-const fn topic_of(news: News) -> Topic {
-    match news {
-        News::Began(..) | News::Ended(..) | News::Homed(_) | News::NotHomed(_) => Topic::Motion,
-        News::Greeted | News::Silent | News::Back => Topic::Link,
-        News::Applied | News::Stored | News::Captured(_) => Topic::Settings,
-        News::BadFrames(_) | News::SamplesLost(_) | News::EventsLost(_) | News::LateTicks(_) => {
-            Topic::Losses
-        }
+const fn topic_of(change: StateChange) -> Topic {
+    match change {
+        StateChange::Began(..)
+        | StateChange::Ended(..)
+        | StateChange::Homed(_)
+        | StateChange::NotHomed(_) => Topic::Motion,
+        StateChange::Greeted | StateChange::Silent | StateChange::Back => Topic::Link,
+        StateChange::Applied | StateChange::Stored | StateChange::Captured(_) => Topic::Settings,
+        StateChange::BadFrames(_)
+        | StateChange::SamplesLost(_)
+        | StateChange::EventsLost(_)
+        | StateChange::LateTicks(_) => Topic::Losses,
     }
 }
 
-fn print_news(news: News) {
-    match news {
-        News::Began(axis, MotionMode::Home) => defmt::info!("{=str}: homing", axis.as_str()),
-        News::Homed(axis) => defmt::info!("{=str}: homed", axis.as_str()),
-        News::NotHomed(axis) => {
+fn print_change(change: StateChange) {
+    match change {
+        StateChange::Began(axis, MotionMode::Home) => defmt::info!("{=str}: homing", axis.as_str()),
+        StateChange::Homed(axis) => defmt::info!("{=str}: homed", axis.as_str()),
+        StateChange::NotHomed(axis) => {
             defmt::warn!(
                 "{=str}: homing ended without a home position",
                 axis.as_str()
             );
         }
-        News::Began(axis, mode) => defmt::debug!("{=str}: {=str}", axis.as_str(), verb(mode)),
-        News::Ended(axis, mode) => {
+        StateChange::Began(axis, mode) => {
+            defmt::debug!("{=str}: {=str}", axis.as_str(), verb(mode))
+        }
+        StateChange::Ended(axis, mode) => {
             defmt::debug!("{=str}: {=str} has ended", axis.as_str(), verb(mode));
         }
-        News::Greeted => defmt::info!("link: a host says hello"),
-        News::Silent => defmt::info!("link: the host has been silent for 3 s"),
-        News::Back => defmt::info!("link: the host is back"),
-        News::Applied => defmt::info!("settings applied"),
-        News::Captured(number) => defmt::info!("capture {=u16} is complete", number),
-        News::BadFrames(frames) => {
+        StateChange::Greeted => defmt::info!("link: a host says hello"),
+        StateChange::Silent => defmt::info!("link: the host has been silent for 3 s"),
+        StateChange::Back => defmt::info!("link: the host is back"),
+        StateChange::Applied => defmt::info!("settings applied"),
+        StateChange::Captured(number) => defmt::info!("capture {=u16} is complete", number),
+        StateChange::BadFrames(frames) => {
             defmt::warn!("link: {=u32} frames were damaged or no message", frames);
         }
-        News::SamplesLost(samples) => defmt::warn!(
+        StateChange::SamplesLost(samples) => defmt::warn!(
             "link: {=u32} samples of the telemetry were lost: it asks for more than the link carries",
             samples
         ),
-        News::EventsLost(events) => {
+        StateChange::EventsLost(events) => {
             defmt::warn!("link: {=u32} notices to the host were lost", events);
         }
-        News::Stored | News::LateTicks(_) => {}
+        StateChange::Stored | StateChange::LateTicks(_) => {}
     }
 }
 
@@ -329,7 +374,7 @@ const fn verb(mode: MotionMode) -> &'static str {
     }
 }
 
-/// Warns that the server has not been polled for so long, from the task that would let the watchdog bite.
+/// Warns of a server that is not polled, from the task that feeds the watchdog.
 pub(crate) fn warn_of_watchdog(silent_ms: u32) {
     defmt::warn!(
         "the server has made no progress for {=u32} ms: at twice that the watchdog ends this run",

@@ -1,12 +1,11 @@
 //! The servo firmware: an RTIC application, thin on purpose.
 //!
-//! What is computed lives in the library, what touches registers in `board`. Here is only who does what, when, and at
-//! which priority:
+//! Computation is in the library, registers are in `board`. Here are the tasks and their priorities:
 //!
 //! | task      | priority | when                          | does |
 //! |-----------|----------|-------------------------------|------|
 //! | control   | highest  | every control tick            | encoders in, law, amplifiers out, deadline check |
-//! | supervise | middle   | every tenth control tick      | lets requests through or refuses them |
+//! | supervise | middle   | every tenth control tick      | passes or refuses requests, watches glitches |
 //! | serve     | low      | after supervise               | answers a host's requests |
 //! | show      | low      | when supervise has something  | prints through defmt |
 //! | idle      | none     | the rest of the time          | what the board asks for |
@@ -50,8 +49,11 @@ mod app {
     use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
+    use quadrant::app::glitch_monitor::GlitchReadings;
     use quadrant::app::supervisor::Event;
-    use quadrant::app::{After, Control, Inputs, Liveness, Meters, Server, Snapshot, Supervision};
+    use quadrant::app::{
+        Control, Inputs, Liveness, Poll, Server, Snapshot, Supervision, TimingStatistics,
+    };
     use quadrant::axes::AxisName;
     use quadrant::command::Command;
     use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
@@ -62,19 +64,19 @@ mod app {
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
         Switches, Tick, Watchdog,
     };
-    use crate::boot::{self, Places};
-    use crate::log::{self, Line, Narrator, Printer};
+    use crate::boot::{self, StaticStorage};
+    use crate::log::{self, EventLogger, LogEntry, Printer};
 
-    /// What the control law computes with.
+    /// The number type of the control law.
     #[cfg(not(feature = "scalar-fixed"))]
     type Number = f32;
-    /// What the control law computes with.
+    /// The number type of the control law.
     #[cfg(feature = "scalar-fixed")]
     type Number = quadrant::scalar::Fixed;
-    /// What that is called.
+    /// The number type's name on the link.
     #[cfg(not(feature = "scalar-fixed"))]
     const NUMBER: NumberType = NumberType::F32;
-    /// What that is called.
+    /// The number type's name on the link.
     #[cfg(feature = "scalar-fixed")]
     const NUMBER: NumberType = NumberType::Fixed;
 
@@ -82,18 +84,18 @@ mod app {
     pub(crate) static TICK: AtomicU32 = AtomicU32::new(0);
     /// Control ticks that ended after the next one was due.
     static OVERRUNS: AtomicU32 = AtomicU32::new(0);
-    /// The longest a control tick took, in cycles of its timer.
+    /// Duration of the longest control tick, in cycles of its timer.
     static LONGEST: AtomicU32 = AtomicU32::new(0);
     /// Polls of the server.
     static POLLS: AtomicU32 = AtomicU32::new(0);
-    /// The host whose set points the axes follow has fallen silent.
+    /// True if the host whose set points the axes follow has fallen silent.
     static LINK_LOST: AtomicBool = AtomicBool::new(false);
 
     defmt::timestamp!("{=u32:010}", TICK.load(Ordering::Relaxed));
 
     #[shared]
     struct Shared {
-        /// What the supervising task saw last, for the server.
+        /// The supervising task's latest snapshot, for the server.
         seen: Snapshot<Number>,
     }
 
@@ -117,34 +119,45 @@ mod app {
         commands_out: Consumer<'static, Command>,
         snapshots_in: Producer<'static, Snapshot<Number>>,
         snapshots_out: Consumer<'static, Snapshot<Number>>,
+        glitches_in: Producer<'static, GlitchReadings>,
+        glitches_out: Consumer<'static, GlitchReadings>,
         events_in: Producer<'static, (u32, Event)>,
         events_out: Consumer<'static, (u32, Event)>,
-        lines_in: Producer<'static, Line<Number>>,
-        lines_out: Consumer<'static, Line<Number>>,
-        narrator: Narrator,
+        lines_in: Producer<'static, LogEntry<Number>>,
+        lines_out: Consumer<'static, LogEntry<Number>>,
+        event_logger: EventLogger,
     }
 
     #[init(local = [
-        places: Places<Number, SettingsFlash> = Places::new(),
+        storage: StaticStorage<Number, SettingsFlash> = StaticStorage::new(),
         requests: Queue<Command, 4> = Queue::new(),
         commands: Queue<Command, 4> = Queue::new(),
         snapshots: Queue<Snapshot<Number>, 4> = Queue::new(),
+        glitches: Queue<GlitchReadings, 2> = Queue::new(),
         events: Queue<(u32, Event), 16> = Queue::new(),
-        lines: Queue<Line<Number>, 16> = Queue::new(),
+        lines: Queue<LogEntry<Number>, 16> = Queue::new(),
     ])]
     fn init(cx: init::Context) -> (Shared, Local) {
         let mut board = Board::init(cx.core);
-        let remains = boot::remains(board.reset_cause);
+        let crashed = boot::report_crash(board.reset_cause);
         let cycle_hz = board.tick.cycle_hz();
         let boot::Machine {
             control,
             server,
             rate_hz,
-        } = boot::machine(cx.local.places, board.flash, remains, cycle_hz, NUMBER);
+            resolution_mm,
+        } = boot::machine(
+            cx.local.storage,
+            board.flash,
+            crash_record,
+            cycle_hz,
+            NUMBER,
+        );
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
         let (snapshots_in, snapshots_out) = cx.local.snapshots.split();
+        let (glitches_in, glitches_out) = cx.local.glitches.split();
         let (events_in, events_out) = cx.local.events.split();
         let (lines_in, lines_out) = cx.local.lines.split();
         board.tick.start(rate_hz);
@@ -160,7 +173,7 @@ mod app {
             watchdog: board.watchdog,
             tick: board.tick,
             idle: board.idle,
-            supervision: Supervision::default(),
+            supervision: Supervision::new(resolution_mm),
             liveness: Liveness::default(),
             requests_in,
             requests_out,
@@ -168,11 +181,13 @@ mod app {
             commands_out,
             snapshots_in,
             snapshots_out,
+            glitches_in,
+            glitches_out,
             events_in,
             events_out,
             lines_in,
             lines_out,
-            narrator: Narrator::new(),
+            event_logger: EventLogger::new(),
         };
         let seen = Snapshot::default();
         (Shared { seen }, local)
@@ -184,7 +199,7 @@ mod app {
     /// panic, divide by a helper or compute in f64 can be reached from here (`cargo xtask prove-no-panic`).
     #[task(binds = CONTROL_TICK, priority = 4, local = [
         control, encoders, switches, operator, amplifiers, tick, requests_in, commands_out, snapshots_in,
-        deadline_missed: bool = false,
+        glitches_out, deadline_missed: bool = false,
     ])]
     fn control(cx: control::Context) {
         cx.local.tick.acknowledge();
@@ -219,6 +234,9 @@ mod app {
             // A supervising task that is late finds the oldest snapshots and misses the newest.
             let _ = cx.local.snapshots_in.enqueue(snapshot);
             let _ = supervise::spawn();
+            if let Some(readings) = cx.local.glitches_out.dequeue() {
+                cx.local.control.show_glitches(readings);
+            }
         }
 
         let elapsed = cx.local.tick.elapsed_cycles();
@@ -234,10 +252,10 @@ mod app {
         }
     }
 
-    /// Lets the operator's requests through to the control law, or refuses them, tells log and server what happened, and
-    /// feeds the watchdog while everything makes progress.
+    /// Passes the operator's requests to the control law or refuses them, reports events to log and server, and feeds the
+    /// watchdog while all tasks make progress.
     #[task(priority = 2, shared = [seen], local = [
-        snapshots_out, requests_out, commands_in, events_in, lines_in, watchdog, supervision, liveness,
+        snapshots_out, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
     ])]
     async fn supervise(mut cx: supervise::Context) {
         while let Some(snapshot) = cx.local.snapshots_out.dequeue() {
@@ -246,16 +264,26 @@ mod app {
             if let Some(command) = supervised.command {
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
-                print(cx.local.lines_in, Line::Command(command));
+                print(cx.local.lines_in, LogEntry::Command(command));
             }
             for event in supervised.events.into_iter().flatten() {
                 // A server or a log that is late loses its newest; nothing waits for them.
                 let _ = cx.local.events_in.enqueue((snapshot.tick, event));
-                print(cx.local.lines_in, Line::Event(event));
+                print(cx.local.lines_in, LogEntry::Event(event));
+            }
+            for glitch in &supervised.glitches {
+                print(cx.local.lines_in, LogEntry::Glitch(*glitch));
+            }
+            if !supervised.glitches.is_empty() {
+                // Control empties this queue at its next snapshot.
+                let _ = cx
+                    .local
+                    .glitches_in
+                    .enqueue(cx.local.supervision.glitch_readings());
             }
             if supervised.status_due {
                 let errors = snapshot.axes.map(|axis| axis.error);
-                print(cx.local.lines_in, Line::Status(errors));
+                print(cx.local.lines_in, LogEntry::Status(errors));
             }
             let polls = POLLS.load(Ordering::Relaxed);
             if cx.local.liveness.check(snapshot.tick, polls) {
@@ -270,38 +298,38 @@ mod app {
     }
 
     /// Answers a host's requests.
-    #[task(priority = 1, shared = [seen], local = [server, serial, events_out, narrator])]
+    #[task(priority = 1, shared = [seen], local = [server, serial, events_out, event_logger])]
     async fn serve(mut cx: serve::Context) {
         POLLS.store(
             POLLS.load(Ordering::Relaxed).wrapping_add(1),
             Ordering::Relaxed,
         );
         while let Some((tick, event)) = cx.local.events_out.dequeue() {
-            cx.local.server.tell_of(tick, event);
+            cx.local.server.push_event(tick, event);
         }
         let seen = cx.shared.seen.lock(|seen| *seen);
-        let meters = Meters {
+        let timing = TimingStatistics {
             overruns: OVERRUNS.load(Ordering::Relaxed),
             longest_tick_cycles: LONGEST.load(Ordering::Relaxed),
         };
-        let after = cx.local.server.poll(cx.local.serial, &seen, meters);
+        let poll = cx.local.server.poll(cx.local.serial, &seen, timing);
         LINK_LOST.store(cx.local.server.link_lost(), Ordering::Relaxed);
-        cx.local.narrator.tell(cx.local.server, &seen, meters);
-        if after == After::Reboot {
+        cx.local.event_logger.log(cx.local.server, &seen, timing);
+        if poll == Poll::Reboot {
             defmt::info!("restart, as a host has asked");
             board::restart();
         }
     }
 
-    /// Hands a line to the log, which prints when nothing more urgent is to be done.
-    fn print(lines: &mut Producer<'static, Line<Number>>, line: Line<Number>) {
+    /// Passes an entry to the log, which prints when nothing more urgent is to be done.
+    fn print(lines: &mut Producer<'static, LogEntry<Number>>, line: LogEntry<Number>) {
         if lines.enqueue(line).is_err() {
             log::lose_line();
         }
         let _ = show::spawn();
     }
 
-    /// Prints.
+    /// Prints the log's entries.
     #[task(priority = 1, local = [lines_out, printer: Printer = Printer::new()])]
     async fn show(cx: show::Context) {
         while let Some(line) = cx.local.lines_out.dequeue() {
@@ -331,7 +359,7 @@ mod app {
     }
 }
 
-/// On a host there is nothing to control: say what to do instead.
+/// Explains how to build the firmware: on a host there is nothing to control.
 #[cfg(not(target_os = "none"))]
 fn main() {
     eprintln!(

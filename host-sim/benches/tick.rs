@@ -6,7 +6,7 @@ use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant_sim::machine::{Machine, Operator};

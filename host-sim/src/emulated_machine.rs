@@ -7,7 +7,7 @@
 use std::collections::VecDeque;
 
 use quadrant::app::supervisor::PERIOD_TICKS;
-use quadrant::link::lockstep::{
+use quadrant::lockstep::{
     FLASH, FLASH_BYTES, InputRecord, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT,
     LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
 };

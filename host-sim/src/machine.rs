@@ -6,7 +6,7 @@ use quadrant::admission::StageView;
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
-use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;

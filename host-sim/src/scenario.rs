@@ -1,6 +1,6 @@
 //! The motion that the firmware is emulated, counted and benchmarked with.
 
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
 use quadrant::settings::{PlanSettings, StageSettings};
 

@@ -1,16 +1,17 @@
-//! The fast half: what the control interrupt owns and does.
+//! The fast half: the state and the work of the control interrupt.
 
-use super::queues::{CaptureOrder, ControlEnds, Exchange, Feed};
+use super::glitch_monitor::GlitchReadings;
+use super::queues::{AxisSwap, CaptureCommand, ControlEnds, StreamItem};
 use super::{Axis, Snapshot};
+use crate::app::capture::Capture;
 use crate::app::supervisor::PERIOD_TICKS;
+use crate::app::telemetry::{Observation, Sampler, SamplerState};
 use crate::law::axes::{AxisName, PerAxis};
-use crate::law::capture::Capture;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::reference::Motion;
 use crate::law::safety::{FaultCode, StreamLoss};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
-use crate::law::telemetry::{Observation, Sampler, SamplerState};
 
 /// Everything that the control interrupt owns.
 pub struct Control<'q, 'a, S: Scalar> {
@@ -21,6 +22,7 @@ pub struct Control<'q, 'a, S: Scalar> {
     sampler: Sampler,
     sampling: SamplerState,
     capture: Option<Capture<'a>>,
+    glitches: GlitchReadings,
     commanded: bool,
     /// Values of the first waiting block that were taken.
     place: usize,
@@ -28,7 +30,7 @@ pub struct Control<'q, 'a, S: Scalar> {
 }
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
-    /// Ready for the first tick.
+    /// Returns the fast half before the first tick.
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(
@@ -45,6 +47,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             sampler: Sampler::default(),
             sampling: SamplerState::default(),
             capture: None,
+            glitches: GlitchReadings::default(),
             commanded: false,
             place: 0,
             ends,
@@ -56,7 +59,12 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         self.state.start_faulted(code);
     }
 
-    /// The control law's memory.
+    /// Sets the glitch monitor's results, which telemetry channels show.
+    pub const fn show_glitches(&mut self, readings: GlitchReadings) {
+        self.glitches = readings;
+    }
+
+    /// The state of the control law.
     pub fn state(&self) -> &StageState<S, FIRMWARE_ELEMENTS> {
         &self.state
     }
@@ -65,17 +73,17 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// tell, and a command of the server's acts when the inputs have none.
     #[inline(always)]
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
-        let settings_changed = match self.ends.exchanges.dequeue() {
-            Some(exchange) => self.exchange(exchange),
+        let settings_changed = match self.ends.swaps.dequeue() {
+            Some(swap) => self.swap(swap),
             None => PerAxis::splat(false),
         };
         if let Some((name, motion)) = self.ends.motions.dequeue() {
             self.take_motion(name, motion);
         }
-        match self.ends.feeds.peek() {
+        match self.ends.stream_items.peek() {
             None => {}
-            Some(Feed::Segments(_)) => self.take_segments(),
-            Some(Feed::Injection(_) | Feed::Voltages(_)) => self.take_voltage(),
+            Some(StreamItem::Segments(_)) => self.take_segments(),
+            Some(StreamItem::Injection(_) | StreamItem::Voltages(_)) => self.take_voltage(),
         }
         let command = inputs.command.or_else(|| self.ends.commands.dequeue());
         self.commanded = command.is_some();
@@ -95,17 +103,18 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         )
     }
 
-    /// Lets the tick be seen, once the outputs are written. Gives what the supervising task looks at, when it is due.
+    /// Samples telemetry and capture after the outputs are written. Returns the supervising task's snapshot when it is due.
     #[inline(always)]
     pub fn observe(&mut self, elapsed_cycles: u32) -> Option<Snapshot<S>> {
         if let Some(sampler) = self.ends.samplers.dequeue() {
             self.sampler = sampler;
         }
-        if let Some(order) = self.ends.orders.dequeue() {
-            self.take_order(order);
+        if let Some(command) = self.ends.capture_commands.dequeue() {
+            self.take_capture_command(command);
         }
         let seen = Observation {
             stage: &self.state,
+            glitches: &self.glitches,
             elapsed_cycles,
             commanded: self.commanded,
         };
@@ -126,18 +135,18 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             .then(|| Snapshot::of(&self.state))
     }
 
-    /// Puts an axis in the place of another, which goes back to the server.
+    /// Replaces an axis; the old one goes back to the server as its back buffer.
     #[cold]
     #[inline(never)]
-    fn exchange(&mut self, exchange: Exchange<'a, S>) -> PerAxis<bool> {
-        let Exchange {
+    fn swap(&mut self, swap: AxisSwap<'a, S>) -> PerAxis<bool> {
+        let AxisSwap {
             name,
             axis,
             streaming,
-        } = exchange;
-        // There is one spare axis, so the queue has room for it.
+        } = swap;
+        // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);
-        let _ = self.ends.spares.enqueue(replaced);
+        let _ = self.ends.back_buffers.enqueue(replaced);
         self.streaming = streaming;
         PerAxis::from_fn(|axis| axis == name)
     }
@@ -152,11 +161,11 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
     }
 
-    /// Hands the axes the next segments of a stream, if they have room.
+    /// Passes the axes the next segments of a stream, if they have room.
     #[inline(always)]
     fn take_segments(&mut self) {
         if self.state.axes().iter().all(|axis| axis.wants_segment())
-            && let Some(Feed::Segments(segments)) = self.ends.feeds.dequeue()
+            && let Some(StreamItem::Segments(segments)) = self.ends.stream_items.dequeue()
         {
             for (name, segment) in AxisName::ALL.into_iter().zip(segments) {
                 self.state.offer_segment(name, segment);
@@ -164,17 +173,17 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
     }
 
-    /// Hands the next value of an injection on, if there is room. What is left of one that was broken off is dropped.
+    /// Passes the next value of an injection on, if there is room. What is left of one that was broken off is dropped.
     #[cold]
     #[inline(never)]
     fn take_voltage(&mut self) {
-        let used = match self.ends.feeds.peek() {
-            Some(Feed::Injection(injection)) => {
+        let used = match self.ends.stream_items.peek() {
+            Some(StreamItem::Injection(injection)) => {
                 self.state.prepare_injection(injection.clone());
                 true
             }
-            Some(Feed::Voltages(_)) if !self.state.has_injection() => true,
-            Some(Feed::Voltages(block)) => {
+            Some(StreamItem::Voltages(_)) if !self.state.has_injection() => true,
+            Some(StreamItem::Voltages(block)) => {
                 if self.state.wants_voltage()
                     && let Some(value) = block.value(self.place)
                 {
@@ -183,20 +192,20 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 }
                 self.place >= block.len()
             }
-            Some(Feed::Segments(_)) | None => false,
+            Some(StreamItem::Segments(_)) | None => false,
         };
         if used {
             self.place = 0;
-            let _ = self.ends.feeds.dequeue();
+            let _ = self.ends.stream_items.dequeue();
         }
     }
 
     #[cold]
     #[inline(never)]
-    fn take_order(&mut self, order: CaptureOrder<'a>) {
-        match order {
-            CaptureOrder::Record(capture) => self.capture = Some(capture),
-            CaptureOrder::GiveBack => {
+    fn take_capture_command(&mut self, command: CaptureCommand<'a>) {
+        match command {
+            CaptureCommand::Record(capture) => self.capture = Some(capture),
+            CaptureCommand::GiveBack => {
                 if let Some(capture) = &mut self.capture {
                     capture.stop();
                 }

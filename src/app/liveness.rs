@@ -1,7 +1,7 @@
-//! Whether everything that must make progress does: what the watchdog is fed by.
+//! Liveness of control, supervision and server: the condition for feeding the watchdog.
 
-/// How long the server may be silent, in runs of the supervising task (ms): it builds settings, and erases flash.
-const SERVER_PATIENCE: u32 = 10_000;
+/// Longest time without a poll of the server, in runs of the supervising task (ms): it builds settings, and erases flash.
+const SERVER_TIMEOUT_RUNS: u32 = 10_000;
 
 /// Watches control, supervision and the server. Supervision is watched by running this.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -12,7 +12,7 @@ pub struct Liveness {
 }
 
 impl Liveness {
-    /// Takes the control tick and how often the server has been polled; says whether to feed the watchdog. Once a run of
+    /// Takes the control tick and how often the server has been polled; returns true if the watchdog is to be fed. Once a run of
     /// the supervising task.
     pub fn check(&mut self, tick: u32, polls: u32) -> bool {
         let control = tick != self.tick;
@@ -22,12 +22,12 @@ impl Liveness {
             0
         };
         (self.tick, self.polls) = (tick, polls);
-        control && self.silent < SERVER_PATIENCE
+        control && self.silent < SERVER_TIMEOUT_RUNS
     }
 
-    /// How long the server has been silent, ms, if that has just become half of what ends in a reset.
+    /// Returns the server's silence, ms, when it reaches half the timeout.
     pub const fn warning_ms(&self) -> Option<u32> {
-        if self.silent == SERVER_PATIENCE / 2 {
+        if self.silent == SERVER_TIMEOUT_RUNS / 2 {
             Some(self.silent)
         } else {
             None
@@ -53,17 +53,17 @@ mod tests {
     }
 
     #[test]
-    fn a_server_that_stands_starves_it_after_its_patience() {
+    fn a_server_that_stands_starves_it_after_its_timeout() {
         let mut liveness = Liveness::default();
         assert!(liveness.check(10, 1));
         let fed = (1..20_000)
             .take_while(|run| liveness.check(10 + 10 * run, 1))
             .count();
-        assert_eq!(fed as u32, SERVER_PATIENCE - 1);
+        assert_eq!(fed as u32, SERVER_TIMEOUT_RUNS - 1);
     }
 
     #[test]
-    fn half_of_the_patience_is_worth_one_warning() {
+    fn half_of_the_timeout_is_worth_one_warning() {
         let mut liveness = Liveness::default();
         let warned = (0..20_000)
             .filter(|run| {

@@ -1,4 +1,4 @@
-//! The application without its registers: what the firmware's tasks do, and what passes between them.
+//! The application without registers: the work of the firmware's tasks, and the queues between them.
 //!
 //! ```text
 //!   control interrupt             supervising task            lowest task
@@ -7,19 +7,22 @@
 //!        |                             |  events ----------------->|
 //!        |<-------- commands ----------|                           |
 //!        |<-------- commands, axes, motions, segments, selections, captures ---|
-//!        |  samples, full captures, spare axes ----------------------------->|
+//!        |  samples, full captures, back buffers --------------------------->|
+//!        |<-------- glitch readings ---|
 //! ```
 //!
 //! Nothing is shared and nothing is locked: what passes from one half to the other is owned by one of them at a time,
 //! and goes through bounded queues ([`Queues`]) that neither side waits for. Settings are built by the slow half into the one
-//! spare [`Axis`](crate::law::axis::Axis), and exchanged whole, by reference.
+//! [`Axis`](crate::law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
 //!
 //! The firmware puts each piece into an RTIC task; a host runs them one after the other in one thread
 //! (`quadrant_sim::console`), in the order in which the target would.
 
+pub mod capture;
+mod change_detector;
 mod control;
-mod journal;
-pub mod last_words;
+pub mod crash_record;
+pub mod glitch_monitor;
 mod liveness;
 mod queues;
 pub mod rate_limiter;
@@ -27,15 +30,17 @@ mod server;
 mod snapshot;
 mod supervision;
 pub mod supervisor;
+pub mod telemetry;
+mod wire;
 
+pub use change_detector::{ChangeDetector, MAX_STATE_CHANGES, StateChange};
 pub use control::Control;
 
 pub use crate::law::stage::Inputs;
-pub use journal::{Journal, MOST_NEWS, News};
 pub use liveness::Liveness;
 pub use queues::{ControlEnds, Queues, ServerEnds};
-pub use server::{After, Server, ServerParts, Vitals};
-pub use snapshot::{AxisSnapshot, Meters, Snapshot};
+pub use server::{Poll, Server, ServerParts, ServerStatistics};
+pub use snapshot::{AxisSnapshot, Snapshot, TimingStatistics};
 pub use supervision::{Supervised, Supervision};
 
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;

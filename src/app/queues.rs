@@ -1,30 +1,30 @@
-//! What passes between the control interrupt and the server.
+//! The queues between the control interrupt and the server.
 
 use heapless_queues::spsc::{Consumer, Producer, Queue};
 
 use super::Axis;
+use crate::app::capture::Capture;
+use crate::app::telemetry::{Sample, Sampler};
 use crate::law::axes::AxisName;
-use crate::law::capture::Capture;
 use crate::law::command::Command;
 use crate::law::injection::{Injection, VoltageBlock};
 use crate::law::reference::{Motion, Segment};
 use crate::law::safety::StreamLoss;
 use crate::law::scalar::Scalar;
-use crate::law::telemetry::{Sample, Sampler};
 
-/// An axis on its way into the control law, and what belongs to the stage beside it.
+/// An axis with new settings on its way into the control law, with the stage's settings beside it.
 #[derive(Debug)]
-pub(super) struct Exchange<'a, S: Scalar> {
+pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) name: AxisName,
     pub(super) axis: &'a mut Axis<S>,
     pub(super) streaming: StreamLoss,
 }
 
-/// What waits for the control law, tick for tick: of a stream or of an injection, never of both.
+/// An item that waits for the control law: of a stream or of an injection, never of both.
 #[derive(Clone, Debug)]
 // They share the room of one queue.
 #[allow(clippy::large_enum_variant)]
-pub(super) enum Feed<S: Scalar> {
+pub(super) enum StreamItem<S: Scalar> {
     /// The next segments of a stream.
     Segments([Segment; 3]),
     /// Another injection.
@@ -33,12 +33,12 @@ pub(super) enum Feed<S: Scalar> {
     Voltages(VoltageBlock),
 }
 
-/// What the server asks of the capture.
+/// A command of the server about the capture.
 #[derive(Debug)]
-pub(super) enum CaptureOrder<'a> {
-    /// Record until frozen, then give it back.
+pub(super) enum CaptureCommand<'a> {
+    /// Records until frozen, then gives the capture back.
     Record(Capture<'a>),
-    /// Give it back now.
+    /// Gives the capture back now.
     GiveBack,
 }
 
@@ -46,23 +46,23 @@ pub(super) enum CaptureOrder<'a> {
 const ONE: usize = 2;
 const COMMANDS: usize = 8;
 const MOTIONS: usize = 4;
-const FEEDS: usize = 16;
+const STREAM_ITEMS: usize = 16;
 /// Samples of each tick of 3 ms at 10 kHz.
 const SAMPLES: usize = 32;
 
 /// Segments of a stream, or blocks of an injection, that may wait for the control law.
-pub(super) const FEED_ROOM: usize = FEEDS - 1;
+pub(super) const STREAM_ITEM_ROOM: usize = STREAM_ITEMS - 1;
 
 /// The queues, each with room for one less than its size.
 pub struct Queues<'a, S: Scalar> {
     commands: Queue<Command, COMMANDS>,
-    exchanges: Queue<Exchange<'a, S>, ONE>,
-    spares: Queue<&'a mut Axis<S>, ONE>,
+    swaps: Queue<AxisSwap<'a, S>, ONE>,
+    back_buffers: Queue<&'a mut Axis<S>, ONE>,
     motions: Queue<(AxisName, Motion<S>), MOTIONS>,
-    feeds: Queue<Feed<S>, FEEDS>,
+    stream_items: Queue<StreamItem<S>, STREAM_ITEMS>,
     samplers: Queue<Sampler, ONE>,
     samples: Queue<Sample, SAMPLES>,
-    orders: Queue<CaptureOrder<'a>, ONE>,
+    capture_commands: Queue<CaptureCommand<'a>, ONE>,
     captures: Queue<Capture<'a>, ONE>,
 }
 
@@ -73,52 +73,52 @@ impl<S: Scalar> Default for Queues<'_, S> {
 }
 
 impl<'a, S: Scalar> Queues<'a, S> {
-    /// Empty queues.
+    /// Returns empty queues.
     pub const fn new() -> Self {
         Self {
             commands: Queue::new(),
-            exchanges: Queue::new(),
-            spares: Queue::new(),
+            swaps: Queue::new(),
+            back_buffers: Queue::new(),
             motions: Queue::new(),
-            feeds: Queue::new(),
+            stream_items: Queue::new(),
             samplers: Queue::new(),
             samples: Queue::new(),
-            orders: Queue::new(),
+            capture_commands: Queue::new(),
             captures: Queue::new(),
         }
     }
 
-    /// The two sides.
+    /// Splits the queues into their two sides.
     pub fn split<'q>(&'q mut self) -> (ControlEnds<'q, 'a, S>, ServerEnds<'q, 'a, S>) {
         let (commands_in, commands) = self.commands.split();
-        let (exchanges_in, exchanges) = self.exchanges.split();
-        let (spares_in, spares) = self.spares.split();
+        let (swaps_in, swaps) = self.swaps.split();
+        let (back_buffers_in, back_buffers) = self.back_buffers.split();
         let (motions_in, motions) = self.motions.split();
-        let (feeds_in, feeds) = self.feeds.split();
+        let (stream_items_in, stream_items) = self.stream_items.split();
         let (samplers_in, samplers) = self.samplers.split();
         let (samples_in, samples) = self.samples.split();
-        let (orders_in, orders) = self.orders.split();
+        let (capture_commands_in, capture_commands) = self.capture_commands.split();
         let (captures_in, captures) = self.captures.split();
         let control = ControlEnds {
             commands,
-            exchanges,
-            spares: spares_in,
+            swaps,
+            back_buffers: back_buffers_in,
             motions,
-            feeds,
+            stream_items,
             samplers,
             samples: samples_in,
-            orders,
+            capture_commands,
             captures: captures_in,
         };
         let server = ServerEnds {
             commands: commands_in,
-            exchanges: exchanges_in,
-            spares,
+            swaps: swaps_in,
+            back_buffers,
             motions: motions_in,
-            feeds: feeds_in,
+            stream_items: stream_items_in,
             samplers: samplers_in,
             samples,
-            orders: orders_in,
+            capture_commands: capture_commands_in,
             captures,
         };
         (control, server)
@@ -128,25 +128,25 @@ impl<'a, S: Scalar> Queues<'a, S> {
 /// The control interrupt's side.
 pub struct ControlEnds<'q, 'a, S: Scalar> {
     pub(super) commands: Consumer<'q, Command, COMMANDS>,
-    pub(super) exchanges: Consumer<'q, Exchange<'a, S>, ONE>,
-    pub(super) spares: Producer<'q, &'a mut Axis<S>, ONE>,
+    pub(super) swaps: Consumer<'q, AxisSwap<'a, S>, ONE>,
+    pub(super) back_buffers: Producer<'q, &'a mut Axis<S>, ONE>,
     pub(super) motions: Consumer<'q, (AxisName, Motion<S>), MOTIONS>,
-    pub(super) feeds: Consumer<'q, Feed<S>, FEEDS>,
+    pub(super) stream_items: Consumer<'q, StreamItem<S>, STREAM_ITEMS>,
     pub(super) samplers: Consumer<'q, Sampler, ONE>,
     pub(super) samples: Producer<'q, Sample, SAMPLES>,
-    pub(super) orders: Consumer<'q, CaptureOrder<'a>, ONE>,
+    pub(super) capture_commands: Consumer<'q, CaptureCommand<'a>, ONE>,
     pub(super) captures: Producer<'q, Capture<'a>, ONE>,
 }
 
 /// The server's side.
 pub struct ServerEnds<'q, 'a, S: Scalar> {
     pub(super) commands: Producer<'q, Command, COMMANDS>,
-    pub(super) exchanges: Producer<'q, Exchange<'a, S>, ONE>,
-    pub(super) spares: Consumer<'q, &'a mut Axis<S>, ONE>,
+    pub(super) swaps: Producer<'q, AxisSwap<'a, S>, ONE>,
+    pub(super) back_buffers: Consumer<'q, &'a mut Axis<S>, ONE>,
     pub(super) motions: Producer<'q, (AxisName, Motion<S>), MOTIONS>,
-    pub(super) feeds: Producer<'q, Feed<S>, FEEDS>,
+    pub(super) stream_items: Producer<'q, StreamItem<S>, STREAM_ITEMS>,
     pub(super) samplers: Producer<'q, Sampler, ONE>,
     pub(super) samples: Consumer<'q, Sample, SAMPLES>,
-    pub(super) orders: Producer<'q, CaptureOrder<'a>, ONE>,
+    pub(super) capture_commands: Producer<'q, CaptureCommand<'a>, ONE>,
     pub(super) captures: Consumer<'q, Capture<'a>, ONE>,
 }

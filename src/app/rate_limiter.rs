@@ -1,13 +1,13 @@
-//! Keeps a log readable: so many lines of a kind in a while, then how many more there were.
+//! The rate limiter of the log: a number of lines of a kind in a window, then a count of the rest.
 
-/// What is kept of a kind of lines.
+/// The state of one kind of lines.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 struct Kind {
-    /// The tick at which the present while began.
+    /// The tick at which the present window began.
     begun: u32,
-    /// Lines let through since.
+    /// Lines let through in this window.
     printed: u16,
-    /// Lines left out that nobody has been told of.
+    /// Lines left out and not reported yet.
     left_out: u32,
 }
 
@@ -23,7 +23,7 @@ pub struct RateLimiter<const KINDS: usize> {
 }
 
 impl<const KINDS: usize> RateLimiter<KINDS> {
-    /// Nothing was printed yet.
+    /// Returns a limiter before the first line.
     pub const fn new(window_ticks: u32, lines: u16) -> Self {
         let kind = Kind {
             begun: 0,
@@ -37,7 +37,7 @@ impl<const KINDS: usize> RateLimiter<KINDS> {
         }
     }
 
-    /// Whether a line of a kind, below `KINDS`, may be printed at a tick. Lines of other kinds may.
+    /// Returns true if a line of a kind may be printed at a tick. Kinds from `KINDS` on are not limited.
     pub fn admits(&mut self, kind: usize, tick: u32) -> bool {
         let Some(of_kind) = self.kinds.get_mut(kind) else {
             return true;
@@ -55,7 +55,7 @@ impl<const KINDS: usize> RateLimiter<KINDS> {
         admitted
     }
 
-    /// A kind whose while is over and of which lines were left out, and how many; it is not reported twice.
+    /// Returns a kind whose window is over, and the number of its lines left out; each is reported once.
     pub fn overdue(&mut self, tick: u32) -> Option<(usize, u32)> {
         let window = self.window_ticks;
         let over = |kind: &Kind| kind.left_out != 0 && tick.wrapping_sub(kind.begun) >= window;

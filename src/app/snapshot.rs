@@ -1,4 +1,4 @@
-//! What the slow half sees of the fast one, once every [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS).
+//! The slow half's view of the fast one, taken once every [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS).
 
 use crate::law::admission::StageView;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
@@ -14,13 +14,15 @@ use crate::law::units::{EncoderCount, Position};
 pub struct AxisSnapshot<S> {
     /// Measured position.
     pub measured: EncoderCount,
-    /// Where the reference stands, ahead of the feedback's by the preview.
+    /// Reference position of the feedback.
+    pub reference: Position,
+    /// Look-ahead reference position: ahead of the feedback's by the preview.
     pub ahead: Position,
     /// Tracking error, mm.
     pub error: S,
     /// Output, V.
     pub output: S,
-    /// What limits the output.
+    /// The active limit of the output.
     pub limited_by: LimitedBy,
     /// The largest tracking error since enabling, against its limit.
     pub following: FollowingState<S>,
@@ -31,16 +33,16 @@ pub struct AxisSnapshot<S> {
 pub struct Snapshot<S> {
     /// Control ticks so far.
     pub tick: u32,
-    /// What decisions are made on.
+    /// The supervisor's view.
     pub view: StageView,
-    /// The axes.
+    /// The axes in order: x, y, z.
     pub axes: [AxisSnapshot<S>; 3],
-    /// How far the injection under way has come, or the last one came.
+    /// Progress of the injection under way, or of the last one.
     pub injection: InjectionProgress,
 }
 
 impl<S: Scalar> Snapshot<S> {
-    /// What there is to see.
+    /// Takes a snapshot of the stage.
     pub fn of(state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
         Self {
             tick: state.tick(),
@@ -49,6 +51,7 @@ impl<S: Scalar> Snapshot<S> {
                 let telemetry = axis.telemetry();
                 AxisSnapshot {
                     measured: telemetry.measured,
+                    reference: telemetry.reference,
                     ahead: axis.reference(),
                     error: telemetry.error,
                     output: telemetry.output,
@@ -61,9 +64,9 @@ impl<S: Scalar> Snapshot<S> {
     }
 }
 
-/// How the control interrupt keeps its time.
+/// Timing statistics of the control interrupt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Meters {
+pub struct TimingStatistics {
     /// Ticks that ended after their deadline.
     pub overruns: u32,
     /// The longest tick, in cycles of its timer.

@@ -1,25 +1,29 @@
-//! The supervising task: lets requests of the operator at the machine through, and finds what there is to tell.
+//! The supervising task: passes or refuses requests of the operator at the machine, and finds events to report.
 
 use super::Snapshot;
+use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
 use crate::app::supervisor::{Decision, Event, Supervisor};
 use crate::law::command::Command;
 use crate::law::scalar::Scalar;
 
-/// What one run of the supervising task found.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The result of one run of the supervising task.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Supervised {
-    /// For the control law's next tick.
+    /// The command for the control law's next tick.
     pub command: Option<Command>,
-    /// What happened.
+    /// The events found.
     pub events: [Option<Event>; 4],
-    /// This run is the one in a second that tells how the axes follow.
+    /// Glitches and circles that have ended.
+    pub glitches: heapless::Vec<GlitchEvent, MAX_GLITCH_EVENTS>,
+    /// True once a second: the tracking errors are due in the log.
     pub status_due: bool,
 }
 
-/// The supervising task's memory.
-#[derive(Clone, Copy, Debug, Default)]
+/// The supervising task's state.
+#[derive(Clone, Debug)]
 pub struct Supervision {
     supervisor: Supervisor,
+    glitches: GlitchMonitor,
     runs: u32,
 }
 
@@ -27,7 +31,16 @@ pub struct Supervision {
 const STATUS_RUNS: u32 = 1_000;
 
 impl Supervision {
-    /// Looks at the machine, and at a request of the operator if there is one.
+    /// Returns the task before its first run. `resolution_mm` are the lengths of the encoders' counts.
+    pub fn new(resolution_mm: [f64; 3]) -> Self {
+        Self {
+            supervisor: Supervisor::default(),
+            glitches: GlitchMonitor::new(resolution_mm.map(|length| length as f32)),
+            runs: 0,
+        }
+    }
+
+    /// Judges the machine, and a request of the operator if there is one.
     pub fn run<S: Scalar>(
         &mut self,
         snapshot: &Snapshot<S>,
@@ -38,7 +51,13 @@ impl Supervision {
         Supervised {
             command,
             events,
+            glitches: self.glitches.step(snapshot),
             status_due: self.runs.is_multiple_of(STATUS_RUNS),
         }
+    }
+
+    /// The glitch monitor's latest results, for [`Control::show_glitches`](super::Control::show_glitches).
+    pub const fn glitch_readings(&self) -> GlitchReadings {
+        self.glitches.readings()
     }
 }

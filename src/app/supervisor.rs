@@ -1,4 +1,4 @@
-//! The supervising task's decisions: which requests reach the control law, and what a person is told.
+//! The supervising task's decisions: passing or refusing requests, and events for the log.
 //!
 //! Runs every [`PERIOD_TICKS`] control ticks, below the control interrupt. Pure, so that the firmware and the host's
 //! run of the same job decide alike.
@@ -32,23 +32,23 @@ pub enum Event {
     Refused(Command, Refusal),
 }
 
-/// The supervisor's memory.
+/// The supervisor's state: the view of its last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Supervisor {
     seen: StageView,
 }
 
-/// What one run of the supervisor decides.
+/// The decision of one step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Decision {
-    /// For the control law's next tick.
+    /// The command for the control law's next tick.
     pub command: Option<Command>,
-    /// For the log: a change of state, a change of motion, a refusal.
+    /// Events: a change of state, a held fault, a change of motion, a refusal.
     pub events: [Option<Event>; 4],
 }
 
 impl Supervisor {
-    /// Looks at the stage and at a request, if there is one.
+    /// Compares the stage with its last view, and judges a request if there is one.
     pub fn step(&mut self, view: StageView, request: Option<Command>) -> Decision {
         let seen = core::mem::replace(&mut self.seen, view);
         let state = match view.safety {

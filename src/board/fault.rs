@@ -1,7 +1,7 @@
 //! The last resort: panics, hard faults and interrupts nobody asked for.
 //!
-//! All three do the same, in this order: outputs to zero and amplifiers disabled; last words for the firmware that comes
-//! after; the same for the log; then the end.
+//! All three do the same, in this order: outputs to zero and amplifiers disabled; the crash record for the next start; the
+//! same for the log; then the end.
 
 use core::arch::naked_asm;
 use core::fmt;
@@ -9,25 +9,25 @@ use core::panic::PanicInfo;
 use core::sync::atomic::{AtomicBool, Ordering};
 
 use cortex_m_rt::exception;
-use quadrant::app::last_words::{Death, LastWords};
+use quadrant::app::crash_record::{CrashCause, CrashRecord};
 
-use super::{Outcome, halt, outputs_off, remains, stack};
+use super::{Outcome, crash_record, halt, outputs_off, stack};
 use crate::app::TICK;
 
-/// Makes the machine safe, then says why, then ends.
-fn fail(death: Death, text: fmt::Arguments) -> ! {
+/// Makes the machine safe, records the cause, and ends.
+fn fail(cause: CrashCause, text: fmt::Arguments) -> ! {
     // A second fault comes from the explanation itself: by then the outputs are off, so stay silent.
     static EXPLAINING: AtomicBool = AtomicBool::new(false);
 
     cortex_m::interrupt::disable();
     outputs_off();
     if !EXPLAINING.swap(true, Ordering::Relaxed) {
-        let words = LastWords::new(death, TICK.load(Ordering::Relaxed), text);
-        remains::leave(&words);
+        let record = CrashRecord::new(cause, TICK.load(Ordering::Relaxed), text);
+        crash_record::write(&record);
         defmt::error!(
             "{=str}, outputs are off: {=str}",
-            death.as_str(),
-            words.text()
+            cause.as_str(),
+            record.text()
         );
     }
     halt(Outcome::Failed)
@@ -35,7 +35,7 @@ fn fail(death: Death, text: fmt::Arguments) -> ! {
 
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
-    fail(Death::Panic, format_args!("{info}"))
+    fail(CrashCause::Panic, format_args!("{info}"))
 }
 
 /// The hard fault's vector. It begins with a fresh stack, as the old one may be what failed: whoever was interrupted is
@@ -59,10 +59,10 @@ extern "C" fn hard_fault(frame: usize) -> ! {
     if stack::holds(frame) {
         // SAFETY: inside the stack, and written by the processor a moment ago.
         let counter = unsafe { (frame as *const u32).add(6).read_volatile() };
-        fail(Death::HardFault, format_args!("at {counter:#010x}"))
+        fail(CrashCause::HardFault, format_args!("at {counter:#010x}"))
     } else {
         fail(
-            Death::HardFault,
+            CrashCause::HardFault,
             format_args!("the stack is full: its pointer was {frame:#010x}"),
         )
     }
@@ -71,5 +71,5 @@ extern "C" fn hard_fault(frame: usize) -> ! {
 // SAFETY: `cortex-m-rt` calls this; nothing is assumed of the interrupted code, and it is never returned to.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
-    fail(Death::StrayInterrupt, format_args!("number {number}"))
+    fail(CrashCause::StrayInterrupt, format_args!("number {number}"))
 }

@@ -12,15 +12,15 @@
 //! - `halt`, which never returns;
 //! - `board_memory.x`, the linker's map, with the stack at the bottom of RAM (`stack`).
 //!
-//! `remains` keeps what a panic or a fault has to say until the next start, on any board.
+//! `crash_record` keeps the cause of a panic or a fault until the next start, on any board.
 //!
 //! How to add a board: `docs/porting.md`.
 
 #[cfg(all(feature = "board-mps2", feature = "board-nucleo-f446re"))]
 compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not both");
 
+pub(crate) mod crash_record;
 mod fault;
-pub(crate) mod remains;
 pub(crate) mod stack;
 
 #[cfg(feature = "board-mps2")]

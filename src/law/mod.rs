@@ -22,7 +22,7 @@
 //! | 9 | feeds friction and inertia forward, from the look-ahead reference alone | [`feedforward`], [`friction`] |
 //! | 10 | feeds the error back, within what the output limit leaves | [`control`] |
 //! | 11 | limits the sum and makes the converter's word of it | [`axis`] |
-//! | 12 | leaves every term to be seen: samples for a host, a ring that freezes at a fault | [`telemetry`], [`capture`] |
+//! | 12 | leaves every term to be seen: samples for a host, a ring that freezes at a fault | [`axis::telemetry`] |
 //!
 //! Steps 1, 2 and 6 to 11 are an [`axis::Axis`], which can be ticked alone; the stage runs three of them and stops all
 //! when one fails. A check returns the fault it found ([`safety::FaultCode`]); what follows from it is the stage's to
@@ -42,7 +42,6 @@
 pub mod admission;
 pub mod axes;
 pub mod axis;
-pub mod capture;
 pub mod command;
 pub mod control;
 pub mod decimal;
@@ -58,5 +57,6 @@ pub mod safety;
 pub mod scalar;
 pub mod stage;
 pub mod table;
-pub mod telemetry;
 pub mod units;
+
+pub use axis::telemetry;

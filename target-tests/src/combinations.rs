@@ -4,7 +4,7 @@
 use anyhow::{Result, ensure};
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 
 use crate::reference_model::{self, ReferenceModel};
 use crate::{count, lockstep};

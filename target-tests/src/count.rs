@@ -5,7 +5,7 @@
 use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::link::lockstep::{Job, Mode};
+use quadrant::lockstep::{Job, Mode};
 use quadrant_sim::emulator::Memory;
 use serde::{Deserialize, Serialize};
 

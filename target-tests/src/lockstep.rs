@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
-use quadrant::link::lockstep::{
+use quadrant::lockstep::{
     InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
 use quadrant_sim::emulator::{Clock, Emulator, Lockstep, Memory};

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::lockstep::{InputRecord, Job};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
 use quadrant_sim::emulator::Program;

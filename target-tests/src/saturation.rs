@@ -5,8 +5,8 @@ use anyhow::{Context, Result, anyhow, ensure};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::link::frame::{self, FRAME_BYTES};
+use quadrant::link::message::{AxisSignal, Channel, MAX_CHANNELS};
 use quadrant::link::message::{Body, Request, TelemetryRequest};
-use quadrant::telemetry::{AxisSignal, Channel, MAX_CHANNELS};
 
 use crate::faults::case::{configuration, moving};
 use crate::faults::fixture::Fixture;
@@ -203,7 +203,7 @@ fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
         let signals = [AxisSignal::Error, AxisSignal::Output, AxisSignal::Position];
         let channels = signals
             .into_iter()
-            .flat_map(|signal| AxisName::ALL.map(|axis| Channel::Axis(axis, signal)))
+            .flat_map(|signal| AxisName::ALL.map(|axis| Channel::Axis(axis.into(), signal)))
             .take(MAX_CHANNELS)
             .collect();
         fixture.done(Body::Telemetry(TelemetryRequest::Select {

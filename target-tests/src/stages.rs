@@ -2,7 +2,7 @@
 
 /// The stages, each by the beginning of the path of its functions. Of an instruction's inlined frames, the outermost
 /// one found here decides: friction evaluated for the feedforward is feedforward.
-const STAGES: [(&str, &str); 11] = [
+const STAGES: [(&str, &str); 12] = [
     ("quadrant_firmware::board::", "inputs and outputs"),
     ("quadrant::law::encoder::", "encoders"),
     ("quadrant::law::reference::", "reference"),
@@ -11,6 +11,7 @@ const STAGES: [(&str, &str); 11] = [
     ("quadrant::law::friction::", "friction"),
     ("quadrant::law::safety::", "safety"),
     ("quadrant::law::telemetry::", "telemetry"),
+    ("quadrant::app::telemetry::", "telemetry"),
     ("quadrant::law::units::", "units"),
     ("heapless::", "queues"),
     ("quadrant_firmware::app::__rtic_internal_", "spawning"),

@@ -1,10 +1,14 @@
 //! The triggered capture against a list of what it should have kept.
 
 use proptest::prelude::*;
-use quadrant::capture::{Capture, CaptureCause, CaptureError, CapturePhase, Edge, Level, Trigger};
+use quadrant::app::capture::{Capture, CaptureError};
+use quadrant::app::glitch_monitor::GlitchReadings;
+use quadrant::app::telemetry::{Observation, Selection};
 use quadrant::command::Command;
+use quadrant::link::message::{
+    CaptureCause, CapturePhase, Channel, Edge, Level, MAX_CHANNELS, Trigger,
+};
 use quadrant::settings::StageSettings;
-use quadrant::telemetry::{Channel, MAX_CHANNELS, Observation, Selection};
 
 use crate::common::{Rig, repeatable, sine_on_x};
 
@@ -36,6 +40,7 @@ impl<'a> Watched<'a> {
         self.rig.tick();
         self.capture.step(&Observation {
             stage: &self.rig.state,
+            glitches: &GlitchReadings::default(),
             elapsed_cycles: 0,
             commanded,
         })

@@ -2,16 +2,16 @@
 
 use heapless::Vec as Bounded;
 use quadrant::app::supervisor;
-use quadrant::axes::AxisName;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{
     self, DecodeError, EncodeError, FRAME_BYTES, FrameCounters, PAYLOAD_BYTES, Receiver,
 };
+use quadrant::link::message::AxisName;
 use quadrant::link::message::{
     AxisPoint, AxisSet, Body, Event, LinkError, Reply, Request, Response, SetPoint, StreamRequest,
     text,
 };
-use quadrant::link::port::Port;
+use quadrant::link::server::LinkServer;
 use quadrant::safety::FaultCode;
 
 use crate::link_traffic::framed;
@@ -83,7 +83,7 @@ fn the_receiver_tells_good_damaged_and_overlong_frames_apart() {
     assert_eq!(receiver.counters(), expected);
 }
 
-fn push_all(port: &mut Port, bytes: &[u8]) -> Vec<Response> {
+fn push_all(port: &mut LinkServer, bytes: &[u8]) -> Vec<Response> {
     let answers = bytes
         .iter()
         .filter_map(|&byte| port.push(byte, |_| Ok(Reply::Done)));
@@ -92,7 +92,7 @@ fn push_all(port: &mut Port, bytes: &[u8]) -> Vec<Response> {
 
 #[test]
 fn nothing_but_stopping_is_let_through_before_hello() {
-    let mut port = Port::new();
+    let mut port = LinkServer::new();
     let mut ask = |body: Body| {
         let answer = push_all(&mut port, &framed(&Request { id: 3, body }));
         assert_eq!((answer.len(), answer[0].id), (1, 3));
@@ -126,7 +126,7 @@ fn of_version(version: u8, id: u8, body: &[u8]) -> Vec<u8> {
 
 #[test]
 fn a_request_of_another_version_is_answered_with_both_versions() {
-    let mut port = Port::new();
+    let mut port = LinkServer::new();
     let answers = push_all(&mut port, &of_version(9, 5, &[200, 1, 2]));
     let error = LinkError::Version {
         yours: 9,
@@ -149,7 +149,7 @@ fn a_request_of_another_version_is_answered_with_both_versions() {
 
 #[test]
 fn a_request_that_this_version_does_not_have_is_answered_as_undecodable() {
-    let mut port = Port::new();
+    let mut port = LinkServer::new();
     let hello_and_more = of_version(PROTOCOL_VERSION, 4, &[0, 1]);
     let unknown = of_version(PROTOCOL_VERSION, 6, &[77]);
     let unknown_axes = of_version(PROTOCOL_VERSION, 7, &[7, 8]);
@@ -223,7 +223,7 @@ fn a_text_that_is_too_long_is_cut_between_characters() {
 fn the_supervisors_events_have_their_notice() {
     let fault = quadrant::safety::Fault {
         code: FaultCode::EncoderJump,
-        axis: Some(AxisName::Y),
+        axis: Some(AxisName::Y.into()),
         tick: 5,
     };
     let expected = Event::Fault {

@@ -3,7 +3,7 @@
 
 use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};
 use quadrant::link::message::{Body, LinkError, Reply, Request};
-use quadrant::link::port::Port;
+use quadrant::link::server::LinkServer;
 
 use crate::link_model::{drive, there_and_back};
 
@@ -19,7 +19,7 @@ pub(crate) fn forged(payload: &[u8]) -> Vec<u8> {
 
 /// The stream as it is; behind it and a zero, a request that must be heard.
 pub(crate) fn stream(data: &[u8], mut serve: impl FnMut(Body) -> Result<Reply, LinkError>) {
-    let mut port = Port::new();
+    let mut port = LinkServer::new();
     drive(&mut port, data, &mut serve);
     drive(&mut port, &[frame::DELIMITER], &mut serve);
     let mut buffer = [0; FRAME_BYTES];
@@ -35,7 +35,7 @@ pub(crate) fn stream(data: &[u8], mut serve: impl FnMut(Body) -> Result<Reply, L
 /// The stream cut into payloads, each behind its length in two bytes, and framed with a right CRC. Each is answered at
 /// most once, and what decodes as a request decodes so again after it was sent.
 pub(crate) fn payloads(mut data: &[u8], mut serve: impl FnMut(Body) -> Result<Reply, LinkError>) {
-    let mut port = Port::new();
+    let mut port = LinkServer::new();
     while let Some((&[low, high], rest)) = data.split_first_chunk() {
         let length = usize::from(u16::from_le_bytes([low, high]));
         let length = length.min(rest.len()).min(PAYLOAD_BYTES);

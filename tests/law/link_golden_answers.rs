@@ -1,11 +1,11 @@
 //! The wire format of what a server sends, byte for byte.
 
 use heapless::Vec as Bounded;
-use quadrant::axes::AxisName::{Y, Z};
-use quadrant::capture::{CaptureCause, CapturePhase, CaptureRecord};
 use quadrant::link::frame::FrameCounters;
+use quadrant::link::message::AxisName::{Y, Z};
 use quadrant::link::message::*;
-use quadrant::telemetry::{LimitedBy, MachineState, TelemetryBlock, Words};
+use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
+use quadrant::link::message::{LimitedBy, MachineState, TelemetryBlock, Words};
 
 use crate::link_golden::{channels, flag, hex, short};
 

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES, Receiver};
 use quadrant::link::message::{Body, Reply, Request, Response};
-use quadrant::link::port::Port;
+use quadrant::link::server::LinkServer;
 
 use crate::common::{Noise, repeatable};
 use crate::link_fuzz::{forged, payloads, stream};
@@ -12,8 +12,8 @@ use crate::link_model::{Model, drive, there_and_back};
 use crate::link_traffic::{arrival, framed};
 
 /// A port whose client has said hello.
-fn greeted(model: &mut Model) -> Port {
-    let mut port = Port::new();
+fn greeted(model: &mut Model) -> LinkServer {
+    let mut port = LinkServer::new();
     let hello = framed(&Request {
         id: 0,
         body: Body::Hello,
@@ -128,7 +128,7 @@ proptest! {
     #[test]
     fn random_bytes_do_no_harm(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
         let mut model = Model::default();
-        drive(&mut Port::new(), &bytes, |body| model.serve(body));
+        drive(&mut LinkServer::new(), &bytes, |body| model.serve(body));
         prop_assert_eq!(model.motions, 0);
         prop_assert!(!model.enabled);
     }
@@ -138,7 +138,7 @@ proptest! {
         payload in prop::collection::vec(any::<u8>(), 0..=PAYLOAD_BYTES),
     ) {
         let mut model = Model::default();
-        let mut port = Port::new();
+        let mut port = LinkServer::new();
         let answers = drive(&mut port, &forged(&payload), |body| model.serve(body));
         prop_assert!(answers.len() <= 1);
         prop_assert_eq!(model.motions, 0);

@@ -2,15 +2,15 @@
 //!
 //! Shared with the targets of `fuzz/`.
 
-use quadrant::capture::CapturePhase;
+use quadrant::app::telemetry::Selection;
 use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
+use quadrant::link::message::CapturePhase;
 use quadrant::link::message::{
     Applied, AxisSet, Body, CaptureRequest, CaptureStatus, LinkError, Message, PathPage,
     Provenance, Reply, Response, SettingsRequest, StreamRequest, StreamStatus, TelemetryRequest,
     Value, WordPage, text,
 };
-use quadrant::link::port::Port;
-use quadrant::telemetry::Selection;
+use quadrant::link::server::LinkServer;
 
 /// The machine behind the model server.
 #[derive(Default)]
@@ -139,7 +139,7 @@ fn invalid(why: impl std::fmt::Display) -> LinkError {
 
 /// Feeds bytes to a port before any server, and checks that each answer survives the way back. Gives the answers.
 pub(crate) fn drive(
-    port: &mut Port,
+    port: &mut LinkServer,
     bytes: &[u8],
     mut serve: impl FnMut(Body) -> Result<Reply, LinkError>,
 ) -> Vec<Response> {

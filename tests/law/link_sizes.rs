@@ -1,21 +1,21 @@
 //! The room that the largest messages need.
 
 use heapless::{String, Vec as Bounded};
-use quadrant::axes::AxisName;
-use quadrant::capture::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{self, FRAME_BYTES, FrameCounters};
+use quadrant::link::message::AxisName;
 use quadrant::link::message::{
     AxisMode, AxisPoint, AxisSet, AxisStatus, Body, CaptureRequest, CaptureStatus, Event,
     FaultReport, INJECT_VALUES, Identity, InjectRequest, LinkError, Message, Notice, NumberType,
     PathPage, Reply, Request, Response, SetPoint, SettingsRequest, Status, StreamRequest,
     TelemetryRequest, Value, Voltages, WordPage,
 };
-use quadrant::link::port::Port;
+use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
+use quadrant::link::message::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
+use quadrant::link::server::LinkServer;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::FaultCode;
 use quadrant::settings::PlanSettings;
-use quadrant::telemetry::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
 
 use crate::link_model::there_and_back;
 
@@ -62,9 +62,12 @@ fn largest_requests() -> Vec<Body> {
     let mut points = Bounded::new();
     while points.push(SetPoint { axes: [point; 3] }).is_ok() {}
     vec![
-        Body::SetPlan(PlanSettings {
-            motions: [harmonic; 3],
-        }),
+        Body::SetPlan(
+            PlanSettings {
+                motions: [harmonic; 3],
+            }
+            .into(),
+        ),
         Body::Stream(StreamRequest::Points {
             sequence: u32::MAX,
             points,
@@ -221,7 +224,11 @@ fn the_largest_messages_fit_a_frame_and_survive_the_way() {
 fn what_a_message_holds_in_memory_is_bounded() {
     assert!(size_of::<Request>() <= 480, "{}", size_of::<Request>());
     assert!(size_of::<Message>() <= 512, "{}", size_of::<Message>());
-    assert!(size_of::<Port>() <= 560, "{}", size_of::<Port>());
+    assert!(
+        size_of::<LinkServer>() <= 560,
+        "{}",
+        size_of::<LinkServer>()
+    );
 }
 
 #[test]

@@ -1,16 +1,16 @@
 //! Traffic for the link: any request, and what a bad line makes of it.
 
 use heapless::{String, Vec as Bounded};
-use quadrant::axes::AxisName;
-use quadrant::capture::{Edge, Level, Trigger};
 use quadrant::link::frame::{self, FRAME_BYTES};
+use quadrant::link::message::AxisName;
+use quadrant::link::message::Channel;
 use quadrant::link::message::{
     AxisPoint, AxisSet, Body, CaptureRequest, InjectRequest, Request, SetPoint, SettingsRequest,
     StreamRequest, TelemetryRequest, Value, Voltages,
 };
+use quadrant::link::message::{Edge, Level, Trigger};
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::settings::PlanSettings;
-use quadrant::telemetry::Channel;
 
 use crate::common::Noise;
 
@@ -187,9 +187,12 @@ impl Noise {
                 velocity_mm_s: self.real(),
             },
             10 => Body::Run,
-            11 => Body::SetPlan(PlanSettings {
-                motions: std::array::from_fn(|_| self.motion()),
-            }),
+            11 => Body::SetPlan(
+                PlanSettings {
+                    motions: std::array::from_fn(|_| self.motion()),
+                }
+                .into(),
+            ),
             12 => Body::Stream(self.stream()),
             13 => Body::Settings(self.settings()),
             14 => Body::Telemetry(match self.below(2) {

@@ -4,8 +4,8 @@ use proptest::prelude::*;
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
-use quadrant::link::lockstep::{
-    BootBlock, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Provocation, Reset, held,
+use quadrant::lockstep::{
+    BootBlock, InjectedFault, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Reset, held,
 };
 use quadrant::reference::Velocity;
 use quadrant::safety::{AxisSwitches, Switches};
@@ -107,7 +107,7 @@ fn words_of_resets_and_provocations_round_trip() {
     for reset in [Reset::PowerOn, Reset::Watchdog, Reset::Software] {
         assert_eq!(Reset::from_word(reset as u32), reset);
     }
-    let known: Vec<_> = (0..100).filter_map(Provocation::from_word).collect();
+    let known: Vec<_> = (0..100).filter_map(InjectedFault::from_repr).collect();
     assert_eq!(known.len(), 6);
     for (word, provocation) in (1..).zip(known) {
         assert_eq!(provocation as u32, word);

@@ -1,14 +1,17 @@
 //! Telemetry: every channel shows what the tick computed, and no drop goes uncounted.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
+use quadrant::app::glitch_monitor::{CircleReading, GlitchReadings};
+use quadrant::app::telemetry::{
+    Observation, Packer, Sample, Sampler, SamplerState, Selection, SelectionError, read,
+};
 use quadrant::command::Command;
+use quadrant::link::message::{
+    AxisName, AxisSignal, Channel, MAX_CHANNELS, MachineState, StageSignal, TelemetryBlock,
+    UnknownChannel, WordKind,
+};
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::StageSettings;
-use quadrant::telemetry::{
-    AxisSignal, Channel, MAX_CHANNELS, MachineState, Observation, Packer, Sample, Sampler,
-    SamplerState, Selection, SelectionError, StageSignal, TelemetryBlock, UnknownChannel, WordKind,
-};
 
 use crate::common::{Rig, repeatable, sine_on_x};
 
@@ -16,9 +19,18 @@ fn channel(name: &str) -> Channel {
     name.parse().expect("a channel")
 }
 
+const GLITCHES: GlitchReadings = GlitchReadings {
+    heights_um: [1.5, 2.5, 3.5],
+    circle: CircleReading {
+        deviation_um: -5.5,
+        angle_deg: 182.0,
+    },
+};
+
 fn seen<S: Scalar>(rig: &Rig<S>) -> Observation<'_, S, 4> {
     Observation {
         stage: &rig.state,
+        glitches: &GLITCHES,
         elapsed_cycles: 1234,
         commanded: false,
     }
@@ -36,7 +48,7 @@ fn moving<S: Scalar>() -> Rig<S> {
 
 #[test]
 fn names_and_numbers_lead_back_to_their_channel() {
-    assert_eq!(Channel::all().count(), 3 * 17 + 4);
+    assert_eq!(Channel::all().count(), 3 * 18 + 6);
     for known in Channel::all() {
         assert_eq!(known.to_string().parse(), Ok(known));
         assert_eq!(Channel::try_from(u8::from(known)), Ok(known));
@@ -82,16 +94,17 @@ fn every_channel_shows_its_term<S: Scalar>() {
             (AxisSignal::Output, volts(term.output)),
             (AxisSignal::Code, f64::from(term.code.0)),
             (AxisSignal::LimitedBy, f64::from(term.limited_by as u8)),
+            (AxisSignal::Glitch, f64::from(GLITCHES.heights_um[axis])),
         ] {
             let shown = Channel::Axis(name, signal);
-            let value = shown.value(shown.read(&seen(&rig)));
+            let value = shown.value(read(shown, &seen(&rig)));
             assert_eq!(value, expected, "{shown}");
         }
         let reference = Channel::Axis(name, AxisSignal::Reference);
-        let counts = reference.value(reference.read(&seen(&rig))) / 256.0;
+        let counts = reference.value(read(reference, &seen(&rig))) / 256.0;
         assert!((counts - term.reference.0 as f64 / 65536.0).abs() <= 1.0 / 256.0);
     }
-    let x = |name: &str| channel(name).value(channel(name).read(&seen(&rig)));
+    let x = |name: &str| channel(name).value(read(channel(name), &seen(&rig)));
     for name in [
         "x.error",
         "x.velocity",
@@ -121,7 +134,7 @@ fn the_velocity_channel_is_the_references_velocity() {
     let mut rig = moving::<f64>();
     let x = |rig: &Rig<f64>| rig.state.axes()[0].telemetry().reference.0 as f64 / 65536.0 * 5e-4;
     // The feedforward's reference is ahead of the one that is shown, by the preview.
-    let shown = channel("x.velocity").value(channel("x.velocity").read(&seen(&rig)));
+    let shown = channel("x.velocity").value(read(channel("x.velocity"), &seen(&rig)));
     let preview = StageSettings::default().axes[0].feedforward.preview_s * 1e4;
     for _ in 0..preview.round() as u32 {
         rig.tick();
@@ -139,22 +152,25 @@ fn the_velocity_channel_is_the_references_velocity() {
 #[test]
 fn the_stages_channels_show_state_fault_tick_and_time() {
     let mut rig = Rig::<f32>::new(&StageSettings::default(), &sine_on_x(30.0, 10.0));
-    let read = |rig: &Rig<f32>, signal| Channel::Stage(signal).read(&seen(rig));
+    let word = |rig: &Rig<f32>, signal| read(Channel::Stage(signal), &seen(rig));
     rig.tick();
     assert_eq!(
-        read(&rig, StageSignal::State),
+        word(&rig, StageSignal::State),
         MachineState::Disabled as u32
     );
-    assert_eq!(read(&rig, StageSignal::Tick), 0);
+    assert_eq!(word(&rig, StageSignal::Tick), 0);
     rig.command(Command::Enable);
-    assert_eq!(read(&rig, StageSignal::State), MachineState::Enabled as u32);
-    assert_eq!(read(&rig, StageSignal::Fault), 0);
+    assert_eq!(word(&rig, StageSignal::State), MachineState::Enabled as u32);
+    assert_eq!(word(&rig, StageSignal::Fault), 0);
     rig.inputs.set_counts([1 << 30, 0, 0]);
     rig.tick();
-    assert_eq!(read(&rig, StageSignal::State), MachineState::Fault as u32);
-    assert_eq!(read(&rig, StageSignal::Fault), 2);
-    assert_eq!(read(&rig, StageSignal::Tick), 2);
-    assert_eq!(read(&rig, StageSignal::Elapsed), 1234);
+    assert_eq!(word(&rig, StageSignal::State), MachineState::Fault as u32);
+    assert_eq!(word(&rig, StageSignal::Fault), 2);
+    assert_eq!(word(&rig, StageSignal::Tick), 2);
+    assert_eq!(word(&rig, StageSignal::Elapsed), 1234);
+    let value = |name: &str| channel(name).value(read(channel(name), &seen(&rig)));
+    assert_eq!(value("stage.circle-deviation"), -5.5);
+    assert_eq!(value("stage.circle-angle"), 182.0);
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{Plane, Sense, circle};
 use quadrant::scalar::Scalar;
 use quadrant::settings::PlanSettings;

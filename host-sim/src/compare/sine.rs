@@ -1,6 +1,6 @@
 //! One configuration on sines of three velocities, of 30 mm unless another amplitude is asked for.
 
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::scalar::Scalar;
 use quadrant::settings::PlanSettings;

@@ -8,7 +8,7 @@ use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver}
 use quadrant::link::message::{
     Body, FaultReport, Identity, LinkError, Message, Notice, Reply, Request, Status,
 };
-use quadrant::telemetry::{MachineState, TelemetryBlock};
+use quadrant::link::message::{MachineState, TelemetryBlock};
 
 use super::error::ClientError;
 use super::hands::Hands;
@@ -216,7 +216,7 @@ impl Client {
                 what,
                 code: fault.code,
                 name: fault.name.as_str().to_owned(),
-                axis: fault.axis,
+                axis: fault.axis.map(Into::into),
                 tick: fault.tick,
                 cause: fault.cause.as_str().to_owned(),
                 remedy: fault.remedy.as_str().to_owned(),

@@ -2,8 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use quadrant::axes::AxisName;
-use quadrant::telemetry::{AxisSignal, Channel, StageSignal};
+use quadrant::link::message::{AxisName, AxisSignal, Channel, StageSignal};
 
 use super::samples::Samples;
 use crate::record::{TraceError, write_trace};
@@ -17,6 +16,8 @@ pub fn column(channel: Channel) -> String {
         Channel::Axis(_, signal) => axis_column(signal).to_owned(),
         Channel::Stage(signal) => match signal {
             StageSignal::Elapsed => "elapsed_cycles".to_owned(),
+            StageSignal::CircleDeviation => "circle_deviation_um".to_owned(),
+            StageSignal::CircleAngle => "circle_angle_deg".to_owned(),
             other => other.as_str().to_owned(),
         },
     }
@@ -41,6 +42,7 @@ const fn axis_column(signal: AxisSignal) -> &'static str {
         AxisSignal::LimitedBy => "limited_by",
         AxisSignal::Injection => "injection_v",
         AxisSignal::CodeSum => "code_sum",
+        AxisSignal::Glitch => "glitch_um",
     }
 }
 

@@ -4,7 +4,7 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use quadrant::link::lockstep::FLASH_BYTES;
+use quadrant::lockstep::FLASH_BYTES;
 use quadrant::safety::Switches;
 use quadrant::settings::StageSettings;
 

@@ -3,9 +3,9 @@
 use std::time::Duration;
 
 use heapless::Vec as Bounded;
-use quadrant::capture::{CapturePhase, CaptureRecord, Trigger};
 use quadrant::link::message::{Body, CaptureRequest, CaptureStatus, Reply, TelemetryRequest};
-use quadrant::telemetry::{Channel, MAX_CHANNELS, TelemetryBlock, WordKind};
+use quadrant::link::message::{CapturePhase, CaptureRecord, Trigger};
+use quadrant::link::message::{Channel, MAX_CHANNELS, TelemetryBlock, WordKind};
 
 use super::client::Client;
 use super::error::ClientError;

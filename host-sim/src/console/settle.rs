@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
+use quadrant::link::message::MachineState;
 use quadrant::link::message::{AxisMode, AxisSet, Status};
-use quadrant::telemetry::MachineState;
 
 use super::client::Client;
 use super::error::ClientError;

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use quadrant::app::supervisor::PERIOD_TICKS;
-use quadrant::link::lockstep::FLASH_BYTES;
+use quadrant::lockstep::FLASH_BYTES;
 use quadrant::safety::Switches;
 use quadrant::settings::StageSettings;
 

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use quadrant::link::lockstep::{
+use quadrant::lockstep::{
     END_OF_RUN, INPUT, INPUT_SEQUENCE, InputRecord, Mode, OUTPUT, OUTPUT_SEQUENCE, OutputRecord,
 };
 use quadrant::stage::Outputs;

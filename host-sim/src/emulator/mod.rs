@@ -1,5 +1,5 @@
 //! QEMU with the firmware in it, and the memory through which a host plays its stage
-//! ([`quadrant::link::lockstep`] is its map).
+//! ([`quadrant::lockstep`] is its map).
 
 mod error;
 mod lockstep;
@@ -10,7 +10,7 @@ mod program;
 use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
 use std::time::Duration;
 
-use quadrant::link::lockstep::MEMORY_BYTES;
+use quadrant::lockstep::MEMORY_BYTES;
 
 pub use self::error::EmulatorError;
 pub use self::lockstep::Lockstep;

@@ -1,6 +1,6 @@
 //! One run: a machine on a simulated stage, and the traces of its axes.
 
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::Scalar;
 use quadrant::telemetry::AxisTelemetry;

@@ -1,6 +1,6 @@
 //! An axis on a sine, scored over its last whole cycles.
 
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings, StreamingSettings};
 

@@ -3,7 +3,7 @@
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::Switches;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;

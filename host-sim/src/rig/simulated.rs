@@ -2,7 +2,7 @@
 
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::reference::MotionSettings;
 use quadrant::safety::SafetyState;
 use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};

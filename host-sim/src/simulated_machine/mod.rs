@@ -8,13 +8,14 @@ mod flash;
 use std::collections::VecDeque;
 
 use quadrant::app::{
-    After, Axis, Control, Inputs, Meters, Queues, Server, ServerParts, Snapshot, Supervision,
+    Axis, Control, Inputs, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
+    TimingStatistics,
 };
 use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
-use quadrant::link::lockstep::InputRecord;
 use quadrant::link::message::NumberType;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::{FaultCode, Switches};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
@@ -27,7 +28,7 @@ use crate::plant::{SimulatedStage, StageTruth};
 /// What the simulated machine calls itself.
 const BOARD: &str = "simulated";
 /// Words of the capture, as on the reference board.
-const CAPTURE_WORDS: usize = quadrant::capture::CAPTURE_WORDS;
+const CAPTURE_WORDS: usize = quadrant::app::capture::CAPTURE_WORDS;
 /// Bytes that the port carries in a run of the server: what 921 600 baud do in a millisecond.
 pub(crate) const PORT_BYTES: usize = 92;
 /// Ticks for which a power cycle leaves the stage to itself: 1 s at 10 kHz.
@@ -198,7 +199,7 @@ impl SimulatedMachine {
         let (outputs, after) = self.running.tick(&inputs, &mut self.wire);
         self.outputs = outputs;
         self.plant.step(&self.outputs);
-        if after == After::Reboot {
+        if after == Poll::Reboot {
             self.restart();
         }
     }
@@ -252,10 +253,14 @@ impl<S: Scalar> Running<S> {
                 Default::default()
             }
         };
+        let resolution_mm = settings
+            .axes
+            .each_ref()
+            .map(|axis| axis.encoder.resolution_mm);
         let stage = settings.build::<S, FIRMWARE_ELEMENTS>()?;
         let plan = start.plan.build(settings)?;
         let (axes, streaming) = stage.into_axes();
-        let spare: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
+        let back_buffer: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
         let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
         let (control_ends, ends) = queues.split();
@@ -265,10 +270,10 @@ impl<S: Scalar> Running<S> {
         }
         Ok(Self {
             control,
-            supervision: Supervision::default(),
+            supervision: Supervision::new(resolution_mm),
             server: Server::new(ServerParts {
                 ends,
-                spare,
+                back_buffer,
                 settings,
                 draft,
                 provenance,
@@ -286,7 +291,7 @@ impl<S: Scalar> Running<S> {
     }
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
-    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, After) {
+    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
         let outputs = self.control.tick(&Inputs {
             command: self.command.take(),
             link_lost: self.server.link_lost(),
@@ -296,15 +301,19 @@ impl<S: Scalar> Running<S> {
             self.requests.extend(inputs.request);
         }
         let Some(seen) = self.control.observe(0) else {
-            return (outputs, After::GoOn);
+            return (outputs, Poll::Continue);
         };
         self.seen = seen;
         let supervised = self.supervision.run(&seen, self.requests.pop_front());
         self.command = supervised.command;
+        self.control
+            .show_glitches(self.supervision.glitch_readings());
         for event in supervised.events.into_iter().flatten() {
-            self.server.tell_of(seen.tick, event);
+            self.server.push_event(seen.tick, event);
         }
-        let after = self.server.poll(serial, &self.seen, Meters::default());
+        let after = self
+            .server
+            .poll(serial, &self.seen, TimingStatistics::default());
         (outputs, after)
     }
 

@@ -4,12 +4,12 @@
 use std::time::Duration;
 
 use quadrant::axes::AxisName;
+use quadrant::link::message::MachineState;
 use quadrant::link::message::{
     AxisMode, Body, InjectRequest, InjectStatus, Reply, Status, Voltages,
 };
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::safety::FaultCode;
-use quadrant::telemetry::MachineState;
 use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings};
 use quadrant_sim::console::rig::ConnectedRig;
 use quadrant_sim::console::{Client, ClientError, SimulatedLink};
@@ -46,7 +46,7 @@ fn inject(client: &mut Client, request: InjectRequest) -> Result<InjectStatus, C
 
 fn open(open_loop: bool) -> InjectRequest {
     InjectRequest::Open {
-        axis: AxisName::X,
+        axis: AxisName::X.into(),
         open_loop,
         with_plan: false,
         limit_v: 0.5,
@@ -76,7 +76,7 @@ fn fault(client: &mut Client) -> Option<FaultCode> {
 
 fn jog(velocity_mm_s: f64) -> Body {
     Body::Jog {
-        axis: AxisName::X,
+        axis: AxisName::X.into(),
         velocity_mm_s,
     }
 }
@@ -112,7 +112,7 @@ fn a_move_needs_no_host() {
     });
     let motions = [motion, MotionSettings::Hold, MotionSettings::Hold];
     let plan = quadrant::settings::PlanSettings { motions };
-    client.order(Body::SetPlan(plan)).unwrap();
+    client.order(Body::SetPlan(plan.into())).unwrap();
     client.order(Body::Run).unwrap();
     silence(&mut client, Duration::from_secs(3));
     let status = client.status().unwrap();
@@ -180,7 +180,7 @@ fn what_cannot_be_injected_is_refused_in_words() {
 
     let mut client = enabled();
     let both = InjectRequest::Open {
-        axis: AxisName::X,
+        axis: AxisName::X.into(),
         open_loop: true,
         with_plan: true,
         limit_v: 1.0,
@@ -189,7 +189,7 @@ fn what_cannot_be_injected_is_refused_in_words() {
     };
     assert!(refused(&mut client, both).contains("with_plan"));
     let much = InjectRequest::Open {
-        axis: AxisName::X,
+        axis: AxisName::X.into(),
         open_loop: true,
         with_plan: false,
         limit_v: 100.0,
@@ -205,7 +205,7 @@ fn what_cannot_be_injected_is_refused_in_words() {
     let said = refused(&mut client, values(0, &[1, 1700], false));
     assert!(said.contains("1700 is beyond 1638"), "{said}");
     let move_away = Body::Move {
-        axis: AxisName::Y,
+        axis: AxisName::Y.into(),
         target_mm: 1.0,
         velocity_mm_s: 1.0,
     };

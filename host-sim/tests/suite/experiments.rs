@@ -3,7 +3,7 @@
 use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
 use quadrant::command::Command;
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
@@ -65,8 +65,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         // The encoder of x stands still, as if the axis were clamped.
         let mut counts = plant.read_counters();
         counts[0] = 0;
-        let input =
-            quadrant::link::lockstep::InputRecord::of_counts(counts, operator.request(tick));
+        let input = quadrant::lockstep::InputRecord::of_counts(counts, operator.request(tick));
         let outputs = machine.tick(&input);
         plant.step(&outputs);
         if let SafetyState::Faulted(fault) = machine.state().safety() {
@@ -77,7 +76,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         }
     }
     for _ in 0..20 {
-        machine.tick(&quadrant::link::lockstep::InputRecord::of_counts(
+        machine.tick(&quadrant::lockstep::InputRecord::of_counts(
             [0; 3],
             Some(Command::Run),
         ));

@@ -8,13 +8,13 @@
 use std::collections::VecDeque;
 use std::time::Instant;
 
-use quadrant::app::After;
+use quadrant::app::Poll;
 use quadrant::hal::Serial;
 use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};
 use quadrant::link::message::{
     AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
 };
-use quadrant::link::port::Port;
+use quadrant::link::server::LinkServer;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant_sim::experiment::run_configuration::identified_settings;
@@ -85,7 +85,7 @@ struct Bench {
     settings: StageSettings,
     line: Line,
     /// Hears what a port hears.
-    ear: Port,
+    ear: LinkServer,
     asked_to_enable: bool,
     asked_to_move: bool,
     tally: Tally,
@@ -119,7 +119,7 @@ impl Bench {
             plant: SimulatedStage::new(&StageTruth::real(), settings.rate_hz, 1),
             settings,
             line: Line::default(),
-            ear: Port::new(),
+            ear: LinkServer::new(),
             asked_to_enable: false,
             asked_to_move: false,
             tally: Tally::default(),
@@ -162,7 +162,7 @@ impl Bench {
         tally.moving_ticks += u64::from(moves);
         tally.enabled_unasked += u64::from(outputs.enabled && !self.asked_to_enable);
         tally.moved_unasked += u64::from(moves && !self.asked_to_move);
-        if after == After::Reboot {
+        if after == Poll::Reboot {
             self.restart();
         }
     }
@@ -171,7 +171,7 @@ impl Bench {
         self.tally.restarts += 1;
         self.running = start(&self.settings);
         self.line.bytes.clear();
-        self.ear = Port::new();
+        self.ear = LinkServer::new();
         (self.asked_to_enable, self.asked_to_move) = (false, false);
         self.hello();
     }

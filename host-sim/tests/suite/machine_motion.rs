@@ -6,7 +6,7 @@ use quadrant::admission::Refusal;
 use quadrant::app::supervisor::Event;
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
-use quadrant::link::lockstep::Job;
+use quadrant::lockstep::Job;
 use quadrant::motion::MotionMode;
 use quadrant::reference::{
     AxisPoint, Motion, MotionSettings, ReferenceSample, SetPoint, StreamPlanner, Velocity,

@@ -1,14 +1,13 @@
 //! A session with the firmware's application, through its port alone.
 
-use quadrant::axes::AxisName;
 use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
+use quadrant::link::message::{AxisName, Channel, MachineState};
 use quadrant::link::message::{
     AxisSet, Body, CaptureRequest, Event, LinkError, Message, Notice, Reply, Request, Response,
     SettingsRequest, Status, StreamRequest, TelemetryRequest, Value,
 };
 use quadrant::safety::Switches;
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
-use quadrant::telemetry::{Channel, MachineState};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::simulated_machine::SimulatedMachine;

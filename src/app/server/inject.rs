@@ -3,16 +3,16 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, invalid, refused};
-use crate::app::queues::{FEED_ROOM, Feed};
+use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::app::supervisor::PERIOD_TICKS;
 use crate::law::command::Command;
 use crate::law::injection::{BLOCK_VALUES, InjectionProgress, VoltageBlock};
 use crate::law::scalar::Scalar;
-use crate::link::message::{InjectRequest, InjectStatus, LinkError, Reply, Voltages};
 use crate::settings::InjectionSettings;
+use quadrant_link::message::{InjectRequest, InjectStatus, LinkError, Reply, Voltages};
 
 /// Blocks that must wait before the injection begins: the host is that far ahead.
-const START_BLOCKS: usize = FEED_ROOM / 2;
+const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;
 /// Ticks after which a command that was sent shows in the snapshot.
 const ARRIVAL_TICKS: u32 = 3 * PERIOD_TICKS;
 
@@ -42,7 +42,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 travel_mm,
                 max_velocity_mm_s,
             } => self.open_injection(&InjectionSettings {
-                axis,
+                axis: axis.into(),
                 open_loop,
                 with_plan,
                 limit_v,
@@ -64,7 +64,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
-    /// Whether a host has opened an injection that has not ended.
+    /// True if a host has opened an injection that has not ended.
     pub(super) fn is_injecting(&self) -> bool {
         self.injection
             .as_ref()
@@ -80,7 +80,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
 
     fn open_injection(&mut self, request: &InjectionSettings) -> Result<Reply, LinkError> {
         self.check(Command::Run)?;
-        if self.stream.is_some() || self.is_injecting() || self.ends.feeds.len() > 0 {
+        if self.stream.is_some() || self.is_injecting() || self.ends.stream_items.len() > 0 {
             return Err(refused(format_args!(
                 "a stream or an injection is open; close it or wait until it ends"
             )));
@@ -96,7 +96,10 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .injection(request)
             .map_err(|error| invalid(format_args!("{error}")))?;
         // There is room: nothing waits.
-        let _ = self.ends.feeds.enqueue(Feed::Injection(injection));
+        let _ = self
+            .ends
+            .stream_items
+            .enqueue(StreamItem::Injection(injection));
         self.injection = Some(OpenInjection {
             most,
             next: 0,
@@ -144,12 +147,12 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             )));
         }
         let mut left = fresh;
-        while left.len() > 0 && self.ends.feeds.ready() {
+        while left.len() > 0 && self.ends.stream_items.ready() {
             let ends = last && left.len() <= BLOCK_VALUES;
             let block = VoltageBlock::new(&mut left, ends);
             let count = block.len() as u32;
             // There is room: it was looked at before.
-            let _ = self.ends.feeds.enqueue(Feed::Voltages(block));
+            let _ = self.ends.stream_items.enqueue(StreamItem::Voltages(block));
             let injection = self.opened_injection()?;
             injection.next = injection.next.saturating_add(count);
             injection.complete = ends;
@@ -158,7 +161,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     }
 
     fn injection_status(&mut self) -> Result<Reply, LinkError> {
-        let free = FEED_ROOM - self.ends.feeds.len();
+        let free = STREAM_ITEM_ROOM - self.ends.stream_items.len();
         let injection = self.opened_injection()?;
         let progress = injection.progress.filter(|progress| progress.values > 0);
         Ok(Reply::Inject(InjectStatus {
@@ -172,7 +175,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
 
     /// Begins when enough is there, and sees how far it has come.
     pub(super) fn follow_injection(&mut self) {
-        let waiting = self.ends.feeds.len();
+        let waiting = self.ends.stream_items.len();
         let view = &self.seen.view;
         let (enabled, injecting, ready) = (
             view.safety.is_enabled(),

@@ -1,4 +1,4 @@
-//! The slow half: answers a host's requests, and hands what they ask for to the control interrupt.
+//! The slow half: answers a host's requests, and passes commands, motions and settings to the control interrupt.
 //!
 //! [`Server::poll`] runs in the lowest task, about once a millisecond. Every request gets one answer, and the next one is
 //! not read before that answer is on its way: a host that asks too fast waits, and nothing grows. A request that takes
@@ -7,95 +7,94 @@
 mod inject;
 mod motion;
 mod observe;
-mod outbox;
 mod settings;
+mod statistics;
 mod status;
 mod stream;
-mod vitals;
+mod transmit_buffer;
 
 use embedded_storage::nor_flash::NorFlash;
 use heapless::String;
 
 use self::inject::OpenInjection;
 use self::observe::Recorder;
-use self::outbox::Outbox;
 use self::stream::OpenStream;
+use self::transmit_buffer::TransmitBuffer;
 use super::queues::ServerEnds;
-use super::{Axis, Meters, Snapshot};
-use crate::app::supervisor;
+use super::{Axis, Snapshot, TimingStatistics};
+use crate::app::telemetry::Packer;
 use crate::hal::Serial;
 use crate::law::axes::AxisName;
 use crate::law::motion::MotionMode;
 use crate::law::scalar::Scalar;
-use crate::law::telemetry::Packer;
-use crate::link::frame::FrameCounters;
-use crate::link::message::{
-    AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply, text,
-};
-use crate::link::port::Port;
 use crate::settings::StageSettings;
 use crate::settings::draft::Draft;
 use crate::store::{BUFFER_BYTES, Store};
+use quadrant_link::frame::FrameCounters;
+use quadrant_link::message::{
+    AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply, text,
+};
+use quadrant_link::server::LinkServer;
 
-pub use self::vitals::Vitals;
+pub use self::statistics::ServerStatistics;
 
 /// Bytes that are taken from the port at a time.
-const INBOX_BYTES: usize = 64;
+const RECEIVE_BYTES: usize = 64;
 /// Messages that one poll prepares at most.
 const MESSAGES_PER_POLL: usize = 4;
 /// Events that wait for the host.
 const EVENT_ROOM: usize = 8;
 /// Ticks without a good frame after which a host that streams counts as lost: 0.5 s at 10 kHz.
-const LINK_PATIENCE_TICKS: u32 = 5_000;
+const LINK_TIMEOUT_TICKS: u32 = 5_000;
 
-/// What a server is made of.
+/// The parts of a server.
 pub struct ServerParts<'q, 'a, S: Scalar, F> {
     /// Its side of the queues.
     pub ends: ServerEnds<'q, 'a, S>,
-    /// The axis that the control law does not use, where new settings are built.
-    pub spare: &'a mut Axis<S>,
+    /// The axis that the control law does not use, in which new settings are built.
+    pub back_buffer: &'a mut Axis<S>,
     /// The settings in force.
     pub settings: &'a mut StageSettings,
-    /// Room for settings that are being edited; what it holds does not matter.
+    /// Memory for settings that are being edited; its content does not matter.
     pub draft: &'a mut StageSettings,
-    /// Where the settings in force come from.
+    /// The origin of the settings in force.
     pub provenance: Provenance,
     /// The memory for settings.
     pub store: Store<F>,
-    /// Room for a set of settings on its way to the store.
+    /// Buffer for a set of settings on its way to the store.
     pub buffer: &'a mut [u8; BUFFER_BYTES],
-    /// Room for a capture.
+    /// Memory for a capture.
     pub capture: &'a mut [u32],
     /// The board's name.
     pub board: &'static str,
     /// Rate of the timer that measures ticks, Hz.
     pub cycle_hz: u32,
-    /// What the control law computes with.
+    /// The number type of the control law.
     pub number: NumberType,
 }
 
-/// What is to be done after a poll.
+/// The result of a poll.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum After {
-    /// Go on.
-    GoOn,
-    /// Start afresh, as a host has asked; its answer has been sent.
+pub enum Poll {
+    /// Polling goes on.
+    Continue,
+    /// A host has asked for a restart, and its answer has been sent.
     Reboot,
 }
 
-/// The slow half.
+/// The slow half: the server of the link.
 pub struct Server<'q, 'a, S: Scalar, F> {
     ends: ServerEnds<'q, 'a, S>,
-    port: Port,
-    /// What the port had seen before the byte that is being served.
+    link: LinkServer,
+    /// Counts of the link before the byte that is being served.
     frames: FrameCounters,
-    inbox: heapless::Deque<u8, INBOX_BYTES>,
-    outbox: Outbox,
+    received: heapless::Deque<u8, RECEIVE_BYTES>,
+    transmit: TransmitBuffer,
     seen: Snapshot<S>,
-    meters: Meters,
+    timing: TimingStatistics,
     /// Axes whose new settings are not built yet.
     pending: AxisSet,
-    spare: Option<&'a mut Axis<S>>,
+    back_buffer: Option<&'a mut Axis<S>>,
     draft: Draft<'a>,
     provenance: Provenance,
     store: Store<F>,
@@ -118,20 +117,20 @@ pub struct Server<'q, 'a, S: Scalar, F> {
 }
 
 impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
-    /// A server that nobody has spoken to.
+    /// Returns a server without a client.
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(parts: ServerParts<'q, 'a, S, F>) -> Self {
         let mut server = Self {
             ends: parts.ends,
-            port: Port::new(),
+            link: LinkServer::new(),
             frames: FrameCounters::default(),
-            inbox: heapless::Deque::new(),
-            outbox: Outbox::new(),
+            received: heapless::Deque::new(),
+            transmit: TransmitBuffer::new(),
             seen: Snapshot::default(),
-            meters: Meters::default(),
+            timing: TimingStatistics::default(),
             pending: AxisSet::NONE,
-            spare: Some(parts.spare),
+            back_buffer: Some(parts.back_buffer),
             draft: Draft::new(parts.settings, parts.draft),
             provenance: parts.provenance,
             store: parts.store,
@@ -154,7 +153,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         };
         let mut version = String::<32>::new();
         let _ = version.push_str(env!("CARGO_PKG_VERSION"));
-        server.tell(0, Event::Started(text(format_args!("version {version}"))));
+        server.push_event(0, Event::Started(text(format_args!("version {version}"))));
         server
     }
 
@@ -163,94 +162,94 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         self.store.flash()
     }
 
-    /// Tells the host, if there is one, that something happened at a tick.
-    pub fn tell(&mut self, tick: u32, event: Event) {
-        if self.events.push_back((tick, event)).is_err() {
+    /// Queues an event of a tick for the host; counts it as dropped if the queue is full.
+    pub fn push_event(&mut self, tick: u32, event: impl Into<Event>) {
+        if self.events.push_back((tick, event.into())).is_err() {
             self.dropped_events = self.dropped_events.wrapping_add(1);
         }
     }
 
-    /// The same for what the supervising task found.
-    pub fn tell_of(&mut self, tick: u32, event: supervisor::Event) {
-        self.tell(tick, event.into());
-    }
-
-    /// Whether the axes do what a host must be there for (set points, a jog, an injected voltage), and it has fallen silent.
+    /// True if the axes depend on a host (set points, a jog, an injected voltage) that has fallen silent.
     pub fn link_lost(&self) -> bool {
         let needed = self.stream.is_some()
             || self.is_injecting()
             || self.seen.view.modes.contains(&MotionMode::Jog);
-        needed && self.seen.tick.wrapping_sub(self.heard_tick) > LINK_PATIENCE_TICKS
+        needed && self.seen.tick.wrapping_sub(self.heard_tick) > LINK_TIMEOUT_TICKS
     }
 
     /// Takes and sends what the port allows, and goes on with what takes longer. `seen` is the latest snapshot.
-    pub fn poll(&mut self, serial: &mut impl Serial, seen: &Snapshot<S>, meters: Meters) -> After {
-        self.tell_homed(seen);
+    pub fn poll(
+        &mut self,
+        serial: &mut impl Serial,
+        seen: &Snapshot<S>,
+        timing: TimingStatistics,
+    ) -> Poll {
+        self.report_homed(seen);
         self.seen = *seen;
-        self.meters = meters;
+        self.timing = timing;
         self.arm_at_start();
         self.build_pending();
         self.collect_capture();
         self.follow_stream();
         self.follow_injection();
         for _ in 0..MESSAGES_PER_POLL {
-            if !self.outbox.flush(serial) {
-                return After::GoOn;
+            if !self.transmit.flush(serial) {
+                return Poll::Continue;
             }
             if self.reboot {
-                return After::Reboot;
+                return Poll::Reboot;
             }
             if !(self.answer(serial) || self.notify()) {
                 break;
             }
         }
-        self.outbox.flush(serial);
-        After::GoOn
+        self.transmit.flush(serial);
+        Poll::Continue
     }
 
-    /// Tells of the axes that have found their home position since the last poll.
-    fn tell_homed(&mut self, seen: &Snapshot<S>) {
+    /// Reports the axes that were homed since the last poll.
+    fn report_homed(&mut self, seen: &Snapshot<S>) {
         for axis in AxisName::ALL {
             if seen.view.homed[index(axis)] && !self.seen.view.homed[index(axis)] {
-                self.tell(seen.tick, Event::Homed(axis));
+                self.push_event(seen.tick, Event::Homed(axis.into()));
             }
         }
     }
 
-    /// Reads until a request is complete, and prepares its answer; says whether there is one.
+    /// Reads until a request is complete, and prepares its answer; returns true if there is one.
     fn answer(&mut self, serial: &mut impl Serial) -> bool {
         loop {
-            if self.inbox.is_empty() {
-                let mut bytes = [0; INBOX_BYTES];
+            if self.received.is_empty() {
+                let mut bytes = [0; RECEIVE_BYTES];
                 let count = serial.read(&mut bytes);
-                self.inbox.extend(bytes.iter().take(count).copied());
+                self.received.extend(bytes.iter().take(count).copied());
             }
-            while let Some(byte) = self.inbox.pop_front() {
-                // The port is taken out while it hands the request over, so that the server can serve it.
-                let mut port = core::mem::take(&mut self.port);
-                self.frames = port.counters();
-                let response = port.push(byte, |body| self.serve(body));
-                self.port = port;
+            while let Some(byte) = self.received.pop_front() {
+                // The link is taken out while it passes the request on, so that the server can serve it.
+                let mut link = core::mem::take(&mut self.link);
+                self.frames = link.counters();
+                let response = link.push(byte, |body| self.serve(body));
+                self.link = link;
                 if let Some(response) = response {
                     self.heard_tick = self.seen.tick;
-                    self.outbox.fill(&Message::Response(response));
+                    self.transmit.fill(&Message::Response(response));
                     return true;
                 }
             }
-            if self.inbox.is_empty() {
+            if self.received.is_empty() {
                 return false;
             }
         }
     }
 
-    /// Prepares what nobody has asked for; says whether there is something.
+    /// Prepares a notice; returns true if there is one.
     fn notify(&mut self) -> bool {
-        if !self.port.is_greeted() {
+        if !self.link.is_greeted() {
             return false;
         }
         if let Some((tick, event)) = self.events.pop_front() {
             self.event_number = self.event_number.wrapping_add(1);
-            self.outbox.fill(&Message::Notice(Notice::Event {
+            self.transmit.fill(&Message::Notice(Notice::Event {
                 sequence: self.event_number,
                 tick,
                 event,
@@ -259,14 +258,15 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         }
         match self.next_block() {
             Some(block) => {
-                self.outbox.fill(&Message::Notice(Notice::Telemetry(block)));
+                self.transmit
+                    .fill(&Message::Notice(Notice::Telemetry(block)));
                 true
             }
             None => false,
         }
     }
 
-    /// Does what a request asks for.
+    /// Serves a request.
     #[inline(never)]
     fn serve(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
@@ -279,17 +279,17 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             Body::Telemetry(request) => self.serve_telemetry(request),
             Body::Capture(request) => self.serve_capture(request),
             Body::Reboot => self.restart(),
-            Body::SetPlan(plan) => self.set_plan(&plan),
+            Body::SetPlan(plan) => self.set_plan(plan),
             Body::Move {
                 axis,
                 target_mm,
                 velocity_mm_s,
-            } => self.start_move(axis, target_mm, velocity_mm_s),
+            } => self.start_move(axis.into(), target_mm, velocity_mm_s),
             other => self.serve_command(other),
         }
     }
 
-    /// Starts afresh, unless that would let go of moving axes.
+    /// Prepares a restart, unless the outputs are on.
     fn restart(&mut self) -> Result<Reply, LinkError> {
         if self.seen.view.safety.drives() {
             return Err(refused(format_args!(
@@ -301,22 +301,22 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     }
 }
 
-/// A refusal in words.
+/// Returns the error of a request that the machine's state does not allow.
 fn refused(reason: core::fmt::Arguments<'_>) -> LinkError {
     LinkError::Refused(text(reason))
 }
 
-/// A value that is not allowed, in words.
+/// Returns the error of a value that is not allowed.
 fn invalid(reason: core::fmt::Arguments<'_>) -> LinkError {
     LinkError::Invalid(text(reason))
 }
 
-/// Something that has to wait, in words.
+/// Returns the error of a request that may succeed later.
 fn busy(reason: core::fmt::Arguments<'_>) -> LinkError {
     LinkError::Busy(text(reason))
 }
 
-/// The place of an axis in arrays.
+/// The index of an axis in arrays.
 const fn index(axis: AxisName) -> usize {
     axis as usize
 }

@@ -8,8 +8,8 @@ use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::reference::{Motion, MotionSettings};
 use crate::law::scalar::Scalar;
-use crate::link::message::{Body, LinkError, Reply};
 use crate::settings::PlanSettings;
+use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     /// Requests that are commands of the control law.
@@ -29,12 +29,12 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             }
             Body::Run => self.command(Command::Run)?,
             Body::Home(axes) => {
-                for axis in axes.iter() {
+                for axis in axes.iter().map(AxisName::from) {
                     self.check(Command::Home(axis))?;
                     let known = self.draft.in_force().can_home(axis);
                     known.map_err(|error| refused(format_args!("{error}")))?;
                 }
-                for axis in axes.iter() {
+                for axis in axes.iter().map(AxisName::from) {
                     self.command(Command::Home(axis))?;
                 }
             }
@@ -42,6 +42,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 axis,
                 velocity_mm_s,
             } => {
+                let axis = axis.into();
                 let velocity = self
                     .draft
                     .in_force()
@@ -50,15 +51,16 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 self.command(Command::Jog(axis, velocity))?;
             }
             other => {
-                return Err(LinkError::Unsupported(crate::link::message::text(
-                    format_args!("{}", other.name()),
-                )));
+                return Err(LinkError::Unsupported(text(format_args!(
+                    "{}",
+                    other.name()
+                ))));
             }
         }
         Ok(Reply::Done)
     }
 
-    /// Whether the control law would take a command, as far as can be seen from here.
+    /// Checks that the control law would take a command, as far as the last snapshot tells.
     pub(super) fn check(&self, command: Command) -> Result<(), LinkError> {
         match supervisor::refusal(self.seen.view, command) {
             Some(reason) => Err(refused(format_args!("{reason}"))),
@@ -99,14 +101,15 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         Ok(Reply::Done)
     }
 
-    /// Exchanges the plan.
+    /// Replaces the plan.
     #[inline(never)]
-    pub(super) fn set_plan(&mut self, plan: &PlanSettings) -> Result<Reply, LinkError> {
+    pub(super) fn set_plan(&mut self, plan: Plan) -> Result<Reply, LinkError> {
         if self.seen.view.running {
             return Err(refused(format_args!(
                 "a motion is under way; stop it before the plan is exchanged"
             )));
         }
+        let plan = PlanSettings::from(plan);
         plan.validate(self.draft.in_force())
             .map_err(|error| invalid(format_args!("{error}")))?;
         for (axis, motion) in AxisName::ALL.into_iter().zip(&plan.motions) {

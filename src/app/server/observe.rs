@@ -1,18 +1,16 @@
-//! Requests about samples: telemetry while it runs, and the capture.
+//! Requests about samples: telemetry and the capture.
 
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, busy, invalid, refused};
-use crate::app::queues::CaptureOrder;
-use crate::law::axes::AxisName;
-use crate::law::capture::{Capture, CapturePhase, Trigger};
+use crate::app::capture::Capture;
+use crate::app::queues::CaptureCommand;
+use crate::app::telemetry::{Packer, Sampler, Selection};
 use crate::law::safety::SafetyState;
 use crate::law::scalar::Scalar;
-use crate::law::telemetry::{
-    AxisSignal, BLOCK_WORDS, Channel, Packer, Sampler, Selection, StageSignal, TelemetryBlock,
-};
-use crate::link::message::{
-    CaptureRequest, CaptureStatus, Event, LinkError, Reply, TelemetryRequest, WordPage,
+use quadrant_link::message::{
+    AxisName, AxisSignal, BLOCK_WORDS, CapturePhase, CaptureRequest, CaptureStatus, Channel, Event,
+    LinkError, Reply, StageSignal, TelemetryBlock, TelemetryRequest, Trigger, WordPage,
 };
 
 /// Pre-trigger share of the capture that waits for faults, %.
@@ -21,11 +19,11 @@ const FAULT_PRE_TRIGGER_PERCENT: u8 = 75;
 /// The capture's book-keeping on this side.
 #[derive(Debug)]
 pub(super) struct Recorder<'a> {
-    /// The capture, while the control interrupt has it not.
+    /// The capture, unless the control interrupt holds it.
     capture: Option<Capture<'a>>,
-    /// What it was armed with.
+    /// The selection that it was armed with.
     selection: Option<Selection>,
-    /// Captures so far.
+    /// Number of complete captures.
     number: u16,
 }
 
@@ -44,12 +42,12 @@ impl<'a> Recorder<'a> {
             .map_or(CapturePhase::Armed, Capture::phase)
     }
 
-    /// Captures so far.
+    /// Number of complete captures.
     pub(super) const fn number(&self) -> u16 {
         self.number
     }
 
-    /// Whether the frozen capture holds a tick.
+    /// True if the frozen capture holds a tick.
     pub(super) fn holds_trace_of(&self, tick: u32) -> bool {
         let record = self.capture.as_ref().and_then(Capture::record);
         record.is_some_and(|record| {
@@ -94,7 +92,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         Ok(Reply::Telemetry { generation })
     }
 
-    /// The next block that is full, or what there is.
+    /// Returns the next full block, or the samples gathered so far.
     #[inline(never)]
     pub(super) fn next_block(&mut self) -> Option<TelemetryBlock> {
         while let Some(sample) = self.ends.samples.dequeue() {
@@ -121,8 +119,8 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             CaptureRequest::Disarm => {
                 if self.recorder.capture.is_none() {
                     self.ends
-                        .orders
-                        .enqueue(CaptureOrder::GiveBack)
+                        .capture_commands
+                        .enqueue(CaptureCommand::GiveBack)
                         .map_err(|_| busy(format_args!("the capture is being armed; ask again")))?;
                 }
             }
@@ -147,17 +145,21 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             self.recorder.capture = Some(capture);
             return Err(invalid(format_args!("{error}")));
         }
-        match self.ends.orders.enqueue(CaptureOrder::Record(capture)) {
+        match self
+            .ends
+            .capture_commands
+            .enqueue(CaptureCommand::Record(capture))
+        {
             Ok(()) => {
                 self.recorder.selection = Some(selection);
                 Ok(())
             }
-            Err(order) => {
-                if let CaptureOrder::Record(capture) = order {
+            Err(command) => {
+                if let CaptureCommand::Record(capture) = command {
                     self.recorder.capture = Some(capture);
                 }
                 Err(busy(format_args!(
-                    "the last order is not taken yet; ask again"
+                    "the last command is not taken yet; ask again"
                 )))
             }
         }
@@ -198,7 +200,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             self.recorder.capture = Some(capture);
             self.recorder.number = self.recorder.number.wrapping_add(1);
             let number = self.recorder.number;
-            self.tell(self.seen.tick, Event::CaptureFrozen { number });
+            self.push_event(self.seen.tick, Event::CaptureFrozen { number });
         }
     }
 

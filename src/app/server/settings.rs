@@ -3,16 +3,16 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, busy, index, invalid, refused};
-use crate::app::queues::Exchange;
+use crate::app::queues::AxisSwap;
 use crate::law::axes::AxisName;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::scalar::Scalar;
-use crate::link::message::{
+use crate::settings::MAX_VALUE_BYTES;
+use crate::settings::draft::ApplyError;
+use quadrant_link::message::{
     Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,
     Value, text,
 };
-use crate::settings::MAX_VALUE_BYTES;
-use crate::settings::draft::ApplyError;
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     #[inline(never)]
@@ -92,6 +92,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         let changed = AxisName::ALL
             .into_iter()
             .filter(|&axis| changed[index(axis)])
+            .map(Into::into)
             .collect();
         self.pending = changed;
         Ok(Reply::Applied(Applied {
@@ -100,38 +101,43 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }))
     }
 
-    /// Builds the next axis whose settings have changed into the spare one, and hands it over.
+    /// Builds the next axis whose settings have changed into the back buffer, and hands it over.
     pub(super) fn build_pending(&mut self) {
-        if self.spare.is_none() {
-            self.spare = self.ends.spares.dequeue();
+        if self.back_buffer.is_none() {
+            self.back_buffer = self.ends.back_buffers.dequeue();
         }
-        let Some(name) = self.pending.iter().next() else {
+        let Some(pending) = self.pending.iter().next() else {
             return;
         };
-        let Some(axis) = self.spare.take() else {
+        let Some(axis) = self.back_buffer.take() else {
             return;
         };
+        let name = pending.into();
         let settings = self.draft.in_force();
         settings.build_axis_into(name, axis);
-        let exchange = Exchange {
+        let swap = AxisSwap {
             name,
             axis,
             streaming: settings.streaming.build(),
         };
-        match self.ends.exchanges.enqueue(exchange) {
+        match self.ends.swaps.enqueue(swap) {
             Ok(()) => {
-                self.pending = self.pending.iter().filter(|&other| other != name).collect();
+                self.pending = self
+                    .pending
+                    .iter()
+                    .filter(|&other| other != pending)
+                    .collect();
                 if self.pending.is_empty() {
                     self.applied = self.applied.wrapping_add(1);
-                    self.tell(self.seen.tick, Event::SettingsApplied(AxisSet::ALL));
+                    self.push_event(self.seen.tick, Event::SettingsApplied(AxisSet::ALL));
                 }
             }
             // The control law has not taken the last one: the same axis again at the next poll.
-            Err(exchange) => self.spare = Some(exchange.axis),
+            Err(swap) => self.back_buffer = Some(swap.axis),
         }
     }
 
-    /// Stores the draft, which is what is in force unless it was edited since, or needs a restart.
+    /// Stores the draft: the settings in force, unless it was edited since or needs a restart.
     #[inline(never)]
     fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
         if self.seen.view.safety.drives() {
@@ -149,7 +155,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .map_err(|error| LinkError::Storage(text(format_args!("{error}"))))?;
         self.provenance = provenance;
         self.stored = self.stored.wrapping_add(1);
-        self.tell(self.seen.tick, Event::SettingsStored);
+        self.push_event(self.seen.tick, Event::SettingsStored);
         Ok(Reply::Done)
     }
 }

@@ -1,4 +1,4 @@
-//! What the machine is and how it is.
+//! Identity and status of the machine.
 
 use embedded_storage::nor_flash::NorFlash;
 
@@ -7,10 +7,11 @@ use crate::law::axes::AxisName;
 use crate::law::motion::MotionMode;
 use crate::law::safety::SafetyState;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::telemetry::MachineState;
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
-use crate::link::PROTOCOL_VERSION;
-use crate::link::message::{AxisSet, AxisStatus, FaultReport, Identity, Status, text};
+use quadrant_link::PROTOCOL_VERSION;
+use quadrant_link::message::{
+    AxisSet, AxisStatus, FaultReport, Identity, MachineState, Status, text,
+};
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     pub(super) fn identity(&self) -> Identity {
@@ -35,7 +36,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 position_mm: measured.to_mm(settings.encoder.resolution_mm),
                 error_mm: axis.error.to_f32(Quantity::Length),
                 output_v: axis.output.to_f32(Quantity::Voltage),
-                limited_by: axis.limited_by,
+                limited_by: axis.limited_by.into(),
                 high_mark: axis.following.high_mark(),
             }
         });
@@ -46,11 +47,11 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             fault: view.safety.fault().map(|fault| fault.code.number()),
             running: view.running,
             homed: homed
-                .filter_map(|(axis, homed)| homed.then_some(axis))
+                .filter_map(|(axis, homed)| homed.then_some(axis.into()))
                 .collect::<AxisSet>(),
             axes,
-            overruns: self.meters.overruns,
-            longest_tick_cycles: self.meters.longest_tick_cycles,
+            overruns: self.timing.overruns,
+            longest_tick_cycles: self.timing.longest_tick_cycles,
             capture: self.recorder.phase(),
             frames: self.frames,
             dropped_samples: self.packer.dropped(),
@@ -58,7 +59,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
-    /// Homing is a motion for the safety, but for a person a state of the machine.
+    /// The machine's state: as the safety has it, but homing counts as one.
     fn state(&self) -> MachineState {
         let view = &self.seen.view;
         let homing = view.modes.into_iter().any(|mode| mode == MotionMode::Home);
@@ -68,7 +69,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
-    /// The latched fault, or the one that the axes brake for.
+    /// The latched fault, or the one for which the axes brake.
     pub(super) fn fault(&self) -> Option<FaultReport> {
         let fault = match self.seen.view.safety {
             SafetyState::Faulted(fault) | SafetyState::Stopping(fault) => fault,
@@ -76,7 +77,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         };
         Some(FaultReport {
             code: fault.code.number(),
-            axis: fault.axis,
+            axis: fault.axis.map(Into::into),
             tick: fault.tick,
             name: text(format_args!("{}", fault.code.name())),
             cause: text(format_args!("{}", fault.code.cause())),

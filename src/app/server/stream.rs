@@ -3,7 +3,7 @@
 use embedded_storage::nor_flash::NorFlash;
 
 use super::{Server, invalid, refused};
-use crate::app::queues::{FEED_ROOM, Feed};
+use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::law::command::Command;
 use crate::law::reference::{
     AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
@@ -11,10 +11,10 @@ use crate::law::reference::{
 };
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
-use crate::link::message::{self, LinkError, Reply, StreamRequest, StreamStatus};
+use quadrant_link::message::{self, LinkError, Reply, StreamRequest, StreamStatus};
 
 /// Segments that must wait before the axes start: the host is that far ahead.
-const START_SEGMENTS: usize = FEED_ROOM / 2;
+const START_SEGMENTS: usize = STREAM_ITEM_ROOM / 2;
 
 /// A stream that a host has opened.
 #[derive(Debug)]
@@ -100,7 +100,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     ) -> Result<bool, LinkError> {
         let scales: [MotionScale; 3] =
             core::array::from_fn(|axis| self.draft.in_force().motion_scale(axis));
-        let room = self.ends.feeds.ready();
+        let room = self.ends.stream_items.ready();
         let stream = self.opened()?;
         if number < stream.next {
             return Ok(true);
@@ -134,22 +134,25 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         stream.next = number.saturating_add(1);
         stream.complete = last;
         // There is room: it was looked at before.
-        let _ = self.ends.feeds.enqueue(Feed::Segments(segments));
+        let _ = self
+            .ends
+            .stream_items
+            .enqueue(StreamItem::Segments(segments));
         Ok(true)
     }
 
     fn stream_status(&mut self) -> Result<Reply, LinkError> {
-        let waiting = self.ends.feeds.len();
+        let waiting = self.ends.stream_items.len();
         let stream = self.opened()?;
         Ok(Reply::Stream(StreamStatus {
             next_sequence: stream.next,
-            free: (FEED_ROOM - waiting) as u16,
+            free: (STREAM_ITEM_ROOM - waiting) as u16,
         }))
     }
 
     /// Starts the axes when enough is there, and forgets a stream that has ended.
     pub(super) fn follow_stream(&mut self) {
-        let waiting = self.ends.feeds.len();
+        let waiting = self.ends.stream_items.len();
         let view = &self.seen.view;
         let (running, enabled) = (view.running, view.safety.is_enabled());
         let Some(stream) = &self.stream else {

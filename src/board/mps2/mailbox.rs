@@ -2,9 +2,7 @@
 
 use core::sync::atomic::{Ordering, fence};
 
-use quadrant::link::lockstep::{
-    BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS, RESET, Reset,
-};
+use quadrant::lockstep::{BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS, RESET, Reset};
 
 /// Where the machine's PSRAM is, which the host backs by a shared file.
 const BASE: usize = 0x2100_0000;

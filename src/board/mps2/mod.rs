@@ -1,13 +1,13 @@
 //! The emulated machine: Arm MPS2 with the AN386 image (Cortex-M4F) or AN385 (Cortex-M3), as QEMU has them.
 //!
 //! There are no encoders and no amplifiers: counts come from, and codes go to, memory shared with a process on the
-//! host. See `quadrant::link::lockstep` for its map and the ways to run.
+//! host. See `quadrant::lockstep` for its map and the ways to run.
 
 pub(crate) mod device;
+mod fault_injection;
 mod flash;
 mod guard;
 mod mailbox;
-mod provocation;
 mod serial;
 mod timer;
 mod watchdog;
@@ -29,7 +29,7 @@ pub(crate) use self::flash::SettingsFlash;
 pub(crate) use self::serial::Serial;
 pub(crate) use self::watchdog::Watchdog;
 use super::{Finished, Outcome};
-use quadrant::link::lockstep::{
+use quadrant::lockstep::{
     self, END_OF_RUN, InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS,
     RECORDED_TICKS, Reset,
 };
@@ -324,7 +324,7 @@ impl Idle {
                 let sequence = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
                 if sequence != self.sequence && sequence != END_OF_RUN {
                     self.sequence = sequence;
-                    provocation::act_on(sequence);
+                    fault_injection::act_on(sequence);
                     serial::exchange();
                     pend_tick();
                 }
@@ -338,7 +338,7 @@ impl Idle {
                     timer::CONTROL.start(PERIOD.load(Ordering::Relaxed) - 1, true);
                 }
                 let ticks = TICKS.load(Ordering::Relaxed);
-                provocation::act_on(ticks);
+                fault_injection::act_on(ticks);
                 ticks == self.last
             }
             Mode::Unpaced => {

@@ -17,7 +17,6 @@ pub mod tracking;
 
 use indicatif::ProgressBar;
 use quadrant::friction::FrictionSettings;
-use quadrant::friction::FrictionSettings;
 use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
 use quadrant::settings::AxisSettings;

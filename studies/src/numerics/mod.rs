@@ -8,7 +8,7 @@ pub mod command;
 pub mod page;
 
 use indicatif::ProgressBar;
-use quadrant::link::lockstep::InputRecord;
+use quadrant::lockstep::InputRecord;
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_configuration};
 use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::link::lockstep::{InputRecord, Job};
+use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::safety::{Fault, SafetyState};
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};

@@ -2,7 +2,7 @@
 
 use anyhow::{Result, anyhow, ensure};
 use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
-use quadrant::link::lockstep::{Mode, OUTPUT, OutputRecord, Provocation};
+use quadrant::lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
 use quadrant::safety::FaultCode;
 use quadrant::settings::StageSettings;
 use quadrant::stage::Outputs;
@@ -17,34 +17,34 @@ use quadrant_sim::emulator::{Clock, Emulator, Memory};
 use xtask::image::Image;
 
 /// What ends a firmware, what the next one finds, and what it says of it.
-const RESETS: [(&str, Provocation, FaultCode, &str); 5] = [
+const RESETS: [(&str, InjectedFault, FaultCode, &str); 5] = [
     (
         "a panic of the idle loop, 30 mm/s",
-        Provocation::Panic,
+        InjectedFault::Panic,
         FaultCode::Panic,
-        "by panic: panicked at src/board/mps2/provocation.rs",
+        "by panic: panicked at src/board/mps2/fault_injection.rs",
     ),
     (
         "an undefined instruction, 30 mm/s",
-        Provocation::UndefinedInstruction,
+        InjectedFault::UndefinedInstruction,
         FaultCode::HardFault,
         "by hard fault: at 0x",
     ),
     (
         "a read where there is nothing, 30 mm/s",
-        Provocation::BusError,
+        InjectedFault::BusError,
         FaultCode::HardFault,
         "by hard fault: at 0x",
     ),
     (
         "a stack that is full, 30 mm/s",
-        Provocation::StackOverflow,
+        InjectedFault::StackOverflow,
         FaultCode::HardFault,
         "by hard fault: the stack is full",
     ),
     (
         "an interrupt without a handler, 30 mm/s",
-        Provocation::StrayInterrupt,
+        InjectedFault::StrayInterrupt,
         FaultCode::HardFault,
         "by interrupt without a handler: number 9",
     ),

@@ -3,8 +3,8 @@
 use anyhow::{Result, bail, ensure};
 use quadrant::axes::AxisName;
 use quadrant::encoder::EncoderReading;
-use quadrant::link::lockstep::{InputRecord, Job};
 use quadrant::link::message::{AxisSet, Body};
+use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
@@ -139,7 +139,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
             bring: |fixture| {
                 enabled(fixture)?;
                 fixture.done(Body::Jog {
-                    axis: AxisName::X,
+                    axis: AxisName::X.into(),
                     velocity_mm_s: 10.0,
                 })?;
                 for _ in 0..10 {
@@ -325,6 +325,6 @@ fn homing(fixture: &mut Fixture) -> Result<u32> {
 /// Lets x home.
 fn start_homing(fixture: &mut Fixture) -> Result<u32> {
     let from = fixture.tick();
-    fixture.done(Body::Home(AxisSet::NONE.with(AxisName::X)))?;
+    fixture.done(Body::Home(AxisSet::NONE.with(AxisName::X.into())))?;
     Ok(from)
 }

@@ -7,11 +7,11 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, bail, ensure};
 use quadrant::axes::AxisName;
-use quadrant::link::lockstep::{
-    END_OF_RUN, FLASH, INPUT, INPUT_SEQUENCE, InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE,
-    OutputRecord, PROVOCATION, PROVOCATION_TICK, Provocation, RESETS_LEFT, STARTS, held,
-};
 use quadrant::link::message::{Body, NumberType};
+use quadrant::lockstep::{
+    END_OF_RUN, FLASH, INJECTED_FAULT, INJECTED_FAULT_TICK, INPUT, INPUT_SEQUENCE, InjectedFault,
+    InputRecord, Job, Mode, OUTPUT, OUTPUT_SEQUENCE, OutputRecord, RESETS_LEFT, STARTS, held,
+};
 use quadrant::motion::MotionMode;
 use quadrant::safety::{AxisSwitches, FaultCode};
 use quadrant::scalar::{Fixed, Scalar};
@@ -248,17 +248,21 @@ impl Fixture {
         let codes = held(told.codes.into_array(), input.stuck);
         self.mismatches = [0, 1, 2].map(|axis| codes[axis] != told.codes[axis]);
         Outputs {
-            codes,
+            codes: codes.into(),
             enabled: told.enabled && self.mismatches == [false; 3],
         }
     }
 
     /// Makes the idle loop of the firmware do something instead of the next tick, and waits until the firmware has started
     /// again. Gives what the firmware has left at the outputs; the reference model starts with the fault that it is to find.
-    pub(crate) fn inject_fault(&mut self, what: Provocation, finds: FaultCode) -> Result<Outputs> {
+    pub(crate) fn inject_fault(
+        &mut self,
+        what: InjectedFault,
+        finds: FaultCode,
+    ) -> Result<Outputs> {
         self.memory.set_word(RESETS_LEFT, 1)?;
-        self.memory.set_word(PROVOCATION_TICK, self.tick + 1)?;
-        self.memory.set_word(PROVOCATION, what as u32)?;
+        self.memory.set_word(INJECTED_FAULT_TICK, self.tick + 1)?;
+        self.memory.set_word(INJECTED_FAULT, what as u32)?;
         self.memory.set_word(INPUT_SEQUENCE, self.tick + 1)?;
         self.await_start()?;
         let mut bytes = [0; OutputRecord::BYTES];

@@ -1,9 +1,9 @@
 //! Faults that need a clock: the hardware timer paces the firmware, on recorded inputs, and instructions are its time.
 
 use anyhow::{Context, Result, ensure};
-use quadrant::link::lockstep::{
-    HANGS_FROM, HANGS_UNTIL, InputRecord, Mode, OutputRecord, PROVOCATION, PROVOCATION_TICK,
-    Provocation, RECORDED_OUTPUTS,
+use quadrant::lockstep::{
+    HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, InputRecord, Mode,
+    OutputRecord, RECORDED_OUTPUTS,
 };
 use quadrant::safety::FaultCode;
 use quadrant::stage::Outputs;
@@ -106,8 +106,8 @@ pub(crate) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
         image,
         |_| {},
         |memory| {
-            memory.set_word(PROVOCATION, Provocation::Hang as u32)?;
-            memory.set_word(PROVOCATION_TICK, SETTLING_TICKS)?;
+            memory.set_word(INJECTED_FAULT, InjectedFault::Hang as u32)?;
+            memory.set_word(INJECTED_FAULT_TICK, SETTLING_TICKS)?;
             Ok(())
         },
     )?;

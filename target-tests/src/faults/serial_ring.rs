@@ -1,7 +1,7 @@
 //! The reference model's end of the link's port: what the emulated board does with its two rings.
 
 use quadrant::hal::Serial;
-use quadrant::link::lockstep::LINK_BYTES;
+use quadrant::lockstep::LINK_BYTES;
 
 /// A port between whose ends bytes change hands once a tick.
 #[derive(Debug, Default)]

@@ -1,7 +1,7 @@
 //! What a host sends at the rate of the machine's time, and what becomes of the machine when it stops.
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::axes::AxisName;
+use quadrant::link::message::AxisName;
 use quadrant::link::message::{
     Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, SetPoint, StreamRequest, Voltages,
 };

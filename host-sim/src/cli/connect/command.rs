@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand};
 use quadrant::axes::AxisName;
-use quadrant::telemetry::Channel;
+use quadrant::link::message::Channel;
 use quadrant_sim::console::hands;
 
 /// One thing to ask of the machine.

@@ -3,7 +3,6 @@
 use anyhow::Context;
 use clap::Args;
 use quadrant::axes::AxisName;
-use quadrant::axes::AxisName;
 use quadrant::link::message::Body;
 use quadrant_sim::command::output::Output;
 use quadrant_sim::console::rig::{ConnectedRig, room_mm};

@@ -57,7 +57,7 @@ fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
             text,
             "{axis:<4}  {homed:<5}  {mode:<8}  {position:>11.4}  {error:>9.2}  {output:>8.4}  {limit:<12}  {mark:>9.3}",
             axis = axis.as_str(),
-            homed = if status.homed.contains(axis) {
+            homed = if status.homed.contains(axis.into()) {
                 "yes"
             } else {
                 "no"
@@ -140,7 +140,7 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
             target_mm,
             velocity,
         } => Body::Move {
-            axis: *axis,
+            axis: (*axis).into(),
             target_mm: *target_mm,
             velocity_mm_s: *velocity,
         },
@@ -148,7 +148,7 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
             axis,
             velocity_mm_s,
         } => Body::Jog {
-            axis: *axis,
+            axis: (*axis).into(),
             velocity_mm_s: *velocity_mm_s,
         },
         Command::Run => Body::Run,
@@ -163,7 +163,7 @@ fn some_or_all(axes: &[AxisName]) -> AxisSet {
     if axes.is_empty() {
         AxisSet::ALL
     } else {
-        axes.iter().copied().collect()
+        axes.iter().map(|&axis| axis.into()).collect()
     }
 }
 

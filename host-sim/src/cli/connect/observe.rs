@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::capture::{Edge, Level, Trigger};
 use quadrant::link::message::{CaptureStatus, Event, Notice};
+use quadrant::link::message::{Edge, Level, Trigger};
 use quadrant_sim::console::samples::{
     Recording, Samples, arm, capture_state, disarm, least_decimation, read_capture,
 };
@@ -240,7 +240,7 @@ fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
 
 /// An event in words.
 fn said(event: &Event) -> String {
-    let fault = |code: &u8, axis: &Option<quadrant::axes::AxisName>| {
+    let fault = |code: &u8, axis: &Option<quadrant::link::message::AxisName>| {
         let axis = axis.map(|axis| format!(" of {axis}")).unwrap_or_default();
         format!("fault {code}{axis}")
     };

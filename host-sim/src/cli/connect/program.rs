@@ -22,7 +22,7 @@ pub(super) fn plan(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let plan: PlanSettings =
         toml::from_str(&text).with_context(|| format!("{} is no plan", file.display()))?;
-    client.order(Body::SetPlan(plan))?;
+    client.order(Body::SetPlan(plan.into()))?;
     Ok(Answer::new("`run` starts it", json!(plan)))
 }
 
@@ -57,7 +57,7 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
         options.turns,
         options.lead_s,
     );
-    client.order(Body::SetPlan(PlanSettings { motions }))?;
+    client.order(Body::SetPlan(PlanSettings { motions }.into()))?;
     let turn_s = TAU * options.radius_mm / feed_mm_s;
     let duration_s = options.turns * turn_s + 2.0 * options.lead_s;
     let text = format!(

@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::telemetry::Channel;
+use quadrant::link::message::Channel;
 use quadrant_sim::console::samples::{Recording, Samples, least_decimation};
 use quadrant_sim::console::{columns, plot, settings};
 use quadrant_sim::report::{Figure, Lines, Plot, Series, Style};

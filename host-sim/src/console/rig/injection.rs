@@ -2,10 +2,10 @@
 
 use std::time::Duration;
 
-use quadrant::axes::AxisName;
+use quadrant::link::message::AxisName;
+use quadrant::link::message::MachineState;
 use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
 use quadrant::settings::AxisSettings;
-use quadrant::telemetry::MachineState;
 use quadrant::units::DacCode;
 
 use super::{Injected, LOOK, Stop};

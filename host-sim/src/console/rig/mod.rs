@@ -7,10 +7,10 @@ use std::time::Duration;
 
 use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSet, Body, InjectStatus, Status};
+use quadrant::link::message::{AxisSignal, Channel, MachineState};
 use quadrant::reference::MotionSettings;
 use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
-use quadrant::telemetry::{AxisSignal, Channel, MachineState};
 
 use self::injection::Injection;
 use self::recording::Shape;
@@ -54,7 +54,10 @@ pub fn room_mm(client: &mut Client, axis: AxisName) -> Result<Option<f64>, Clien
     let stage = settings::dump(client)?;
     let limits = &stage.axes[axis as usize].limits;
     let room = |status: &Status, homed: AxisSet| {
-        let travel = limits.travel_mm.as_ref().filter(|_| homed.contains(axis))?;
+        let travel = limits
+            .travel_mm
+            .as_ref()
+            .filter(|_| homed.contains(axis.into()))?;
         let here = status.axes[axis as usize].position_mm;
         Some((here - travel.negative).min(travel.positive - here))
     };
@@ -107,13 +110,14 @@ impl<'a> ConnectedRig<'a> {
         let moves = motion.is_some_and(|motion| motion != MotionSettings::Hold);
         let mut motions = [MotionSettings::Hold; 3];
         motions[self.axis as usize] = motion.unwrap_or(MotionSettings::Hold);
-        self.client.order(Body::SetPlan(PlanSettings { motions }))?;
+        self.client
+            .order(Body::SetPlan(PlanSettings { motions }.into()))?;
         let channels = [
             AxisSignal::Reference,
             AxisSignal::Position,
             AxisSignal::CodeSum,
         ]
-        .map(|signal| Channel::Axis(self.axis, signal));
+        .map(|signal| Channel::Axis(self.axis.into(), signal));
         let rate_hz = self.client.identity().rate_hz;
         let wanted = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
         let every = wanted.max(least_decimation(channels.len(), rate_hz));
@@ -124,7 +128,13 @@ impl<'a> ConnectedRig<'a> {
         let mut injection = None;
         if injects {
             let room_mm = self.travel_mm - if moves { 0.0 } else { here.abs() };
-            let mut plan = Injection::new(experiment, self.settings(), self.axis, room_mm, moves);
+            let mut plan = Injection::new(
+                experiment,
+                self.settings(),
+                self.axis.into(),
+                room_mm,
+                moves,
+            );
             plan.send(self.client, &mut telemetry)?;
             injection = Some(plan);
         } else if moves {

@@ -93,9 +93,9 @@ impl Shape<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::axes::AxisName;
+    use quadrant::link::message::AxisName;
+    use quadrant::link::message::{AxisSignal, Channel};
     use quadrant::settings::x_axis;
-    use quadrant::telemetry::{AxisSignal, Channel};
 
     use super::*;
 

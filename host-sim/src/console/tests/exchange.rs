@@ -1,7 +1,7 @@
 //! Settings to and from the machine.
 
-use quadrant::axes::AxisName;
 use quadrant::control::feedback::LawKind;
+use quadrant::link::message::AxisName;
 use quadrant::link::message::AxisSet;
 use quadrant::settings::StageSettings;
 

@@ -6,7 +6,7 @@ use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
 use quadrant::link::message::Body;
-use quadrant::telemetry::MachineState;
+use quadrant::link::message::MachineState;
 
 use super::model::Model;
 use crate::console::transport::Exchange;

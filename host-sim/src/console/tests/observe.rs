@@ -2,11 +2,11 @@
 
 use std::time::Duration;
 
-use quadrant::axes::AxisName;
-use quadrant::capture::Trigger;
+use quadrant::link::message::AxisName;
 use quadrant::link::message::Body;
+use quadrant::link::message::Trigger;
+use quadrant::link::message::{AxisSignal, Channel, StageSignal};
 use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::telemetry::{AxisSignal, Channel, StageSignal};
 
 use super::connected;
 use crate::console::columns;
@@ -230,7 +230,7 @@ fn a_set_points_velocity_and_acceleration_are_those_of_its_position() {
 #[test]
 fn a_connected_axis_runs_experiments_in_closed_loop() {
     let (mut client, bench) = connected();
-    let mut rig = ConnectedRig::new(&mut client, AxisName::X, 200.0).unwrap();
+    let mut rig = ConnectedRig::new(&mut client, AxisName::X.into(), 200.0).unwrap();
     let motion = MotionSettings::PointToPoint(PointToPointSettings {
         distance_mm: 5.0,
         max_velocity_mm_s: 20.0,

@@ -3,10 +3,10 @@
 use std::io;
 use std::time::Duration;
 
-use quadrant::axes::AxisName;
 use quadrant::link::frame::{self, FRAME_BYTES};
+use quadrant::link::message::AxisName;
+use quadrant::link::message::MachineState;
 use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
-use quadrant::telemetry::MachineState;
 
 use super::connected;
 use crate::console::settle;

@@ -7,11 +7,12 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Duration;
 
+use quadrant::app::telemetry::{Packer, Sample, Selection};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::*;
-use quadrant::link::port::Port;
+use quadrant::link::message::{AxisSignal, Channel, StageSignal};
+use quadrant::link::server::LinkServer;
 use quadrant::settings::StageSettings;
-use quadrant::telemetry::{AxisSignal, Channel, Packer, Sample, Selection, StageSignal};
 
 use crate::console::transport::Exchange;
 
@@ -46,7 +47,7 @@ pub(super) struct Bench {
 
 pub(super) struct Model {
     pub(super) bench: Rc<RefCell<Bench>>,
-    port: Port,
+    port: LinkServer,
     tick: u32,
     enabled: bool,
     fault: Option<u8>,
@@ -71,7 +72,7 @@ impl Model {
         let bench = Rc::new(RefCell::new(Bench::default()));
         let model = Self {
             bench: Rc::clone(&bench),
-            port: Port::new(),
+            port: LinkServer::new(),
             tick: 0,
             enabled: false,
             fault: None,
@@ -192,7 +193,7 @@ impl Model {
 
 /// What a channel shows: positions as they are, and the tick where a test wants to recognise a sample.
 fn read(channel: Channel, position_mm: &[f64; 3], tick: u32) -> u32 {
-    let counts = |axis: quadrant::axes::AxisName| position_mm[axis as usize] / 0.0005;
+    let counts = |axis: quadrant::link::message::AxisName| position_mm[axis as usize] / 0.0005;
     match channel {
         Channel::Axis(axis, AxisSignal::Position) => counts(axis).round() as i32 as u32,
         Channel::Axis(axis, AxisSignal::Reference) => (256.0 * counts(axis)).round() as i32 as u32,

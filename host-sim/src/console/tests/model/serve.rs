@@ -1,10 +1,11 @@
 //! What the model does with each request.
 
 use heapless::String as Bounded;
-use quadrant::capture::{CaptureCause, CapturePhase, CaptureRecord};
+use quadrant::app::telemetry::{Packer, Selection};
 use quadrant::link::message::*;
+use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
+use quadrant::link::message::{LimitedBy, MachineState, Words};
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
-use quadrant::telemetry::{LimitedBy, MachineState, Packer, Selection, Words};
 
 use super::{Model, ROOM, read};
 
@@ -71,7 +72,7 @@ impl Model {
             }
             Body::Run if self.running() => return Err(refused("a motion is under way")),
             Body::Run => self.plan_left = 5000,
-            Body::SetPlan(plan) => self.bench.borrow_mut().plan = Some(plan),
+            Body::SetPlan(plan) => self.bench.borrow_mut().plan = Some(plan.into()),
             Body::Stream(request) => return self.stream(request),
             Body::Settings(request) => return self.settings(request),
             Body::Telemetry(TelemetryRequest::Select {
@@ -164,7 +165,7 @@ impl Model {
                     .map_err(|error| invalid(error.to_string()))?;
                 let old =
                     std::mem::replace(&mut self.bench.borrow_mut().in_force, settings.clone());
-                let changed = quadrant::axes::AxisName::ALL
+                let changed = quadrant::link::message::AxisName::ALL
                     .into_iter()
                     .filter(|axis| old.axes[*axis as usize] != settings.axes[*axis as usize]);
                 Reply::Applied(Applied {

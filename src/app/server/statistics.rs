@@ -1,0 +1,61 @@
+//! Statistics of the server, for the board's own log.
+
+use embedded_storage::nor_flash::NorFlash;
+
+use super::Server;
+use crate::law::scalar::Scalar;
+use quadrant_link::message::Provenance;
+
+/// Statistics of a server: counts that only grow, and wrap.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct ServerStatistics {
+    /// True if a host has said hello.
+    pub greeted: bool,
+    /// The tick of the last request.
+    pub heard_tick: u32,
+    /// Frames that were damaged, too long, or no message.
+    pub bad_frames: u32,
+    /// Samples of the present selection of telemetry that found no room.
+    pub dropped_samples: u32,
+    /// Notices that found no room.
+    pub dropped_events: u32,
+    /// Number of times that settings were applied.
+    pub applied: u16,
+    /// Number of times that settings were stored.
+    pub stored: u16,
+    /// Number of complete captures.
+    pub captures: u16,
+}
+
+impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+    /// Returns the statistics.
+    pub fn statistics(&self) -> ServerStatistics {
+        let frames = self.link.counters();
+        ServerStatistics {
+            greeted: self.link.is_greeted(),
+            heard_tick: self.heard_tick,
+            bad_frames: frames
+                .damaged
+                .wrapping_add(frames.overlong)
+                .wrapping_add(frames.undecodable),
+            dropped_samples: self.packer.dropped(),
+            dropped_events: self.dropped_events,
+            applied: self.applied,
+            stored: self.stored,
+            captures: self.recorder.number(),
+        }
+    }
+
+    /// The origin of the settings in force, or of the stored ones.
+    pub const fn provenance(&self) -> &Provenance {
+        &self.provenance
+    }
+
+    /// Counts the paths of the draft. Visits them all: for rare occasions.
+    pub fn paths(&self) -> usize {
+        let mut paths = 0;
+        // An error of the tree would end the visit early, and show as a number that is too small.
+        let _ = self.draft.settings().list("", &mut |_| paths += 1);
+        paths
+    }
+}

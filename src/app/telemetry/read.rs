@@ -1,0 +1,92 @@
+//! Reading a channel's word after a tick.
+
+use quadrant_link::message::{AxisName, AxisSignal, Channel, MachineState, StageSignal};
+
+use crate::app::glitch_monitor::GlitchReadings;
+use crate::law::axis::AxisState;
+use crate::law::scalar::{Quantity, Scalar};
+use crate::law::stage::StageState;
+
+/// What can be read after a tick.
+#[derive(Clone, Copy, Debug)]
+pub struct Observation<'a, S: Scalar, const N: usize> {
+    /// The stage as the tick left it.
+    pub stage: &'a StageState<S, N>,
+    /// The latest results of the glitch monitor.
+    pub glitches: &'a GlitchReadings,
+    /// Duration of the tick before, in cycles of the board's tick timer.
+    pub elapsed_cycles: u32,
+    /// True if the tick was given a command.
+    pub commanded: bool,
+}
+
+impl<S: Scalar, const N: usize> Observation<'_, S, N> {
+    /// The number of the tick that has just ended, as a fault of that tick has it.
+    #[inline(always)]
+    pub const fn tick(&self) -> u32 {
+        self.stage.tick().wrapping_sub(1)
+    }
+}
+
+/// Reads a channel's word.
+#[inline(always)]
+pub fn read<S: Scalar, const N: usize>(channel: Channel, seen: &Observation<'_, S, N>) -> u32 {
+    let [x, y, z] = seen.stage.axes().by_ref().into_array();
+    let [glitch_x, glitch_y, glitch_z] = seen.glitches.heights_um;
+    match channel {
+        Channel::Stage(signal) => read_stage(signal, seen),
+        Channel::Axis(name, signal) => {
+            let (axis, glitch_um) = match name {
+                AxisName::X => (x, glitch_x),
+                AxisName::Y => (y, glitch_y),
+                AxisName::Z => (z, glitch_z),
+            };
+            read_axis(signal, axis, glitch_um)
+        }
+    }
+}
+
+#[inline(always)]
+fn read_axis<S: Scalar, const N: usize>(
+    signal: AxisSignal,
+    axis: &AxisState<S, N>,
+    glitch_um: f32,
+) -> u32 {
+    let seen = axis.telemetry();
+    let volts = |value: S| value.to_f32(Quantity::Voltage).to_bits();
+    match signal {
+        AxisSignal::Reference => (seen.reference.0 >> 8) as u32,
+        AxisSignal::Position => seen.measured.0 as u32,
+        AxisSignal::Error => seen.error.to_f32(Quantity::Length).to_bits(),
+        AxisSignal::Velocity => seen.velocity.to_f32(Quantity::Velocity).to_bits(),
+        AxisSignal::Proportional => volts(seen.feedback.proportional),
+        AxisSignal::Integral => volts(seen.feedback.integral),
+        AxisSignal::Derivative => volts(seen.feedback.derivative),
+        AxisSignal::Level => volts(seen.feedforward.level),
+        AxisSignal::Viscous => volts(seen.feedforward.viscous),
+        AxisSignal::Gms => volts(seen.feedforward.gms),
+        AxisSignal::Inertia => volts(seen.feedforward.inertia),
+        AxisSignal::BumplessOffset => volts(seen.bumpless_offset),
+        AxisSignal::Output => volts(seen.output),
+        AxisSignal::Code => i32::from(seen.code.0) as u32,
+        AxisSignal::LimitedBy => seen.limited_by as u32,
+        AxisSignal::Injection => volts(axis.injected()),
+        AxisSignal::CodeSum => seen.code_sum.wrapping_sub(seen.code.0.into()) as u32,
+        AxisSignal::Glitch => glitch_um.to_bits(),
+    }
+}
+
+#[inline(always)]
+fn read_stage<S: Scalar, const N: usize>(signal: StageSignal, seen: &Observation<'_, S, N>) -> u32 {
+    match signal {
+        StageSignal::State => MachineState::from(seen.stage.safety()) as u32,
+        StageSignal::Fault => match seen.stage.safety().fault() {
+            Some(fault) => u32::from(fault.code.number()),
+            None => 0,
+        },
+        StageSignal::Tick => seen.tick(),
+        StageSignal::Elapsed => seen.elapsed_cycles,
+        StageSignal::CircleDeviation => seen.glitches.circle.deviation_um.to_bits(),
+        StageSignal::CircleAngle => seen.glitches.circle.angle_deg.to_bits(),
+    }
+}
