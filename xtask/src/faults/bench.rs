@@ -238,7 +238,7 @@ impl Bench {
         let codes = held(told.codes.into_array(), input.stuck);
         self.mismatches = [0, 1, 2].map(|axis| codes[axis] != told.codes[axis]);
         Outputs {
-            codes,
+            codes: codes.into(),
             enabled: told.enabled && self.mismatches == [false; 3],
         }
     }
