@@ -31,6 +31,7 @@ mod injection_ends;
 mod jog;
 mod journal;
 mod last_words;
+mod law_imports;
 mod link_frames;
 mod link_fuzz;
 mod link_golden;
