@@ -124,7 +124,7 @@ impl Encoder {
 
     /// The accumulated count at which the counter showed `raw`, within half its range of the last reading.
     #[inline(always)]
-    pub const fn count_at(&self, state: &EncoderState, raw: u32) -> EncoderCount {
+    pub(crate) const fn count_at(&self, state: &EncoderState, raw: u32) -> EncoderCount {
         let back = self.between(raw, state.raw);
         EncoderCount(state.count().0.wrapping_sub(back as i64))
     }

@@ -212,7 +212,7 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     }
 
     /// True if an injection can begin.
-    pub fn is_injection_ready(&self) -> bool {
+    pub(crate) fn is_injection_ready(&self) -> bool {
         self.injection.is_ready()
     }
 

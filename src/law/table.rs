@@ -14,7 +14,7 @@ const OCTAVES: usize = 14;
 const INTERVALS: usize = 1 + (OCTAVES << OCTAVE_INTERVAL_BITS);
 
 /// Nodes of every table.
-pub const NODES: usize = INTERVALS + 1;
+pub(crate) const NODES: usize = INTERVALS + 1;
 
 /// `CURVES` curves over one non-negative argument, sharing its look-up; constant beyond the end of the table.
 #[derive(Clone, Debug, PartialEq)]
@@ -106,7 +106,7 @@ impl<S: Scalar, const CURVES: usize> OctaveTable<S, CURVES> {
 
 /// The largest difference between `curve` and its table in `f64` arithmetic, over the middles and quarters of every
 /// interval and the argument `beyond`. Settings time only: the validation of a curve's parameters asks for it.
-pub fn interpolation_error(end: f64, beyond: f64, curve: impl Fn(f64) -> f64) -> f64 {
+pub(crate) fn interpolation_error(end: f64, beyond: f64, curve: impl Fn(f64) -> f64) -> f64 {
     let exponent = end_exponent(end);
     let mut worst = libm::fabs(curve(node_argument(INTERVALS, exponent)) - curve(beyond));
     for index in 0..INTERVALS {

@@ -26,7 +26,7 @@ impl Position {
 
     /// The displacement of a step of an encoder; never saturates.
     #[inline(always)]
-    pub const fn from_step(counts: i32) -> Self {
+    pub(crate) const fn from_step(counts: i32) -> Self {
         Self((counts as i64) << POSITION_FRACTION_BITS)
     }
 

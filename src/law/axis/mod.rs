@@ -432,7 +432,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     }
 
     /// True if a stream can start: its first segment is there, and starts where the axis rests.
-    pub fn is_stream_ready(&self) -> bool {
+    pub(crate) fn is_stream_ready(&self) -> bool {
         self.mode() == MotionMode::Hold && self.generator.stream.is_ready(self.look_ahead)
     }
 

@@ -29,7 +29,7 @@ impl PlantModel {
     }
 
     /// `A exp(-s Td)` at `s = j omega`, mm/(V s^2).
-    pub fn delayed_gain(&self, omega_rad_s: f64) -> Complex64 {
+    pub(crate) fn delayed_gain(&self, omega_rad_s: f64) -> Complex64 {
         let (sin, cos) = libm::sincos(-omega_rad_s * self.delay_s);
         Complex64::new(cos, sin) * self.gain_mm_per_v_s2
     }

@@ -63,7 +63,7 @@ impl<T> PerDirection<T> {
     }
 
     /// The thing for one sense of motion, to be changed.
-    pub fn of_mut(&mut self, direction: Direction) -> &mut T {
+    pub(crate) fn of_mut(&mut self, direction: Direction) -> &mut T {
         match direction {
             Direction::Positive => &mut self.positive,
             Direction::Negative => &mut self.negative,

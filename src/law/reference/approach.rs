@@ -57,7 +57,7 @@ impl<S: Scalar> Approach<S> {
     }
 
     /// The move over `distance`.
-    pub fn aim(&self, distance: Position) -> PointToPoint<S> {
+    pub(crate) fn aim(&self, distance: Position) -> PointToPoint<S> {
         // Longer than both others together, so that the order of the impulses is known.
         let mut velocity = self.acceleration + 1;
         let most = distance.0.unsigned_abs();

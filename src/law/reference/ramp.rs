@@ -130,7 +130,7 @@ impl RampState {
     /// A ramp that takes over from another motion, `displacement` being its last tick's. The acceleration is taken to be
     /// zero; [`Ramp::take_over`] keeps it.
     #[inline(always)]
-    pub const fn from_motion(position: Position, displacement: Position) -> Self {
+    pub(crate) const fn from_motion(position: Position, displacement: Position) -> Self {
         Self {
             velocity: Velocity::from_displacement(displacement),
             ..Self::at_rest(position)

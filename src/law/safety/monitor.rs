@@ -170,7 +170,7 @@ impl IndexSpacing {
     }
 
     /// Forgets the last pulse: the counts that follow do not belong to the same count.
-    pub fn forget(state: &mut IndexState) {
+    pub(crate) fn forget(state: &mut IndexState) {
         state.last = None;
     }
 }

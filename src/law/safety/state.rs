@@ -42,7 +42,7 @@ impl SafetyState {
 
     /// Latches a fault; the first one stays, but one that calls for switching off ends a stop under control.
     #[inline(always)]
-    pub fn trip(&mut self, fault: Fault, reaction: Reaction) {
+    pub(crate) fn trip(&mut self, fault: Fault, reaction: Reaction) {
         *self = match (*self, reaction) {
             (Self::Faulted(first), _) | (Self::Stopping(first), Reaction::Off) => {
                 Self::Faulted(first)
