@@ -43,7 +43,7 @@
 //! use quadrant::settings::StageSettings;
 //! use quadrant::stage::{Inputs, Stage, StageState};
 //!
-//! let stage: Stage<f32> = StageSettings::default().build()?;
+//! let stage: Stage<f32> = StageSettings::simulated().build()?;
 //! let plan = [Motion::Hold, Motion::Hold, Motion::Hold];
 //! let mut state = StageState::default();
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };

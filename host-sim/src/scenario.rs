@@ -25,7 +25,7 @@ pub fn circle_and_sine(lead_s: f64) -> Job {
         }
     }
     Job {
-        stage: StageSettings::default(),
+        stage: StageSettings::simulated(),
         plan: PlanSettings { motions },
     }
 }

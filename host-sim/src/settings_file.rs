@@ -170,7 +170,7 @@ mod tests {
                 records: vec!["frf.csv".to_owned()],
                 sets: vec!["plant".to_owned()],
             }],
-            ..SettingsFile::new(StageSettings::default())
+            ..SettingsFile::new(StageSettings::simulated())
         }
     }
 

@@ -1,7 +1,7 @@
 //! The supervising task: lets requests of the operator at the machine through, and finds what there is to tell.
 
 use super::Snapshot;
-use crate::app::supervisor::{Decision, Event, Supervisor};
+use crate::app::supervisor::{Decision, Event, StageView, Supervisor};
 use crate::law::safety::Command;
 use crate::law::scalar::Scalar;
 
@@ -27,13 +27,19 @@ pub struct Supervision {
 const STATUS_RUNS: u32 = 1_000;
 
 impl Supervision {
-    /// Looks at the machine, and at a request of the operator if there is one.
+    /// Looks at the machine, and at a request of the operator if there is one; `commissioned` as
+    /// [`Server::is_commissioned`](super::Server::is_commissioned) has it.
     pub fn run<S: Scalar>(
         &mut self,
         snapshot: &Snapshot<S>,
         request: Option<Command>,
+        commissioned: bool,
     ) -> Supervised {
-        let Decision { command, events } = self.supervisor.step(snapshot.view, request);
+        let view = StageView {
+            commissioned,
+            ..snapshot.view
+        };
+        let Decision { command, events } = self.supervisor.step(view, request);
         self.runs = self.runs.wrapping_add(1);
         Supervised {
             command,

@@ -2,7 +2,9 @@
 
 use core::fmt;
 
-use super::{AxisSettings, StageSettings};
+use super::axis::AxisSettings;
+use super::leaves::limits::LONGEST_TRAVEL_MM;
+use super::stage::StageSettings;
 use crate::law::decimal::Decimal;
 use crate::law::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
 use crate::law::safety::AxisName;
@@ -115,7 +117,9 @@ impl StageSettings {
         let travel_mm = limits
             .travel_mm
             .as_ref()
-            .map_or((-1e4, 1e4), |travel| (travel.negative, travel.positive));
+            .map_or((-LONGEST_TRAVEL_MM, LONGEST_TRAVEL_MM), |travel| {
+                (travel.negative, travel.positive)
+            });
         // So written, what is not a number is refused.
         if !(target_mm >= travel_mm.0 && target_mm <= travel_mm.1) {
             return refuse(MoveFlaw::BeyondTravel {

@@ -6,8 +6,9 @@
 
 use core::fmt;
 
+use super::error::SettingsError;
+use super::stage::StageSettings;
 use super::tree::TreeError;
-use super::{SettingsError, StageSettings};
 use crate::law::safety::AxisName;
 
 /// A set of settings that is edited leaf by leaf, and the one in force.

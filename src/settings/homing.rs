@@ -4,7 +4,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use super::AxisSettings;
+use super::axis::AxisSettings;
 use crate::law::friction::Direction;
 use crate::law::homing::Homing;
 use crate::law::reference::{Approach, MotionScale, Velocity};

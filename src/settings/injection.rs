@@ -1,6 +1,8 @@
 //! What a request to inject a voltage comes to under the settings. For the slow half.
 
-use super::{Reason, SettingsError, StageSettings};
+use super::error::{Reason, SettingsError};
+use super::leaves::limits::LONGEST_TRAVEL_MM;
+use super::stage::StageSettings;
 use crate::law::injection::Injection;
 use crate::law::safety::AxisName;
 use crate::law::scalar::{Quantity, Scalar};
@@ -22,9 +24,6 @@ pub struct InjectionSettings {
     /// How fast it may be, mm/s; above zero, at most `limits.max_velocity_mm_s`.
     pub max_velocity_mm_s: f64,
 }
-
-/// Farther than any machine's travel, mm.
-const MOST_TRAVEL_MM: f64 = 1e4;
 
 impl StageSettings {
     /// Builds an injection, and says which magnitude of a word its limit is.
@@ -49,7 +48,7 @@ impl StageSettings {
             })
         };
         within("limit_v", request.limit_v, axis.amplifier.output_limit_v)?;
-        within("travel_mm", request.travel_mm, MOST_TRAVEL_MM)?;
+        within("travel_mm", request.travel_mm, LONGEST_TRAVEL_MM)?;
         within(
             "max_velocity_mm_s",
             request.max_velocity_mm_s,

@@ -20,10 +20,10 @@ pub struct LimitSettings {
     /// Largest tracking error while the reference stands, mm; beyond it the stage is switched off.
     pub following_error_mm: f64,
     /// What the largest tracking error grows by with the reference's speed, mm per mm/s; 0 to 1.
-    #[serde(default)]
+    #[serde(default = "following_error_lag_s")]
     pub following_error_lag_s: f64,
     /// The most that the largest tracking error grows to, mm; at least that at rest, at most 20.
-    #[serde(default = "largest_following_error_mm")]
+    #[serde(default = "following_error_max_mm")]
     pub following_error_max_mm: f64,
     /// Measured speed that is a fault, as a multiple of the largest velocity; 1.05 to 2.
     #[serde(default = "overspeed_ratio")]
@@ -57,33 +57,25 @@ pub struct TravelSettings {
     pub positive: f64,
 }
 
-fn max_jerk_mm_s3() -> f64 {
-    1e5
+/// Defaults of the fields that a file may lack.
+macro_rules! defaults {
+    ($($field:ident),+) => {
+        $(fn $field() -> f64 {
+            LimitSettings::default().$field
+        })+
+    };
 }
 
-fn largest_following_error_mm() -> f64 {
-    20.0
-}
-
-fn overspeed_ratio() -> f64 {
-    1.2
-}
-
-fn braking_mm_s2() -> f64 {
-    4000.0
-}
-
-fn braking_jerk_mm_s3() -> f64 {
-    1e6
-}
-
-fn silent_s() -> f64 {
-    0.1
-}
-
-fn silent_share() -> f64 {
-    0.9
-}
+defaults!(
+    max_jerk_mm_s3,
+    following_error_lag_s,
+    following_error_max_mm,
+    overspeed_ratio,
+    braking_mm_s2,
+    braking_jerk_mm_s3,
+    silent_s,
+    silent_share
+);
 
 /// What the axes do when set points of a stream no longer come.
 #[derive(
@@ -117,15 +109,6 @@ pub struct StreamingSettings {
     /// When the next set point is late.
     #[tree(with = miniconf::leaf)]
     pub underrun: LossReaction,
-}
-
-impl Default for StreamingSettings {
-    fn default() -> Self {
-        Self {
-            link_lost: LossReaction::Stop,
-            underrun: LossReaction::Stop,
-        }
-    }
 }
 
 impl StreamingSettings {

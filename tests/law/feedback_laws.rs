@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use quadrant::control::feedback::{Feedback, FeedbackInput, FeedbackState, LawKind};
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 
 use crate::common::{any_f32, repeatable};
 

@@ -4,7 +4,7 @@ use proptest::prelude::*;
 use quadrant::control::feedback::{FeedbackInput, FeedbackState};
 use quadrant::control::pid::{Pid, PidGains};
 use quadrant::control::schedule::{GainSchedule, SchedulePoint, ScheduledPid};
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 
 use crate::common::repeatable;
 

@@ -42,6 +42,7 @@ mod link_sizes;
 mod link_traffic;
 mod lockstep_records;
 mod nonlinear_gain;
+mod not_commissioned;
 mod number_types;
 mod pid;
 mod provocations;

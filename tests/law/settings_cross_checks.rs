@@ -35,7 +35,7 @@ fn weights_that_do_not_sum_to_one_are_refused() {
 #[test]
 fn elements_must_fit_the_room_and_exist() {
     let split = |count: usize| {
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         for axis in &mut settings.axes {
             axis.friction.gms.elements = (0..count)
                 .map(|_| GmsElement {
@@ -142,7 +142,7 @@ fn a_kind_whose_model_is_missing_is_refused_by_name() {
 /// Files from before there were these models.
 #[test]
 fn settings_without_the_single_state_models_still_load() {
-    let mut tree = serde_json::to_value(StageSettings::default()).expect("plain data");
+    let mut tree = serde_json::to_value(StageSettings::simulated()).expect("plain data");
     for axis in tree["axes"].as_array_mut().expect("axes") {
         let friction = axis["friction"].as_object_mut().expect("fields");
         for field in ["dahl", "lugre", "smoothed_gms"] {

@@ -4,7 +4,8 @@ use quadrant::control::feedback::{FeedbackInput, FeedbackState, LawKind};
 use quadrant::control::nctf::CharacteristicPoint;
 use quadrant::control::pid::{Pid, PidGains};
 use quadrant::control::surface::SurfaceGains;
-use quadrant::settings::{FeedbackSettings, x_axis};
+use quadrant::settings::FeedbackSettings;
+use quadrant::settings::presets::x_axis;
 
 const PERIOD_S: f64 = 1e-4;
 

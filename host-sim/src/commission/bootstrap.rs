@@ -88,7 +88,7 @@ const QUIET_FILTER: f64 = 0.07;
 
 #[cfg(test)]
 mod tests {
-    use quadrant::settings::{x_axis, y_axis, z_axis};
+    use quadrant::settings::presets::{x_axis, y_axis, z_axis};
 
     use super::*;
     use crate::design::{SampledLoop, margins};

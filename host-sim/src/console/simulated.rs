@@ -28,7 +28,7 @@ impl SimulatedLink {
     /// # Errors
     /// Defaults that are refused, or a file that is no flash.
     pub fn start(seed: u64, flash: Option<&Path>) -> io::Result<InProcess<Self>> {
-        let settings = StageSettings::default();
+        let settings = StageSettings::simulated();
         let flash = flash
             .map(|path| FlashFile::open(path, FLASH_BYTES))
             .transpose()?;

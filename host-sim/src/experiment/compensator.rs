@@ -59,7 +59,7 @@ pub struct Setup {
 impl Setup {
     /// The ideal stage, and the default settings with its own friction.
     pub fn matched() -> Self {
-        Self::matched_under(StageSettings::default())
+        Self::matched_under(StageSettings::simulated())
     }
 
     /// The ideal stage, and these settings with its own friction: the simulation beside an experiment with the same

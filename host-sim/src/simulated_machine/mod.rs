@@ -300,7 +300,11 @@ impl<S: Scalar> Running<S> {
             return (outputs, After::GoOn);
         };
         self.seen = seen;
-        let supervised = self.supervision.run(&seen, self.requests.pop_front());
+        let supervised = self.supervision.run(
+            &seen,
+            self.requests.pop_front(),
+            self.server.is_commissioned(),
+        );
         self.command = supervised.command;
         for event in supervised.events.into_iter().flatten() {
             self.server.tell_of(seen.tick, event);

@@ -9,7 +9,7 @@ use quadrant::settings::StageSettings;
 use quadrant_sim::program::{Limits, Program, ProgramError, Trajectory, Vector};
 
 fn limits() -> Limits {
-    Limits::of(&StageSettings::default())
+    Limits::of(&StageSettings::simulated())
 }
 
 fn plan(source: &str) -> Trajectory {

@@ -97,6 +97,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     pending: AxisSet,
     spare: Option<&'a mut Axis<S>>,
     draft: Draft<'a>,
+    /// Somebody has given the settings in force.
+    commissioned: bool,
     provenance: Provenance,
     store: Store<F>,
     buffer: &'a mut [u8; BUFFER_BYTES],
@@ -132,6 +134,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             meters: Meters::default(),
             pending: AxisSet::NONE,
             spare: Some(parts.spare),
+            commissioned: parts.settings.is_commissioned(),
             draft: Draft::new(parts.settings, parts.draft),
             provenance: parts.provenance,
             store: parts.store,
@@ -163,6 +166,11 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         self.store.flash()
     }
 
+    /// True if the settings in force are not the default ones, on which the outputs are not enabled.
+    pub const fn is_commissioned(&self) -> bool {
+        self.commissioned
+    }
+
     /// Tells the host, if there is one, that something happened at a tick.
     pub fn tell(&mut self, tick: u32, event: Event) {
         if self.events.push_back((tick, event)).is_err() {
@@ -187,6 +195,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     pub fn poll(&mut self, serial: &mut impl Serial, seen: &Snapshot<S>, meters: Meters) -> After {
         self.tell_homed(seen);
         self.seen = *seen;
+        self.seen.view.commissioned = self.commissioned;
         self.meters = meters;
         self.arm_at_start();
         self.build_pending();

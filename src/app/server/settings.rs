@@ -93,6 +93,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .into_iter()
             .filter(|&axis| changed[index(axis)])
             .collect();
+        self.commissioned = self.draft.in_force().is_commissioned();
         self.pending = changed;
         Ok(Reply::Applied(Applied {
             changed,

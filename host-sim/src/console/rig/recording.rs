@@ -94,7 +94,7 @@ impl Shape<'_> {
 #[cfg(test)]
 mod tests {
     use quadrant::safety::AxisName;
-    use quadrant::settings::x_axis;
+    use quadrant::settings::presets::x_axis;
     use quadrant::telemetry::{AxisSignal, Channel};
 
     use super::*;
