@@ -1,4 +1,4 @@
-//! The settings of one axis.
+//! The settings of one axis. Ranges, defaults and meanings stand in [the table](super::leaves).
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
@@ -19,39 +19,39 @@ use crate::law::friction::stribeck::StaticFriction;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct AxisSettings {
-    /// The encoder.
+    /// Encoder.
     pub encoder: EncoderSettings,
-    /// The amplifier and the converter that drives it.
+    /// Amplifier, and the converter that drives it.
     pub amplifier: AmplifierSettings,
-    /// The feedback law.
+    /// Feedback law and its parameters.
     pub feedback: FeedbackSettings,
-    /// The friction models that the feedforward uses.
+    /// Friction models that the feedforward uses.
     pub friction: FrictionSettings,
-    /// The feedforward.
+    /// Friction and inertia feedforward.
     pub feedforward: FeedforwardSettings,
-    /// What the axis may do.
+    /// Limits of motion, tracking error and encoder signal.
     pub limits: LimitSettings,
-    /// How the axis finds out where it is; none: it cannot be homed.
+    /// Homing; none: the axis cannot be homed.
     #[serde(default)]
     pub homing: Option<HomingSettings>,
     /// The linear model of the axis, if known: with it, the nonlinear gain is held to the Popov bound.
     pub plant: Option<PlantModel>,
 }
 
-/// An incremental encoder.
+/// An incremental encoder and its hardware counter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct EncoderSettings {
-    /// Length of one count, mm; 1e-6 to 1.
+    /// Length of one count, mm.
     pub resolution_mm: f64,
-    /// Width of the hardware counter: 8 to 32.
+    /// Width of the hardware counter, bits.
     pub counter_bits: u8,
-    /// The counter runs backwards when the axis moves to larger positions.
+    /// True if the counter runs backwards when the axis moves to larger positions.
     pub reversed: bool,
-    /// Counts between neighbouring index pulses, 16 to 1e9; none: the encoder has no index, or its spacing is not known.
+    /// Counts between neighbouring index pulses; none: the encoder has no index, or its spacing is not known.
     #[serde(default)]
     pub counts_per_index: Option<u32>,
-    /// By how many counts an index pulse may be off; at most a quarter of their spacing.
+    /// Distance, either way, by which an index pulse may miss its place, counts.
     #[serde(default = "index_tolerance_counts")]
     pub index_tolerance_counts: u32,
 }
@@ -64,13 +64,13 @@ fn index_tolerance_counts() -> u32 {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct AmplifierSettings {
-    /// Voltage of the converter's largest code, V; 0.1 to 20.
+    /// Voltage of the converter's largest code, V.
     pub full_scale_v: f64,
-    /// Largest output, V; above zero, at most the full scale.
+    /// Output limit, V.
     pub output_limit_v: f64,
-    /// Voltage at which the motor gives no force, V; it is added to every output. Within +-10 % of the full scale.
+    /// Voltage at which the motor gives no force, V; it is added to every output.
     pub offset_v: f64,
-    /// A positive voltage moves the axis to smaller positions.
+    /// True if a positive voltage moves the axis to smaller positions.
     pub reversed: bool,
 }
 
@@ -80,9 +80,9 @@ pub struct AmplifierSettings {
 pub struct FrictionSettings {
     /// The static model, for each sense of motion.
     pub sliding: PerDirection<StaticFriction>,
-    /// The GMS model.
+    /// GMS model: elements and attraction parameter.
     pub gms: GmsParameters,
-    /// What the smoothed GMS has beyond it.
+    /// Parameters of the smoothed GMS beyond those of the GMS.
     #[serde(default)]
     pub smoothed_gms: SmoothedGmsParameters,
     /// Dahl's model; needed by its kind of feedforward alone.
@@ -105,11 +105,11 @@ impl FrictionSettings {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedforwardSettings {
-    /// Which friction models act.
+    /// Friction models that act.
     #[tree(with = miniconf::leaf)]
     pub kind: FeedforwardKind,
-    /// How much of each.
+    /// Shares of the models, and the inertia gain.
     pub gains: FeedforwardGains,
-    /// How far ahead of the feedback's reference the feedforward looks, s: the plant's delay. 0 to 31 control periods.
+    /// Look-ahead of the feedforward over the feedback's reference, s: the plant's delay.
     pub preview_s: f64,
 }

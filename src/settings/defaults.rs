@@ -199,7 +199,7 @@ impl Default for SmoothedGmsParameters {
 }
 
 impl Default for FeedforwardSettings {
-    /// None.
+    /// No friction model and no inertia.
     fn default() -> Self {
         Self {
             kind: FeedforwardKind::None,

@@ -21,12 +21,12 @@ use crate::law::scalar::Scalar;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct FeedbackSettings {
-    /// The law that acts.
+    /// Law in force.
     #[tree(with = miniconf::leaf)]
     pub law: LawKind,
-    /// The integral of any law stays within plus and minus this, V; above zero, at most the output limit.
+    /// Limit of the integral of any law, V, either sign.
     pub integral_limit_v: f64,
-    /// Time constant with which the offset of a bumpless change of settings fades, s; 0.001 to 10.
+    /// Time constant with which the offset of a bumpless change of settings fades, s.
     pub transfer_s: f64,
     /// The gains of PD, PID, N-PID and of the scheduled PID; the derivative's filter is every law's.
     pub pid: PidGains,
@@ -34,11 +34,11 @@ pub struct FeedbackSettings {
     pub nonlinear: Option<NonlinearGain>,
     /// The schedule of the scheduled PID: shares of the PID's gains over the reference's speed.
     pub schedule: Option<GainSchedule>,
-    /// The cascade.
+    /// P/PI cascade.
     pub cascade: Option<CascadeGains>,
-    /// Sliding mode.
+    /// Sliding mode with boundary layer.
     pub sliding_mode: Option<SlidingModeGains>,
-    /// NCTF.
+    /// Nominal characteristic trajectory following.
     pub nctf: Option<NctfGains>,
 }
 

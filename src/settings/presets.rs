@@ -22,6 +22,54 @@ use crate::law::friction::lugre::LugreParameters;
 use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
 use crate::law::friction::{Direction, PerDirection};
 
+/// Linear model of the x axis, chosen so that the thesis' printed margins come out.
+pub const X_PLANT: PlantModel = PlantModel {
+    gain_mm_per_v_s2: 69_390.0,
+    damping_per_s: 144.8,
+    stiffness_per_s2: 166.6,
+    delay_s: 1.20e-3,
+};
+
+/// PID gains of the x axis, designed on that model.
+pub const X_GAINS: PidGains = PidGains {
+    kp_v_per_mm: 1.118,
+    ki_v_per_mm_s: 0.74,
+    kd_v_s_per_mm: 0.005_537,
+    derivative_filter_s: 52e-6,
+};
+
+/// Linear model of the y axis, which carries x and is heavier.
+pub const Y_PLANT: PlantModel = PlantModel {
+    gain_mm_per_v_s2: 61_200.0,
+    damping_per_s: 151.0,
+    stiffness_per_s2: 148.0,
+    delay_s: 1.20e-3,
+};
+
+/// PID gains of the y axis, designed on that model.
+pub const Y_GAINS: PidGains = PidGains {
+    kp_v_per_mm: 1.310,
+    ki_v_per_mm_s: 1.1,
+    kd_v_s_per_mm: 0.006_275,
+    derivative_filter_s: 52e-6,
+};
+
+/// Linear model of the z axis, vertical and counterbalanced.
+pub const Z_PLANT: PlantModel = PlantModel {
+    gain_mm_per_v_s2: 48_500.0,
+    damping_per_s: 172.0,
+    stiffness_per_s2: 205.0,
+    delay_s: 1.30e-3,
+};
+
+/// PID gains of the z axis, designed on that model.
+pub const Z_GAINS: PidGains = PidGains {
+    kp_v_per_mm: 1.669,
+    ki_v_per_mm_s: 1.3,
+    kd_v_s_per_mm: 0.007_301,
+    derivative_filter_s: 52e-6,
+};
+
 /// Parameters that differ from axis to axis.
 struct Parameters {
     plant: PlantModel,
@@ -30,7 +78,6 @@ struct Parameters {
     coulomb_v: f64,
     breakaway_v: f64,
     stribeck_velocity_mm_s: f64,
-    viscous_v_s_per_mm: f64,
     presliding_mm: f64,
     dahl: DahlParameters,
     lugre_stiffness_v_per_mm: f64,
@@ -52,6 +99,8 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             weight,
         })
         .collect();
+    // sigma and B / A: what a run at constant velocity cannot tell apart.
+    let viscous_v_s_per_mm = parameters.plant.damping_per_s / parameters.plant.gain_mm_per_v_s2;
     AxisSettings {
         encoder: EncoderSettings {
             // The screw's lead, 10 mm.
@@ -72,7 +121,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
                     stribeck_velocity_mm_s: parameters.stribeck_velocity_mm_s,
                     exponent: 1.0,
                 },
-                viscous_v_s_per_mm: parameters.viscous_v_s_per_mm,
+                viscous_v_s_per_mm,
             }),
             gms: GmsParameters {
                 elements,
@@ -82,7 +131,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             lugre: Some(LugreParameters {
                 stiffness_v_per_mm: parameters.lugre_stiffness_v_per_mm,
                 // As much damping before sliding as in it.
-                damping_v_s_per_mm: parameters.viscous_v_s_per_mm,
+                damping_v_s_per_mm: viscous_v_s_per_mm,
             }),
             ..FrictionSettings::default()
         },
@@ -120,18 +169,8 @@ fn axis(parameters: &Parameters) -> AxisSettings {
 /// The x axis: the model and the gains of `thesis.md`'s chosen parameters.
 pub fn x_axis() -> AxisSettings {
     axis(&Parameters {
-        plant: PlantModel {
-            gain_mm_per_v_s2: 69_390.0,
-            damping_per_s: 144.8,
-            stiffness_per_s2: 166.6,
-            delay_s: 1.20e-3,
-        },
-        pid: PidGains {
-            kp_v_per_mm: 1.118,
-            ki_v_per_mm_s: 0.74,
-            kd_v_s_per_mm: 0.005_537,
-            derivative_filter_s: 52e-6,
-        },
+        plant: X_PLANT,
+        pid: X_GAINS,
         nonlinear: NonlinearGain {
             rate_per_mm: 15.0,
             range_mm: 0.1,
@@ -139,8 +178,6 @@ pub fn x_axis() -> AxisSettings {
         coulomb_v: 0.120,
         breakaway_v: 0.150,
         stribeck_velocity_mm_s: 1.0,
-        // sigma and B / A: what a run at constant velocity cannot tell apart.
-        viscous_v_s_per_mm: 144.8 / 69_390.0,
         presliding_mm: 0.030,
         dahl: DahlParameters {
             stiffness_v_per_mm: 18.31,
@@ -153,18 +190,8 @@ pub fn x_axis() -> AxisSettings {
 /// The y axis: carries x, so it is heavier.
 pub fn y_axis() -> AxisSettings {
     axis(&Parameters {
-        plant: PlantModel {
-            gain_mm_per_v_s2: 61_200.0,
-            damping_per_s: 151.0,
-            stiffness_per_s2: 148.0,
-            delay_s: 1.20e-3,
-        },
-        pid: PidGains {
-            kp_v_per_mm: 1.310,
-            ki_v_per_mm_s: 1.1,
-            kd_v_s_per_mm: 0.006_275,
-            derivative_filter_s: 52e-6,
-        },
+        plant: Y_PLANT,
+        pid: Y_GAINS,
         nonlinear: NonlinearGain {
             rate_per_mm: 15.0,
             range_mm: 0.1,
@@ -172,7 +199,6 @@ pub fn y_axis() -> AxisSettings {
         coulomb_v: 0.140,
         breakaway_v: 0.170,
         stribeck_velocity_mm_s: 1.2,
-        viscous_v_s_per_mm: 151.0 / 61_200.0,
         presliding_mm: 0.034,
         dahl: DahlParameters {
             stiffness_v_per_mm: 18.33,
@@ -185,18 +211,8 @@ pub fn y_axis() -> AxisSettings {
 /// The z axis: vertical and counterbalanced, with the largest friction.
 pub fn z_axis() -> AxisSettings {
     axis(&Parameters {
-        plant: PlantModel {
-            gain_mm_per_v_s2: 48_500.0,
-            damping_per_s: 172.0,
-            stiffness_per_s2: 205.0,
-            delay_s: 1.30e-3,
-        },
-        pid: PidGains {
-            kp_v_per_mm: 1.669,
-            ki_v_per_mm_s: 1.3,
-            kd_v_s_per_mm: 0.007_301,
-            derivative_filter_s: 52e-6,
-        },
+        plant: Z_PLANT,
+        pid: Z_GAINS,
         nonlinear: NonlinearGain {
             rate_per_mm: 15.0,
             range_mm: 0.1,
@@ -204,7 +220,6 @@ pub fn z_axis() -> AxisSettings {
         coulomb_v: 0.160,
         breakaway_v: 0.200,
         stribeck_velocity_mm_s: 0.9,
-        viscous_v_s_per_mm: 172.0 / 48_500.0,
         presliding_mm: 0.026,
         dahl: DahlParameters {
             stiffness_v_per_mm: 28.17,

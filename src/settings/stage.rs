@@ -11,12 +11,12 @@ use crate::law::reference::MotionSettings;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StageSettings {
-    /// Control rate, Hz; 1000 to 100 000.
+    /// Control rate, Hz.
     pub rate_hz: f64,
-    /// What happens when set points of a stream no longer come.
+    /// Reactions when set points of a stream no longer come.
     #[serde(default)]
     pub streaming: StreamingSettings,
-    /// The axes.
+    /// x, y, z.
     pub axes: [AxisSettings; 3],
 }
 

@@ -1,4 +1,4 @@
-//! What a leaf of the settings can hold, as bytes and as JSON text.
+//! Values of leaves, as bytes and as JSON text.
 //!
 //! The bytes are postcard (<https://postcard.jamesmunns.com/wire-format>), a name as its text. They are what is stored, and
 //! what a firmware should speak: JSON takes 55 KB of its image (`docs/settings-storage.md`).

@@ -1,4 +1,4 @@
-//! Bytes to settings.
+//! Decoding of stored settings.
 
 use core::fmt;
 
@@ -13,7 +13,7 @@ use crate::settings::tree::{TreeError, is_leaf, leaves};
 use crate::settings::value::{KIND_PART, take_bytes};
 use crate::settings::{SettingsError, StageSettings};
 
-/// Why bytes are refused as settings.
+/// Reason why bytes are refused as settings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DecodeError {
     /// They are of another format.

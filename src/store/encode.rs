@@ -1,4 +1,4 @@
-//! Settings to bytes.
+//! Encoding of settings to be stored.
 
 use core::any::Any;
 

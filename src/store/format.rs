@@ -17,14 +17,14 @@ use serde::{Deserialize, Serialize};
 /// The format that is written, and the only one there has been.
 pub const FORMAT: u8 = 1;
 
-/// What a set starts with.
+/// The head of a set.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Head<'a> {
     pub(super) format: u8,
     pub(super) provenance: &'a str,
 }
 
-/// What a record starts with; `axes` is its last byte.
+/// The head of a record; `axes` is its last byte.
 #[derive(Serialize, Deserialize)]
 pub(super) struct RecordHead<'a> {
     pub(super) shared: u8,

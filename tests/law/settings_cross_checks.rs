@@ -3,6 +3,7 @@
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::GmsElement;
 use quadrant::safety::AxisName;
+use quadrant::settings::presets::X_PLANT;
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::with_x;
@@ -86,7 +87,10 @@ fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
         panic!("{reason:?}");
     };
     // (0.5 / Ts)^2 / A.
-    assert!((most - 25e6 / 69_390.0).abs() < 1e-9, "{most}");
+    assert!(
+        (most - 25e6 / X_PLANT.gain_mm_per_v_s2).abs() < 1e-9,
+        "{most}"
+    );
     assert!(text.contains(&format!("{most:.4}")), "{text}");
     let unknown = with_x(|axis| {
         stiff(axis);
@@ -102,7 +106,7 @@ fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
 
 #[test]
 fn bristles_stiffer_than_the_rate_resolves_are_refused() {
-    let most = 25e6 / 69_390.0;
+    let most = 25e6 / X_PLANT.gain_mm_per_v_s2;
     for (expected, stiff) in [
         (
             "friction.dahl.stiffness_v_per_mm",

@@ -47,6 +47,17 @@ fn what_is_contradictory_only_for_a_while_is_accepted() {
     assert_eq!(error.field, "feedback.nctf");
     assert!(draft.is_edited(), "the draft is still there to be mended");
     set(&mut draft, "/axes/x/feedback/nctf", "\"present\"");
+    let Err(ApplyError::Refused(error)) = draft.apply(8) else {
+        panic!("a trajectory that nobody has given");
+    };
+    assert_eq!(error.field, "feedback.nctf.characteristic.error_mm");
+    let points = r#"[{"error_mm":1.2,"velocity_mm_s":250.0}]"#;
+    set(&mut draft, "/axes/x/feedback/nctf/characteristic", points);
+    set(
+        &mut draft,
+        "/axes/x/feedback/nctf/gain_v_s_per_mm",
+        "0.0055",
+    );
     assert_eq!(draft.apply(8), Ok([true, false, false]));
 }
 
@@ -105,7 +116,7 @@ fn the_axes_built_one_by_one_are_those_of_the_stage() {
 #[test]
 fn a_set_that_is_loaded_over_a_draft_concerns_every_axis() {
     let mut draft = draft();
-    draft.settings_mut().set_default();
+    draft.settings_mut().copy_from(&StageSettings::simulated());
     assert_eq!(draft.apply(8), Ok([true; 3]));
 }
 
@@ -137,7 +148,7 @@ fn settings_made_in_place_are_the_default_ones_and_copies_are_the_same() {
     copy.copy_from(&settings);
     assert_eq!(copy, settings);
     copy.set_default();
-    assert_eq!(copy, StageSettings::simulated());
+    assert_eq!(copy, StageSettings::default());
 }
 
 /// The server builds into an axis that was another's.

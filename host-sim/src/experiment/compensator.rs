@@ -57,7 +57,7 @@ pub struct Setup {
 }
 
 impl Setup {
-    /// The ideal stage, and the default settings with its own friction.
+    /// The ideal stage, and its settings with its own friction.
     pub fn matched() -> Self {
         Self::matched_under(StageSettings::simulated())
     }

@@ -38,7 +38,7 @@ pub struct SimulatedRig {
 }
 
 impl SimulatedRig {
-    /// Axis 0 to 2 with `truth`, under the default settings of that axis without feedforward and nonlinear gain; `seed`
+    /// Axis 0 to 2 with `truth`, under the simulated stage's settings of that axis without feedforward and nonlinear gain; `seed`
     /// decides the noise.
     pub fn new(index: usize, truth: AxisTruth, seed: u64) -> Self {
         let mut stage = StageSettings::simulated();

@@ -11,7 +11,7 @@ use super::stage::StageSettings;
 use super::tree::number_at;
 use crate::law::safety::AxisName;
 
-/// Where a check stands.
+/// The axis that a check is about, or the stage.
 #[derive(Clone, Copy)]
 struct Place {
     axis: Option<AxisName>,
