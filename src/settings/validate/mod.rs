@@ -54,7 +54,7 @@ impl StageSettings {
         let of_stage = Place { axis: None };
         let [x, _, _] = &self.axes;
         for rule in &OF_THE_STAGE {
-            of_stage.obey(rule, x, 0.0, self.number_at(rule.field))?;
+            of_stage.check_range(rule, x, 0.0, self.number_at(rule.field))?;
         }
         let period_s = 1.0 / self.rate_hz;
         for (name, axis) in AxisName::ALL.into_iter().zip(&self.axes) {
@@ -66,7 +66,7 @@ impl StageSettings {
 
 impl Place {
     /// Checks a number, if it is there, against its rule.
-    fn obey(
+    fn check_range(
         self,
         rule: &Rule,
         axis: &AxisSettings,
@@ -84,12 +84,12 @@ impl AxisSettings {
     fn validate(&self, at: Place, period_s: f64, elements: usize) -> Result<(), SettingsError> {
         for rule in &OF_AN_AXIS {
             let Some(read) = rule.point else {
-                at.obey(rule, self, period_s, number_at(self, rule.field))?;
+                at.check_range(rule, self, period_s, number_at(self, rule.field))?;
                 continue;
             };
             let numbers = (0..).map_while(|point| read(self, point));
             for number in numbers {
-                at.obey(rule, self, period_s, Some(number))?;
+                at.check_range(rule, self, period_s, Some(number))?;
             }
         }
         self.validate_homing(at)?;
