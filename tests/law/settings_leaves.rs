@@ -234,3 +234,31 @@ fn each_name_is_understood_and_each_flag_is_one() {
         }
     }
 }
+
+#[test]
+fn the_default_of_every_number_is_the_one_that_the_table_says() {
+    let mut made = StageSettings::default();
+    for path in paths(&StageSettings::simulated(), "/axes/x") {
+        if is_part(&path) {
+            made.set_json(&path, b"\"present\"").expect("a part");
+        }
+    }
+    for leaf in all() {
+        let Range::Number(..) = leaf.range else {
+            continue;
+        };
+        let path = leaf.path().replacen('*', "0", 1);
+        let value = match path.split_once("/*/") {
+            None => get(&made, &path)
+                .expect("a leaf")
+                .parse()
+                .expect("a number"),
+            Some((list, name)) => {
+                let points: Value =
+                    serde_json::from_str(&get(&made, list).expect("a list")).expect("JSON");
+                points[0][name].as_f64().expect("a number")
+            }
+        };
+        assert_eq!(leaf.default, value, "{path}");
+    }
+}
