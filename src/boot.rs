@@ -126,8 +126,8 @@ struct Loaded<S: Scalar, F> {
     fault: Option<FaultCode>,
 }
 
-/// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults.
-/// They have been checked then.
+/// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults, on
+/// which the outputs are not enabled. They have been checked then.
 ///
 /// # Panics
 /// When a job cannot be decoded or is refused: then there is nothing that could safely be run.
@@ -158,10 +158,11 @@ fn load<S: Scalar, F: NorFlash>(
                     defmt::error!("stored settings refused: {}", defmt::Display2Format(&error));
                     fault = Some(FaultCode::SettingsInvalid);
                 }
-                _ => defmt::info!("no settings are stored: the defaults are in force, or a host's"),
+                _ => defmt::info!("no settings are stored"),
             }
             let plan = take(board::job(), Some(settings));
             built(settings.validate(FIRMWARE_ELEMENTS));
+            log::not_commissioned(settings);
             plan
         }
     };

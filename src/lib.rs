@@ -44,8 +44,8 @@
 //! use quadrant::settings::StageSettings;
 //! use quadrant::stage::{Inputs, Stage, StageState};
 //!
-//! let stage: Stage<f32> = StageSettings::default().build()?;
-//! let plan = PerAxis::from_fn(|_| Motion::Hold);
+//! let stage: Stage<f32> = StageSettings::simulated().build()?;
+//! let plan = [Motion::Hold, Motion::Hold, Motion::Hold];
 //! let mut state = StageState::default();
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
 //! assert!(stage.tick(&plan, &mut state, &enable).enabled);

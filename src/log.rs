@@ -69,6 +69,15 @@ pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance:
     );
 }
 
+/// Warns if the settings in force are the default ones, and says what to do.
+pub(crate) fn not_commissioned(settings: &StageSettings) {
+    if !settings.is_commissioned() {
+        defmt::warn!(
+            "not commissioned: no axis has a law, the outputs stay off; run `quadrant commission`, or load settings and store them"
+        );
+    }
+}
+
 /// Counts an entry that found no room.
 pub(crate) fn lose_line() {
     LOST.store(

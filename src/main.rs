@@ -90,6 +90,8 @@ mod app {
     static POLLS: AtomicU32 = AtomicU32::new(0);
     /// True if the host whose set points the axes follow has fallen silent.
     static LINK_LOST: AtomicBool = AtomicBool::new(false);
+    /// Somebody has given the settings in force.
+    static COMMISSIONED: AtomicBool = AtomicBool::new(false);
 
     defmt::timestamp!("{=u32:010}", TICK.load(Ordering::Relaxed));
 
@@ -162,6 +164,7 @@ mod app {
         let (lines_in, lines_out) = cx.local.lines.split();
         board.tick.start(rate_hz);
         board.watchdog.start();
+        COMMISSIONED.store(server.is_commissioned(), Ordering::Relaxed);
         let local = Local {
             control,
             server,
@@ -260,7 +263,8 @@ mod app {
     async fn supervise(mut cx: supervise::Context) {
         while let Some(snapshot) = cx.local.snapshots_out.dequeue() {
             let request = cx.local.requests_out.dequeue();
-            let supervised = cx.local.supervision.run(&snapshot, request);
+            let commissioned = COMMISSIONED.load(Ordering::Relaxed);
+            let supervised = cx.local.supervision.run(&snapshot, request, commissioned);
             if let Some(command) = supervised.command {
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
@@ -314,6 +318,7 @@ mod app {
         };
         let poll = cx.local.server.poll(cx.local.serial, &seen, timing);
         LINK_LOST.store(cx.local.server.link_lost(), Ordering::Relaxed);
+        COMMISSIONED.store(cx.local.server.is_commissioned(), Ordering::Relaxed);
         cx.local.event_logger.log(cx.local.server, &seen, timing);
         if poll == Poll::Reboot {
             defmt::info!("restart, as a host has asked");

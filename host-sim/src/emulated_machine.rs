@@ -8,19 +8,26 @@ use std::collections::VecDeque;
 
 use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::lockstep::{
-    FLASH, FLASH_BYTES, InputRecord, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT,
-    LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
+    FLASH, FLASH_BYTES, InputRecord, Job, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN,
+    LINK_OUT, LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
 };
 use quadrant::safety::Switches;
-use quadrant::settings::StageSettings;
+use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 
 use crate::emulator::{EmulatorError, Lockstep, Memory, Program};
 use crate::plant::{SimulatedStage, StageTruth};
 use crate::simulated_machine::{OFF_TICKS, PORT_BYTES};
 
-/// The job that leaves the firmware its own defaults.
-const NO_JOB: &[u8] = &[];
+/// Settings of a machine whose flash is empty: the simulated stage's, without a motion.
+fn first_job() -> Vec<u8> {
+    let job = Job {
+        stage: StageSettings::simulated(),
+        plan: PlanSettings::default(),
+    };
+    // Plain data: it cannot fail.
+    postcard::to_allocvec(&job).unwrap_or_default()
+}
 
 /// The firmware's image on the simulated stage.
 pub struct EmulatedMachine {
@@ -54,12 +61,12 @@ impl EmulatedMachine {
         }
         let memory = Memory::create()?;
         memory.write(FLASH, &inverted(flash))?;
-        memory.prepare(Mode::Lockstep, 0, NO_JOB)?;
+        memory.prepare(Mode::Lockstep, 0, &first_job())?;
         let port = HostPort::default();
         port.reset(&memory)?;
         Ok(Self {
             lockstep: Lockstep::start(program, memory, |_| {})?,
-            plant: SimulatedStage::new(truth, StageSettings::default().rate_hz, seed),
+            plant: SimulatedStage::new(truth, StageSettings::simulated().rate_hz, seed),
             port,
             outputs: Outputs::default(),
             pressed: Switches::NONE,
@@ -170,7 +177,7 @@ impl EmulatedMachine {
             ..HostPort::default()
         };
         self.port.reset(self.lockstep.memory())?;
-        self.lockstep.restart(NO_JOB)
+        self.lockstep.restart(&first_job())
     }
 
     /// Cuts the supply, lets the stage coast, and switches it on again: what is in flash stays.

@@ -4,7 +4,7 @@ use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
 use quadrant::settings::{PlanSettings, StageSettings};
 
-/// A circle in XY and a sine in Z, without an end, on the default settings: all axes move, and reverse, at different
+/// A circle in XY and a sine in Z, without an end, on the simulated stage's settings: all axes move, and reverse, at different
 /// times. `lead_s` is the duration of the lead-in, s.
 pub fn circle_and_sine(lead_s: f64) -> Job {
     const RADIUS_MM: f64 = 30.0;
@@ -25,7 +25,7 @@ pub fn circle_and_sine(lead_s: f64) -> Job {
         }
     }
     Job {
-        stage: StageSettings::default(),
+        stage: StageSettings::simulated(),
         plan: PlanSettings { motions },
     }
 }

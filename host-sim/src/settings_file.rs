@@ -1,5 +1,4 @@
-//! The settings of a stage as a file: what a commissioning leaves, and what replays, comparisons and the firmware start
-//! from.
+//! The settings of a stage as a file: the result of commissioning, and the start of replays, comparisons and the firmware.
 //!
 //! TOML, with the names and units of [`StageSettings`], and above them where the numbers come from. A file is checked
 //! as a whole, against the firmware's own rules and its room for GMS elements.
@@ -13,13 +12,13 @@ use serde::{Deserialize, Serialize};
 /// Form of the file; a file of another form is refused.
 const FORM: u32 = 1;
 
-/// A stage's settings and where they come from.
+/// A stage's settings and their origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SettingsFile {
     /// Form of the file: 1.
     form: u32,
-    /// Source of the numbers, newest last.
+    /// Origin of the numbers, newest last.
     #[serde(default)]
     pub provenance: Vec<Provenance>,
     /// The settings.
@@ -38,17 +37,17 @@ pub struct Provenance {
     pub axis: String,
     /// The recordings that it worked on, and what each was for.
     pub records: Vec<String>,
-    /// Parts of the settings that it set.
+    /// Settings that it set.
     pub sets: Vec<String>,
 }
 
-/// Reason that a settings file cannot be used, or written.
+/// Reason why a settings file cannot be used, or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsFileError {
     /// The file cannot be read or written.
     #[error("{}: {source}", path.display())]
     Io {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Cause.
         source: std::io::Error,
@@ -56,15 +55,15 @@ pub enum SettingsFileError {
     /// It is no TOML, a field is missing, misspelt, or of the wrong type.
     #[error("{}: {source}", path.display())]
     Syntax {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Place and error.
+        /// Line and cause.
         source: Box<toml::de::Error>,
     },
     /// It cannot be expressed as TOML.
     #[error("{}: {source}", path.display())]
     Serialise {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Cause.
         source: toml::ser::Error,
@@ -72,15 +71,15 @@ pub enum SettingsFileError {
     /// It is of a form that this program does not know.
     #[error("{}: form {form} of the settings file; this program reads form {FORM}", path.display())]
     Form {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Its form.
+        /// Form that the file names.
         form: u32,
     },
     /// A value is refused.
     #[error("{}: {source}", path.display())]
     Refused {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The field and what is allowed.
         source: SettingsError,
@@ -170,7 +169,7 @@ mod tests {
                 records: vec!["frf.csv".to_owned()],
                 sets: vec!["plant".to_owned()],
             }],
-            ..SettingsFile::new(StageSettings::default())
+            ..SettingsFile::new(StageSettings::simulated())
         }
     }
 

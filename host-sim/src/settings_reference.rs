@@ -4,38 +4,50 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{Bound, LeafInfo, Range, all};
+use quadrant::settings::leaves::{Bound, LeafInfo, Range, UNSET, all};
 use quadrant::settings::tree::is_part;
 use serde_json::Value;
 
-/// What a row of the reference says of a leaf, or of a number of a list's points.
+/// A row of the reference: a leaf, or a number of a list's points.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Row {
     /// Its path, with `*` for the axis and for the point of a list.
-    pub path: &'static str,
+    pub path: String,
     /// Its unit; empty for none.
     pub unit: &'static str,
-    /// What it may be, in words.
+    /// Its range, in words.
     pub range: String,
-    /// Its default: one for all axes, or those of x, y and z; of a list's points, of each point.
+    /// Its default; of a list's points, of each point. Of a number that has none: that it must be given.
     pub default: String,
-    /// What it means.
+    /// Its meaning.
     pub meaning: &'static str,
 }
 
 /// Every setting whose path contains `part`, in the order of the table.
 pub fn rows(part: &str) -> Vec<Row> {
-    let settings = StageSettings::default();
+    let settings = with_every_part();
     all()
-        .filter(|leaf| leaf.path.contains(part))
-        .map(|leaf| Row {
-            path: leaf.path,
+        .map(|leaf| (leaf, leaf.path().as_str().to_owned()))
+        .filter(|(_, path)| path.contains(part))
+        .map(|(leaf, path)| Row {
             unit: leaf.unit,
             range: range(leaf),
-            default: default(&settings, leaf.path),
+            default: default(&settings, leaf, &path),
             meaning: leaf.meaning,
+            path,
         })
         .collect()
+}
+
+/// The default settings, with the parts that may be left out made.
+fn with_every_part() -> StageSettings {
+    let mut settings = StageSettings::simulated();
+    for part in parts() {
+        // Every part can be made.
+        let made = settings.set_json(&part.replacen('*', "0", 1), b"\"present\"");
+        debug_assert!(made.is_ok());
+    }
+    settings
 }
 
 /// A number as briefly as it goes.
@@ -50,7 +62,9 @@ fn number(value: f64) -> String {
 fn bound(bound: Bound) -> String {
     match bound {
         Bound::At(value) => number(value),
-        Bound::Of(words, _) => words.to_owned(),
+        Bound::Times(1.0, words, _) => words.to_owned(),
+        Bound::Times(factor, words, _) => format!("{} x {words}", number(factor)),
+        Bound::AtMost(most, words, _) => format!("{} or {words}, the smaller", number(most)),
     }
 }
 
@@ -63,27 +77,19 @@ fn range(leaf: &LeafInfo) -> String {
     }
 }
 
-/// The default of a leaf in words, for one axis after the other unless they agree.
-fn default(settings: &StageSettings, path: &str) -> String {
-    let (list, name) = match path
-        .split_once("/*/")
-        .filter(|_| path.matches('*').count() > 1)
+/// The default of a leaf in words.
+fn default(settings: &StageSettings, leaf: &LeafInfo, path: &str) -> String {
+    if let Range::Number(least, _) = leaf.range
+        && leaf.default == UNSET
+        && least.value(settings, 0) > UNSET
     {
-        // The first star is the axis.
-        Some((axes, below)) => match below.split_once("/*/") {
-            Some((list, name)) => (format!("{axes}/*/{list}"), Some(name)),
-            None => (path.to_owned(), None),
-        },
-        None => (path.to_owned(), None),
-    };
-    let mut defaults: Vec<String> = ["0", "1", "2"]
-        .iter()
-        .map(|axis| spoken(&json(settings, &list.replacen('*', axis, 1)), name))
-        .collect();
-    if defaults.iter().all(|default| *default == defaults[0]) {
-        defaults.truncate(1);
+        return "must be given".to_owned();
     }
-    defaults.join(" / ")
+    let path = path.replacen('*', "0", 1);
+    match path.split_once("/*/") {
+        Some((list, name)) => spoken(&json(settings, list), Some(name)),
+        None => spoken(&json(settings, &path), None),
+    }
 }
 
 fn json(settings: &StageSettings, path: &str) -> Value {
@@ -115,7 +121,7 @@ fn spoken(value: &Value, name: Option<&str>) -> String {
 /// The parts of an axis that may be left out, with `*` for the axis.
 fn parts() -> BTreeSet<String> {
     let mut parts = BTreeSet::new();
-    let listed = StageSettings::default().list("/axes/x", &mut |path| {
+    let listed = StageSettings::simulated().list("/axes/x", &mut |path| {
         if is_part(path) {
             parts.insert(path.replacen("/axes/0", "/axes/*", 1));
         }
@@ -159,7 +165,7 @@ pub fn markdown() -> String {
 fn table(page: &mut String, heading: &str, rows: &[Row]) {
     let _ = write!(
         page,
-        "\n## {heading}\n\n| path | unit | range | default (x / y / z) | meaning |\n|---|---|---|---|---|\n"
+        "\n## {heading}\n\n| path | unit | range | default | meaning |\n|---|---|---|---|---|\n"
     );
     for row in rows {
         let _ = writeln!(
@@ -176,8 +182,11 @@ const INTRODUCTION: &str = "\
 Made by `quadrant settings --markdown` from the table in `src/settings/leaves`; a test says when this page is stale.
 
 Every setting has a path. `*` stands for the axis, `x`, `y` or `z` (or 0, 1, 2), and for a point of a list: a list is one
-value, and its points' numbers are below it here only to be explained. Values are JSON. The defaults are those of the
-simulated stage, chosen and not measured (see [parameters.md](parameters.md)).
+value, and its points' numbers are below it here only to be explained. Values are JSON.
+
+The defaults are those of a board that nobody has commissioned: they hold no law, and the outputs are not enabled on them
+(`quadrant commission` finds an axis' settings). The simulated stage's own settings are in
+[parameters.md](parameters.md).
 
 A set of settings is checked as a whole before it takes effect. Beyond the ranges below: the law that acts and the kind of
 feedforward have their parameters; with a plant, the loop is stable at small errors and the nonlinear gain stays within its
@@ -185,8 +194,8 @@ Popov bound, and pre-sliding springs are resolved at the control rate; the weigh
 points of lists rise; the Stribeck curve is smooth enough for its table. `rate_hz` and the encoders change with a restart.
 How a set is stored is in [settings-storage.md](settings-storage.md).
 
-A part that may be left out reads `\"present\"` or `null` at its own path. `null` removes it; `\"present\"` makes it, with
-the default axis' values.
+A part that may be left out is left out by default. It reads `\"present\"` or `null` at its own path. `null` removes it;
+`\"present\"` makes it, with the defaults below; a number that must be given is refused by name until it is.
 ";
 
 #[cfg(test)]
@@ -217,9 +226,11 @@ mod tests {
         let found = rows("kp_v_per_mm");
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].range, "0 to 10000");
-        assert_eq!(found[0].default, "1.118 / 1.31 / 1.669");
-        assert_eq!(rows("elements/*/weight")[0].default, "0.3, 0.3, 0.25, 0.15");
-        assert_eq!(rows("/feedback/schedule")[0].default, "2 points");
+        assert_eq!(found[0].default, "0");
+        assert_eq!(rows("plant/gain")[0].default, "must be given");
+        assert_eq!(rows("elements/*/weight")[0].default, "1");
+        assert_eq!(rows("/feedback/schedule")[0].default, "1 point");
+        assert_eq!(rows("preview_s")[0].range, "0 to 30 x the control period");
         assert_eq!(rows("resolution_mm")[0].range, "1e-6 to 1");
     }
 }

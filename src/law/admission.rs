@@ -28,6 +28,8 @@ pub struct StageView {
     pub injection_ready: bool,
     /// A voltage is being injected.
     pub injecting: bool,
+    /// The settings are those of a commissioning, or of a host. The law cannot tell: the application says so.
+    pub commissioned: bool,
 }
 
 /// Reason why a command is not acted on.
@@ -55,6 +57,8 @@ pub enum Refusal {
     NoInjection,
     /// A voltage is being injected.
     Injecting,
+    /// The settings are the default ones, which hold no law.
+    NotCommissioned,
 }
 
 impl Refusal {
@@ -74,6 +78,9 @@ impl Refusal {
                 "there is no injection to begin; open it again and send its first values"
             }
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
+            Self::NotCommissioned => {
+                "not commissioned: no axis has a law; run `quadrant commission`, or load a settings file"
+            }
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(interlock) => match interlock.code {
                 FaultCode::EmergencyStop => "the emergency stop is pressed; release it",
@@ -127,6 +134,7 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
             view.interlock.map(Refusal::BadInput)
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
+        Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
         Command::Enable => None,
         _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
         Command::Run | Command::StartStream | Command::StartInjection if view.running => {

@@ -7,7 +7,7 @@
 //! use quadrant::settings::StageSettings;
 //! use quadrant::stage::{Inputs, Stage, StageState};
 //!
-//! let stage: Stage<f32> = StageSettings::default().build()?;
+//! let stage: Stage<f32> = StageSettings::simulated().build()?;
 //! let plan = PerAxis::from_fn(|_| Motion::Hold);
 //! let mut state = StageState::default();
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
@@ -240,6 +240,7 @@ impl StageView {
             stream_ready: state.axes.iter().all(AxisState::is_stream_ready),
             injection_ready: state.is_injection_ready(),
             injecting: state.is_injecting(),
+            commissioned: true,
         }
     }
 }

@@ -1,247 +1,33 @@
-//! The simulated stage's axes as a control engineer would set them up. Every number is chosen, none measured; see
-//! `docs/parameters.md` for the reasons.
+//! The default settings: those of a board that nobody has commissioned. No gain, no feedforward, moderate limits.
 
 use heapless::Vec;
 
-use super::{
-    AmplifierSettings, AxisSettings, EncoderSettings, FeedbackSettings, FeedforwardSettings,
-    FrictionSettings, HomeSwitch, HomingSettings, LimitSettings, StageSettings, StreamingSettings,
-    TravelSettings,
-};
-use crate::law::control::npid::NonlinearGain;
+use super::axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardSettings};
+use super::feedback::FeedbackSettings;
+use super::leaves::default;
+use super::leaves::rules::OF_AN_AXIS;
+use super::limits::{LimitSettings, LossReaction, StreamingSettings};
+use super::stage::StageSettings;
+use super::tree::number_at;
+use crate::law::control::feedback::LawKind;
 use crate::law::control::pid::PidGains;
-use crate::law::control::plant_model::PlantModel;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::law::friction::dahl::DahlParameters;
+use crate::law::friction::FrictionSettings;
+use crate::law::friction::PerDirection;
 use crate::law::friction::gms::{GmsElement, GmsParameters};
-use crate::law::friction::lugre::LugreParameters;
 use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
 use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
-use crate::law::friction::{Direction, PerDirection};
-
-/// What tells one default axis from another.
-struct Character {
-    plant: PlantModel,
-    pid: PidGains,
-    nonlinear: NonlinearGain,
-    coulomb_v: f64,
-    breakaway_v: f64,
-    stribeck_velocity_mm_s: f64,
-    viscous_v_s_per_mm: f64,
-    presliding_mm: f64,
-    dahl: DahlParameters,
-    lugre_stiffness_v_per_mm: f64,
-}
-
-/// Control rate, Hz.
-const RATE_HZ: f64 = 10e3;
-/// Largest velocity of every axis, mm/s.
-const MAX_VELOCITY_MM_S: f64 = 250.0;
-
-/// Break points of the virgin curve as shares of the pre-sliding range, and the weights that break there.
-const VIRGIN_CURVE: [(f64, f64); 4] = [(0.07, 0.30), (0.20, 0.30), (0.47, 0.25), (1.0, 0.15)];
-
-#[inline(never)]
-fn axis(character: &Character) -> AxisSettings {
-    let elements: Vec<GmsElement, _> = VIRGIN_CURVE
-        .iter()
-        .map(|&(place, weight)| GmsElement {
-            stiffness_v_per_mm: weight * character.breakaway_v / (place * character.presliding_mm),
-            weight,
-        })
-        .collect();
-    AxisSettings {
-        encoder: EncoderSettings {
-            resolution_mm: 5e-4,
-            counter_bits: 32,
-            reversed: false,
-            // The screw's lead, 10 mm.
-            counts_per_index: Some(20_000),
-            index_tolerance_counts: 4,
-        },
-        amplifier: AmplifierSettings {
-            full_scale_v: 10.0,
-            output_limit_v: 10.0,
-            offset_v: 0.0,
-            reversed: false,
-        },
-        feedback: FeedbackSettings::all_laws(
-            character.pid,
-            Some(character.nonlinear),
-            MAX_VELOCITY_MM_S,
-        ),
-        friction: FrictionSettings {
-            sliding: PerDirection::both(StaticFriction {
-                curve: StribeckCurve {
-                    coulomb_v: character.coulomb_v,
-                    breakaway_v: character.breakaway_v,
-                    stribeck_velocity_mm_s: character.stribeck_velocity_mm_s,
-                    exponent: 1.0,
-                },
-                viscous_v_s_per_mm: character.viscous_v_s_per_mm,
-            }),
-            gms: GmsParameters {
-                elements,
-                attraction_v_s: 5.0,
-            },
-            smoothed_gms: SmoothedGmsParameters::default(),
-            dahl: Some(character.dahl),
-            lugre: Some(LugreParameters {
-                stiffness_v_per_mm: character.lugre_stiffness_v_per_mm,
-                // As much damping before sliding as in it.
-                damping_v_s_per_mm: character.viscous_v_s_per_mm,
-            }),
-        },
-        feedforward: FeedforwardSettings {
-            kind: FeedforwardKind::Combined,
-            gains: FeedforwardGains {
-                level: 1.0,
-                viscous: 1.0,
-                gms: 1.0,
-                inertia_v_s2_per_mm: 0.0,
-            },
-            preview_s: character.plant.delay_s,
-        },
-        limits: LimitSettings {
-            max_velocity_mm_s: MAX_VELOCITY_MM_S,
-            max_acceleration_mm_s2: 2000.0,
-            max_jerk_mm_s3: 1e5,
-            following_error_mm: 1.0,
-            following_error_lag_s: 2e-3,
-            following_error_max_mm: 1.4,
-            overspeed_ratio: 1.2,
-            braking_mm_s2: 4000.0,
-            braking_jerk_mm_s3: 1e6,
-            silent_s: 0.1,
-            silent_share: 0.9,
-            travel_mm: Some(TravelSettings {
-                negative: -200.0,
-                positive: 200.0,
-            }),
-        },
-        homing: Some(HomingSettings {
-            direction: Direction::Negative,
-            switch: HomeSwitch::Home,
-            search_mm_s: 20.0,
-            latch_mm_s: 2.0,
-            debounce_s: 5e-4,
-            index: true,
-            mark_mm: -36.0,
-            park_mm: 0.0,
-            travel_mm: 410.0,
-        }),
-        plant: Some(character.plant),
-    }
-}
-
-/// The x axis: the model and the gains of `thesis.md`'s chosen parameters.
-pub fn x_axis() -> AxisSettings {
-    axis(&Character {
-        plant: PlantModel {
-            gain_mm_per_v_s2: 69_390.0,
-            damping_per_s: 144.8,
-            stiffness_per_s2: 166.6,
-            delay_s: 1.20e-3,
-        },
-        pid: PidGains {
-            kp_v_per_mm: 1.118,
-            ki_v_per_mm_s: 0.74,
-            kd_v_s_per_mm: 0.005_537,
-            derivative_filter_s: 52e-6,
-        },
-        nonlinear: NonlinearGain {
-            rate_per_mm: 15.0,
-            range_mm: 0.1,
-        },
-        coulomb_v: 0.120,
-        breakaway_v: 0.150,
-        stribeck_velocity_mm_s: 1.0,
-        // sigma and B / A: what a run at constant velocity cannot tell apart.
-        viscous_v_s_per_mm: 144.8 / 69_390.0,
-        presliding_mm: 0.030,
-        dahl: DahlParameters {
-            stiffness_v_per_mm: 18.31,
-            exponent: 1.0,
-        },
-        lugre_stiffness_v_per_mm: 18.03,
-    })
-}
-
-/// The y axis: carries x, so it is heavier.
-pub fn y_axis() -> AxisSettings {
-    axis(&Character {
-        plant: PlantModel {
-            gain_mm_per_v_s2: 61_200.0,
-            damping_per_s: 151.0,
-            stiffness_per_s2: 148.0,
-            delay_s: 1.20e-3,
-        },
-        pid: PidGains {
-            kp_v_per_mm: 1.310,
-            ki_v_per_mm_s: 1.1,
-            kd_v_s_per_mm: 0.006_275,
-            derivative_filter_s: 52e-6,
-        },
-        nonlinear: NonlinearGain {
-            rate_per_mm: 15.0,
-            range_mm: 0.1,
-        },
-        coulomb_v: 0.140,
-        breakaway_v: 0.170,
-        stribeck_velocity_mm_s: 1.2,
-        viscous_v_s_per_mm: 151.0 / 61_200.0,
-        presliding_mm: 0.034,
-        dahl: DahlParameters {
-            stiffness_v_per_mm: 18.33,
-            exponent: 1.0,
-        },
-        lugre_stiffness_v_per_mm: 18.03,
-    })
-}
-
-/// The z axis: vertical and counterbalanced, with the largest friction.
-pub fn z_axis() -> AxisSettings {
-    axis(&Character {
-        plant: PlantModel {
-            gain_mm_per_v_s2: 48_500.0,
-            damping_per_s: 172.0,
-            stiffness_per_s2: 205.0,
-            delay_s: 1.30e-3,
-        },
-        pid: PidGains {
-            kp_v_per_mm: 1.669,
-            ki_v_per_mm_s: 1.3,
-            kd_v_s_per_mm: 0.007_301,
-            derivative_filter_s: 52e-6,
-        },
-        nonlinear: NonlinearGain {
-            rate_per_mm: 15.0,
-            range_mm: 0.1,
-        },
-        coulomb_v: 0.160,
-        breakaway_v: 0.200,
-        stribeck_velocity_mm_s: 0.9,
-        viscous_v_s_per_mm: 172.0 / 48_500.0,
-        presliding_mm: 0.026,
-        dahl: DahlParameters {
-            stiffness_v_per_mm: 28.17,
-            exponent: 1.0,
-        },
-        lugre_stiffness_v_per_mm: 27.74,
-    })
-}
 
 impl StageSettings {
     /// Takes the [default](Self::default) settings over, in place.
     // Axis by axis: the firmware's stack has no room for a whole set.
     #[inline(never)]
     pub fn set_default(&mut self) {
-        self.rate_hz = RATE_HZ;
+        self.rate_hz = default!("rate_hz");
         self.streaming = StreamingSettings::default();
-        let [x, y, z] = &mut self.axes;
-        *x = x_axis();
-        *y = y_axis();
-        *z = z_axis();
+        for axis in &mut self.axes {
+            *axis = AxisSettings::default();
+        }
     }
 
     /// Takes other settings over, in place.
@@ -258,15 +44,190 @@ impl StageSettings {
             axis.clone_from(other);
         }
     }
+
+    /// True if somebody has given at least one axis numbers of its own. The default settings hold no law: outputs are not
+    /// enabled on them.
+    pub fn is_commissioned(&self) -> bool {
+        self.axes.iter().any(AxisSettings::differs_from_default)
+    }
+}
+
+impl AxisSettings {
+    /// True if a number is another than its default.
+    fn differs_from_default(&self) -> bool {
+        OF_AN_AXIS.iter().any(|rule| {
+            let number = match rule.point {
+                Some(read) => read(self, 0),
+                None => number_at(self, rule.field),
+            };
+            number.is_some_and(|number| number != rule.default)
+        })
+    }
 }
 
 impl Default for StageSettings {
-    /// The simulated XYZ stage at 10 kHz, N-PID with combined feedforward.
+    /// A stage that nobody has commissioned, at 10 kHz.
     fn default() -> Self {
         Self {
-            rate_hz: RATE_HZ,
+            rate_hz: default!("rate_hz"),
             streaming: StreamingSettings::default(),
-            axes: [x_axis(), y_axis(), z_axis()],
+            axes: core::array::from_fn(|_| AxisSettings::default()),
+        }
+    }
+}
+
+impl Default for StreamingSettings {
+    fn default() -> Self {
+        Self {
+            link_lost: LossReaction::Stop,
+            underrun: LossReaction::Stop,
+        }
+    }
+}
+
+impl Default for AxisSettings {
+    /// An axis that nobody has commissioned: no gain, no feedforward, no homing, no model.
+    #[inline(never)]
+    fn default() -> Self {
+        Self {
+            encoder: EncoderSettings::default(),
+            amplifier: AmplifierSettings::default(),
+            feedback: FeedbackSettings::default(),
+            friction: FrictionSettings::default(),
+            feedforward: FeedforwardSettings::default(),
+            limits: LimitSettings::default(),
+            homing: None,
+            plant: None,
+        }
+    }
+}
+
+impl Default for EncoderSettings {
+    fn default() -> Self {
+        Self {
+            resolution_mm: default!("encoder.resolution_mm"),
+            counter_bits: default!("encoder.counter_bits") as u8,
+            reversed: false,
+            counts_per_index: None,
+            index_tolerance_counts: default!("encoder.index_tolerance_counts") as u32,
+        }
+    }
+}
+
+impl Default for AmplifierSettings {
+    fn default() -> Self {
+        Self {
+            full_scale_v: default!("amplifier.full_scale_v"),
+            output_limit_v: default!("amplifier.output_limit_v"),
+            offset_v: default!("amplifier.offset_v"),
+            reversed: false,
+        }
+    }
+}
+
+impl Default for FeedbackSettings {
+    /// A PID whose gains are zero.
+    fn default() -> Self {
+        Self {
+            law: LawKind::Pid,
+            integral_limit_v: default!("feedback.integral_limit_v"),
+            transfer_s: default!("feedback.transfer_s"),
+            pid: PidGains {
+                kp_v_per_mm: default!("feedback.pid.kp_v_per_mm"),
+                ki_v_per_mm_s: default!("feedback.pid.ki_v_per_mm_s"),
+                kd_v_s_per_mm: default!("feedback.pid.kd_v_s_per_mm"),
+                derivative_filter_s: default!("feedback.pid.derivative_filter_s"),
+            },
+            nonlinear: None,
+            schedule: None,
+            cascade: None,
+            sliding_mode: None,
+            nctf: None,
+        }
+    }
+}
+
+impl Default for FrictionSettings {
+    /// As little friction as there can be.
+    fn default() -> Self {
+        Self {
+            sliding: PerDirection {
+                positive: StaticFriction {
+                    curve: StribeckCurve {
+                        coulomb_v: default!("friction.sliding.positive.curve.coulomb_v"),
+                        breakaway_v: default!("friction.sliding.positive.curve.breakaway_v"),
+                        stribeck_velocity_mm_s: default!(
+                            "friction.sliding.positive.curve.stribeck_velocity_mm_s"
+                        ),
+                        exponent: default!("friction.sliding.positive.curve.exponent"),
+                    },
+                    viscous_v_s_per_mm: default!("friction.sliding.positive.viscous_v_s_per_mm"),
+                },
+                negative: StaticFriction {
+                    curve: StribeckCurve {
+                        coulomb_v: default!("friction.sliding.negative.curve.coulomb_v"),
+                        breakaway_v: default!("friction.sliding.negative.curve.breakaway_v"),
+                        stribeck_velocity_mm_s: default!(
+                            "friction.sliding.negative.curve.stribeck_velocity_mm_s"
+                        ),
+                        exponent: default!("friction.sliding.negative.curve.exponent"),
+                    },
+                    viscous_v_s_per_mm: default!("friction.sliding.negative.viscous_v_s_per_mm"),
+                },
+            },
+            gms: GmsParameters {
+                elements: Vec::from_iter([GmsElement {
+                    stiffness_v_per_mm: default!("friction.gms.elements.stiffness_v_per_mm"),
+                    weight: default!("friction.gms.elements.weight"),
+                }]),
+                attraction_v_s: default!("friction.gms.attraction_v_s"),
+            },
+            smoothed_gms: SmoothedGmsParameters::default(),
+            dahl: None,
+            lugre: None,
+        }
+    }
+}
+
+impl Default for SmoothedGmsParameters {
+    fn default() -> Self {
+        Self {
+            width: default!("friction.smoothed_gms.width"),
+        }
+    }
+}
+
+impl Default for FeedforwardSettings {
+    /// No friction model and no inertia.
+    fn default() -> Self {
+        Self {
+            kind: FeedforwardKind::None,
+            gains: FeedforwardGains {
+                level: default!("feedforward.gains.level"),
+                viscous: default!("feedforward.gains.viscous"),
+                gms: default!("feedforward.gains.gms"),
+                inertia_v_s2_per_mm: default!("feedforward.gains.inertia_v_s2_per_mm"),
+            },
+            preview_s: default!("feedforward.preview_s"),
+        }
+    }
+}
+
+impl Default for LimitSettings {
+    fn default() -> Self {
+        Self {
+            max_velocity_mm_s: default!("limits.max_velocity_mm_s"),
+            max_acceleration_mm_s2: default!("limits.max_acceleration_mm_s2"),
+            max_jerk_mm_s3: default!("limits.max_jerk_mm_s3"),
+            following_error_mm: default!("limits.following_error_mm"),
+            following_error_lag_s: default!("limits.following_error_lag_s"),
+            following_error_max_mm: default!("limits.following_error_max_mm"),
+            overspeed_ratio: default!("limits.overspeed_ratio"),
+            braking_mm_s2: default!("limits.braking_mm_s2"),
+            braking_jerk_mm_s3: default!("limits.braking_jerk_mm_s3"),
+            silent_s: default!("limits.silent_s"),
+            silent_share: default!("limits.silent_share"),
+            travel_mm: None,
         }
     }
 }

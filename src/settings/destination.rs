@@ -1,14 +1,16 @@
-//! What a request to move comes to under the settings: checked before anything moves. For the slow half.
+//! Requests to move, checked against the settings before anything moves. For the slow half.
 
 use core::fmt;
 
-use super::{AxisSettings, StageSettings};
+use super::axis::AxisSettings;
+use super::leaves::limits::LONGEST_TRAVEL_MM;
+use super::stage::StageSettings;
 use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
 use crate::law::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
 use crate::law::units::Position;
 
-/// Why an axis is not moved.
+/// Reason why an axis is not moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum MoveFlaw {
     /// The axis does not know where it is.
@@ -17,16 +19,16 @@ pub enum MoveFlaw {
     NoHoming,
     /// The destination lies beyond the travel.
     BeyondTravel {
-        /// Where the axis was to go, mm.
+        /// Requested position, mm.
         target_mm: f64,
         /// The travel's ends, mm.
         travel_mm: (f64, f64),
     },
     /// The velocity is not above zero, or above the axis' largest.
     Velocity {
-        /// What was asked for, mm/s.
+        /// Requested velocity, mm/s.
         value_mm_s: f64,
-        /// The largest, mm/s.
+        /// Largest velocity of the axis, mm/s.
         limit_mm_s: f64,
     },
 }
@@ -34,9 +36,9 @@ pub enum MoveFlaw {
 /// A refused request to move an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct MoveError {
-    /// The axis.
+    /// Axis that was to move.
     pub axis: AxisName,
-    /// Why.
+    /// Reason.
     pub flaw: MoveFlaw,
 }
 
@@ -115,7 +117,9 @@ impl StageSettings {
         let travel_mm = limits
             .travel_mm
             .as_ref()
-            .map_or((-1e4, 1e4), |travel| (travel.negative, travel.positive));
+            .map_or((-LONGEST_TRAVEL_MM, LONGEST_TRAVEL_MM), |travel| {
+                (travel.negative, travel.positive)
+            });
         // So written, what is not a number is refused.
         if !(target_mm >= travel_mm.0 && target_mm <= travel_mm.1) {
             return refuse(MoveFlaw::BeyondTravel {
@@ -158,7 +162,7 @@ impl StageSettings {
         Ok(Velocity::from_mm_s(velocity_mm_s, self.scale_of(axis)))
     }
 
-    /// Whether an axis can be homed; asked before [`Command::Home`](crate::law::command::Command::Home), which an axis without
+    /// Checks that an axis can be homed, before [`Command::Home`](crate::law::command::Command::Home), which an axis without
     /// homing ignores.
     ///
     /// # Errors
@@ -173,7 +177,7 @@ impl StageSettings {
         }
     }
 
-    /// What a stream may ask of the axes; the travel holds for those that are homed.
+    /// Limits of streamed set points; the travel holds for axes that are homed.
     pub fn stream_limits(&self, homed: [bool; 3]) -> [StreamLimits; 3] {
         let [x, y, z] = AxisName::ALL;
         let [of_x, of_y, of_z] = homed;

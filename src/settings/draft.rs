@@ -6,8 +6,9 @@
 
 use core::fmt;
 
+use super::error::SettingsError;
+use super::stage::StageSettings;
 use super::tree::TreeError;
-use super::{SettingsError, StageSettings};
 use crate::law::axes::AxisName;
 
 /// A set of settings that is edited leaf by leaf, and the one in force.
@@ -18,7 +19,7 @@ pub struct Draft<'a> {
     touched: [bool; 3],
 }
 
-/// Why a draft does not take effect.
+/// Reason why a draft does not take effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum ApplyError {
     /// It is not valid.
@@ -101,14 +102,14 @@ impl<'a> Draft<'a> {
         Ok(())
     }
 
-    /// What belongs to no axis concerns all of them.
+    /// Marks an axis as changed; all of them for a setting of the stage.
     fn touch(&mut self, axis: Option<usize>) {
         for (index, touched) in self.touched.iter_mut().enumerate() {
             *touched |= axis.is_none_or(|axis| axis == index);
         }
     }
 
-    /// Whether something was written since the draft last took effect.
+    /// True if something was written since the draft last took effect.
     pub fn is_edited(&self) -> bool {
         self.touched.contains(&true)
     }

@@ -1,11 +1,11 @@
-//! What is wrong with a set of settings, in words that say what to change.
+//! Refused settings, in words that say what to change.
 
 use core::fmt;
 
 use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
 
-/// Why a value is refused.
+/// Reason why a value is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Reason {
     /// It is not a finite number.
@@ -21,12 +21,12 @@ pub enum Reason {
     WeightsSum,
     /// More elements than the firmware has room for.
     TooManyElements {
-        /// The room.
+        /// Elements that there is room for.
         room: usize,
     },
     /// The nonlinear gain's largest value exceeds what the Popov criterion allows for the plant and the PID.
     BeyondPopov {
-        /// The bound.
+        /// Largest allowed value of cosh(rate * range).
         bound: f64,
     },
     /// It is not there, and what is chosen needs it.
@@ -58,9 +58,9 @@ pub struct SettingsError {
     pub axis: Option<AxisName>,
     /// Path of the field below the axis or the stage.
     pub field: &'static str,
-    /// What it holds.
+    /// Its value.
     pub value: f64,
-    /// Why that is refused.
+    /// Reason.
     pub reason: Reason,
 }
 

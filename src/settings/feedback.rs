@@ -1,18 +1,46 @@
-//! What becomes of the feedback's settings: the law that acts, and the linear loops it is judged by.
+//! The settings of the feedback law, the law that is built of them, and the linear loops that its stability is judged by.
 
 use heapless::Vec;
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
 
-use super::FeedbackSettings;
+use super::leaves::default;
 use crate::law::control::cascade::{Cascade, CascadeGains};
 use crate::law::control::feedback::{Feedback, LawKind};
 use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
 use crate::law::control::npid::{NonlinearGain, NonlinearGainTable};
 use crate::law::control::pid::Pid;
 use crate::law::control::pid::PidGains;
-use crate::law::control::schedule::{MAX_POINTS, SchedulePoint, ScheduledPid};
+use crate::law::control::schedule::{GainSchedule, MAX_POINTS, SchedulePoint, ScheduledPid};
 use crate::law::control::sliding_mode::{SlidingMode, SlidingModeGains};
 use crate::law::control::surface::SurfaceGains;
 use crate::law::scalar::Scalar;
+
+/// The feedback law, and the parameters of every law that the axis has some for: the law can be changed without losing
+/// them, but only to one that has its own.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct FeedbackSettings {
+    /// Law in force.
+    #[tree(with = miniconf::leaf)]
+    pub law: LawKind,
+    /// Limit of the integral of any law, V, either sign.
+    pub integral_limit_v: f64,
+    /// Time constant with which the offset of a bumpless change of settings fades, s.
+    pub transfer_s: f64,
+    /// The gains of PD, PID, N-PID and of the scheduled PID; the derivative's filter is every law's.
+    pub pid: PidGains,
+    /// The nonlinear gain that makes the PID an N-PID.
+    pub nonlinear: Option<NonlinearGain>,
+    /// The schedule of the scheduled PID: shares of the PID's gains over the reference's speed.
+    pub schedule: Option<GainSchedule>,
+    /// P/PI cascade.
+    pub cascade: Option<CascadeGains>,
+    /// Sliding mode with boundary layer.
+    pub sliding_mode: Option<SlidingModeGains>,
+    /// Nominal characteristic trajectory following.
+    pub nctf: Option<NctfGains>,
+}
 
 /// Output of sliding mode before anybody has chosen it, V: several times the friction of the axes this was written for.
 const SWITCHING_V: f64 = 1.0;
@@ -42,8 +70,8 @@ impl FeedbackSettings {
             } else {
                 LawKind::Pid
             },
-            integral_limit_v: 2.0,
-            transfer_s: 0.05,
+            integral_limit_v: default!("feedback.integral_limit_v"),
+            transfer_s: default!("feedback.transfer_s"),
             pid,
             nonlinear,
             schedule: Some(Vec::from_iter([

@@ -1,10 +1,10 @@
-//! How an axis finds out where it is.
+//! The settings of homing, and homing as it is built of them.
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use super::AxisSettings;
+use super::axis::AxisSettings;
 use crate::law::friction::Direction;
 use crate::law::homing::{Homing, HomingParameters};
 use crate::law::reference::{Approach, MotionScale, Velocity};
@@ -20,40 +20,40 @@ use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
 pub enum HomeSwitch {
-    /// The home switch.
+    /// Home switch.
     Home,
-    /// The limit switch at the end that is searched.
+    /// Limit switch at the end that is searched.
     Limit,
 }
 
-/// How an axis finds out where it is.
+/// Homing of an axis: search of a switch, then of an index pulse.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct HomingSettings {
-    /// Towards which end the switch is searched.
+    /// End of the travel towards which the switch is searched.
     #[tree(with = miniconf::leaf)]
     pub direction: Direction,
-    /// Which switch that is.
+    /// Switch that is searched.
     #[tree(with = miniconf::leaf)]
     pub switch: HomeSwitch,
-    /// Velocity of the search and of the move to the parking position, mm/s; 0.001 to 1000, held to the axis' largest.
+    /// Velocity of the search and of the move after it, mm/s; held to the axis' largest.
     pub search_mm_s: f64,
-    /// Velocity away from the switch, over its edge and to the index pulse, mm/s; 0.001 to that of
-    /// the search.
+    /// Creep velocity, mm/s: off the switch, over its edge and to the index pulse.
     pub latch_mm_s: f64,
-    /// For how long the switch may bounce, s; 0 to 0.1. It also delays what it says.
+    /// Longest bounce of the switch, s; its reading is delayed by as much.
     pub debounce_s: f64,
-    /// The mark is the first index pulse after the switch; else the switch's edge is. Needs `encoder.counts_per_index`.
+    /// True if the reference mark is the first index pulse after the switch, false if it is the switch's edge. Needs
+    /// `encoder.counts_per_index`.
     pub index: bool,
-    /// Position of the mark, mm, rounded to a whole count; within +-1e4.
+    /// Position of the reference mark, mm; rounded to a whole count.
     pub mark_mm: f64,
-    /// Where the axis goes in the end, mm; within +-1e4, held to the travel.
+    /// Position to which the axis moves in the end, mm; held to the travel.
     pub park_mm: f64,
-    /// How far the axis goes for the switch, and off it, before homing fails, mm; one count to 2e4.
+    /// Longest way to the switch, and off it, before homing fails, mm.
     pub travel_mm: f64,
 }
 
-/// How long an axis rests before its origin is defined, s: many times the longest preview at the usual control rates.
+/// Rest of an axis before its origin is defined, s: many times the longest preview at the usual control rates.
 const SETTLE_S: f64 = 0.02;
 
 impl AxisSettings {

@@ -1,30 +1,29 @@
-//! What a request to inject a voltage comes to under the settings. For the slow half.
+//! Requests to inject a voltage, checked against the settings. For the slow half.
 
-use super::{Reason, SettingsError, StageSettings};
+use super::error::{Reason, SettingsError};
+use super::leaves::limits::LONGEST_TRAVEL_MM;
+use super::stage::StageSettings;
 use crate::law::axes::AxisName;
 use crate::law::injection::{Coupling, Injection};
 use crate::law::scalar::Scalar;
 use crate::law::units::{DacCode, Position};
 
-/// What is to be injected, and within which bounds.
+/// A request to inject a voltage, and the bounds that end it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InjectionSettings {
-    /// The axis.
+    /// Axis whose output it is added to.
     pub axis: AxisName,
-    /// The values alone drive the amplifier; the other axes hold.
+    /// True if the values alone drive the amplifier; the other axes hold.
     pub open_loop: bool,
-    /// The plan's motions start with it; in closed loop only.
+    /// True if the plan's motions start with it; in closed loop only.
     pub with_plan: bool,
-    /// The largest magnitude of a value, V; above zero, at most `amplifier.output_limit_v`.
+    /// Largest magnitude of a value, V; above zero, at most `amplifier.output_limit_v`.
     pub limit_v: f64,
-    /// How far the axis may go from where it was, either way, mm; above zero, at most 10 000.
+    /// Largest distance from the position at the start, either way, mm; above zero, at most 10 000.
     pub travel_mm: f64,
-    /// How fast it may be, mm/s; above zero, at most `limits.max_velocity_mm_s`.
+    /// Largest velocity, mm/s; above zero, at most `limits.max_velocity_mm_s`.
     pub max_velocity_mm_s: f64,
 }
-
-/// Farther than any machine's travel, mm.
-const MOST_TRAVEL_MM: f64 = 1e4;
 
 impl StageSettings {
     /// Builds an injection, and says which magnitude of a word its limit is.
@@ -49,7 +48,7 @@ impl StageSettings {
             })
         };
         within("limit_v", request.limit_v, axis.amplifier.output_limit_v)?;
-        within("travel_mm", request.travel_mm, MOST_TRAVEL_MM)?;
+        within("travel_mm", request.travel_mm, LONGEST_TRAVEL_MM)?;
         within(
             "max_velocity_mm_s",
             request.max_velocity_mm_s,

@@ -2,26 +2,25 @@
 //!
 //! A path is `/rate_hz` or `/axes/<axis>/…`, the axis as `x`, `y`, `z` or as 0 to 2: `/axes/x/feedback/pid/kp_v_per_mm`.
 //! Numbers, truth values, names and lists are leaves. Some parts of an axis may be left out ([`is_part`]): such a part
-//! reads as `null` or `"present"`, `null` removes it, and `"present"` makes it, with the default axis' values, unless it is
-//! there already. A leaf that is written is not judged; [`StageSettings::validate`] judges the whole.
+//! reads as `null` or `"present"`, `null` removes it, and `"present"` makes it, with default values, unless it is there
+//! already. A leaf that is written is not checked; [`StageSettings::validate`] checks the whole.
 //!
-//! The same values are had as bytes ([`StageSettings::get_bytes`]), for a firmware that leaves JSON to the host.
+//! The same values are read and written as bytes ([`StageSettings::get_bytes`]), for a firmware that leaves JSON to the
+//! host.
 
 use core::any::Any;
 
-use heapless::String;
-use miniconf::{ConstPath, IntoKeys, KeyError, Keys, NodeIter, TreeAny, TreeSchema, ValueError};
+use miniconf::{
+    ConstPath, ConstPathIter, IntoKeys, KeyError, Keys, NodeIter, TreeAny, TreeSchema, ValueError,
+};
 
+use super::axis::AxisSettings;
 use super::parts::{Part, part_below_axis, part_of};
+use super::path::{self, below_axis};
+pub use super::path::{MAX_PATH, Path, expand};
+use super::stage::StageSettings;
 pub use super::value::MAX_VALUE_BYTES;
-use super::value::{KIND_PART, kind, take_bytes, take_json, to_bytes, to_json};
-use super::{AxisSettings, StageSettings};
-
-/// The longest path, in bytes.
-pub const MAX_PATH: usize = 96;
-
-/// A path, or a part of one.
-pub type Path = String<MAX_PATH>;
+use super::value::{KIND_PART, kind, number, take_bytes, take_json, to_bytes, to_json};
 
 /// The value of a part that is there.
 const PRESENT: &[u8] = b"\"present\"";
@@ -29,7 +28,7 @@ const PRESENT: &[u8] = b"\"present\"";
 /// The value of a part that is not.
 const NULL: &[u8] = b"null";
 
-/// Why a leaf cannot be read or written.
+/// Reason why a leaf cannot be read or written.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum TreeError {
     /// Nothing has this path.
@@ -71,7 +70,7 @@ impl From<ValueError> for TreeError {
     }
 }
 
-/// Whether a path names a part that may be left out.
+/// True if a path names a part that may be left out.
 pub fn is_part(path: &str) -> bool {
     canonical(path).is_ok_and(|path| part_at(&path).is_some())
 }
@@ -82,40 +81,9 @@ fn part_at(path: &str) -> Option<(usize, &'static Part)> {
     Some((axis, part_below_axis(below)?))
 }
 
-/// The axis of a canonical path, and what follows it.
-pub(crate) fn below_axis(path: &str) -> Option<(usize, &str)> {
-    let rest = path.strip_prefix("/axes/")?;
-    let below = rest.get(1..)?;
-    let axis = ["0", "1", "2"]
-        .iter()
-        .position(|index| rest.starts_with(index))?;
-    (below.is_empty() || below.starts_with('/')).then_some((axis, below))
-}
-
 /// The path with its axis as a number.
-fn canonical(path: &str) -> Result<Path, TreeError> {
-    let mut canonical = Path::new();
-    let written = match path.strip_prefix("/axes/") {
-        None if path.starts_with('/') => canonical.push_str(path),
-        None => return Err(TreeError::NotFound),
-        Some(rest) => {
-            let end = rest.find('/').unwrap_or(rest.len());
-            // By `get`: slicing, should it fail, would want to print the text.
-            let (name, below) = rest.split_at_checked(end).unwrap_or((rest, ""));
-            let index = match name {
-                "x" | "0" => "0",
-                "y" | "1" => "1",
-                "z" | "2" => "2",
-                _ => return Err(TreeError::NotFound),
-            };
-            canonical
-                .push_str("/axes/")
-                .and_then(|()| canonical.push_str(index))
-                .and_then(|()| canonical.push_str(below))
-        }
-    };
-    written.map_err(|_| TreeError::NotFound)?;
-    Ok(canonical)
+fn canonical(written: &str) -> Result<Path, TreeError> {
+    path::canonical(written).ok_or(TreeError::NotFound)
 }
 
 /// Number of nodes on the way to the deepest leaf.
@@ -138,7 +106,7 @@ impl Iterator for Leaves {
     }
 }
 
-/// Whether there is a leaf at a canonical path.
+/// True if there is a leaf at a canonical path.
 pub(crate) fn is_leaf(path: &str) -> bool {
     StageSettings::SCHEMA
         .get(path)
@@ -151,6 +119,20 @@ pub(crate) fn axis_leaf<'a>(axis: &'a AxisSettings, below: &str) -> Result<&'a d
     Ok(axis.ref_any_by_key(keys)?)
 }
 
+/// The number `field` (as the table names it) of an axis; `None` in a part that is left out.
+pub(crate) fn number_at(axis: &AxisSettings, field: &str) -> Option<f64> {
+    let keys: &mut dyn Keys = &mut ConstPathIter::<'.'>::new(Some(field));
+    number(axis.ref_any_by_key(keys).ok()?)
+}
+
+impl StageSettings {
+    /// The number `field` of the stage.
+    pub(crate) fn number_at(&self, field: &str) -> Option<f64> {
+        let keys: &mut dyn Keys = &mut ConstPathIter::<'.'>::new(Some(field));
+        number(self.ref_any_by_key(keys).ok()?)
+    }
+}
+
 /// The leaf at a path below an axis, to be written.
 pub(crate) fn axis_leaf_mut<'a>(
     axis: &'a mut AxisSettings,
@@ -160,7 +142,7 @@ pub(crate) fn axis_leaf_mut<'a>(
     Ok(axis.mut_any_by_key(keys)?)
 }
 
-/// What is done to a leaf or a part.
+/// A change to a leaf or a part.
 enum Change<'a> {
     /// The part is removed.
     Remove,
@@ -170,7 +152,7 @@ enum Change<'a> {
     Take(&'a dyn Fn(&mut dyn Any) -> bool),
 }
 
-/// What there is at a path.
+/// A leaf, or a part and whether it is there.
 enum Found<'a> {
     Leaf(&'a dyn Any),
     Part(bool),
@@ -288,12 +270,12 @@ impl StageSettings {
             (Some((index, part)), _) => {
                 let axis = self.axes.get_mut(index).ok_or(TreeError::NotFound)?;
                 if let Change::Remove = change {
-                    (part.copy)(axis, None);
+                    (part.remove)(axis);
                     return Ok(of_axis);
                 }
                 let absent = !(part.is_present)(axis);
                 if absent {
-                    part.make_default(axis, index);
+                    (part.make)(axis);
                 }
                 absent.then_some((index, part))
             }
@@ -313,7 +295,7 @@ impl StageSettings {
         if let Some((index, part)) = made
             && let Some(axis) = self.axes.get_mut(index)
         {
-            (part.copy)(axis, None);
+            (part.remove)(axis);
         }
         Err(taken)
     }

@@ -1,17 +1,18 @@
-//! What a leaf of the settings can hold, as bytes and as JSON text.
+//! Values of leaves, as bytes and as JSON text.
 //!
 //! The bytes are postcard (<https://postcard.jamesmunns.com/wire-format>), a name as its text. They are what is stored, and
 //! what a firmware should speak: JSON takes 55 KB of its image (`docs/settings-storage.md`).
 
 use core::any::Any;
 
+use super::homing::HomeSwitch;
+use super::limits::LossReaction;
 use crate::law::control::feedback::LawKind;
 use crate::law::control::nctf::Characteristic;
 use crate::law::control::schedule::GainSchedule;
 use crate::law::feedforward::FeedforwardKind;
 use crate::law::friction::Direction;
 use crate::law::friction::gms::GmsElements;
-use crate::settings::{HomeSwitch, LossReaction};
 
 /// The longest value in bytes: a list of 16 points of two numbers takes 257.
 pub const MAX_VALUE_BYTES: usize = 320;
@@ -124,6 +125,15 @@ macro_rules! each {
             false
         }
     };
+}
+
+/// The value of a leaf that is a number.
+pub(crate) fn number(leaf: &dyn Any) -> Option<f64> {
+    if let Some(&number) = leaf.downcast_ref::<f64>() {
+        return Some(number);
+    }
+    let whole = leaf.downcast_ref::<u8>().map(|&whole| whole.into());
+    whole.or_else(|| leaf.downcast_ref::<u32>().map(|&whole| whole.into()))
 }
 
 // A leaf of another type is to be added to both lists, with a kind of its own that stays.

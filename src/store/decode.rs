@@ -1,4 +1,4 @@
-//! Bytes to settings.
+//! Decoding of stored settings.
 
 use core::fmt;
 
@@ -6,13 +6,14 @@ use heapless::String;
 use serde::Deserialize;
 
 use super::Provenance;
-use super::format::{ANY_AXIS, FORMAT, Head, RecordHead, any_axis, of_axis};
+use super::format::{FORMAT, Head, RecordHead};
 use crate::settings::parts::{PARTS, part_below_axis, part_of};
-use crate::settings::tree::{Path, below_axis, is_leaf, leaves};
+use crate::settings::path::{ANY_AXIS, Path, below_axis, of_any_axis, of_axis};
+use crate::settings::tree::{TreeError, is_leaf, leaves};
 use crate::settings::value::{KIND_PART, take_bytes};
 use crate::settings::{SettingsError, StageSettings};
 
-/// Why bytes are refused as settings.
+/// Reason why bytes are refused as settings.
 #[derive(Clone, Debug, PartialEq)]
 pub enum DecodeError {
     /// They are of another format.
@@ -169,9 +170,9 @@ fn take_record(
         };
         for (index, axis) in settings.axes.iter_mut().enumerate() {
             if record.axes & 1 << index == 0 {
-                (part.copy)(axis, None);
+                (part.remove)(axis);
             } else if !(part.is_present)(axis) {
-                part.make_default(axis, index);
+                (part.make)(axis);
             }
         }
         return Ok(true);
@@ -182,6 +183,13 @@ fn take_record(
             return Ok(false);
         }
         let Some(value) = value else { continue };
+        // A later firmware may have made a part optional that was not: its leaves make it.
+        if let (Err(TreeError::Absent), Some((index, below))) =
+            (settings.leaf(&path), below_axis(&path))
+            && let (Some(part), Some(axis)) = (part_of(below), settings.axes.get_mut(index))
+        {
+            (part.make)(axis);
+        }
         let taken = settings
             .leaf_mut(&path)
             .is_ok_and(|leaf| take_bytes(leaf, record.kind, value));
@@ -210,7 +218,7 @@ fn report_missing(
         Ok(None)
     };
     for part in &PARTS {
-        let path = any_axis(part.path).ok_or(DecodeError::Malformed)?;
+        let path = of_any_axis(part.path).ok_or(DecodeError::Malformed)?;
         if stored(&path, true)?.is_none() {
             report(Finding::Missing(&path));
         }
@@ -219,7 +227,7 @@ fn report_missing(
         match below_axis(&leaf) {
             None if stored(&leaf, false)?.is_none() => report(Finding::Missing(&leaf)),
             Some((0, below)) => {
-                let path = any_axis(below).ok_or(DecodeError::Malformed)?;
+                let path = of_any_axis(below).ok_or(DecodeError::Malformed)?;
                 let axes = stored(&path, false)?.unwrap_or(0);
                 for (index, axis) in settings.axes.iter().enumerate() {
                     let left_out = part_of(below).is_some_and(|part| !(part.is_present)(axis));

@@ -1,13 +1,14 @@
-//! Settings to bytes.
+//! Encoding of settings to be stored.
 
 use core::any::Any;
 
 use serde::Serialize;
 
-use super::format::{FORMAT, Head, RecordHead, any_axis};
+use super::format::{FORMAT, Head, RecordHead};
 use crate::settings::StageSettings;
 use crate::settings::parts::PARTS;
-use crate::settings::tree::{MAX_VALUE_BYTES, Path, axis_leaf, below_axis, leaves};
+use crate::settings::path::{Path, below_axis, of_any_axis};
+use crate::settings::tree::{MAX_VALUE_BYTES, axis_leaf, leaves};
 use crate::settings::value::{KIND_PART, kind, to_bytes};
 
 /// Settings are longer than their room.
@@ -70,7 +71,7 @@ pub fn encode(
     for part in &PARTS {
         let present = |axes, (index, axis)| axes | u8::from((part.is_present)(axis)) << index;
         let axes = settings.axes.iter().enumerate().fold(0, present);
-        writer.head(any_axis(part.path).ok_or(TooLong)?, KIND_PART, axes)?;
+        writer.head(of_any_axis(part.path).ok_or(TooLong)?, KIND_PART, axes)?;
     }
     for leaf in leaves() {
         encode_leaf(settings, &leaf, &mut writer)?;
@@ -99,7 +100,7 @@ fn encode_leaf(settings: &StageSettings, path: &str, to: &mut Writer) -> Result<
         let mask_at = match mask_at {
             Some(place) => place,
             None => {
-                let record = any_axis(below).ok_or(TooLong)?;
+                let record = of_any_axis(below).ok_or(TooLong)?;
                 to.head(record, kind(leaf).ok_or(TooLong)?, 0)?;
                 *mask_at.insert(to.length.checked_sub(1).ok_or(TooLong)?)
             }

@@ -14,46 +14,21 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::settings::tree::Path;
-
 /// The format that is written, and the only one there has been.
 pub const FORMAT: u8 = 1;
 
-/// What stands for the axis in a record's path.
-pub(super) const ANY_AXIS: &str = "/axes/*";
-
-/// What a set starts with.
+/// The head of a set.
 #[derive(Serialize, Deserialize)]
 pub(super) struct Head<'a> {
     pub(super) format: u8,
     pub(super) provenance: &'a str,
 }
 
-/// What a record starts with; `axes` is its last byte.
+/// The head of a record; `axes` is its last byte.
 #[derive(Serialize, Deserialize)]
 pub(super) struct RecordHead<'a> {
     pub(super) shared: u8,
     pub(super) suffix: &'a str,
     pub(super) kind: u8,
     pub(super) axes: u8,
-}
-
-/// The record's path of something below an axis.
-pub(super) fn any_axis(below: &str) -> Option<Path> {
-    let mut path = Path::new();
-    path.push_str(ANY_AXIS).ok()?;
-    path.push_str(below).ok()?;
-    Some(path)
-}
-
-/// A record's path with the axis as a number.
-pub(super) fn of_axis(path: &str, index: usize) -> Path {
-    let number = ["0", "1", "2"].get(index).copied().unwrap_or_default();
-    let mut named = Path::new();
-    let mut push = |text: &str| named.push_str(text).unwrap_or(());
-    match path.strip_prefix(ANY_AXIS) {
-        Some(below) => ["/axes/", number, below].into_iter().for_each(&mut push),
-        None => push(path),
-    }
-    named
 }

@@ -20,12 +20,12 @@ use super::sector::{Access, Sector, SectorError};
 /// Bytes of the sequence number at the start of an item.
 pub(super) const SEQUENCE_BYTES: usize = 4;
 
-/// Why nothing was stored, or read.
+/// Reason why nothing was stored, or read.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum LogError<E> {
     /// The flash failed; what was stored last is still there.
     Flash(E),
-    /// What was written, or read a moment ago, cannot be read back: the flash is worn out or broken.
+    /// The bytes just written, or read, cannot be read back: the flash is worn out or broken.
     NotKept,
 }
 
@@ -40,7 +40,7 @@ impl<E: fmt::Debug> fmt::Display for LogError<E> {
     }
 }
 
-/// Where the newest item is.
+/// Place of the newest item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct Place {
     sector: u32,
@@ -206,11 +206,11 @@ impl<F: NorFlash> Log<F> {
     }
 }
 
-/// What it took to store an item.
+/// Effort of storing an item.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Stored {
     /// Its sequence number: how many sets have been stored, this one included.
     pub sequence: u32,
-    /// Whether a sector was erased for it, which takes the flash a quarter to half a second.
+    /// True if a sector was erased for it, which takes the flash a quarter to half a second.
     pub erased: bool,
 }

@@ -33,13 +33,13 @@ use log::{Log, SEQUENCE_BYTES};
 /// The longest text on where settings come from, in bytes.
 pub const PROVENANCE_BYTES: usize = 200;
 
-/// Where settings come from: the command, its version, the record.
+/// Origin of settings: the command, its version, the record.
 pub type Provenance = String<PROVENANCE_BYTES>;
 
 /// Room for one set while it is written or read; a test fills it with the longest.
 pub const BUFFER_BYTES: usize = 7 * 1024;
 
-/// Why settings were not stored.
+/// Reason why settings were not stored.
 #[derive(Clone, Debug, PartialEq)]
 pub enum SaveError<E> {
     /// They are not valid.
@@ -50,7 +50,7 @@ pub enum SaveError<E> {
     Log(LogError<E>),
 }
 
-/// Why stored settings were not taken over. They stay where they are, and the settings are the default ones.
+/// Reason why stored settings were not taken over. They stay where they are, and the settings are the default ones.
 #[derive(Clone, Debug, PartialEq)]
 pub enum LoadError<E> {
     /// They are not understood, or not valid.
@@ -81,12 +81,12 @@ impl<E: fmt::Debug> fmt::Display for LoadError<E> {
 impl<E: fmt::Debug> core::error::Error for SaveError<E> {}
 impl<E: fmt::Debug> core::error::Error for LoadError<E> {}
 
-/// A stored set.
+/// Number and origin of a stored set.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Loaded {
-    /// How many sets have been stored, up to this one.
+    /// Number of sets stored so far, this one included.
     pub sequence: u32,
-    /// Where it comes from.
+    /// Its origin.
     pub provenance: Provenance,
 }
 
@@ -109,7 +109,7 @@ impl<F: NorFlash> Store<F> {
         &self.log.flash
     }
 
-    /// The flash back.
+    /// Gives the flash back.
     pub fn into_flash(self) -> F {
         self.log.flash
     }

@@ -6,7 +6,7 @@ use embedded_storage_async::nor_flash::{
     ReadNorFlash as AsyncReadNorFlash,
 };
 
-/// What may be done to a sector.
+/// Kind of access to a sector.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Access {
     /// It is read.
@@ -23,7 +23,7 @@ pub(super) struct Sector<'f, F> {
     pub(super) access: Access,
 }
 
-/// Why an operation on a sector failed.
+/// Reason why an operation on a sector failed.
 #[derive(Debug)]
 pub(super) enum SectorError<E> {
     /// The flash failed.

@@ -34,12 +34,13 @@ const TIM7: u32 = 1 << (55 - 32);
 /// `str r0, [r1]` and a branch to itself, at the bottom of the stack, where nobody is.
 const PEND: [u8; 4] = [0x08, 0x60, 0xFE, 0xE7];
 const SCRATCH: u32 = 0x2000_0000;
-/// What the log must say: SPI was asked and answered zero, the flash was found empty, initialisation came to its end; and
-/// that a full stack ended it.
-const EXPECTED: [&str; 5] = [
+/// What the log must say: SPI was asked and answered zero, the flash was found empty and the board not commissioned,
+/// initialisation came to its end; and that a full stack ended it.
+const EXPECTED: [&str; 6] = [
     "the converter answers 0x0000 instead of 0x0004",
     "quadrant ",
     "no settings are stored",
+    "not commissioned: no axis has a law",
     "10000 control ticks per second, outputs off",
     "hard fault, outputs are off: the stack is full",
 ];

@@ -5,7 +5,7 @@ use quadrant::control::pid::PidGains;
 use quadrant::control::surface::SurfaceGains;
 use quadrant::control::terms::FeedbackInput;
 use quadrant::control::terms::FeedbackState;
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 
 const PERIOD_S: f64 = 1e-4;
 const LIMIT_V: f64 = 1.0;

@@ -13,7 +13,7 @@ use crate::common::{Rig, repeatable, sine_on_x, with_x};
 
 /// Outputs of 2 V on converters of 5 V, with an offset, and room for large errors.
 fn limited(kind: FeedforwardKind, law: LawKind) -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.amplifier.full_scale_v = 5.0;
         axis.amplifier.output_limit_v = 2.0;

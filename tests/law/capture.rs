@@ -29,7 +29,7 @@ struct Watched<'a> {
 impl<'a> Watched<'a> {
     fn new(words: &'a mut [u32]) -> Self {
         Self {
-            rig: Rig::new(&StageSettings::default(), &sine_on_x(30.0, 10.0)),
+            rig: Rig::new(&StageSettings::simulated(), &sine_on_x(30.0, 10.0)),
             capture: Capture::new(words),
         }
     }

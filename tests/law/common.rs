@@ -63,7 +63,7 @@ impl Noise {
 
 /// The default stage with one change to its x axis.
 pub(crate) fn with_x(change: impl FnOnce(&mut quadrant::settings::AxisSettings)) -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     change(&mut settings.axes[0]);
     settings
 }

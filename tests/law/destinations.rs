@@ -9,7 +9,7 @@ use crate::common::with_x;
 
 #[test]
 fn a_move_to_a_position_ends_on_it_from_wherever_it_starts() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     for from in [Position(0), Position(123_456_789), Position(-7)] {
         let made = settings
             .move_to(AxisName::Y, from, true, 12.345_678, 50.0)
@@ -22,7 +22,7 @@ fn a_move_to_a_position_ends_on_it_from_wherever_it_starts() {
 
 #[test]
 fn a_move_is_refused_unless_the_axis_knows_where_it_is_and_may_go_there() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let refused = |homed, target_mm, velocity_mm_s| {
         settings
             .move_to(AxisName::Z, Position::ZERO, homed, target_mm, velocity_mm_s)
@@ -46,7 +46,7 @@ fn a_move_is_refused_unless_the_axis_knows_where_it_is_and_may_go_there() {
 
 #[test]
 fn a_jog_is_refused_beyond_the_largest_velocity() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let slow = settings.jog_at(AxisName::X, -3.0).expect("slow");
     assert_eq!(slow, Velocity::from_mm_s(-3.0, settings.motion_scale(0)));
     for velocity_mm_s in [250.1, -250.1, f64::NAN] {
@@ -65,7 +65,7 @@ fn an_axis_without_homing_cannot_be_homed() {
 
 #[test]
 fn the_travel_limits_a_stream_of_homed_axes_alone() {
-    let [x, y, _] = StageSettings::default().stream_limits([true, false, true]);
+    let [x, y, _] = StageSettings::simulated().stream_limits([true, false, true]);
     let end = Position::from_mm(200.0, 5e-4);
     assert_eq!(x.travel, Some((-end, end)));
     assert_eq!(y.travel, None);

@@ -152,7 +152,7 @@ fn inert(base: &StageSettings, of_interest: impl Fn(&str) -> bool) -> Vec<String
 }
 
 fn with_kind(kind: FeedforwardKind) -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.feedforward.kind = kind;
         // Low enough for the stretch with a large error to saturate, and the integral to reach its limit.

@@ -5,7 +5,7 @@ use quadrant::control::feedback::{Feedback, LawKind};
 use quadrant::control::terms::FeedbackInput;
 use quadrant::control::terms::FeedbackState;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 
 use crate::common::{any_f32, repeatable};
 

@@ -7,7 +7,8 @@ use quadrant::feedforward::{
 };
 use quadrant::friction::FrictionSettings;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings, x_axis};
+use quadrant::settings::presets::x_axis;
+use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::units::{DacCode, Position};
 
 use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x, x_alone};
@@ -264,9 +265,9 @@ fn a_stage_of_any_kind_is_small() {
 /// A path in the plane keeps its shape: an axis whose plant is slower must not drag its reference behind.
 #[test]
 fn axes_with_different_previews_keep_one_time() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for (axis, preview_s) in settings.axes.iter_mut().zip([1.2e-3, 0.0, 1.3e-3]) {
-        *axis = quadrant::settings::x_axis();
+        *axis = quadrant::settings::presets::x_axis();
         axis.feedforward.preview_s = preview_s;
     }
     let sine = sine_on_x(1.0, 10.0).motions[0];

@@ -6,7 +6,7 @@ use quadrant::friction::smoothed_gms::{SmoothedGms, SmoothedGmsParameters};
 use quadrant::friction::stribeck::{Sliding, SlidingTable};
 use quadrant::friction::{Direction, PerDirection};
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 
 use crate::common::{any_f32, repeatable};
 use crate::friction_gms::elements;

@@ -5,7 +5,7 @@ use quadrant::control::pid::{Pid, PidGains};
 use quadrant::control::schedule::{GainSchedule, SchedulePoint, ScheduledPid};
 use quadrant::control::terms::FeedbackInput;
 use quadrant::control::terms::FeedbackState;
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 
 use crate::common::repeatable;
 

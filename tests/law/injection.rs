@@ -54,7 +54,7 @@ impl<S: Scalar> Bench<S> {
 
     pub(crate) fn begin(&mut self, request: &InjectionSettings, words: &[i16]) {
         let (injection, _): (Injection<S>, u16) =
-            StageSettings::default().injection(request).unwrap();
+            StageSettings::simulated().injection(request).unwrap();
         self.rig.state.prepare_injection(injection);
         self.words = words.to_vec();
         self.sent = 0;
@@ -106,12 +106,12 @@ impl<S: Scalar> Bench<S> {
 }
 
 pub(crate) fn bench() -> Bench<f32> {
-    Bench::new(&StageSettings::default(), &PlanSettings::default())
+    Bench::new(&StageSettings::simulated(), &PlanSettings::default())
 }
 
 fn words_are_put_out<S: Scalar>() {
     for open_loop in [false, true] {
-        let mut bench = Bench::<S>::new(&StageSettings::default(), &PlanSettings::default());
+        let mut bench = Bench::<S>::new(&StageSettings::simulated(), &PlanSettings::default());
         let words = [1, -2, 1000, -32_767, 32_767, 7];
         bench.begin(&request(open_loop), &words);
         // An axis at rest on its reference: the law itself puts nothing out.
@@ -137,7 +137,7 @@ fn words_are_put_out_in_every_number_type() {
 
 #[test]
 fn in_closed_loop_the_voltage_is_added_to_the_laws() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let mut plain = Bench::<f64>::new(&settings, &sine_on_x(5.0, 10.0));
     let mut driven = Bench::<f64>::new(&settings, &sine_on_x(5.0, 10.0));
     let with_plan = InjectionSettings {
@@ -160,7 +160,7 @@ fn in_closed_loop_the_voltage_is_added_to_the_laws() {
 
 #[test]
 fn the_output_limit_holds_whatever_is_injected() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     settings.axes[0].amplifier.output_limit_v = 2.0;
     for axis in &mut settings.axes {
         axis.feedback.integral_limit_v = axis.feedback.integral_limit_v.min(2.0);
@@ -201,7 +201,7 @@ fn nothing_else_begins_meanwhile_and_it_begins_only_at_rest() {
     assert!(view.injecting && view.running);
     let jog = Command::Jog(
         AxisName::Y,
-        Velocity::from_mm_s(1.0, StageSettings::default().motion_scale(1)),
+        Velocity::from_mm_s(1.0, StageSettings::simulated().motion_scale(1)),
     );
     for command in [
         jog,
@@ -219,7 +219,7 @@ fn nothing_else_begins_meanwhile_and_it_begins_only_at_rest() {
     }
     assert_eq!(refusal(view, Command::Run), Some(Refusal::AlreadyRunning));
 
-    let mut moving = Bench::<f32>::new(&StageSettings::default(), &PlanSettings::default());
+    let mut moving = Bench::<f32>::new(&StageSettings::simulated(), &PlanSettings::default());
     moving.rig.inputs.command = Some(jog);
     moving.tick();
     moving.begin(&request(false), &[100; 10]);
@@ -230,6 +230,7 @@ fn nothing_else_begins_meanwhile_and_it_begins_only_at_rest() {
         injection_ready: false,
         running: false,
         injecting: false,
+        commissioned: true,
         ..view
     };
     assert_eq!(
@@ -264,7 +265,7 @@ fn the_sum_of_codes_is_that_of_all_ticks_and_outlasts_a_disable() {
 
 #[test]
 fn what_is_out_of_range_is_refused_by_name() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let refused = |change: fn(&mut InjectionSettings)| {
         let mut request = request(true);
         change(&mut request);
@@ -301,7 +302,7 @@ proptest! {
             travel_mm: travel_mm.into(),
             ..request(open_loop)
         };
-        let settings = StageSettings::default();
+        let settings = StageSettings::simulated();
         let mut rig: Rig<Fixed> = Rig::new(&settings, &PlanSettings::default());
         rig.tick();
         rig.command(Command::Enable);

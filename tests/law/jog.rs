@@ -134,13 +134,13 @@ fn the_travel_holds_a_jog_once_the_axis_is_homed_and_not_before() {
 
 #[test]
 fn a_jog_is_held_to_the_largest_velocity_and_follows_changes() {
-    let mut rig = enabled(&StageSettings::default());
+    let mut rig = enabled(&StageSettings::simulated());
     rig.command(Command::Jog(AxisName::Y, velocity(1e6)));
     follow(&mut rig, 3_000);
     let before = rig.state.axes()[1].reference();
     follow(&mut rig, 1);
     let per_tick = (rig.state.axes()[1].reference() - before).to_mm(5e-4);
-    let largest = StageSettings::default().axes[1].limits.max_velocity_mm_s;
+    let largest = StageSettings::simulated().axes[1].limits.max_velocity_mm_s;
     assert!(
         (per_tick * 1e4 - largest).abs() < 1e-3 * largest,
         "{per_tick}"

@@ -153,7 +153,7 @@ fn every_command_without_a_value_has_its_number_and_no_other_number_a_command() 
 #[test]
 fn the_default_job_fits_its_room_and_round_trips() {
     let job = Job {
-        stage: StageSettings::default(),
+        stage: StageSettings::simulated(),
         plan: sine_on_x(30.0, 10.0),
     };
     let mut room = vec![0; JOB_BYTES];

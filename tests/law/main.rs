@@ -43,6 +43,7 @@ mod link_traffic;
 mod lockstep_records;
 mod motion_modes;
 mod nonlinear_gain;
+mod not_commissioned;
 mod number_types;
 mod pid;
 mod provocations;

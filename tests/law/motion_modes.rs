@@ -63,7 +63,7 @@ fn roughness(rig: &mut Rig<f32>, ticks: u32) -> (f64, f64) {
 #[test]
 fn a_stop_brakes_a_motion_in_flight_without_a_jolt_and_holds() {
     for after in [400, 2_345, 3_777, 5_000] {
-        let mut rig = enabled(&StageSettings::default(), &sines());
+        let mut rig = enabled(&StageSettings::simulated(), &sines());
         rig.command(Command::Run);
         follow(&mut rig, after);
         rig.inputs.command = Some(Command::Stop);
@@ -89,8 +89,8 @@ fn one_axis_moves_alone_while_another_jogs() {
         max_acceleration_mm_s2: 1000.0,
         max_jerk_mm_s3: 1e5,
     });
-    let mut rig = enabled(&StageSettings::default(), &plan);
-    let slow = Velocity::from_mm_s(1.0, StageSettings::default().motion_scale(0));
+    let mut rig = enabled(&StageSettings::simulated(), &plan);
+    let slow = Velocity::from_mm_s(1.0, StageSettings::simulated().motion_scale(0));
     rig.command(Command::Jog(AxisName::X, slow));
     rig.command(Command::StartMove(AxisName::Y));
     follow(&mut rig, 3_000);
@@ -108,7 +108,7 @@ fn one_axis_moves_alone_while_another_jogs() {
 
 /// A stream of x and y from rest to rest, `count` set points of 1 ms; the axes' segments.
 fn stream(count: u32) -> Vec<[Segment; 3]> {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let limits = core::array::from_fn(|index| StreamLimits {
         scale: settings.motion_scale(index),
         max_velocity_mm_s: 100.0,
@@ -172,7 +172,7 @@ impl Feed {
 
 #[test]
 fn a_stream_ends_where_its_last_set_point_is_on_all_axes() {
-    let mut rig = enabled(&StageSettings::default(), &PlanSettings::default());
+    let mut rig = enabled(&StageSettings::simulated(), &PlanSettings::default());
     let mut feed = Feed::new(stream(500));
     feed.serve(&mut rig);
     rig.command(Command::StartStream);
@@ -194,7 +194,7 @@ fn an_underrun_brakes_and_latches_a_fault_or_holds_as_the_settings_say() {
         (LossReaction::Stop, Reaction::Stop),
         (LossReaction::Hold, Reaction::Hold),
     ] {
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         settings.streaming.underrun = underrun;
         let mut rig = enabled(&settings, &PlanSettings::default());
         let mut segments = stream(500);
@@ -230,7 +230,7 @@ fn an_underrun_brakes_and_latches_a_fault_or_holds_as_the_settings_say() {
 
 #[test]
 fn a_stop_forgets_a_stream_that_has_not_begun() {
-    let mut rig = enabled(&StageSettings::default(), &PlanSettings::default());
+    let mut rig = enabled(&StageSettings::simulated(), &PlanSettings::default());
     Feed::new(stream(500)).serve(&mut rig);
     assert!(StageView::of(&rig.state).stream_ready);
     rig.command(Command::Stop);
@@ -240,7 +240,7 @@ fn a_stop_forgets_a_stream_that_has_not_begun() {
 
 #[test]
 fn a_request_that_cannot_be_followed_is_refused_with_its_reason() {
-    let mut rig = enabled(&StageSettings::default(), &sines());
+    let mut rig = enabled(&StageSettings::simulated(), &sines());
     let refused = |rig: &Rig<f32>, command| {
         let decision = Supervisor::default().step(StageView::of(&rig.state), Some(command));
         decision

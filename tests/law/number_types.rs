@@ -11,7 +11,7 @@ type Shown = ([f64; 5], i16);
 
 /// All axes over a motion with noise on the counts: the same counts for every type.
 fn run<S: Scalar>(kind: FeedforwardKind, plan: &PlanSettings, ticks: usize) -> Vec<[Shown; 3]> {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.feedforward.kind = kind;
     }

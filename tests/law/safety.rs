@@ -11,7 +11,7 @@ use quadrant::units::DacCode;
 use crate::common::{Rig, sine_on_x};
 
 fn rig() -> Rig<f32> {
-    Rig::new(&StageSettings::default(), &sine_on_x(1.0, 10.0))
+    Rig::new(&StageSettings::simulated(), &sine_on_x(1.0, 10.0))
 }
 
 fn off() -> Outputs {
@@ -233,7 +233,7 @@ fn a_fault_ends_the_motion() {
 
 #[test]
 fn a_plan_without_motion_ends_at_once() {
-    let mut rig = Rig::<f32>::new(&StageSettings::default(), &PlanSettings::default());
+    let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &PlanSettings::default());
     rig.start();
     assert!(!rig.state.is_running());
     assert!(rig.state.safety().is_enabled());

@@ -230,7 +230,7 @@ const CASES: [Case; 16] = [
 ];
 
 fn settings(code: FaultCode) -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         let travel = axis.limits.travel_mm.as_mut().expect("by default");
         match code {

@@ -79,7 +79,7 @@ fn promises<S: Scalar>(
     loss: LossReaction,
     sequence: &[Flaws],
 ) -> Result<usize, TestCaseError> {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     settings.streaming.link_lost = loss;
     for axis in &mut settings.axes {
         let travel = axis.limits.travel_mm.as_mut().expect("by default");
@@ -195,7 +195,7 @@ proptest! {
         braking_jerk_mm_s3 in 1e5f64..1e8,
         hold in any::<bool>(),
     ) {
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         settings.streaming.link_lost = if hold { LossReaction::Hold } else { LossReaction::Stop };
         for axis in &mut settings.axes {
             axis.limits.braking_mm_s2 = braking_mm_s2;

@@ -11,7 +11,7 @@ use crate::safety_faults::{OF_OTHERS, follow, moving, push, sines, standing};
 
 #[test]
 fn an_axis_built_alone_is_the_stages() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let stage: Stage<f32, 4> = settings.build().expect("valid");
     for axis in AxisName::ALL {
         let alone = settings.build_axis::<f32, 4>(axis);
@@ -22,7 +22,7 @@ fn an_axis_built_alone_is_the_stages() {
 
 #[test]
 fn one_axis_is_exchanged_without_a_jump_and_without_the_others() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let stage: Stage<f32, 4> = settings.build().expect("valid");
     let weak = with_x(|axis| axis.feedback.pid.kp_v_per_mm *= 0.4);
     let weak = weak.build_axis::<f32, 4>(AxisName::X);
@@ -64,7 +64,7 @@ fn one_axis_is_exchanged_without_a_jump_and_without_the_others() {
 
 #[test]
 fn without_faults_nothing_is_found() {
-    let mut rig = moving(&StageSettings::default());
+    let mut rig = moving(&StageSettings::simulated());
     for _ in 0..20_000 {
         follow(&mut rig);
         assert!(rig.tick().enabled);
@@ -76,7 +76,7 @@ fn without_faults_nothing_is_found() {
 
 #[test]
 fn the_high_mark_outlasts_the_fault_and_ends_with_enabling() {
-    let mut rig = standing(&StageSettings::default());
+    let mut rig = standing(&StageSettings::simulated());
     let mark = |rig: &Rig<f32>| rig.state.axes()[1].following_high_mark();
     assert!((mark(&rig) - 0.1).abs() < 1e-3, "{}", mark(&rig));
     while rig.state.safety().is_enabled() {
@@ -93,7 +93,7 @@ fn the_high_mark_outlasts_the_fault_and_ends_with_enabling() {
 #[test]
 fn a_fault_of_the_last_run_is_latched_at_the_start() {
     for code in &OF_OTHERS[3..] {
-        let mut rig = Rig::<f32>::new(&StageSettings::default(), &sines());
+        let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &sines());
         rig.state = StageState::with_fault(*code);
         for command in [Command::Enable, Command::Run, Command::Disable] {
             assert_eq!(rig.command(command), Outputs::default());

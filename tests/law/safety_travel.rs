@@ -170,7 +170,7 @@ fn a_pressed_limit_switch_lets_an_axis_away_and_not_further() {
             -5.0,
         ),
     ] {
-        let settings = StageSettings::default();
+        let settings = StageSettings::simulated();
         let mut rig = homed(&settings);
         run(&mut rig, &settings, &by(out, 100.0));
         for _ in 0..300 {
@@ -198,7 +198,7 @@ fn a_pressed_limit_switch_lets_an_axis_away_and_not_further() {
 
 #[test]
 fn a_switch_of_an_axis_that_stands_is_no_fault() {
-    let mut rig = homed(&StageSettings::default());
+    let mut rig = homed(&StageSettings::simulated());
     let both = AxisSwitches::NEGATIVE_LIMIT.with(AxisSwitches::POSITIVE_LIMIT);
     for axis in AxisName::ALL {
         rig.inputs.switches = Switches::NONE.with_axis(axis, both.with(AxisSwitches::HOME));
@@ -229,7 +229,7 @@ fn bad_inputs_keep_the_stage_from_being_enabled_and_are_named() {
         }),
     ];
     for (code, spoil) in cases {
-        let mut rig = Rig::<f32>::new(&StageSettings::default(), &sines());
+        let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &sines());
         // From the start, and again once there were good inputs.
         for state in [SafetyState::Start, SafetyState::Disabled] {
             for _ in 0..10 {
@@ -251,7 +251,7 @@ fn bad_inputs_keep_the_stage_from_being_enabled_and_are_named() {
 
 #[test]
 fn a_fault_that_switches_off_ends_a_stop_and_leaves_the_first_fault() {
-    let mut rig = moving(&StageSettings::default());
+    let mut rig = moving(&StageSettings::simulated());
     rig.inputs.link_lost = true;
     assert!(rig.tick().enabled);
     follow(&mut rig);
@@ -265,7 +265,7 @@ fn a_fault_that_switches_off_ends_a_stop_and_leaves_the_first_fault() {
 
 #[test]
 fn disabling_ends_a_stop_and_keeps_its_fault() {
-    let mut rig = moving(&StageSettings::default());
+    let mut rig = moving(&StageSettings::simulated());
     rig.inputs.link_lost = true;
     rig.tick();
     follow(&mut rig);
@@ -277,7 +277,7 @@ fn disabling_ends_a_stop_and_keeps_its_fault() {
 
 #[test]
 fn a_lost_link_that_holds_can_be_followed_by_a_motion() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     settings.streaming.link_lost = LossReaction::Hold;
     let mut rig = moving(&settings);
     for _ in 0..1000 {
@@ -295,7 +295,7 @@ fn a_lost_link_that_holds_can_be_followed_by_a_motion() {
 
 #[test]
 fn a_lost_link_is_nothing_to_an_axis_that_stands() {
-    let mut rig = homed(&StageSettings::default());
+    let mut rig = homed(&StageSettings::simulated());
     rig.inputs.link_lost = true;
     assert!(rig.tick().enabled);
     assert_eq!(rig.state.safety(), SafetyState::Enabled);

@@ -40,9 +40,9 @@ fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
     for (index, name) in AxisName::ALL.into_iter().enumerate() {
         for &(field, place, below, above) in fields() {
             for value in [below, above] {
-                let mut settings = StageSettings::default();
+                let mut settings = StageSettings::simulated();
                 // Below breakaway is above x's coulomb level; other axes have other levels.
-                settings.axes[index] = quadrant::settings::x_axis();
+                settings.axes[index] = quadrant::settings::presets::x_axis();
                 *place(&mut settings.axes[index]) = value;
                 let error = refusal(&settings);
                 check_message(&error, name, field);
@@ -77,7 +77,7 @@ fn the_list_of_fields_is_complete() {
             _ => 0,
         }
     }
-    let axis = quadrant::settings::x_axis();
+    let axis = quadrant::settings::presets::x_axis();
     let elements = axis.friction.gms.elements.len();
     let stored = numbers(&serde_json::to_value(&axis).expect("plain data"));
     let points = axis.feedback.schedule.expect("by default").len();
@@ -93,7 +93,7 @@ fn the_control_rate_and_the_counter_width_have_ranges() {
     for rate_hz in [999.0, 1.01e5, f64::NAN] {
         let settings = StageSettings {
             rate_hz,
-            ..StageSettings::default()
+            ..StageSettings::simulated()
         };
         let error = refusal(&settings);
         assert_eq!((error.axis, error.field), (None, "rate_hz"));
@@ -126,10 +126,10 @@ fn the_spacing_of_the_index_and_its_tolerance_have_ranges() {
 
 #[test]
 fn defaults_are_valid_at_every_rate_they_claim_and_with_room() {
-    assert_eq!(StageSettings::default().validate(4), Ok(()));
-    assert_eq!(StageSettings::default().validate(10), Ok(()));
+    assert_eq!(StageSettings::simulated().validate(4), Ok(()));
+    assert_eq!(StageSettings::simulated().validate(10), Ok(()));
     assert_eq!(
-        PlanSettings::default().validate(&StageSettings::default()),
+        PlanSettings::default().validate(&StageSettings::simulated()),
         Ok(())
     );
 }

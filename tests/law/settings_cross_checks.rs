@@ -1,8 +1,9 @@
-//! Conditions that fields of the settings must hold together.
+//! What the fields of the settings must hold together.
 
 use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::GmsElement;
+use quadrant::settings::presets::X_PLANT;
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::with_x;
@@ -35,7 +36,7 @@ fn weights_that_do_not_sum_to_one_are_refused() {
 #[test]
 fn elements_must_fit_the_room_and_exist() {
     let split = |count: usize| {
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         for axis in &mut settings.axes {
             axis.friction.gms.elements = (0..count)
                 .map(|_| GmsElement {
@@ -86,7 +87,10 @@ fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
         panic!("{reason:?}");
     };
     // (0.5 / Ts)^2 / A.
-    assert!((most - 25e6 / 69_390.0).abs() < 1e-9, "{most}");
+    assert!(
+        (most - 25e6 / X_PLANT.gain_mm_per_v_s2).abs() < 1e-9,
+        "{most}"
+    );
     assert!(text.contains(&format!("{most:.4}")), "{text}");
     let unknown = with_x(|axis| {
         stiff(axis);
@@ -102,7 +106,7 @@ fn stiffness_beyond_what_the_rate_resolves_is_refused_when_a_plant_is_given() {
 
 #[test]
 fn bristles_stiffer_than_the_rate_resolves_are_refused() {
-    let most = 25e6 / 69_390.0;
+    let most = 25e6 / X_PLANT.gain_mm_per_v_s2;
     for (expected, stiff) in [
         (
             "friction.dahl.stiffness_v_per_mm",
@@ -142,7 +146,7 @@ fn a_kind_whose_model_is_missing_is_refused_by_name() {
 /// Files from before there were these models.
 #[test]
 fn settings_without_the_single_state_models_still_load() {
-    let mut tree = serde_json::to_value(StageSettings::default()).expect("plain data");
+    let mut tree = serde_json::to_value(StageSettings::simulated()).expect("plain data");
     for axis in tree["axes"].as_array_mut().expect("axes") {
         let friction = axis["friction"].as_object_mut().expect("fields");
         for field in ["dahl", "lugre", "smoothed_gms"] {

@@ -7,14 +7,14 @@ use quadrant::settings::draft::{ApplyError, Draft};
 use quadrant::stage::Stage;
 
 fn draft_of(settings: StageSettings) -> Draft<'static> {
-    let room = || Box::leak(Box::new(StageSettings::default()));
+    let room = || Box::leak(Box::new(StageSettings::simulated()));
     let in_force = room();
     *in_force = settings;
     Draft::new(in_force, room())
 }
 
 fn draft() -> Draft<'static> {
-    draft_of(StageSettings::default())
+    draft_of(StageSettings::simulated())
 }
 
 fn set(draft: &mut Draft, path: &str, json: &str) {
@@ -47,6 +47,17 @@ fn what_is_contradictory_only_for_a_while_is_accepted() {
     assert_eq!(error.field, "feedback.nctf");
     assert!(draft.is_edited(), "the draft is still there to be mended");
     set(&mut draft, "/axes/x/feedback/nctf", "\"present\"");
+    let Err(ApplyError::Refused(error)) = draft.apply(8) else {
+        panic!("a trajectory that nobody has given");
+    };
+    assert_eq!(error.field, "feedback.nctf.characteristic.error_mm");
+    let points = r#"[{"error_mm":1.2,"velocity_mm_s":250.0}]"#;
+    set(&mut draft, "/axes/x/feedback/nctf/characteristic", points);
+    set(
+        &mut draft,
+        "/axes/x/feedback/nctf/gain_v_s_per_mm",
+        "0.0055",
+    );
     assert_eq!(draft.apply(8), Ok([true, false, false]));
 }
 
@@ -105,7 +116,7 @@ fn the_axes_built_one_by_one_are_those_of_the_stage() {
 #[test]
 fn a_set_that_is_loaded_over_a_draft_concerns_every_axis() {
     let mut draft = draft();
-    draft.settings_mut().set_default();
+    draft.settings_mut().copy_from(&StageSettings::simulated());
     assert_eq!(draft.apply(8), Ok([true; 3]));
 }
 
@@ -113,10 +124,10 @@ fn a_set_that_is_loaded_over_a_draft_concerns_every_axis() {
 fn what_is_in_force_stays_until_the_draft_takes_effect_and_can_be_gone_back_to() {
     let mut draft = draft();
     set(&mut draft, "/axes/y/feedback/pid/kp_v_per_mm", "1.2");
-    assert_eq!(*draft.in_force(), StageSettings::default());
+    assert_eq!(*draft.in_force(), StageSettings::simulated());
     draft.revert();
     assert!(!draft.is_edited());
-    assert_eq!(*draft.settings(), StageSettings::default());
+    assert_eq!(*draft.settings(), StageSettings::simulated());
     set(&mut draft, "/axes/y/feedback/pid/kp_v_per_mm", "1.2");
     draft.apply(8).expect("valid");
     assert_eq!(draft.in_force().axes[1].feedback.pid.kp_v_per_mm, 1.2);
@@ -128,12 +139,12 @@ fn what_is_in_force_stays_until_the_draft_takes_effect_and_can_be_gone_back_to()
 fn settings_made_in_place_are_the_default_ones_and_copies_are_the_same() {
     let mut settings = StageSettings {
         rate_hz: 5e3,
-        ..StageSettings::default()
+        ..StageSettings::simulated()
     };
     settings.streaming.link_lost = quadrant::settings::LossReaction::Hold;
     settings.axes[2].homing = None;
     settings.axes[0].feedback.pid.kp_v_per_mm = 7.0;
-    let mut copy = StageSettings::default();
+    let mut copy = StageSettings::simulated();
     copy.copy_from(&settings);
     assert_eq!(copy, settings);
     copy.set_default();
@@ -143,7 +154,7 @@ fn settings_made_in_place_are_the_default_ones_and_copies_are_the_same() {
 /// The server builds into an axis that was another's.
 #[test]
 fn an_axis_built_in_the_place_of_another_is_the_same() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     for kind in FeedforwardKind::ALL {
         let mut settings = settings.clone();
         settings.axes[0].feedforward.kind = kind;

@@ -6,7 +6,7 @@ use quadrant::settings::AxisSettings;
 
 use crate::settings_fields::Field;
 
-/// The laws' fields, as [`crate::settings_fields::FIELDS`].
+/// As [`crate::settings_fields::FIELDS`].
 pub(crate) const LAW_FIELDS: &[(&str, Field, f64, f64)] = &[
     (
         "feedback.schedule.speed_mm_s",

@@ -12,7 +12,7 @@ use crate::settings_tree::{get, paths};
 const ELEMENTS: usize = 8;
 
 fn settings() -> StageSettings {
-    StageSettings::default()
+    StageSettings::simulated()
 }
 
 /// All leaves of the tree with the axis as `*`, and the numbers of the lists' points with the point as `*`.
@@ -43,7 +43,7 @@ fn tree() -> BTreeSet<String> {
 
 #[test]
 fn every_leaf_has_its_entry_and_every_entry_its_leaf() {
-    let entries: BTreeSet<String> = all().map(|leaf| leaf.path.to_owned()).collect();
+    let entries: BTreeSet<String> = all().map(|leaf| leaf.path().as_str().to_owned()).collect();
     let leaves = tree();
     let without_entry: Vec<_> = leaves.difference(&entries).collect();
     let without_leaf: Vec<_> = entries.difference(&leaves).collect();
@@ -60,20 +60,24 @@ fn every_entry_says_what_the_leaf_means() {
         assert!(
             leaf.meaning.ends_with('.') && leaf.meaning.len() > 2,
             "{}",
-            leaf.path
+            leaf.path()
         );
         assert!(
             leaf.meaning.len() <= 160 && !leaf.meaning.contains(['\n', '|']),
             "{}",
-            leaf.path
+            leaf.path()
         );
         // Of the leaf, or of what it is an end of.
-        let unit_in_name = leaf.path.rsplit('/').take(2).any(|name| name.contains('_'));
+        let unit_in_name = leaf
+            .path()
+            .rsplit('/')
+            .take(2)
+            .any(|name| name.contains('_'));
         if !leaf.unit.is_empty() {
             assert!(
                 unit_in_name,
                 "{} has a unit, but not in its name",
-                leaf.path
+                leaf.path()
             );
         }
     }
@@ -115,13 +119,7 @@ fn write(settings: &mut StageSettings, path: &str, number: f64) -> Result<(), Tr
     Ok(())
 }
 
-/// The field of an error about a leaf.
-fn field(path: &str) -> String {
-    let path = path.strip_prefix("/axes/*/").unwrap_or(&path[1..]);
-    path.replace("/*/", ".").replace('/', ".")
-}
-
-/// True if a leaf is a whole number.
+/// Whether a leaf is a whole number.
 pub(crate) fn is_whole(path: &str) -> bool {
     ["counter_bits", "counts_per_index", "index_tolerance_counts"]
         .iter()
@@ -130,7 +128,7 @@ pub(crate) fn is_whole(path: &str) -> bool {
 
 fn about(leaf: &LeafInfo, result: &Result<(), SettingsError>) -> Option<Reason> {
     let error = result.as_ref().err()?;
-    (error.field == field(leaf.path)).then_some(error.reason)
+    (error.field == leaf.field).then_some(error.reason)
 }
 
 #[test]
@@ -142,28 +140,28 @@ fn each_end_of_each_range_is_the_one_that_is_enforced() {
         };
         let settings = settings();
         let (least, most) = (least.value(&settings, 0), most.value(&settings, 0));
-        assert!(least < most, "{}", leaf.path);
-        let step: f64 = if is_whole(leaf.path) { 1.0 } else { 0.0 };
+        assert!(least < most, "{}", leaf.path());
+        let step: f64 = if is_whole(leaf.field) { 1.0 } else { 0.0 };
         for (end, away) in [(least, -1.0), (most, 1.0)] {
             let mut at_end = settings.clone();
-            write(&mut at_end, leaf.path, end).expect("a number");
+            write(&mut at_end, &leaf.path(), end).expect("a number");
             let reason = about(leaf, &at_end.validate(ELEMENTS));
             let outside = matches!(reason, Some(Reason::OutOfRange { .. } | Reason::NotFinite));
-            assert!(!outside, "{} = {end} is refused: {reason:?}", leaf.path);
+            assert!(!outside, "{} = {end} is refused: {reason:?}", leaf.path());
             let beyond = end + away * step.max(1e-9 * f64::abs(end)).max(1e-12);
-            if is_whole(leaf.path) && beyond < 0.0 {
+            if is_whole(leaf.field) && beyond < 0.0 {
                 // The leaf's type has no such value.
                 continue;
             }
             let mut outside = settings.clone();
-            write(&mut outside, leaf.path, beyond).expect("a number");
+            write(&mut outside, &leaf.path(), beyond).expect("a number");
             let reason = about(leaf, &outside.validate(ELEMENTS));
             let Some(Reason::OutOfRange {
                 least: low,
                 most: high,
             }) = reason
             else {
-                panic!("{} = {beyond} is not refused: {reason:?}", leaf.path);
+                panic!("{} = {beyond} is not refused: {reason:?}", leaf.path());
             };
             // What an end depends on may itself have been changed with it.
             let enforced = if away < 0.0 { low } else { high };
@@ -171,7 +169,7 @@ fn each_end_of_each_range_is_the_one_that_is_enforced() {
             assert!(
                 error <= 1e-12 * end.abs(),
                 "{}: {enforced}, table {end}",
-                leaf.path
+                leaf.path()
             );
             ends += 1;
         }
@@ -188,7 +186,7 @@ fn each_list_has_the_room_that_is_said() {
             continue;
         };
         lists += 1;
-        let path = leaf.path.replacen('*', "0", 1);
+        let path = leaf.path().replacen('*', "0", 1);
         let mut settings = settings();
         let points: Value =
             serde_json::from_str(&get(&settings, &path).expect("a list")).expect("JSON");
@@ -215,7 +213,7 @@ fn each_list_has_the_room_that_is_said() {
 fn each_name_is_understood_and_each_flag_is_one() {
     let mut settings = settings();
     for leaf in all() {
-        let path = leaf.path.replacen('*', "0", 1);
+        let path = leaf.path().replacen('*', "0", 1);
         match leaf.range {
             Range::Name(names) => {
                 for name in names {
@@ -234,5 +232,33 @@ fn each_name_is_understood_and_each_flag_is_one() {
             }
             Range::Number(..) | Range::List(_) => {}
         }
+    }
+}
+
+#[test]
+fn the_default_of_every_number_is_the_one_that_the_table_says() {
+    let mut made = StageSettings::default();
+    for path in paths(&StageSettings::simulated(), "/axes/x") {
+        if is_part(&path) {
+            made.set_json(&path, b"\"present\"").expect("a part");
+        }
+    }
+    for leaf in all() {
+        let Range::Number(..) = leaf.range else {
+            continue;
+        };
+        let path = leaf.path().replacen('*', "0", 1);
+        let value = match path.split_once("/*/") {
+            None => get(&made, &path)
+                .expect("a leaf")
+                .parse()
+                .expect("a number"),
+            Some((list, name)) => {
+                let points: Value =
+                    serde_json::from_str(&get(&made, list).expect("a list")).expect("JSON");
+                points[0][name].as_f64().expect("a number")
+            }
+        };
+        assert_eq!(leaf.default, value, "{path}");
     }
 }

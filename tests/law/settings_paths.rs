@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use miniconf::{Internal, Schema, TreeSchema};
-use quadrant::settings::tree::{MAX_PATH, is_part};
+use quadrant::settings::tree::{MAX_PATH, expand, is_part};
 use quadrant::settings::{AxisSettings, StageSettings};
 
 use crate::settings_tree::{get, paths};
@@ -29,7 +29,7 @@ fn json_leaves(value: &serde_json::Value, path: &str, found: &mut BTreeSet<Strin
 
 #[test]
 fn every_field_of_the_settings_file_is_a_leaf_and_the_other_way_round() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let tree = serde_json::to_value(&settings).expect("plain data");
     let mut fields = BTreeSet::new();
     json_leaves(&tree, "", &mut fields);
@@ -54,7 +54,7 @@ fn every_part_that_may_be_left_out_can_be() {
     }
     let mut found = BTreeSet::new();
     absent(AxisSettings::SCHEMA, "/axes/0", &mut found);
-    let parts: BTreeSet<String> = paths(&StageSettings::default(), "/axes/x")
+    let parts: BTreeSet<String> = paths(&StageSettings::simulated(), "/axes/x")
         .into_iter()
         .filter(|path| is_part(path))
         .collect();
@@ -64,4 +64,21 @@ fn every_part_that_may_be_left_out_can_be() {
 #[test]
 fn the_longest_path_has_room() {
     assert!(StageSettings::SCHEMA.max_length("/") < MAX_PATH);
+}
+
+#[test]
+fn what_a_person_writes_for_a_path_becomes_the_whole_path() {
+    for (written, whole) in [
+        ("x/limits/silent_s", "/axes/0/limits/silent_s"),
+        ("/axes/y/homing", "/axes/1/homing"),
+        ("axes/2/plant", "/axes/2/plant"),
+        ("z", "/axes/2"),
+        ("0/plant", "/axes/0/plant"),
+        ("rate_hz", "/rate_hz"),
+        ("/streaming/underrun", "/streaming/underrun"),
+        ("", "/"),
+    ] {
+        assert_eq!(expand(written).as_deref(), Some(whole), "{written}");
+    }
+    assert_eq!(expand(&"x".repeat(MAX_PATH + 1)), None);
 }

@@ -10,7 +10,7 @@ use crate::settings::check_message;
 fn plan_refusal(motion: MotionSettings) -> SettingsError {
     let mut plan = PlanSettings::default();
     plan.motions[1] = motion;
-    plan.validate(&StageSettings::default())
+    plan.validate(&StageSettings::simulated())
         .expect_err("refused")
 }
 

@@ -29,7 +29,7 @@ fn stages() -> [StageSettings; 2] {
         axis.feedback.nctf = None;
         axis.amplifier.reversed = true;
     });
-    [StageSettings::default(), bare]
+    [StageSettings::simulated(), bare]
 }
 
 #[test]
@@ -73,7 +73,7 @@ fn a_misspelt_field_is_refused_wherever_it_stands() {
             _ => {}
         }
     }
-    let tree = serde_json::to_value(StageSettings::default()).expect("plain data");
+    let tree = serde_json::to_value(StageSettings::simulated()).expect("plain data");
     let mut found = vec![];
     objects(&tree, "", &mut found);
     assert!(found.len() > 30, "{found:?}");

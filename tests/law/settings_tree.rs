@@ -24,7 +24,7 @@ pub(crate) fn paths(settings: &StageSettings, prefix: &str) -> Vec<String> {
 
 /// Settings with no part that may be left out.
 fn bare() -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     let all = paths(&settings, "");
     for path in all.iter().filter(|path| is_part(path)) {
         settings.set_json(path, b"null").expect("a part");
@@ -34,7 +34,7 @@ fn bare() -> StageSettings {
 
 #[test]
 fn a_leaf_is_read_and_written_by_its_path() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     assert_eq!(get(&settings, "/rate_hz").as_deref(), Ok("10000.0"));
     let path = "/axes/y/feedback/pid/kp_v_per_mm";
     assert_eq!(get(&settings, path).as_deref(), Ok("1.31"));
@@ -51,7 +51,7 @@ fn a_leaf_is_read_and_written_by_its_path() {
 
 #[test]
 fn letters_and_numbers_name_the_same_axes() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     for (letter, number) in [("x", "0"), ("y", "1"), ("z", "2")] {
         let gain = |axis: &str| {
             get(
@@ -65,7 +65,7 @@ fn letters_and_numbers_name_the_same_axes() {
 
 #[test]
 fn laws_and_kinds_go_by_their_names_as_in_settings_files() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for law in [
         LawKind::Pd,
         LawKind::Pid,
@@ -110,7 +110,7 @@ fn laws_and_kinds_go_by_their_names_as_in_settings_files() {
 
 #[test]
 fn a_part_is_removed_and_made_by_its_path() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for path in [
         "/axes/y/plant",
         "/axes/y/feedback/nonlinear",
@@ -127,10 +127,10 @@ fn a_part_is_removed_and_made_by_its_path() {
     settings
         .set_json("/axes/y/plant", b"\"present\"")
         .expect("a part");
-    assert_eq!(
-        settings.axes[1].plant,
-        StageSettings::default().axes[1].plant
-    );
+    let error = settings
+        .validate(4)
+        .expect_err("A must be given before the settings are valid");
+    assert_eq!(error.field, "plant.gain_mm_per_v_s2");
     settings.set_json(leaf, b"0.001").expect("present now");
     settings
         .set_json("/axes/y/plant", b"\"present\"")
@@ -170,7 +170,7 @@ fn a_list_is_one_value_and_makes_itself() {
 
 #[test]
 fn what_is_no_setting_is_told_from_what_holds_several() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for path in [
         "",
         "rate_hz",
@@ -209,12 +209,12 @@ fn what_is_no_setting_is_told_from_what_holds_several() {
         settings.set_json("/axes/x/plant", b"{}"),
         Err(TreeError::NotALeaf)
     );
-    assert_eq!(settings, StageSettings::default());
+    assert_eq!(settings, StageSettings::simulated());
 }
 
 #[test]
 fn values_that_are_none_change_nothing() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for json in ["", "nan", "1,2", "\"1\"", "true", "1 2", "{", "[1]"] {
         let result = settings.set_json("/axes/x/feedback/pid/kp_v_per_mm", json.as_bytes());
         assert_eq!(result, Err(TreeError::Value), "{json}");
@@ -223,12 +223,12 @@ fn values_that_are_none_change_nothing() {
         let result = settings.set_json("/axes/x/encoder/counter_bits", json.as_bytes());
         assert_eq!(result, Err(TreeError::Value), "{json}");
     }
-    assert_eq!(settings, StageSettings::default());
+    assert_eq!(settings, StageSettings::simulated());
 }
 
 #[test]
 fn an_answer_that_does_not_fit_is_an_error_of_its_own() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     for path in ["/rate_hz", "/axes/x/plant", "/axes/x/friction/gms/elements"] {
         let result = settings.get_json(path, &mut [0; 3]);
         assert_eq!(result, Err(TreeError::NoRoom), "{path}");
@@ -237,7 +237,7 @@ fn an_answer_that_does_not_fit_is_an_error_of_its_own() {
 
 #[test]
 fn a_list_of_paths_is_complete_without_repetition_and_can_be_limited() {
-    let settings = StageSettings::default();
+    let settings = StageSettings::simulated();
     let all = paths(&settings, "");
     assert_eq!(
         all.iter().collect::<std::collections::BTreeSet<_>>().len(),
@@ -258,12 +258,12 @@ fn a_list_of_paths_is_complete_without_repetition_and_can_be_limited() {
     assert_eq!((result, none), (Err(TreeError::NotFound), vec![]));
 }
 
-/// As the console's `dump` and `load` do.
+/// What `quadrant dump` and `load` do.
 #[test]
 fn a_dump_makes_the_same_settings_again() {
-    for original in [StageSettings::default(), bare()] {
+    for original in [StageSettings::simulated(), bare()] {
         let mut copy = if original == bare() {
-            StageSettings::default()
+            StageSettings::simulated()
         } else {
             bare()
         };
@@ -276,13 +276,13 @@ fn a_dump_makes_the_same_settings_again() {
     }
 }
 
-/// As a host does it that leaves JSON to itself.
+/// What a host does that leaves JSON to itself.
 #[test]
 fn a_dump_in_bytes_makes_the_same_settings_again() {
     let mut longest = 0;
-    for original in [StageSettings::default(), bare()] {
+    for original in [StageSettings::simulated(), bare()] {
         let mut copy = if original == bare() {
-            StageSettings::default()
+            StageSettings::simulated()
         } else {
             bare()
         };
@@ -303,7 +303,7 @@ fn a_dump_in_bytes_makes_the_same_settings_again() {
 
 #[test]
 fn bytes_of_another_kind_or_length_change_nothing() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     let gain = "/axes/x/feedback/pid/kp_v_per_mm";
     let one = 1.0f64.to_le_bytes();
     for (path, kind, bytes) in [
@@ -328,7 +328,7 @@ fn bytes_of_another_kind_or_length_change_nothing() {
         settings.set_bytes("/axes/x", 0, &[1]),
         Err(TreeError::NotALeaf)
     );
-    assert_eq!(settings, StageSettings::default());
+    assert_eq!(settings, StageSettings::simulated());
     assert_eq!(settings.set_bytes(gain, 4, &one), Ok(Some(0)));
     assert_eq!(settings.axes[0].feedback.pid.kp_v_per_mm, 1.0);
 }
@@ -340,7 +340,7 @@ proptest! {
     fn any_finite_number_comes_back_to_the_last_bit(bits: u64) {
         let number = f64::from_bits(bits);
         prop_assume!(number.is_finite());
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         let json = serde_json::to_string(&number).expect("finite");
         settings.set_json("/axes/x/feedback/transfer_s", json.as_bytes()).expect("a number");
         let read = get(&settings, "/axes/x/feedback/transfer_s").expect("a leaf");
@@ -351,11 +351,11 @@ proptest! {
 
     #[test]
     fn no_path_and_no_value_panics(path in "(/axes/[xyz0-9]{0,2})?(/[a-z_]{0,12}){0,5}", json in any::<Vec<u8>>()) {
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         let _ = settings.get_json(&path, &mut [0; 64]);
         let _ = settings.list(&path, &mut |_| {});
         if settings.set_json(&path, &json).is_err() {
-            prop_assert_eq!(settings, StageSettings::default());
+            prop_assert_eq!(settings, StageSettings::simulated());
         }
     }
 }

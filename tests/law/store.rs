@@ -23,7 +23,7 @@ type Stored = Result<Option<(u32, StageSettings)>, LoadError<FlashError>>;
 fn load(flash: &Flash) -> Stored {
     let mut settings = StageSettings {
         rate_hz: 77.0,
-        ..StageSettings::default()
+        ..StageSettings::simulated()
     };
     let loaded = Store::new(flash.clone(), 0).load(
         &mut settings,
@@ -41,7 +41,7 @@ fn load(flash: &Flash) -> Stored {
 }
 
 fn numbered(number: u32) -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     settings.axes[0].feedback.transfer_s = 0.1 + f64::from(number) * 1e-3;
     settings
 }
@@ -68,7 +68,7 @@ fn a_flash_full_of_something_else_takes_settings() {
 
 #[test]
 fn a_set_that_is_refused_stays_and_makes_room_for_another() {
-    let mut many = StageSettings::default();
+    let mut many = StageSettings::simulated();
     let elements = &mut many.axes[1].friction.gms.elements;
     let (weight, stiffness_v_per_mm) = (1.0 / 9.0, 1.0);
     *elements = [GmsElement {

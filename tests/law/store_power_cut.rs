@@ -11,7 +11,7 @@ const ELEMENTS: usize = 8;
 
 /// Settings that tell which store they are of, and are soon checked: without a plant there is no bound to search.
 fn set(number: u32) -> StageSettings {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.plant = None;
         axis.feedback.law = LawKind::Pid;
@@ -34,7 +34,7 @@ fn save(flash: Flash, number: u32) -> (Flash, Result<Stored, SaveError<FlashErro
 /// The number of the set that a reboot finds; `None` if nothing was ever stored.
 fn after_reboot(flash: Flash) -> (Flash, Option<u32>) {
     let mut store = Store::new(flash.reboot(), 0);
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     let loaded = store
         .load(&mut settings, ELEMENTS, &mut [0; BUFFER_BYTES], &mut |_| {})
         .expect("what was stored is valid");
@@ -102,7 +102,7 @@ fn no_cut_loses_the_settings() {
     assert_eq!(lost, 0);
 }
 
-/// The remains of one cut are there at the next.
+/// What one cut leaves behind is there at the next.
 #[test]
 fn cuts_upon_cuts_lose_nothing() {
     let mut noise = Noise::new(7);

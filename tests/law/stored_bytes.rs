@@ -35,7 +35,7 @@ fn decoded(bytes: &[u8]) -> Decoded {
     let mut findings = vec![];
     let mut settings = StageSettings {
         rate_hz: 77.0,
-        ..StageSettings::default()
+        ..StageSettings::simulated()
     };
     let result = decode(bytes, ELEMENTS, &mut settings, &mut |finding| {
         findings.push(format!("{finding:?}"));
@@ -101,7 +101,7 @@ fn assemble(head: &(u8, String), records: &[Record]) -> Vec<u8> {
 
 /// A change to one record of the default settings' set.
 fn with_record(path: &str, change: impl FnOnce(&mut Record)) -> Vec<u8> {
-    let (head, mut records) = parse(&encoded(&StageSettings::default(), ""));
+    let (head, mut records) = parse(&encoded(&StageSettings::simulated(), ""));
     let named = |record: &&mut Record| record.suffix == path && record.kind != 0;
     change(records.iter_mut().find(named).expect("a record"));
     assemble(&head, &records)
@@ -110,7 +110,7 @@ fn with_record(path: &str, change: impl FnOnce(&mut Record)) -> Vec<u8> {
 /// Settings unlike the default ones in everything that chance picks, valid or not.
 fn varied(seed: u64) -> StageSettings {
     let mut noise = Noise::new(seed);
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for path in paths(&settings, "") {
         if is_part(&path) && noise.bits() >> 20 & 7 == 0 {
             settings.set_json(&path, b"null").expect("a part");
@@ -167,7 +167,7 @@ proptest! {
 
     #[test]
     fn no_garbled_set_panics(place: prop::sample::Index, byte: u8) {
-        let mut bytes = encoded(&StageSettings::default(), "from somewhere");
+        let mut bytes = encoded(&StageSettings::simulated(), "from somewhere");
         let place = place.index(bytes.len());
         bytes[place] = byte;
         let _ = decoded(&bytes);
@@ -177,7 +177,7 @@ proptest! {
 
 #[test]
 fn the_paths_are_written_once_for_all_axes() {
-    let ((format, provenance), records) = parse(&encoded(&StageSettings::default(), "here"));
+    let ((format, provenance), records) = parse(&encoded(&StageSettings::simulated(), "here"));
     assert_eq!((format, provenance.as_str()), (1, "here"));
     let gain = records
         .iter()
@@ -193,7 +193,7 @@ fn the_paths_are_written_once_for_all_axes() {
 
 #[test]
 fn what_is_unknown_is_skipped_and_reported() {
-    let (head, mut records) = parse(&encoded(&StageSettings::default(), ""));
+    let (head, mut records) = parse(&encoded(&StageSettings::simulated(), ""));
     let new = |suffix: &str, kind, axes: u8| Record {
         shared: 0,
         suffix: suffix.to_owned(),
@@ -213,7 +213,7 @@ fn what_is_unknown_is_skipped_and_reported() {
     records.push(new("/spindle/speed", 4, 1));
     records.push(new("/axes/*/feedback", 4, 7));
     let (settings, _, findings) = decoded(&assemble(&head, &records)).expect("understood");
-    assert_eq!(settings, StageSettings::default());
+    assert_eq!(settings, StageSettings::simulated());
     assert_eq!(
         findings,
         [
@@ -227,7 +227,7 @@ fn what_is_unknown_is_skipped_and_reported() {
 
 #[test]
 fn what_is_missing_has_its_default_and_is_reported() {
-    let mut original = StageSettings::default();
+    let mut original = StageSettings::simulated();
     for axis in &mut original.axes {
         axis.feedback.transfer_s = 0.2;
         axis.feedforward.gains.level = 0.5;
@@ -301,7 +301,7 @@ fn a_value_out_of_its_range_refuses_the_set() {
 
 #[test]
 fn another_format_is_refused() {
-    let mut bytes = encoded(&StageSettings::default(), "");
+    let mut bytes = encoded(&StageSettings::simulated(), "");
     for format in [0, 2, 255] {
         bytes[0] = format;
         assert_eq!(decoded(&bytes), Err(DecodeError::Format(format)));
@@ -335,7 +335,7 @@ fn a_set_of_the_first_release_is_read() {
 /// The longest settings there can be, and the longest provenance.
 #[test]
 fn the_buffer_holds_any_settings() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.feedback.law = LawKind::SlidingMode;
         axis.feedforward.kind = FeedforwardKind::SmoothedGms;
@@ -354,7 +354,7 @@ fn the_buffer_holds_any_settings() {
             .collect::<heapless::Vec<CharacteristicPoint, 16>>();
     }
     let longest = encoded(&settings, &"x".repeat(PROVENANCE_BYTES)).len();
-    let usual = encoded(&StageSettings::default(), "quadrant commission --axis x").len();
+    let usual = encoded(&StageSettings::simulated(), "quadrant commission --axis x").len();
     println!("longest set {longest} bytes, default set {usual} bytes, room {BUFFER_BYTES}");
     // The sequence number, and as much again as one more list on each axis.
     assert!(longest + 4 + 3 * 320 <= BUFFER_BYTES, "{longest}");

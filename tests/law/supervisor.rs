@@ -25,6 +25,7 @@ const DISABLED: StageView = StageView {
     stream_ready: false,
     injection_ready: false,
     injecting: false,
+    commissioned: true,
 };
 const ENABLED: StageView = StageView {
     safety: SafetyState::Enabled,

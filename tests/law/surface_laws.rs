@@ -6,7 +6,7 @@ use quadrant::control::pid::{Pid, PidGains};
 use quadrant::control::surface::SurfaceGains;
 use quadrant::control::terms::FeedbackInput;
 use quadrant::control::terms::FeedbackState;
-use quadrant::settings::{FeedbackSettings, x_axis};
+use quadrant::settings::{FeedbackSettings, presets::x_axis};
 
 const PERIOD_S: f64 = 1e-4;
 

@@ -38,7 +38,7 @@ fn seen<S: Scalar>(rig: &Rig<S>) -> Observation<'_, S, 4> {
 
 /// A stage in the middle of a motion, every term of its law at work.
 fn moving<S: Scalar>() -> Rig<S> {
-    let mut rig = Rig::new(&StageSettings::default(), &sine_on_x(30.0, 10.0));
+    let mut rig = Rig::new(&StageSettings::simulated(), &sine_on_x(30.0, 10.0));
     rig.start();
     for _ in 0..300 {
         rig.tick();
@@ -135,7 +135,7 @@ fn the_velocity_channel_is_the_references_velocity() {
     let x = |rig: &Rig<f64>| rig.state.axes()[0].telemetry().reference.0 as f64 / 65536.0 * 5e-4;
     // The feedforward's reference is ahead of the one that is shown, by the preview.
     let shown = channel("x.velocity").value(read(channel("x.velocity"), &seen(&rig)));
-    let preview = StageSettings::default().axes[0].feedforward.preview_s * 1e4;
+    let preview = StageSettings::simulated().axes[0].feedforward.preview_s * 1e4;
     for _ in 0..preview.round() as u32 {
         rig.tick();
     }
@@ -151,7 +151,7 @@ fn the_velocity_channel_is_the_references_velocity() {
 
 #[test]
 fn the_stages_channels_show_state_fault_tick_and_time() {
-    let mut rig = Rig::<f32>::new(&StageSettings::default(), &sine_on_x(30.0, 10.0));
+    let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &sine_on_x(30.0, 10.0));
     let word = |rig: &Rig<f32>, signal| read(Channel::Stage(signal), &seen(rig));
     rig.tick();
     assert_eq!(

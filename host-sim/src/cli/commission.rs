@@ -65,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let mut file = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?,
-        None => SettingsFile::new(StageSettings::default()),
+        None => SettingsFile::new(StageSettings::simulated()),
     };
     let base = file.stage.axes[axis.index()].clone();
     let found = request.run(&mut axis.rig(output.seed), &base, output.seed)?;

@@ -88,7 +88,7 @@ const QUIET_FILTER: f64 = 0.07;
 
 #[cfg(test)]
 mod tests {
-    use quadrant::settings::{x_axis, y_axis, z_axis};
+    use quadrant::settings::presets::{X_PLANT, x_axis, y_axis, z_axis};
 
     use super::*;
     use crate::design::{SampledLoop, margins};
@@ -99,7 +99,7 @@ mod tests {
             for delay_s in [0.0, 0.5e-3, 1.2e-3, 3e-3, 5e-3] {
                 for wrong in [0.5, 1.0, 2.0] {
                     let plant = PlantModel {
-                        gain_mm_per_v_s2: 69_390.0,
+                        gain_mm_per_v_s2: X_PLANT.gain_mm_per_v_s2,
                         damping_per_s,
                         stiffness_per_s2: 0.0,
                         delay_s,

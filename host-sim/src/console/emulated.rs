@@ -41,7 +41,7 @@ impl EmulatedLink {
         Ok(InProcess::new(Self {
             machine,
             flash,
-            period: period(&StageSettings::default()),
+            period: period(&StageSettings::simulated()),
         }))
     }
 }

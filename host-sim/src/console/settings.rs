@@ -4,7 +4,7 @@ use heapless::{String as Bounded, Vec as Bytes};
 use quadrant::link::message::{
     Applied, Body, Path as LeafPath, Reply, SettingsRequest, Value as LeafValue,
 };
-use quadrant::settings::tree::{TreeError, is_part};
+use quadrant::settings::tree::{TreeError, expand, is_part};
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
 use serde_json::Value;
 
@@ -14,25 +14,10 @@ use super::error::ClientError;
 /// Room for every value as JSON.
 const JSON_BYTES: usize = 2048;
 
-/// Paths of the axes in the tree, and what a person may write for them.
-const AXES: [(&str, &str); 3] = [("x/", "0"), ("y/", "1"), ("z/", "2")];
-
-/// The whole path of what a person may write: `x/limits/max_velocity_mm_s` for `/axes/0/limits/max_velocity_mm_s`.
+/// The whole path of what a person may write: `x/limits/max_velocity_mm_s` for `/axes/0/limits/max_velocity_mm_s`. What is
+/// longer than any path stays as it is.
 pub fn whole_path(path: &str) -> String {
-    let path = path.strip_prefix("/axes/").unwrap_or(path);
-    let bare = path.strip_prefix('/').unwrap_or(path);
-    for (name, index) in AXES {
-        let by_index = bare
-            .strip_prefix(index)
-            .and_then(|rest| rest.strip_prefix('/'));
-        if let Some(rest) = bare.strip_prefix(name).or(by_index) {
-            return format!("/axes/{index}/{rest}");
-        }
-        if bare == name.trim_end_matches('/') {
-            return format!("/axes/{index}");
-        }
-    }
-    format!("/{bare}")
+    expand(path).map_or_else(|| path.to_owned(), |path| path.as_str().to_owned())
 }
 
 /// The value of a leaf in the machine's draft, or whether a part that may be left out is there.
@@ -45,8 +30,8 @@ pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
         path: path.to_owned(),
         source,
     };
-    // Settings of our own, into which the value is put to read it as text.
-    let mut own = StageSettings::default();
+    // Settings with every part, into which the value is put to read it as text.
+    let mut own = StageSettings::simulated();
     own.set_bytes(path, value.kind, &value.bytes)
         .map_err(unknown)?;
     let mut json = [0; JSON_BYTES];
@@ -77,7 +62,7 @@ pub fn set(client: &mut Client, path: &str, value: &str) -> Result<(), ClientErr
         path: format!("{path} = {json}"),
         source,
     };
-    let mut own = StageSettings::default();
+    let mut own = StageSettings::simulated();
     own.set_json(path, json.as_bytes()).map_err(wrong)?;
     set_bytes(client, path, bytes_of(&own, path).map_err(wrong)?)
 }
@@ -190,7 +175,7 @@ pub enum ExchangeError {
 /// # Errors
 /// A connection that is broken, or a machine of a later release.
 pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     // In the machine's order a part comes before its leaves.
     for path in list(client, "")? {
         let LeafValue { kind, bytes } = get_bytes(client, &path)?;

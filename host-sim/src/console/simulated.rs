@@ -15,7 +15,7 @@ use super::transport::{Exchange, InProcess};
 use crate::plant::StageTruth;
 use crate::simulated_machine::{MemoryFlash, SimulatedMachine};
 
-/// The firmware's application on the simulated stage, with the firmware's default settings, and the bytes to and from it.
+/// The firmware's application on the simulated stage, with that stage's settings, and the bytes to and from it.
 pub struct SimulatedLink {
     machine: SimulatedMachine,
     flash: Option<FlashFile>,
@@ -26,9 +26,9 @@ impl SimulatedLink {
     /// A machine that has just been switched on; `seed` decides the noise of its encoders, and a file keeps its flash.
     ///
     /// # Errors
-    /// Defaults that are refused, or a file that is no flash.
+    /// Settings that are refused, or a file that is no flash.
     pub fn start(seed: u64, flash: Option<&Path>) -> io::Result<InProcess<Self>> {
-        let settings = StageSettings::default();
+        let settings = StageSettings::simulated();
         let flash = flash
             .map(|path| FlashFile::open(path, FLASH_BYTES))
             .transpose()?;

@@ -98,15 +98,11 @@ pub fn largest_integral_gain(
 /// Acceptable to 0.05 dB and 0.05 deg of the loop without integral action, for instance:
 ///
 /// ```
-/// # use quadrant::control::{plant_model::PlantModel, pid::PidGains};
+/// # use quadrant::control::pid::PidGains;
+/// # use quadrant::settings::presets::{X_GAINS, X_PLANT};
 /// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
-/// # let plant = PlantModel {
-/// #     gain_mm_per_v_s2: 69390.0, damping_per_s: 144.8, stiffness_per_s2: 166.6, delay_s: 1.2e-3,
-/// # };
-/// # let gains = PidGains {
-/// #     kp_v_per_mm: 1.118, ki_v_per_mm_s: 0.0, kd_v_s_per_mm: 0.005537, derivative_filter_s: 52e-6,
-/// # };
-/// let process = Process::Model(plant);
+/// # let gains = PidGains { ki_v_per_mm_s: 0.0, ..X_GAINS };
+/// let process = Process::Model(X_PLANT);
 /// let without = process.margins(&gains, Form::Continuous)?;
 /// let ki = largest_integral_gain_where(&process, Form::Continuous, &gains, |with| {
 ///     (with.gain_margin_db - without.gain_margin_db).abs() <= 0.05

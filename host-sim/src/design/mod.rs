@@ -35,31 +35,8 @@ pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]
 mod fixtures {
-    use quadrant::control::{pid::PidGains, plant_model::PlantModel};
-
-    /// The x axis, chosen so that the thesis' printed margins come out.
-    pub(crate) const X_PLANT: PlantModel = PlantModel {
-        gain_mm_per_v_s2: 69390.0,
-        damping_per_s: 144.8,
-        stiffness_per_s2: 166.6,
-        delay_s: 1.2e-3,
-    };
-
-    /// A similar y axis, invented.
-    pub(crate) const Y_PLANT: PlantModel = PlantModel {
-        gain_mm_per_v_s2: 61200.0,
-        damping_per_s: 151.0,
-        stiffness_per_s2: 148.0,
-        delay_s: 1.2e-3,
-    };
-
-    /// A similar z axis, invented.
-    pub(crate) const Z_PLANT: PlantModel = PlantModel {
-        gain_mm_per_v_s2: 48500.0,
-        damping_per_s: 172.0,
-        stiffness_per_s2: 205.0,
-        delay_s: 1.3e-3,
-    };
+    use quadrant::control::pid::PidGains;
+    pub(crate) use quadrant::settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 
     /// The derivative filter of all axes, s.
     pub(crate) const FILTER_S: f64 = 52e-6;

@@ -169,7 +169,7 @@ mod tests {
 
     #[test]
     fn the_default_axes_have_what_the_fit_to_their_elements_gives() {
-        for axis in StageSettings::default().axes {
+        for axis in StageSettings::simulated().axes {
             let friction = axis.friction;
             let again = with_all_models(friction.sliding, friction.gms.clone());
             let (dahl, fitted) = (friction.dahl.unwrap(), again.dahl.unwrap());
@@ -189,7 +189,7 @@ mod tests {
 
     #[test]
     fn the_fits_of_the_default_axes_are_a_tenth_of_breakaway_off() {
-        for axis in StageSettings::default().axes {
+        for axis in StageSettings::simulated().axes {
             let (gms, curve) = (axis.friction.gms, axis.friction.sliding.positive.curve);
             let dahl = fit_dahl(&gms, curve.breakaway_v, curve.coulomb_v).unwrap();
             let lugre = fit_lugre(&gms, curve.breakaway_v, 0.0).unwrap();
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn elements_that_cannot_be_fitted_leave_the_models_out() {
-        let sliding = StageSettings::default().axes[0].friction.sliding;
+        let sliding = StageSettings::simulated().axes[0].friction.sliding;
         let gms = GmsParameters {
             elements: [GmsElement {
                 stiffness_v_per_mm: 0.0,

@@ -3,9 +3,11 @@
 use std::f64::consts::TAU;
 
 use heapless::Vec;
+use quadrant::control::plant_model::PlantModel;
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant::settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 
 use super::Drive;
 use super::FrictionTruth;
@@ -133,9 +135,7 @@ fn directed(mean: &StaticFriction, factor: f64) -> StaticFriction {
 
 /// Parameters in which the simulated axes differ.
 struct Character {
-    gain_mm_per_v_s2: f64,
-    linear_damping_per_s: f64,
-    delay_s: f64,
+    linear: PlantModel,
     mean: StaticFriction,
     asymmetry: f64,
     presliding_mm: f64,
@@ -145,12 +145,12 @@ struct Character {
 fn axis(character: &Character) -> AxisTruth {
     let Character { mean, .. } = character;
     AxisTruth {
-        gain_mm_per_v_s2: character.gain_mm_per_v_s2,
+        gain_mm_per_v_s2: character.linear.gain_mm_per_v_s2,
         // The viscous part of the linear model's damping is carried by friction.
-        damping_per_s: character.linear_damping_per_s
-            - character.gain_mm_per_v_s2 * mean.viscous_v_s_per_mm,
+        damping_per_s: character.linear.damping_per_s
+            - character.linear.gain_mm_per_v_s2 * mean.viscous_v_s_per_mm,
         stiffness_per_s2: 0.0,
-        delay_s: character.delay_s,
+        delay_s: character.linear.delay_s,
         friction: PerDirection {
             positive: directed(mean, 1.0 + character.asymmetry),
             negative: directed(mean, 1.0 - character.asymmetry),
@@ -194,27 +194,21 @@ impl StageTruth {
         Self {
             axes: [
                 axis(&Character {
-                    gain_mm_per_v_s2: 69_390.0,
-                    linear_damping_per_s: 144.8,
-                    delay_s: 1.20e-3,
+                    linear: X_PLANT,
                     mean: mean(0.120, 0.150, 1.0),
                     asymmetry: 0.03,
                     presliding_mm: 0.030,
                     imperfections: imperfections(0.003, 0.002),
                 }),
                 axis(&Character {
-                    gain_mm_per_v_s2: 61_200.0,
-                    linear_damping_per_s: 151.0,
-                    delay_s: 1.20e-3,
+                    linear: Y_PLANT,
                     mean: mean(0.140, 0.170, 1.2),
                     asymmetry: -0.02,
                     presliding_mm: 0.034,
                     imperfections: imperfections(-0.002, 0.003),
                 }),
                 axis(&Character {
-                    gain_mm_per_v_s2: 48_500.0,
-                    linear_damping_per_s: 172.0,
-                    delay_s: 1.30e-3,
+                    linear: Z_PLANT,
                     mean: mean(0.160, 0.200, 0.9),
                     asymmetry: 0.04,
                     presliding_mm: 0.026,

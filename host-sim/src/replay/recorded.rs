@@ -140,7 +140,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
         stiffness_per_s2: 0.0,
         delay_s: emps::DELAY_S,
     };
-    let mut settings = quadrant::settings::x_axis();
+    let mut settings = quadrant::settings::presets::x_axis();
     let filter_s = settings.feedback.pid.derivative_filter_s;
     let mut pid = shape_to_margins(
         &Process::Model(plant),
@@ -247,7 +247,7 @@ pub fn replay<S: Scalar>(
     progress: &ProgressBar,
 ) -> Result<Vec<RecordedOutcome>, ReplayError> {
     let axis = axis.build(setup)?;
-    let rate_hz = StageSettings::default().rate_hz;
+    let rate_hz = StageSettings::simulated().rate_hz;
     let ticks = record.sample_time_s * rate_hz;
     let ticks_per_sample = ticks.round();
     if ticks_per_sample < 1.0 || (ticks - ticks_per_sample).abs() > 1e-3 * ticks_per_sample {
@@ -304,7 +304,7 @@ fn run_record<S: Scalar>(
     ticks_per_sample: u32,
     seed: u64,
 ) -> Result<RecordedOutcome, ReplayError> {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     settings.axes[0] = axis.settings.clone();
     configuration.apply(&mut settings);
     let mut truth = StageTruth::ideal();

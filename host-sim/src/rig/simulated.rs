@@ -38,10 +38,10 @@ pub struct SimulatedRig {
 }
 
 impl SimulatedRig {
-    /// Axis 0 to 2 with `truth`, under the default settings of that axis without feedforward and nonlinear gain; `seed`
+    /// Axis 0 to 2 with `truth`, under the simulated stage's settings of that axis without feedforward and nonlinear gain; `seed`
     /// decides the noise.
     pub fn new(index: usize, truth: AxisTruth, seed: u64) -> Self {
-        let mut stage = StageSettings::default();
+        let mut stage = StageSettings::simulated();
         let mut axis = stage.axes[index].clone();
         axis.feedback.law = LawKind::Pid;
         axis.feedforward.kind = FeedforwardKind::None;

@@ -118,7 +118,7 @@ pub struct SimulatedMachine {
 }
 
 impl SimulatedMachine {
-    /// Starts a machine whose flash is empty, with `settings` as the defaults of its firmware.
+    /// Starts a machine whose flash is empty, with `settings` in force until others are stored.
     ///
     /// # Errors
     /// The first of the settings that is refused.
@@ -231,7 +231,7 @@ impl<S: Scalar> Running<S> {
     /// As the firmware does after a reset.
     ///
     /// # Errors
-    /// The first of the default settings that is refused.
+    /// The first of the settings for an empty flash that is refused.
     pub fn start(start: Start<'_>, flash: MemoryFlash) -> Result<Self, SettingsError> {
         let Start { defaults, .. } = start;
         let mut fault = None;
@@ -304,7 +304,11 @@ impl<S: Scalar> Running<S> {
             return (outputs, Poll::Continue);
         };
         self.seen = seen;
-        let supervised = self.supervision.run(&seen, self.requests.pop_front());
+        let supervised = self.supervision.run(
+            &seen,
+            self.requests.pop_front(),
+            self.server.is_commissioned(),
+        );
         self.command = supervised.command;
         self.control
             .show_glitches(self.supervision.glitch_readings());

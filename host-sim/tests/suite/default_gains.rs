@@ -1,7 +1,8 @@
 //! The default settings' gains are what `docs/parameters.md` says they are.
 
 use quadrant::control::popov::sector_bound;
-use quadrant::settings::{AxisSettings, StageSettings, x_axis, y_axis, z_axis};
+use quadrant::settings::presets::{x_axis, y_axis, z_axis};
+use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::design::{
     ContinuousLoop, Form, Margins, PrintedMargins, Process, largest_integral_gain,
     largest_integral_gain_where, margins, shape_to_margins,
@@ -67,7 +68,7 @@ fn y_and_z_are_shaped_to_the_same_margins_with_an_integral_gain_chosen_as_strict
 
 #[test]
 fn the_largest_nonlinear_gain_is_about_four_fifths_of_the_popov_bound() {
-    let stage = StageSettings::default();
+    let stage = StageSettings::simulated();
     for axis in &stage.axes {
         let bound = sector_bound(
             &axis.plant.unwrap(),

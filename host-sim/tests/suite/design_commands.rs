@@ -75,7 +75,7 @@ fn one_design_builds_on_another_and_the_settings_tell_both() {
     let axes: Vec<&str> = file.provenance.iter().map(|p| p.axis.as_str()).collect();
     assert_eq!(axes, ["y", "y"]);
     assert_eq!(file.provenance[1].sets, ["feedback.nonlinear"]);
-    let default = quadrant::settings::y_axis();
+    let default = quadrant::settings::presets::y_axis();
     assert!(file.stage.axes[1].feedback.pid.kp_v_per_mm > default.feedback.pid.kp_v_per_mm);
     assert!(at.join("npid/npid.html").exists());
 }

@@ -2,26 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::sector_proof;
+use quadrant::settings::presets::{X_GAINS, X_PLANT};
 use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear};
 use quadrant_sim::design::robustness::{Robustness, RobustnessError, Uncertainty, robustness};
 use quadrant_sim::design::time_varying::{Switching, VaryingLoop};
 use quadrant_sim::design::{ContinuousLoop, OpenLoop};
 
-const X_PLANT: PlantModel = PlantModel {
-    gain_mm_per_v_s2: 69390.0,
-    damping_per_s: 144.8,
-    stiffness_per_s2: 166.6,
-    delay_s: 1.2e-3,
-};
-const X_GAINS: PidGains = PidGains {
-    kp_v_per_mm: 1.118,
-    ki_v_per_mm_s: 0.74,
-    kd_v_s_per_mm: 0.005537,
-    derivative_filter_s: 52e-6,
-};
 const PERIOD_S: f64 = 1e-4;
 const CROSSOVER_HZ: f64 = 64.9;
 const X_LOOP: VaryingLoop = VaryingLoop {

@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use quadrant::control::plant_model::PlantModel;
+use quadrant::settings::presets::X_PLANT;
 use quadrant_sim::design::measured::{MeasuredError, MeasuredResponse};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::{
@@ -11,13 +12,6 @@ use quadrant_sim::design::{
     ShapingError, Target, design_pid,
 };
 use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
-
-const X_PLANT: PlantModel = PlantModel {
-    gain_mm_per_v_s2: 69390.0,
-    damping_per_s: 144.8,
-    stiffness_per_s2: 166.6,
-    delay_s: 1.2e-3,
-};
 
 const SAMPLED: Form = Form::Sampled {
     sample_time_s: 1e-4,

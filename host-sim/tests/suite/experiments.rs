@@ -53,7 +53,7 @@ fn combined_feedforward_makes_the_circle_rounder() {
 fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
     let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(30.0, 15.0, 1.0, 0.5));
     let job = Job {
-        stage: StageSettings::default(),
+        stage: StageSettings::simulated(),
         plan: PlanSettings {
             motions: [sine, MotionSettings::Hold, MotionSettings::Hold],
         },
@@ -109,7 +109,7 @@ fn our_controllers_follow_the_recorded_emps_reference() {
     let outcomes = replay::<f32>(
         &record,
         axis,
-        &RunConfiguration::exact(StageSettings::default()),
+        &RunConfiguration::exact(StageSettings::simulated()),
         1,
         &ProgressBar::hidden(),
     )

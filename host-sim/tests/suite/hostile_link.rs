@@ -110,7 +110,11 @@ fn starts_a_motion(body: &Body) -> bool {
 impl Bench {
     fn new() -> Self {
         let mut settings = identified_settings().expect("the committed settings").stage;
-        for (axis, default) in settings.axes.iter_mut().zip(StageSettings::default().axes) {
+        for (axis, default) in settings
+            .axes
+            .iter_mut()
+            .zip(StageSettings::simulated().axes)
+        {
             axis.homing = default.homing;
             axis.limits.travel_mm = default.limits.travel_mm;
         }
@@ -244,7 +248,7 @@ fn plausible(body: Body, noise: &mut Noise, paths: &[String]) -> Body {
 fn set_something(noise: &mut Noise, paths: &[String]) -> Body {
     let path = &paths[noise.below(paths.len() as u64) as usize];
     let mut bytes = [0; MAX_VALUE_BYTES];
-    let (kind, length) = StageSettings::default()
+    let (kind, length) = StageSettings::simulated()
         .get_bytes(path, &mut bytes)
         .unwrap_or((0, 0));
     let mut bytes = bytes[..length].to_vec();
@@ -315,7 +319,7 @@ fn hostile(seed: u64, frames: u64, allowed: Allowed) -> Tally {
     let mut noise = Noise::new(seed);
     let mut bench = Bench::new();
     let mut paths = Vec::new();
-    let listed = StageSettings::default().list("", &mut |path| paths.push(path.to_owned()));
+    let listed = StageSettings::simulated().list("", &mut |path| paths.push(path.to_owned()));
     listed.expect("the tree lists itself");
     bench.hello();
     while bench.tally.frames < frames {

@@ -163,7 +163,7 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
         ],
     );
     assert!(fresh.contains("Simulated, not measured"), "{fresh}");
-    let file = SettingsFile::new(StageSettings::default());
+    let file = SettingsFile::new(StageSettings::simulated());
     file.write(at.join("stage.toml")).unwrap();
     succeed(
         at,

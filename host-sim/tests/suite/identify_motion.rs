@@ -158,7 +158,7 @@ fn the_friction_of_a_record_makes_settings_that_the_firmware_takes() {
     let truth = &StageTruth::real().axes[0];
     let candidates = fitted(&simulated(0, truth), &MotionFitSettings::default());
     let model = &recommended(&candidates).unwrap().model;
-    let mut stage = quadrant::settings::StageSettings::default();
+    let mut stage = quadrant::settings::StageSettings::simulated();
     stage.axes[0].friction = model.friction_settings();
     stage
         .validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)

@@ -170,7 +170,7 @@ fn send_circle(bench: &mut Bench) {
 
 #[test]
 fn three_axes_are_homed_at_once_to_the_count_of_their_index_pulses() {
-    let mut bench = Bench::new(StageSettings::default());
+    let mut bench = Bench::new(StageSettings::simulated());
     bench.home();
     bench.assert_enabled();
     for (index, axis) in bench.machine.state().axes().iter().enumerate() {
@@ -188,7 +188,7 @@ fn three_axes_are_homed_at_once_to_the_count_of_their_index_pulses() {
 fn a_switch_elsewhere_gives_the_same_origin_to_the_count() {
     let mut origins = vec![];
     for home_mm in [-40.0, -39.2, -41.3, -38.1] {
-        let mut bench = Bench::new(StageSettings::default());
+        let mut bench = Bench::new(StageSettings::simulated());
         let marks = MarkTruth {
             home_mm,
             ..MarkTruth::default()
@@ -209,7 +209,7 @@ fn a_switch_elsewhere_gives_the_same_origin_to_the_count() {
 
 #[test]
 fn a_jog_comes_to_rest_before_the_soft_limit_without_a_fault() {
-    let mut bench = Bench::new(StageSettings::default());
+    let mut bench = Bench::new(StageSettings::simulated());
     bench.home();
     for (velocity_mm_s, limit_mm) in [(150.0, 200.0), (-150.0, -200.0), (20.0, -150.0)] {
         bench.jog(AxisName::X, velocity_mm_s);
@@ -234,7 +234,7 @@ fn a_jog_comes_to_rest_before_the_soft_limit_without_a_fault() {
 
 #[test]
 fn a_move_to_a_position_starts_from_where_the_axis_stands() {
-    let mut bench = Bench::new(StageSettings::default());
+    let mut bench = Bench::new(StageSettings::simulated());
     bench.home();
     let scale = bench.settings.motion_scale(2);
     for (target_mm, velocity_mm_s) in [(40.0, 50.0), (-12.5, 80.0)] {
@@ -268,7 +268,7 @@ fn a_move_to_a_position_starts_from_where_the_axis_stands() {
 
 #[test]
 fn a_streamed_circle_is_driven_on_the_true_stage() {
-    let mut bench = Bench::new(StageSettings::default());
+    let mut bench = Bench::new(StageSettings::simulated());
     bench.home();
     send_circle(&mut bench);
     bench.run(1);
@@ -305,7 +305,7 @@ const MOST_RADIAL_MM: f64 = 0.012;
 
 #[test]
 fn a_stop_in_the_middle_of_a_stream_holds_and_another_stream_starts_from_there() {
-    let mut bench = Bench::new(StageSettings::default());
+    let mut bench = Bench::new(StageSettings::simulated());
     bench.home();
     send_circle(&mut bench);
     bench.run(1);
@@ -338,7 +338,7 @@ fn a_stop_in_the_middle_of_a_stream_holds_and_another_stream_starts_from_there()
 
 #[test]
 fn a_home_switch_that_is_not_there_is_a_fault_and_the_axis_stops_first() {
-    let mut settings = StageSettings::default();
+    let mut settings = StageSettings::simulated();
     settings.axes[1]
         .homing
         .as_mut()

@@ -7,21 +7,18 @@ use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::sector_bound;
 use quadrant::control::terms::FeedbackState;
+use quadrant::settings::presets::{X_GAINS, X_PLANT};
 use quadrant_sim::design::held_plant::{HeldPlant, HeldPlantRun};
 use quadrant_sim::design::{Form, Process};
 
 /// The x axis, without the spring and the integral action that would end a lasting error.
 const PLANT: PlantModel = PlantModel {
-    gain_mm_per_v_s2: 69_390.0,
-    damping_per_s: 144.8,
     stiffness_per_s2: 0.0,
-    delay_s: 1.2e-3,
+    ..X_PLANT
 };
 const GAINS: PidGains = PidGains {
-    kp_v_per_mm: 1.118,
     ki_v_per_mm_s: 0.0,
-    kd_v_s_per_mm: 0.005_537,
-    derivative_filter_s: 52e-6,
+    ..X_GAINS
 };
 const GAIN: NonlinearGain = NonlinearGain {
     rate_per_mm: 15.0,

@@ -10,7 +10,7 @@ use quadrant_sim::gcode::{Limits, Program, ProgramError, Trajectory, Vector};
 use crate::command;
 
 fn limits() -> Limits {
-    Limits::of(&StageSettings::default())
+    Limits::of(&StageSettings::simulated())
 }
 
 fn plan(source: &str) -> Trajectory {

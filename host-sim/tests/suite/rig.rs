@@ -1,7 +1,7 @@
 //! Experiments on the simulated stage's axes.
 
 use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::rig::{Drive, Experiment, Recording, Rig, RigError, SimulatedRig};
 

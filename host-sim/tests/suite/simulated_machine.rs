@@ -23,7 +23,11 @@ impl Session {
     fn open() -> Self {
         let mut settings = identified_settings().unwrap().stage;
         // Commissioning does not say where the switches are.
-        for (axis, default) in settings.axes.iter_mut().zip(StageSettings::default().axes) {
+        for (axis, default) in settings
+            .axes
+            .iter_mut()
+            .zip(StageSettings::simulated().axes)
+        {
             axis.homing = default.homing;
             axis.limits.travel_mm = default.limits.travel_mm;
         }
@@ -122,7 +126,7 @@ impl Session {
         let path = path.try_into().unwrap();
         match self.done(Body::Settings(SettingsRequest::Get(path))) {
             Reply::Value(value) => {
-                let mut settings = StageSettings::default();
+                let mut settings = StageSettings::simulated();
                 settings.set_bytes(&name, value.kind, &value.bytes).unwrap();
                 let mut text = [0; 1536];
                 let length = settings.get_json(&name, &mut text).unwrap();
@@ -133,7 +137,7 @@ impl Session {
     }
 
     fn set(&mut self, path: &str, value: &str) {
-        let mut settings = StageSettings::default();
+        let mut settings = StageSettings::simulated();
         settings.set_json(path, value.as_bytes()).unwrap();
         let mut bytes = [0; MAX_VALUE_BYTES];
         let (kind, length) = settings.get_bytes(path, &mut bytes).unwrap();

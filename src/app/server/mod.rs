@@ -96,6 +96,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     pending: AxisSet,
     back_buffer: Option<&'a mut Axis<S>>,
     draft: Draft<'a>,
+    /// Somebody has given the settings in force.
+    commissioned: bool,
     provenance: Provenance,
     store: Store<F>,
     buffer: &'a mut [u8; BUFFER_BYTES],
@@ -131,6 +133,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             timing: TimingStatistics::default(),
             pending: AxisSet::NONE,
             back_buffer: Some(parts.back_buffer),
+            commissioned: parts.settings.is_commissioned(),
             draft: Draft::new(parts.settings, parts.draft),
             provenance: parts.provenance,
             store: parts.store,
@@ -162,6 +165,11 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         self.store.flash()
     }
 
+    /// True if the settings in force are not the default ones, on which the outputs are not enabled.
+    pub const fn is_commissioned(&self) -> bool {
+        self.commissioned
+    }
+
     /// Queues an event of a tick for the host; counts it as dropped if the queue is full.
     pub fn push_event(&mut self, tick: u32, event: impl Into<Event>) {
         if self.events.push_back((tick, event.into())).is_err() {
@@ -186,6 +194,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     ) -> Poll {
         self.report_homed(seen);
         self.seen = *seen;
+        self.seen.view.commissioned = self.commissioned;
         self.timing = timing;
         self.arm_at_start();
         self.build_pending();

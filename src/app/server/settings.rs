@@ -94,6 +94,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .filter(|&axis| changed[index(axis)])
             .map(Into::into)
             .collect();
+        self.commissioned = self.draft.in_force().is_commissioned();
         self.pending = changed;
         Ok(Reply::Applied(Applied {
             changed,

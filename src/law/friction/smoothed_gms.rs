@@ -31,13 +31,6 @@ pub struct SmoothedGmsParameters {
     pub width: f64,
 }
 
-impl Default for SmoothedGmsParameters {
-    /// The last quarter of each element's level (our choice).
-    fn default() -> Self {
-        Self { width: 0.25 }
-    }
-}
-
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct ElementConfig<S: Scalar> {
     stiffness: S::Gain,

@@ -1,113 +1,99 @@
-//! The leaves of what an axis may do, and of how it is homed.
+//! The leaves of an axis' limits and of its homing.
 
 use strum::VariantNames;
 
-use super::{Bound, LeafInfo, Range, at, leaves};
+use super::row::{LeafInfo, UNSET, at, at_most, flag, name, number, period_s, times};
 use crate::law::friction::Direction;
-use crate::settings::{HomeSwitch, StageSettings};
+use crate::settings::axis::AxisSettings;
+use crate::settings::homing::HomeSwitch;
 
-fn resolution_mm(settings: &StageSettings, axis: usize) -> f64 {
-    settings.axes[axis].encoder.resolution_mm
+/// The longest travel of an axis and of a motion, mm.
+pub(in crate::settings) const LONGEST_TRAVEL_MM: f64 = 1e4;
+/// The fastest reference, in counts per tick: what the formats of the moves' velocity and of the displacement hold.
+const MOST_COUNTS_PER_TICK: f64 = 4096.0;
+/// The largest acceleration of a reference, in counts per tick squared: what the format of the moves' holds.
+const MOST_COUNTS_PER_TICK_SQUARED: f64 = 256.0;
+/// The largest limit of the tracking error, in counts: half of where the error saturates.
+const MOST_ERROR_COUNTS: f64 = 8_388_608.0;
+
+fn resolution_mm(axis: &AxisSettings, _: f64) -> f64 {
+    axis.encoder.resolution_mm
 }
 
-/// Half of what half the encoder's counter holds, or 4096 counts, a tick.
-fn fastest_mm_s(settings: &StageSettings, axis: usize) -> f64 {
-    let quarter = libm::scalbn(0.25, settings.axes[axis].encoder.counter_bits.into());
-    let fastest = quarter.min(4096.0) * resolution_mm(settings, axis) * settings.rate_hz;
-    fastest.min(1e3)
+/// The encoder may move twice as far in a tick, within half of its counter's range, or its direction is lost.
+fn fastest_mm_s(axis: &AxisSettings, period_s: f64) -> f64 {
+    let half_range = libm::scalbn(0.5, axis.encoder.counter_bits.into());
+    (0.5 * half_range).min(MOST_COUNTS_PER_TICK) * axis.encoder.resolution_mm / period_s
 }
 
-fn most_acceleration_mm_s2(settings: &StageSettings, axis: usize) -> f64 {
-    let most = 256.0 * resolution_mm(settings, axis) * settings.rate_hz * settings.rate_hz;
-    most.min(3e4)
+fn most_acceleration_mm_s2(axis: &AxisSettings, period_s: f64) -> f64 {
+    MOST_COUNTS_PER_TICK_SQUARED * axis.encoder.resolution_mm / (period_s * period_s)
 }
 
-fn most_following_error_mm(settings: &StageSettings, axis: usize) -> f64 {
-    (8_388_608.0 * resolution_mm(settings, axis)).min(20.0)
+fn most_error_mm(axis: &AxisSettings, _: f64) -> f64 {
+    MOST_ERROR_COUNTS * axis.encoder.resolution_mm
 }
 
-fn least_positive_mm(settings: &StageSettings, axis: usize) -> f64 {
-    let travel = settings.axes[axis].limits.travel_mm;
-    travel.map_or(-1e4, |travel| travel.negative) + resolution_mm(settings, axis)
+fn least_positive_mm(axis: &AxisSettings, _: f64) -> f64 {
+    let negative = axis.limits.travel_mm.as_ref().map(|travel| travel.negative);
+    negative.unwrap_or(f64::NEG_INFINITY) + axis.encoder.resolution_mm
 }
 
-fn search_mm_s(settings: &StageSettings, axis: usize) -> f64 {
-    let homing = settings.axes[axis].homing.as_ref();
-    homing.map_or(1e3, |homing| homing.search_mm_s)
+fn search_mm_s(axis: &AxisSettings, _: f64) -> f64 {
+    let homing = axis.homing.as_ref();
+    homing.map_or(f64::INFINITY, |homing| homing.search_mm_s)
 }
 
-pub(super) const LEAVES: &[LeafInfo] = leaves! {
-    "/axes/*/limits/max_velocity_mm_s" "mm/s" Range::Number(
-        at(1e-3),
-        Bound::Of("1000, and what the encoder's counter can follow", fastest_mm_s)
-    );
-    "Largest velocity of any reference; at twice this the encoder counts as faulty."
-    "/axes/*/limits/max_acceleration_mm_s2" "mm/s²" Range::Number(
-        at(1e-3),
-        Bound::Of("30 000, and 256 counts per tick²", most_acceleration_mm_s2)
-    );
-    "Largest acceleration of any reference."
-    "/axes/*/limits/max_jerk_mm_s3" "mm/s³" Range::Number(at(1.0), at(1e9));
-    "Jerk of jogs, moves and homing."
-    "/axes/*/limits/following_error_mm" "mm" Range::Number(
-        Bound::Of("one count", resolution_mm),
-        Bound::Of("20, and 2²³ counts", most_following_error_mm)
-    );
-    "Largest tracking error while the reference stands; beyond it the stage is switched off."
-
-    "/axes/*/limits/following_error_lag_s" "s" Range::Number(at(0.0), at(1.0));
-    "What the largest tracking error grows by with the reference's speed, mm per mm/s."
-    "/axes/*/limits/following_error_max_mm" "mm" Range::Number(
-        Bound::Of("that at rest", |s, axis| s.axes[axis].limits.following_error_mm),
-        Bound::Of("20, and 2²³ counts", most_following_error_mm)
-    );
-    "The most that it grows to."
-    "/axes/*/limits/overspeed_ratio" "" Range::Number(at(1.05), at(2.0));
-    "Measured speed that is a fault, as a multiple of the largest velocity."
-    "/axes/*/limits/braking_mm_s2" "mm/s²" Range::Number(
-        at(1e-3),
-        Bound::Of("30 000, and 256 counts per tick²", most_acceleration_mm_s2)
-    );
-    "Deceleration of a stop after a fault; above the largest acceleration."
-    "/axes/*/limits/braking_jerk_mm_s3" "mm/s³" Range::Number(at(1.0), at(1e9));
-    "Jerk of that stop."
-    "/axes/*/limits/silent_s" "s" Range::Number(
-        Bound::Of("one control period", |s, _| 1.0 / s.rate_hz),
-        at(10.0)
-    );
-    "How long the encoder may show no motion while the output is high."
-    "/axes/*/limits/silent_share" "" Range::Number(at(0.01), at(1.0));
-    "From which output on that is, as a share of the output limit."
-    "/axes/*/limits/travel_mm/negative" "mm" Range::Number(at(-1e4), at(1e4));
-    "The smallest position of a homed axis."
-    "/axes/*/limits/travel_mm/positive" "mm" Range::Number(
-        Bound::Of("the smallest and one count", least_positive_mm),
-        at(1e4)
-    );
-    "The largest position of a homed axis."
-
-    "/axes/*/homing/direction" "" Range::Name(Direction::VARIANTS);
-    "Towards which end the switch is searched."
-    "/axes/*/homing/switch" "" Range::Name(HomeSwitch::VARIANTS);
-    "Which switch that is."
-    "/axes/*/homing/search_mm_s" "mm/s" Range::Number(at(1e-3), at(1e3));
-    "Velocity of the search and of the move to the parking position; held to the axis' largest."
-    "/axes/*/homing/latch_mm_s" "mm/s" Range::Number(
-        at(1e-3),
-        Bound::Of("that of the search", search_mm_s)
-    );
-    "Velocity away from the switch, over its edge and to the index pulse."
-    "/axes/*/homing/debounce_s" "s" Range::Number(at(0.0), at(0.1));
-    "For how long the switch may bounce; it also delays what it says."
-    "/axes/*/homing/index" "" Range::Flag;
-    "The mark is the first index pulse after the switch; else the switch's edge is. Needs the encoder's index spacing."
-    "/axes/*/homing/mark_mm" "mm" Range::Number(at(-1e4), at(1e4));
-    "Position of the mark, rounded to a whole count."
-    "/axes/*/homing/park_mm" "mm" Range::Number(at(-1e4), at(1e4));
-    "Where the axis goes in the end; held to the travel."
-    "/axes/*/homing/travel_mm" "mm" Range::Number(
-        Bound::Of("one count", resolution_mm),
-        at(2e4)
-    );
-    "How far the axis goes for the switch, and off it, before homing fails."
-};
+#[rustfmt::skip]
+pub(super) const LEAVES: &[LeafInfo] = &[
+    number("limits.max_velocity_mm_s", "mm/s",
+        at(1e-3), at_most(1e3, "what the encoder's counter can follow", fastest_mm_s), 50.0,
+        "Largest velocity of any reference; at twice this the encoder counts as faulty."),
+    number("limits.max_acceleration_mm_s2", "mm/s²",
+        at(1e-3), at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 500.0,
+        "Largest acceleration of any reference."),
+    number("limits.max_jerk_mm_s3", "mm/s³", at(1.0), at(1e9), 1e5,
+        "Jerk of jogs, moves and homing."),
+    number("limits.following_error_mm", "mm",
+        times(1.0, "one count", resolution_mm), at_most(20.0, "2²³ counts", most_error_mm), 1.0,
+        "Largest tracking error while the reference stands; beyond it the stage is switched off."),
+    number("limits.following_error_lag_s", "s", at(0.0), at(1.0), 0.0,
+        "Growth of the largest tracking error with the speed of the reference, mm per mm/s."),
+    number("limits.following_error_max_mm", "mm",
+        times(1.0, "that at rest", |axis, _| axis.limits.following_error_mm), at_most(20.0, "2²³ counts", most_error_mm), 20.0,
+        "Upper bound of the largest tracking error, at any speed."),
+    number("limits.overspeed_ratio", "", at(1.05), at(2.0), 1.2,
+        "Measured speed that is a fault, as a multiple of the largest velocity."),
+    number("limits.braking_mm_s2", "mm/s²",
+        at(1e-3), at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
+        "Deceleration of a stop after a fault; above the largest acceleration."),
+    number("limits.braking_jerk_mm_s3", "mm/s³", at(1.0), at(1e9), 1e6,
+        "Jerk of that stop."),
+    number("limits.silent_s", "s", times(1.0, "the control period", period_s), at(10.0), 0.1,
+        "Longest time without encoder motion while the output is above the share below; then the encoder counts as faulty."),
+    number("limits.silent_share", "", at(0.01), at(1.0), 0.9,
+        "Output, as a share of the output limit, above which the encoder must show motion."),
+    number("limits.travel_mm.negative", "mm", at(-LONGEST_TRAVEL_MM), at(LONGEST_TRAVEL_MM), 0.0,
+        "The smallest position of a homed axis."),
+    number("limits.travel_mm.positive", "mm",
+        times(1.0, "the smallest and one count", least_positive_mm), at(LONGEST_TRAVEL_MM), UNSET,
+        "The largest position of a homed axis."),
+    name("homing.direction", Direction::VARIANTS,
+        "End of the travel towards which the switch is searched."),
+    name("homing.switch", HomeSwitch::VARIANTS,
+        "Switch that is searched: the home switch, or the limit switch at that end."),
+    number("homing.search_mm_s", "mm/s", at(1e-3), at(1e3), 10.0,
+        "Velocity of the search and of the move after it; held to the axis' largest."),
+    number("homing.latch_mm_s", "mm/s", at(1e-3), times(1.0, "that of the search", search_mm_s), 1.0,
+        "Creep velocity: off the switch, over its edge and to the index pulse."),
+    number("homing.debounce_s", "s", at(0.0), at(0.1), 5e-4,
+        "Longest bounce of the switch; its reading is delayed by as much."),
+    flag("homing.index",
+        "True if the reference mark is the first index pulse after the switch, false if it is the switch's edge. Needs the encoder's index spacing."),
+    number("homing.mark_mm", "mm", at(-LONGEST_TRAVEL_MM), at(LONGEST_TRAVEL_MM), 0.0,
+        "Position of the reference mark, rounded to a whole count."),
+    number("homing.park_mm", "mm", at(-LONGEST_TRAVEL_MM), at(LONGEST_TRAVEL_MM), 0.0,
+        "Position to which the axis moves in the end; held to the travel."),
+    number("homing.travel_mm", "mm", times(1.0, "one count", resolution_mm), at(2.0 * LONGEST_TRAVEL_MM), UNSET,
+        "Longest way to the switch, and off it, before homing fails."),
+];

@@ -1,9 +1,12 @@
 //! Checks of motions against their axes' limits.
 
-use super::{LONGEST_TRAVEL_MM, Place};
+use super::Place;
 use crate::law::axes::AxisName;
 use crate::law::reference::MotionSettings;
-use crate::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+use crate::settings::axis::AxisSettings;
+use crate::settings::error::SettingsError;
+use crate::settings::leaves::limits::LONGEST_TRAVEL_MM;
+use crate::settings::stage::{PlanSettings, StageSettings};
 
 /// The longest travel of a motion, in counts: what the references' products hold.
 const MOST_TRAVEL_COUNTS: f64 = 1_073_741_824.0;

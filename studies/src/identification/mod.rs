@@ -129,7 +129,7 @@ pub fn validate(seeds: u64, progress: &ProgressBar) -> Result<Vec<Judgement>, Co
 pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, CommissionError> {
     let mut truth = StageTruth::real().axes[axis].clone();
     truth.imperfections.encoder_noise_mm *= noise;
-    let base = StageSettings::default().axes[axis].clone();
+    let base = StageSettings::simulated().axes[axis].clone();
     let mut rig = SimulatedRig::new(axis, truth.clone(), seed);
     let found = commission(
         &mut rig,

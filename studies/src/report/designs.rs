@@ -36,7 +36,7 @@ pub(super) fn identification(
     let mut rig = SimulatedRig::new(0, truth, context.seed);
     let found = commission(
         &mut rig,
-        &StageSettings::default().axes[0],
+        &StageSettings::simulated().axes[0],
         &CommissionSettings::default(),
         &mut |_, done| progress.at(COMMISSIONED * done),
     )?;

@@ -56,7 +56,7 @@ pub fn commission_drive(
     seed: u64,
 ) -> Result<AxisSettings, CommissionError> {
     let mut rig = SimulatedRig::new(index, truth.clone(), seed);
-    let base = StageSettings::default().axes[index].clone();
+    let base = StageSettings::simulated().axes[index].clone();
     let request = CommissionSettings::default();
     Ok(commission(&mut rig, &base, &request, &mut |_, _| {})?.settings)
 }

@@ -2,7 +2,7 @@
 
 use crate::command::{fail, succeed};
 use indicatif::ProgressBar;
-use quadrant::settings::x_axis;
+use quadrant::settings::presets::x_axis;
 use quadrant::units::DacCode;
 use quadrant_sim::plant::{AxisTruth, FrictionTruth, SimulatedAxis, StageTruth};
 use quadrant_studies::friction_models::{Behaviour, Model, Parameters, compare};

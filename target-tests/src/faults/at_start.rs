@@ -105,8 +105,8 @@ pub(crate) fn refused_job(image: &Image) -> Result<()> {
 }
 
 /// Starts on a set that a firmware with room for more elements has stored.
-pub(crate) fn refused_settings(image: &Image) -> Result<Finding> {
-    let mut settings = StageSettings::default();
+pub(super) fn refused_settings(image: &Image) -> Result<Finding> {
+    let mut settings = StageSettings::simulated();
     let more = FIRMWARE_ELEMENTS + 1;
     let element = GmsElement {
         stiffness_v_per_mm: 1.0,

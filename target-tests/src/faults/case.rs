@@ -39,7 +39,7 @@ pub(crate) fn configuration() -> Configuration {
         cycles: None,
         ..HarmonicSettings::with_velocity(1.0, SPEED_MM_S, 1.0, 0.1)
     };
-    let mut stage = StageSettings::default();
+    let mut stage = StageSettings::simulated();
     for axis in &mut stage.axes {
         axis.encoder.counts_per_index = Some(COUNTS_PER_INDEX);
         if let Some(homing) = &mut axis.homing {

@@ -129,7 +129,7 @@ pub(super) fn store(client: &mut Client, provenance: Option<&str>) -> anyhow::Re
 pub(super) fn provenance(client: &mut Client) -> anyhow::Result<Answer> {
     let provenance = settings::provenance(client)?;
     let text = match provenance.as_str() {
-        "" => "nothing is kept: the machine starts with the defaults",
+        "" => "nothing is stored: the machine starts not commissioned",
         text => text,
     };
     Ok(Answer::new(text, json!(provenance)))

@@ -50,7 +50,7 @@ impl Model {
     pub(super) fn file(&self) -> anyhow::Result<SettingsFile> {
         Ok(match &self.settings {
             Some(path) => SettingsFile::read(path)?,
-            None => SettingsFile::new(StageSettings::default()),
+            None => SettingsFile::new(StageSettings::simulated()),
         })
     }
 

@@ -66,7 +66,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let stage = match &arguments.settings {
         Some(path) => SettingsFile::read(path)?.stage,
-        None => quadrant::settings::StageSettings::default(),
+        None => quadrant::settings::StageSettings::simulated(),
     };
     let settings = &stage.axes[arguments.axis.map_or(0, Axis::index)];
     let Some(surface) = SurfaceGains::from_pid(&settings.feedback.pid) else {

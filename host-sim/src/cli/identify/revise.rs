@@ -179,7 +179,7 @@ impl Arguments {
         let settings = match &self.settings {
             Some(path) => SettingsFile::read(path)?.stage.axes[index].clone(),
             None => {
-                let base = &StageSettings::default().axes[index];
+                let base = &StageSettings::simulated().axes[index];
                 let request = CommissionSettings::default();
                 commission(&mut rig, base, &request, &mut |_, done| {
                     bar.set_position((1000.0 * done) as u64);

@@ -26,7 +26,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
     /// Settings with the static friction of the axis and the linear model that its quiet controller is made for. Without them the
-    /// record's own plateau stands for the friction, and the simulated axis is measured under its default settings.
+    /// record's own plateau stands for the friction, and the simulated axis is measured under its own settings.
     #[arg(long, value_name = "FILE", requires = "axis")]
     settings: Option<PathBuf>,
     /// Amplitude of the sine, um: it must outrun the controller's error at breakaway; too small a one is refused with one that

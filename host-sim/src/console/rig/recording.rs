@@ -93,9 +93,8 @@ impl Shape<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::link::message::AxisName;
-    use quadrant::link::message::{AxisSignal, Channel};
-    use quadrant::settings::x_axis;
+    use quadrant::link::message::{AxisName, AxisSignal, Channel};
+    use quadrant::settings::presets::x_axis;
 
     use super::*;
 

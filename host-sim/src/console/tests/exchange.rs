@@ -37,7 +37,7 @@ fn what_is_dumped_is_what_the_machine_has() {
 #[test]
 fn what_is_loaded_is_what_acts_parts_and_lists_included() {
     let (mut client, bench) = connected();
-    let mut wanted = StageSettings::default();
+    let mut wanted = StageSettings::simulated();
     wanted.axes[0].feedback.law = LawKind::Pid;
     wanted.axes[0].feedback.nonlinear = None;
     wanted.axes[1].plant = None;
@@ -49,8 +49,8 @@ fn what_is_loaded_is_what_acts_parts_and_lists_included() {
     assert_eq!(loaded.changed.len(), 4, "{:?}", loaded.changed);
     assert!(loaded.left.is_empty());
     // And back: the parts that were left out come again.
-    let loaded = settings::load(&mut client, &StageSettings::default()).unwrap();
-    assert_eq!(bench.borrow().in_force, StageSettings::default());
+    let loaded = settings::load(&mut client, &StageSettings::simulated()).unwrap();
+    assert_eq!(bench.borrow().in_force, StageSettings::simulated());
     assert!(
         loaded
             .changed
@@ -58,24 +58,24 @@ fn what_is_loaded_is_what_acts_parts_and_lists_included() {
             .any(|path| path == "/axes/0/feedback/nonlinear")
     );
     // A second time there is nothing to do.
-    let loaded = settings::load(&mut client, &StageSettings::default()).unwrap();
+    let loaded = settings::load(&mut client, &StageSettings::simulated()).unwrap();
     assert!(loaded.changed.is_empty(), "{:?}", loaded.changed);
 }
 
 #[test]
 fn what_the_machine_refuses_is_reverted() {
     let (mut client, bench) = connected();
-    let mut bad = StageSettings::default();
+    let mut bad = StageSettings::simulated();
     bad.axes[2].encoder.resolution_mm = 7.0;
     let error = settings::load(&mut client, &bad).unwrap_err();
     assert!(matches!(error, ExchangeError::Reverted(_)), "{error}");
     let text = error.to_string();
     assert!(text.contains("z.encoder.resolution_mm = 7"), "{text}");
     assert!(text.contains("nothing was changed"), "{text}");
-    assert_eq!(bench.borrow().in_force, StageSettings::default());
+    assert_eq!(bench.borrow().in_force, StageSettings::simulated());
     assert_eq!(
         settings::dump(&mut client).unwrap(),
-        StageSettings::default()
+        StageSettings::simulated()
     );
 }
 

@@ -80,7 +80,7 @@ impl Model {
             position_mm: [0.0; 3],
             goal: None,
             plan_left: 0,
-            draft: StageSettings::default(),
+            draft: StageSettings::simulated(),
             stored: std::string::String::new(),
             stream: None,
             telemetry: None,

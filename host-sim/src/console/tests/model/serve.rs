@@ -178,7 +178,7 @@ impl Model {
                 Reply::Done
             }
             SettingsRequest::Defaults => {
-                self.draft = StageSettings::default();
+                self.draft = StageSettings::simulated();
                 Reply::Done
             }
             SettingsRequest::Store(provenance) => {

@@ -1,0 +1,29 @@
+//! The settings of the whole stage, and of its motions.
+
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
+
+use super::axis::AxisSettings;
+use super::limits::StreamingSettings;
+use crate::law::reference::MotionSettings;
+
+/// Everything the stage's control law is made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct StageSettings {
+    /// Control rate, Hz.
+    pub rate_hz: f64,
+    /// Reactions when set points of a stream no longer come.
+    #[serde(default)]
+    pub streaming: StreamingSettings,
+    /// x, y, z.
+    pub axes: [AxisSettings; 3],
+}
+
+/// The motions of the three axes, started together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanSettings {
+    /// One motion an axis.
+    pub motions: [MotionSettings; 3],
+}
