@@ -4,7 +4,6 @@ use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use super::leaves::default;
 use crate::law::control::cascade::{Cascade, CascadeGains};
 use crate::law::control::feedback::{Feedback, LawKind};
 use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
@@ -70,8 +69,6 @@ impl FeedbackSettings {
             } else {
                 LawKind::Pid
             },
-            integral_limit_v: default!("feedback.integral_limit_v"),
-            transfer_s: default!("feedback.transfer_s"),
             pid,
             nonlinear,
             schedule: Some(Vec::from_iter([
@@ -100,6 +97,7 @@ impl FeedbackSettings {
                 gain_v_s_per_mm: surface.gain_v_s_per_mm,
                 integral_per_s: surface.integral_per_s,
             }),
+            ..Self::default()
         }
     }
 

@@ -1,10 +1,9 @@
-//! The settings of homing, and homing as it is built of them.
+//! The settings of homing.
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use super::axis::AxisSettings;
 use crate::law::friction::Direction;
 use crate::law::homing::{Homing, HomingParameters};
 use crate::law::reference::{Approach, MotionScale, Velocity};

@@ -6,6 +6,7 @@
 
 mod axis;
 mod build;
+mod build_homing;
 mod defaults;
 mod destination;
 pub mod draft;
