@@ -1,4 +1,4 @@
-//! What is fuzzed: any bytes before a port and a server. The targets of `fuzz/` are these functions; here they replay the
+//! The fuzz targets' functions: any bytes before a port and a server. The targets of `fuzz/` are these functions; here they replay the
 //! corpus.
 
 use quadrant::link::frame::{self, FRAME_BYTES, PAYLOAD_BYTES};

@@ -29,7 +29,7 @@ fn posted<T: serde::Serialize>(value: &T) -> Vec<u8> {
     used.to_vec()
 }
 
-/// What became of frames over a bad line.
+/// Fate of frames over a bad line.
 #[derive(Debug, Default, PartialEq)]
 struct Tally {
     frames: u64,
@@ -37,7 +37,7 @@ struct Tally {
     intact: u64,
     heard: u64,
     missed: u64,
-    /// What one trouble took away, another put back: a byte lost at the front, found at the end of the chunk before.
+    /// Damage that other damage undid: a byte lost at the front, found at the end of the chunk before.
     restored: u64,
     slipped: u64,
     unintended_motions: u64,

@@ -17,7 +17,7 @@ use quadrant::link::server::LinkServer;
 pub(crate) struct Model {
     pub(crate) greeted: bool,
     pub(crate) enabled: bool,
-    /// How often it was set in motion.
+    /// Number of times that it was set in motion.
     pub(crate) motions: u32,
     next_point: Option<u32>,
 }
@@ -158,7 +158,7 @@ pub(crate) fn drive(
     answers
 }
 
-/// What arrives of a message.
+/// Sends a message through a frame and back.
 pub(crate) fn there_and_back<T: serde::Serialize + serde::de::DeserializeOwned>(message: &T) -> T {
     let mut buffer = [0; FRAME_BYTES];
     let sent = frame::encode(message, &mut buffer).expect("every message fits a frame");

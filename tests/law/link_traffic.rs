@@ -209,13 +209,13 @@ impl Noise {
     }
 }
 
-/// What a line made of a frame.
+/// The fate of a frame on a line.
 pub(crate) struct Arrival {
     /// The bytes that arrive.
     pub(crate) bytes: Vec<u8>,
     /// The request that was sent.
     pub(crate) request: Request,
-    /// How often the bytes hold its frame, whole and by itself.
+    /// Number of times that the bytes hold its frame, whole and by itself.
     pub(crate) copies: usize,
 }
 

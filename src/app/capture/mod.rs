@@ -74,7 +74,7 @@ pub struct Capture<'a> {
     /// Samples kept from before the trigger, and recorded from it on.
     pre_samples: u32,
     post_samples: u32,
-    /// Where the next sample goes.
+    /// Index of the next sample's first word.
     next_word: usize,
     /// Ticks until the next sample.
     wait: u16,
