@@ -8,12 +8,9 @@ use std::fs::OpenOptions;
 use std::io::{Read, Write};
 use std::net::{TcpListener, TcpStream};
 
-use quadrant_link::PROTOCOL_VERSION;
 use quadrant_link::frame::{self, DELIMITER, FRAME_BYTES, Receiver};
-use quadrant_link::message::{
-    Body, Identity, LinkError, Message, NumberType, Reply, Request, text,
-};
-use quadrant_link::server::LinkServer;
+use quadrant_link::message::*;
+use quadrant_link::{PROTOCOL_VERSION, server::LinkServer};
 
 /// Sends a request and waits for its response; notices that come first are passed over.
 fn ask(port: &mut (impl Read + Write), id: u16, body: Body) -> Result<Reply, Box<dyn Error>> {
@@ -34,10 +31,8 @@ fn ask(port: &mut (impl Read + Write), id: u16, body: Body) -> Result<Reply, Box
 fn session(mut port: impl Read + Write) -> Result<(), Box<dyn Error>> {
     // Ends whatever the line has carried so far.
     port.write_all(&[DELIMITER])?;
-    println!("{:?}", ask(&mut port, 1, Body::Hello)?);
-    match ask(&mut port, 2, Body::Status) {
-        Ok(status) => println!("{status:?}"),
-        Err(error) => println!("{error}"),
+    for (id, body) in (1..).zip([Body::Hello, Body::Status]) {
+        println!("{:?}", ask(&mut port, id, body));
     }
     Ok(())
 }
