@@ -3,16 +3,14 @@
 //! `cargo run --example client` talks to a server in this process; with the path of a serial port that is set to the
 //! board's baud rate (`stty -F /dev/ttyACM0 921600 raw`), `cargo run --example client -- /dev/ttyACM0` talks to a board.
 
-use std::collections::VecDeque;
 use std::error::Error;
 use std::fs::OpenOptions;
-use std::io::{self, Read, Write};
+use std::io::{Read, Write};
+use std::net::{TcpListener, TcpStream};
 
-use quadrant_link::PROTOCOL_VERSION;
 use quadrant_link::frame::{self, DELIMITER, FRAME_BYTES, Receiver};
-use quadrant_link::message::{Body, Identity, LinkError, Message, NumberType};
-use quadrant_link::message::{Reply, Request, text};
-use quadrant_link::server::LinkServer;
+use quadrant_link::message::*;
+use quadrant_link::{PROTOCOL_VERSION, server::LinkServer};
 
 /// Sends a request and waits for its response; notices that come first are passed over.
 fn ask(port: &mut (impl Read + Write), id: u16, body: Body) -> Result<Reply, Box<dyn Error>> {
@@ -30,13 +28,16 @@ fn ask(port: &mut (impl Read + Write), id: u16, body: Body) -> Result<Reply, Box
     }
 }
 
-/// A server in this process, in the place of a board.
-#[derive(Default)]
-struct Loopback {
-    server: LinkServer,
-    answers: VecDeque<u8>,
+fn session(mut port: impl Read + Write) -> Result<(), Box<dyn Error>> {
+    // Ends whatever the line has carried so far.
+    port.write_all(&[DELIMITER])?;
+    for (id, body) in (1..).zip([Body::Hello, Body::Status]) {
+        println!("{:?}", ask(&mut port, id, body));
+    }
+    Ok(())
 }
 
+/// Answers hello like a board, and refuses everything else.
 fn serve(body: Body) -> Result<Reply, LinkError> {
     match body {
         Body::Hello => Ok(Reply::Identity(Identity {
@@ -55,44 +56,28 @@ fn serve(body: Body) -> Result<Reply, LinkError> {
     }
 }
 
-impl Read for Loopback {
-    fn read(&mut self, into: &mut [u8]) -> io::Result<usize> {
-        self.answers.read(into)
-    }
-}
-
-impl Write for Loopback {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        for response in bytes
-            .iter()
-            .filter_map(|&byte| self.server.push(byte, serve))
-        {
-            let mut buffer = [0; FRAME_BYTES];
-            let sent = frame::encode(&Message::Response(response), &mut buffer);
-            self.answers.extend(sent.map_err(io::Error::other)?);
+fn run_server(mut port: TcpStream) -> Option<()> {
+    let (mut server, mut byte, mut buffer) = (LinkServer::new(), [0], [0; FRAME_BYTES]);
+    loop {
+        port.read_exact(&mut byte).ok()?;
+        if let Some(response) = server.push(byte[0], serve) {
+            let sent = frame::encode(&Message::Response(response), &mut buffer).ok()?;
+            port.write_all(sent).ok()?;
         }
-        Ok(bytes.len())
     }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-fn session(mut port: impl Read + Write) -> Result<(), Box<dyn Error>> {
-    // Ends whatever the line has carried so far.
-    port.write_all(&[DELIMITER])?;
-    println!("{:?}", ask(&mut port, 1, Body::Hello)?);
-    match ask(&mut port, 2, Body::Status) {
-        Ok(status) => println!("{status:?}"),
-        Err(error) => println!("{error}"),
-    }
-    Ok(())
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
-    match std::env::args().nth(1) {
-        Some(path) => session(OpenOptions::new().read(true).write(true).open(path)?),
-        None => session(Loopback::default()),
+    if let Some(path) = std::env::args().nth(1) {
+        return session(OpenOptions::new().read(true).write(true).open(path)?);
     }
+    let listener = TcpListener::bind("127.0.0.1:0")?;
+    let address = listener.local_addr()?;
+    std::thread::spawn(move || {
+        listener
+            .accept()
+            .ok()
+            .and_then(|(port, _)| run_server(port))
+    });
+    session(TcpStream::connect(address)?)
 }

@@ -1,4 +1,4 @@
-//! What a board gives to the firmware.
+//! Traits of a board.
 //!
 //! embedded-hal 1.0 has no encoder, no converter, no watchdog and no port that is read and written without waiting; these
 //! traits are ours, and this is their only place. They speak in raw words: what a word means is
@@ -10,7 +10,7 @@ use crate::law::units::DacCode;
 
 /// The three axes' encoders.
 pub trait Encoders {
-    /// What all three say, read in this call; to be called once a tick. A counter narrower than 32 bits fills the low
+    /// Reads all three; to be called once a tick. A counter narrower than 32 bits fills the low
     /// bits, and an index pulse is reported once.
     fn read(&mut self) -> [EncoderReading; 3];
 }
@@ -52,7 +52,7 @@ pub trait Watchdog {
     fn feed(&mut self, driving: bool);
 }
 
-/// What started the processor.
+/// The cause of the processor's start.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum ResetCause {
     /// The supply came up.
@@ -85,7 +85,7 @@ impl ResetCause {
         }
     }
 
-    /// Whether the firmware before this one did not end of its own accord or at somebody's wish.
+    /// True if the run before ended by a failure: neither of its own accord nor on request.
     pub const fn is_alarming(self) -> bool {
         matches!(self, Self::BrownOut | Self::Watchdog | Self::LowPower)
     }

@@ -151,7 +151,7 @@ mod app {
         } = boot::machine(
             cx.local.storage,
             board.flash,
-            crash_record,
+            crashed,
             cycle_hz,
             NUMBER,
         );

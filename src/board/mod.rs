@@ -33,7 +33,7 @@ mod nucleo_f446re;
 #[cfg(all(feature = "board-nucleo-f446re", not(feature = "board-mps2")))]
 pub(crate) use nucleo_f446re::*;
 
-/// What [`Idle::turn`] reports when the machine has run all it was asked to.
+/// The report of [`Idle::turn`] at the end of a run.
 ///
 /// Only the emulated machine ever finishes.
 pub(crate) struct Finished {
@@ -44,7 +44,7 @@ pub(crate) struct Finished {
     pub(crate) microseconds: u32,
 }
 
-/// How a program ends.
+/// The outcome of a program.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub(crate) enum Outcome {
     /// It did all it was asked to.

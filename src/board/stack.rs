@@ -1,4 +1,4 @@
-//! How much of the stack was ever used.
+//! High-water mark of the stack.
 //!
 //! The stack lies below everything else in RAM: one that grows too far meets addresses where there is no memory, and the
 //! processor faults instead of overwriting variables. The start-up code fills it with a pattern; what still holds it was
@@ -18,7 +18,7 @@ pub(crate) fn size() -> usize {
     (&raw const _stack_start as usize) - (&raw const _stack_end as usize)
 }
 
-/// Whether the eight words that an exception leaves at this address are inside the stack.
+/// True if the eight words that an exception leaves at this address are inside the stack.
 pub(super) fn holds(frame: usize) -> bool {
     let (bottom, top) = (
         &raw const _stack_end as usize,

@@ -23,7 +23,7 @@ mod register {
     pub(super) const DAC: u8 = 0b000 << 3;
     /// The range of one channel or all.
     pub(super) const RANGE: u8 = 0b001 << 3;
-    /// Which parts are powered, and what was shut down.
+    /// Address of the power register: powered parts, and shut-downs.
     pub(super) const POWER: u8 = 0b010 << 3;
     /// Options and commands; which, the channel bits say.
     pub(super) const CONTROL: u8 = 0b011 << 3;
@@ -80,7 +80,7 @@ pub const fn write_ns(writing_hz: u32, reading_hz: u32) -> u64 {
     (3 * FRAME).div_ceil(writing_hz as u64) + FRAME.div_ceil(reading_hz as u64) + waits as u64
 }
 
-/// How fast the bus has to be.
+/// The clock of the bus.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// As fast as the chip can listen, 30 MHz at most.
@@ -95,29 +95,29 @@ pub trait SelectClock {
     fn select(&mut self, clock: Clock);
 }
 
-/// What was read back.
+/// A register read back.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Item {
     /// The code of channel A, B or C (0, 1, 2).
     Code(u8),
     /// The range of the channels.
     Range,
-    /// What is powered, and what was shut down: over-current, over-temperature.
+    /// The power register: powered parts, and shut-downs by over-current, over-temperature.
     Power,
 }
 
-/// Why outputs cannot be trusted.
+/// An error after which the outputs cannot be trusted.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Error<E> {
     /// The bus failed.
     Bus(E),
     /// The chip holds something else than what was written: it is not there, lost its supply, or shut an output down.
     Mismatch {
-        /// What was compared.
+        /// The register that was compared.
         item: Item,
-        /// What it should hold.
+        /// The expected word.
         expected: u16,
-        /// What it answered.
+        /// The word read back.
         answered: u16,
     },
 }
@@ -143,9 +143,9 @@ pub struct Ad5754r<Bus, Sync, Load, Clear, Delay> {
     bus: Bus,
     pins: Pins<Sync, Load, Clear>,
     delay: Delay,
-    /// What the chip was told last.
+    /// The codes written last.
     codes: [i16; 3],
-    /// What is read back next: 0 to 2 a code, 3 the power register.
+    /// The register to read back next: 0 to 2 a code, 3 the power register.
     turn: u8,
     /// A register that read wrong, until it reads right.
     wrong: Option<Wrong>,

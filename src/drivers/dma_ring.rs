@@ -1,6 +1,6 @@
 //! Reading what a DMA stream writes round and round into a ring, by polling.
 
-/// How far a ring of `N` bytes was read.
+/// Read position in a ring of `N` bytes.
 ///
 /// The stream overwrites what nobody read. A reader that polls more often than the ring fills loses nothing; one that does
 /// not gets what is in the ring when it comes back, and cannot tell: frames carry a check sum for that.

@@ -11,7 +11,7 @@ pub const DEBOUNCE_TICKS: u32 = u32::BITS;
 /// stuck, or held over a restart, would enable a machine that nobody has asked to.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct HoldButton {
-    /// Whether it was down in the last ticks, the newest in the lowest bit.
+    /// Its states in the last ticks, the newest in the lowest bit.
     history: u32,
     was_up: bool,
     is_held: bool,
@@ -27,7 +27,7 @@ impl HoldButton {
         }
     }
 
-    /// What is asked for in this tick: to enable once the button has been down for [`DEBOUNCE_TICKS`], and to disable at
+    /// Returns this tick's request: to enable once the button has been down for [`DEBOUNCE_TICKS`], and to disable at
     /// the first tick it is up.
     #[inline(always)]
     pub const fn step(&mut self, is_down: bool) -> Option<Command> {

@@ -1,4 +1,4 @@
-//! What stands between the traits of [`hal`](crate::hal) and a chip's registers, as far as it needs none of them: chips
+//! The layer between the traits of [`hal`](crate::hal) and a chip's registers, as far as it needs none of them: chips
 //! behind a bus, and the arithmetic of counters, filters and rings. All of it is tested on the host.
 
 pub mod ad5754r;

@@ -27,7 +27,7 @@ const HIGHEST: i32 = 2047;
 /// Errors beyond this come from a converter at the end of its range: remembering more would wind up.
 const LARGEST_ERROR: i32 = STEP;
 
-/// How the error of the past is taken into account.
+/// The feedback of past rounding errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum NoiseShaper {
     /// Not at all: the code is rounded.
@@ -39,7 +39,7 @@ pub enum NoiseShaper {
     SecondOrder,
 }
 
-/// What a [`NoiseShaper`] remembers.
+/// The state of a [`NoiseShaper`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct NoiseShaperState {
     /// The last error, in codes.

@@ -7,7 +7,7 @@ use crate::law::axis::AxisState;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::stage::StageState;
 
-/// What can be read after a tick.
+/// The readable state after a tick.
 #[derive(Clone, Copy, Debug)]
 pub struct Observation<'a, S: Scalar, const N: usize> {
     /// The stage as the tick left it.

@@ -1,4 +1,4 @@
-//! What RTIC and `cortex-m-rt` need to know of the chip: a hand-made device crate, as none exists for this machine.
+//! Description of the chip for RTIC and `cortex-m-rt`: a hand-made device crate, as none exists for this machine.
 
 /// Priority bits implemented by the interrupt controller.
 pub(crate) const NVIC_PRIO_BITS: u8 = 3;

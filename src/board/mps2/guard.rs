@@ -1,4 +1,4 @@
-//! What lies below the stack: nothing on a real chip, and so the processor faults there; the emulator has a region that
+//! A guard below the stack: there is nothing on a real chip, and so the processor faults there; the emulator has a region that
 //! swallows what is written. The memory protection unit makes it fault here, too.
 
 use cortex_m::peripheral::MPU;

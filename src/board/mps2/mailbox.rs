@@ -4,15 +4,15 @@ use core::sync::atomic::{Ordering, fence};
 
 use quadrant::lockstep::{BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS, RESET, Reset};
 
-/// Where the machine's PSRAM is, which the host backs by a shared file.
+/// Base address of the PSRAM, which the host backs by a shared file.
 const BASE: usize = 0x2100_0000;
 
-/// What the host asked for.
+/// The run that the host asked for.
 #[derive(Clone, Copy)]
 pub(super) struct Boot {
-    /// How to run.
+    /// The source of the control interrupt.
     pub(super) mode: Mode,
-    /// How many ticks to run; in lockstep the host decides and this is zero.
+    /// Number of ticks to run; in lockstep the host decides and this is zero.
     pub(super) ticks: u32,
     /// The job as the host encoded it.
     pub(super) job: &'static [u8],
@@ -64,7 +64,7 @@ pub(super) fn write_sequence(offset: usize, sequence: u32) {
     write(offset, sequence);
 }
 
-/// Why the processor was reset; the next time it says that it was not.
+/// Takes the cause of the processor's reset; the next call returns [`Reset::PowerOn`].
 pub(super) fn take_reset() -> Reset {
     let reset = Reset::from_word(read(RESET));
     write(RESET, Reset::PowerOn as u32);

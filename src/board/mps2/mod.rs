@@ -49,25 +49,25 @@ pub(crate) struct Board {
     pub(crate) encoders: Encoders,
     /// Limits, homes, amplifier faults, emergency stop.
     pub(crate) switches: Switches,
-    /// What the operator asks for.
+    /// The operator's requests.
     pub(crate) operator: Operator,
     /// Three amplifiers.
     pub(crate) amplifiers: Amplifiers,
     /// The control tick.
     pub(crate) tick: Tick,
-    /// What the idle loop does.
+    /// The work of the idle loop.
     pub(crate) idle: Idle,
     /// The link's port, in the shared memory.
     pub(crate) serial: Serial,
     /// The watchdog, which bites in a paced run.
     pub(crate) watchdog: Watchdog,
-    /// Where settings are stored: in the shared memory.
+    /// The flash for settings, in the shared memory.
     pub(crate) flash: SettingsFlash,
-    /// Why the processor started.
+    /// The cause of the start.
     pub(crate) reset_cause: ResetCause,
 }
 
-/// What the board calls itself.
+/// The board's name.
 pub(crate) const NAME: &str = "mps2";
 
 /// Ends the emulator; the host starts it afresh. The answer to whoever asked for it is on its way by then.
@@ -128,7 +128,7 @@ pub(crate) fn job() -> Option<&'static [u8]> {
     (!job.is_empty()).then_some(job)
 }
 
-/// Where this tick's inputs are.
+/// Offset of this tick's inputs.
 #[inline(always)]
 fn input(mode: Mode) -> usize {
     match mode {
@@ -182,13 +182,13 @@ impl hal::Switches for Switches {
     }
 }
 
-/// What the operator asks for.
+/// The operator's requests.
 pub(crate) struct Operator {
     mode: Mode,
 }
 
 impl Operator {
-    /// What is asked for in this tick.
+    /// Returns this tick's request.
     #[inline(always)]
     pub(crate) fn request(&mut self) -> Option<Command> {
         Command::from_number(mailbox::read(
@@ -306,7 +306,7 @@ impl Tick {
     }
 }
 
-/// What the idle loop does.
+/// The work of the idle loop.
 pub(crate) struct Idle {
     mode: Mode,
     last: u32,

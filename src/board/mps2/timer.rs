@@ -45,13 +45,13 @@ impl Timer {
         self.write(Self::CTRL, 0);
     }
 
-    /// What is left until the next reload.
+    /// Cycles left until the next reload.
     #[inline(always)]
     pub(super) fn value(self) -> u32 {
         self.read(Self::VALUE)
     }
 
-    /// Whether a reload has not been acknowledged.
+    /// True if a reload has not been acknowledged.
     #[inline(always)]
     pub(super) fn is_due(self) -> bool {
         self.read(Self::INTERRUPT) & 1 != 0

@@ -17,7 +17,7 @@ const LOAD: u8 = 1;
 const CLEAR: u8 = 2;
 /// Number of the enable pin in port C.
 const ENABLE: u8 = 9;
-/// How often to look for the bus before giving up, in the emergency path: far more than one byte takes.
+/// Largest number of polls of the bus before giving up, in the emergency path: far more than one byte takes.
 const PATIENCE: u32 = 10_000;
 
 // A tenth of a control period at 10 kHz is what the outputs may take.

@@ -18,7 +18,7 @@ const CR1: u16 = 1 | 1 << 2 | 1 << 6 | 1 << 8 | 1 << 9;
 const BY_2: u16 = 0b000 << 3;
 const BY_8: u16 = 0b010 << 3;
 
-/// How often to look at the bus before giving up. A byte takes 256 cycles of the processor at the slow clock, a look
+/// Largest number of polls of the bus before giving up. A byte takes 256 cycles of the processor at the slow clock, a look
 /// about ten.
 const PATIENCE: u32 = 400;
 

@@ -1,4 +1,4 @@
-//! What RTIC needs to know of the chip, with the interrupts we use named by role.
+//! Description of the chip for RTIC, with the interrupts we use named by role.
 //!
 //! The vector table itself is the chip crate's; `roles.x` tells the linker which entry plays which role.
 

@@ -16,7 +16,7 @@ use stm32f4xx_hal::pac::{FLASH, IWDG};
 use super::encoders::keep_up;
 use super::watchdog::KEY_RELOAD;
 
-/// Where the two sectors are; the linker's map leaves them out.
+/// Address of the two sectors; the linker's map leaves them out.
 const START: u32 = 0x0800_4000;
 /// Bytes of a sector, and the number of the first.
 const SECTOR: u32 = 16 * 1024;
@@ -38,7 +38,7 @@ const ERRORS: u32 = 1 << 1 | 0b1_1111 << 4;
 /// FLASH_ACR: data cache enabled, and its reset.
 const DATA_CACHE: u32 = 1 << 10;
 const DATA_CACHE_RESET: u32 = 1 << 12;
-/// How often to look at the busy bit of an erase before the watchdog is no longer fed: a look takes at least 20 cycles, as
+/// Largest number of polls of the busy bit of an erase before the watchdog is no longer fed: a look takes at least 20 cycles, as
 /// three of its accesses cross a bus bridge, so this is at least one second at 180 MHz.
 const ERASE_LOOKS: u32 = 9_000_000;
 /// The same for a word: at least 1 ms, and the processor waits by itself, as it fetches from the same flash.
@@ -119,7 +119,7 @@ impl SettingsFlash {
         result
     }
 
-    /// How the last operation went.
+    /// Checks the result of the last operation.
     fn outcome(&self) -> Result<(), FlashError> {
         match self.flash.sr().read().bits() {
             status if status & BUSY != 0 => Err(FlashError::Stuck),

@@ -66,13 +66,13 @@ const CORE_HZ: u32 = 180_000_000;
 pub(crate) struct Board {
     /// Three position encoders.
     pub(crate) encoders: Encoders,
-    /// What the operator asks for.
+    /// The operator's requests.
     pub(crate) operator: Operator,
     /// Three amplifiers.
     pub(crate) amplifiers: Amplifiers,
     /// The control tick.
     pub(crate) tick: Tick,
-    /// What the idle loop does.
+    /// The work of the idle loop.
     pub(crate) idle: Idle,
     /// Limits, homes, amplifier faults, emergency stop.
     pub(crate) switches: Switches,
@@ -80,9 +80,9 @@ pub(crate) struct Board {
     pub(crate) serial: Serial,
     /// The watchdog, not started.
     pub(crate) watchdog: Watchdog,
-    /// Where settings are stored.
+    /// The flash for settings.
     pub(crate) flash: SettingsFlash,
-    /// Why the processor started.
+    /// The cause of the start.
     pub(crate) reset_cause: ResetCause,
 }
 
@@ -158,7 +158,7 @@ impl Board {
     }
 }
 
-/// What the board calls itself.
+/// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";
 
 /// Starts the firmware afresh.
@@ -171,14 +171,14 @@ pub(crate) fn job() -> Option<&'static [u8]> {
     None
 }
 
-/// What the operator asks for: the button is a dead man's switch.
+/// The operator's requests: the button is a dead man's switch.
 pub(crate) struct Operator {
     button: PC13<Input>,
     hold: HoldButton,
 }
 
 impl Operator {
-    /// What is asked for in this tick.
+    /// Returns this tick's request.
     #[inline(always)]
     pub(crate) fn request(&mut self) -> Option<Command> {
         // Pressed is low.
@@ -186,7 +186,7 @@ impl Operator {
     }
 }
 
-/// What the idle loop does.
+/// The work of the idle loop.
 pub(crate) struct Idle;
 
 impl Idle {

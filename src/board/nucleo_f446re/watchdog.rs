@@ -82,7 +82,7 @@ impl Supply {
         Self { power }
     }
 
-    /// Whether the supply is below that at present (PWR_CSR, PVDO).
+    /// True if the supply is below that at present (PWR_CSR, PVDO).
     #[inline(always)]
     pub(super) fn is_low(&self) -> bool {
         self.power.csr().read().pvdo().bit_is_set()

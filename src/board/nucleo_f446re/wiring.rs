@@ -1,4 +1,4 @@
-//! What the board's words mean. No registers here: the tests of the library include this file and run it on the host.
+//! Meaning of the bits in the board's words. No registers here: the tests of the library include this file and run it on the host.
 
 use quadrant::drivers::input_filter::{InputFilter, shortest_level_ns};
 use quadrant::hal::ResetCause;
@@ -43,7 +43,7 @@ pub(crate) const fn switches(port_a: u16, port_c: u16) -> Switches {
     )
 }
 
-/// What a sagging supply of the processor reads as: the same as amplifiers that are not ready, as nothing that this
+/// The reading of a sagging supply of the processor: the same as amplifiers that are not ready, as nothing that this
 /// processor says should drive them any more.
 pub(crate) const SUPPLY_LOW: Switches = Switches::of_axes([AxisSwitches::AMPLIFIER_FAULT; 3]);
 
