@@ -148,13 +148,7 @@ mod app {
             server,
             rate_hz,
             resolution_mm,
-        } = boot::machine(
-            cx.local.storage,
-            board.flash,
-            crashed,
-            cycle_hz,
-            NUMBER,
-        );
+        } = boot::machine(cx.local.storage, board.flash, crashed, cycle_hz, NUMBER);
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();

@@ -3,7 +3,7 @@
 use super::axis::AxisSettings;
 use super::homing::HomeSwitch;
 use crate::law::friction::Direction;
-use crate::law::homing::Homing;
+use crate::law::homing::{Homing, HomingParameters};
 use crate::law::reference::{Approach, MotionScale, Velocity};
 use crate::law::rounding;
 use crate::law::safety::AxisSwitches;
@@ -26,27 +26,28 @@ impl AxisSettings {
         let spacing = self.encoder.counts_per_index.filter(|_| homing.index);
         let whole_counts =
             rounding::round(homing.mark_mm / resolution_mm) * POSITION_UNITS_PER_COUNT;
-        Some(Homing {
+        let parameters = HomingParameters {
             direction: homing.direction,
             switch: match (homing.switch, homing.direction) {
                 (HomeSwitch::Home, _) => AxisSwitches::HOME,
                 (HomeSwitch::Limit, Direction::Negative) => AxisSwitches::NEGATIVE_LIMIT,
                 (HomeSwitch::Limit, Direction::Positive) => AxisSwitches::POSITIVE_LIMIT,
             },
-            search: Velocity::from_mm_s(search_mm_s, scale),
-            latch: Velocity::from_mm_s(homing.latch_mm_s.min(search_mm_s), scale),
+            search_velocity: Velocity::from_mm_s(search_mm_s, scale),
+            creep_velocity: Velocity::from_mm_s(homing.latch_mm_s.min(search_mm_s), scale),
             debounce_ticks: rounding::round(homing.debounce_s * scale.rate_hz) as u32,
             settle_ticks: rounding::round(SETTLE_S * scale.rate_hz) as u32,
             index_spacing: spacing.map(|counts| Position(i64::from(counts) << 16)),
-            mark: Position(whole_counts as i64),
-            park: Position::from_mm(park_mm, resolution_mm),
+            home_offset: Position(whole_counts as i64),
+            parking: Position::from_mm(park_mm, resolution_mm),
             travel: Position::from_mm(homing.travel_mm, resolution_mm),
-            approach: Approach::new(
-                search_mm_s,
-                self.limits.max_acceleration_mm_s2,
-                self.limits.max_jerk_mm_s3,
-                scale,
-            ),
-        })
+        };
+        let approach = Approach::new(
+            search_mm_s,
+            self.limits.max_acceleration_mm_s2,
+            self.limits.max_jerk_mm_s3,
+            scale,
+        );
+        Some(Homing::new(parameters, approach))
     }
 }

@@ -5,12 +5,6 @@ use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
 use crate::law::friction::Direction;
-use crate::law::homing::{Homing, HomingParameters};
-use crate::law::reference::{Approach, MotionScale, Velocity};
-use crate::law::rounding;
-use crate::law::safety::AxisSwitches;
-use crate::law::scalar::Scalar;
-use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// The switch that homing looks for.
 #[derive(
@@ -50,46 +44,4 @@ pub struct HomingSettings {
     pub park_mm: f64,
     /// Longest way to the switch, and off it, before homing fails, mm.
     pub travel_mm: f64,
-}
-
-/// Rest of an axis before its origin is defined, s: many times the longest preview at the usual control rates.
-const SETTLE_S: f64 = 0.02;
-
-impl AxisSettings {
-    /// Homing ready for the tick, if the axis has any.
-    pub(super) fn build_homing<S: Scalar>(&self, scale: MotionScale) -> Option<Homing<S>> {
-        let homing = self.homing.as_ref()?;
-        let resolution_mm = scale.resolution_mm;
-        let search_mm_s = homing.search_mm_s.min(self.limits.max_velocity_mm_s);
-        let park_mm = match &self.limits.travel_mm {
-            Some(travel) => homing.park_mm.max(travel.negative).min(travel.positive),
-            None => homing.park_mm,
-        };
-        let spacing = self.encoder.counts_per_index.filter(|_| homing.index);
-        let whole_counts =
-            rounding::round(homing.mark_mm / resolution_mm) * POSITION_UNITS_PER_COUNT;
-        let parameters = HomingParameters {
-            direction: homing.direction,
-            switch: match (homing.switch, homing.direction) {
-                (HomeSwitch::Home, _) => AxisSwitches::HOME,
-                (HomeSwitch::Limit, Direction::Negative) => AxisSwitches::NEGATIVE_LIMIT,
-                (HomeSwitch::Limit, Direction::Positive) => AxisSwitches::POSITIVE_LIMIT,
-            },
-            search_velocity: Velocity::from_mm_s(search_mm_s, scale),
-            creep_velocity: Velocity::from_mm_s(homing.latch_mm_s.min(search_mm_s), scale),
-            debounce_ticks: rounding::round(homing.debounce_s * scale.rate_hz) as u32,
-            settle_ticks: rounding::round(SETTLE_S * scale.rate_hz) as u32,
-            index_spacing: spacing.map(|counts| Position(i64::from(counts) << 16)),
-            home_offset: Position(whole_counts as i64),
-            parking: Position::from_mm(park_mm, resolution_mm),
-            travel: Position::from_mm(homing.travel_mm, resolution_mm),
-        };
-        let approach = Approach::new(
-            search_mm_s,
-            self.limits.max_acceleration_mm_s2,
-            self.limits.max_jerk_mm_s3,
-            scale,
-        );
-        Some(Homing::new(parameters, approach))
-    }
 }
