@@ -1,7 +1,8 @@
 //! The simulated XYZ stage, and what is done around a controller: experiments, comparison, design.
 //!
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
-//! - [`machine`]: the firmware's application in this process, on the library's own control law;
+//! - [`machine`]: the control law alone, the firmware's application in this process, its image in QEMU, a board: one
+//!   interface to measure them all;
 //! - [`experiment`]: runs of a machine on a stage, and what they score;
 //! - [`report_parts`]: what `quadrant report` computes, part by part, and keeps;
 //! - [`presentation`]: their tables and pages, made with [`report`];
@@ -9,22 +10,14 @@
 //! - [`program`]: part programs in G-code, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
 //! - [`settings_reference`]: what every setting means, as a page;
-//! - [`scenario`]: the motion that the firmware is emulated with;
-//! - [`console`]: a machine with the firmware on it, or a simulated one, over the link;
-//! - [`emulator`]: QEMU with the firmware in it;
-//! - [`emulated_machine`]: the firmware's image in it on the simulated stage, as [`simulated_machine`] is without it;
-//! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
+//! - [`client`]: a session with a machine over the link;
 //! - [`identify`]: from recordings to the parameters of an axis;
 //! - [`design`]: margins, loop shaping, the choice of gains.
 #![forbid(unsafe_code)]
 
+pub mod client;
 pub mod commission;
-pub mod console;
 pub mod design;
-#[cfg(unix)]
-pub mod emulated_machine;
-#[cfg(unix)]
-pub mod emulator;
 pub mod experiment;
 pub mod identify;
 pub mod machine;
@@ -34,8 +27,23 @@ pub mod program;
 pub mod record;
 pub use quadrant_report as report;
 pub mod report_parts;
+#[doc(hidden)]
 pub mod rig;
-pub mod scenario;
 pub mod settings_file;
 pub mod settings_reference;
-pub mod simulated_machine;
+
+// Names that moved, until every caller has the new ones.
+#[doc(hidden)]
+pub use client as console;
+#[doc(hidden)]
+pub use machine::benchmark_job as scenario;
+#[cfg(unix)]
+#[doc(hidden)]
+pub use machine::{emulated as emulated_machine, emulator};
+/// The simulated machine under its old name.
+#[doc(hidden)]
+pub mod simulated_machine {
+    pub use crate::machine::application::{Running, Start};
+    pub use crate::machine::memory_flash::MemoryFlash;
+    pub use crate::machine::simulated::SimulatedMachine;
+}

@@ -9,12 +9,12 @@ use quadrant::safety::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::presentation::{
     commission_page, friction_table, gains_table, gms_table, motor_constant_table, plant_tables,
     provenance, revise_table, verdict_table,
 };
 use quadrant_sim::report::Table;
-use quadrant_sim::rig::Rig;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
 use super::identify::rig::Axis;
@@ -68,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None => SettingsFile::new(StageSettings::default()),
     };
     let base = file.stage.axes[axis.index()].clone();
-    let found = request.run(&mut axis.rig(output.seed), &base, output.seed)?;
+    let found = request.run(&mut axis.test_axis(output.seed), &base, output.seed)?;
     println!(
         "Simulated, not measured: {} axis, seed {}\n",
         axis.name(),
@@ -84,10 +84,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 impl Request {
-    /// Commissions the rig's axis, with a bar for whoever watches.
+    /// Commissions the test_axis's axis, with a bar for whoever watches.
     pub(super) fn run(
         &self,
-        rig: &mut dyn Rig,
+        test_axis: &mut dyn TestAxis,
         base: &AxisSettings,
         seed: u64,
     ) -> anyhow::Result<Found> {
@@ -104,12 +104,12 @@ impl Request {
             bar.set_message(step);
             bar.set_position((1000.0 * done) as u64);
         };
-        let found = commission(rig, base, &request, &mut report)?;
+        let found = commission(test_axis, base, &request, &mut report)?;
         let checked = if self.quick {
             None
         } else {
             bar.enable_steady_tick(Duration::from_millis(200));
-            let checked = CrossCheck::run(rig, &found.settings, seed, &mut report)?;
+            let checked = CrossCheck::run(test_axis, &found.settings, seed, &mut report)?;
             Some(checked)
         };
         bar.finish_and_clear();

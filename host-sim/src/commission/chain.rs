@@ -7,7 +7,9 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 
-use super::bootstrap::{first_settings, limp_settings, measuring_settings, quiet_settings};
+use super::bootstrap::{
+    bootstrap_settings, low_bandwidth_settings, measuring_settings, zero_gain_settings,
+};
 use super::error::CommissionError;
 use super::verify::{Trial, Verdict, verify};
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
@@ -21,7 +23,8 @@ use crate::identify::static_friction::{
     self, Exponent, FrictionFit, FrictionMap, StaticFrictionSettings, fit_map,
 };
 use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveError, VirginCurveSettings};
-use crate::rig::{Recording, Rig, approach};
+use crate::machine::{TestAxis, approach};
+use crate::record::Recording;
 
 /// What a commissioning is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -102,33 +105,34 @@ const DENSITY: f64 = 1.6;
 /// Largest relative error of the predicted hysteresis.
 const MOST_HYSTERESIS_ERROR: f64 = 0.10;
 
-/// Commissions the rig's axis, unattended. `base` says what the axis is: encoder, amplifier, limits, derivative filter; its gains
+/// Commissions the test_axis's axis, unattended. `base` says what the axis is: encoder, amplifier, limits, derivative filter; its gains
 /// and its friction are not looked at. `progress` is told the step and the share of the whole.
 ///
 /// # Errors
 /// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.
 pub fn commission(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     base: &AxisSettings,
     request: &CommissionSettings,
     progress: &mut dyn FnMut(&'static str, f64),
 ) -> Result<Commissioned, CommissionError> {
-    let rate_hz = rig.axis().rate_hz;
+    let rate_hz = test_axis.info().rate_hz;
     let mut step = 0;
     let mut report = |step: usize, share: f64| {
         let before: f64 = STEPS[..step].iter().map(|(_, part)| part).sum();
         progress(STEPS[step].0, before + share * STEPS[step].1);
     };
 
-    rig.apply(&limp_settings(base))?;
-    let motor = motor_constant::measure(rig, &MotorConstantSettings::default(), &mut |share| {
-        report(step, share);
-    })?;
+    test_axis.apply(&zero_gain_settings(base))?;
+    let motor =
+        motor_constant::measure(test_axis, &MotorConstantSettings::default(), &mut |share| {
+            report(step, share);
+        })?;
 
     step += 1;
-    rig.apply(&first_settings(base, motor.gain_mm_per_v_s2, rate_hz))?;
-    approach(rig, HOME_MM)?;
-    let response = sliding_response(rig, &mut |share| report(step, share))?;
+    test_axis.apply(&bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz))?;
+    approach(test_axis, HOME_MM)?;
+    let response = sliding_response(test_axis, &mut |share| report(step, share))?;
     let plant = fit_plant(
         &response.estimate.response,
         &PlantFitSettings {
@@ -149,19 +153,19 @@ pub fn commission(
     let mut settings = base.clone();
     settings.plant = Some(plant.plant);
     settings.feedback.pid = pid;
-    rig.apply(&measuring_settings(&settings))?;
-    approach(rig, HOME_MM)?;
-    let (map, recordings) = static_friction::measure(rig, &request.friction, &mut |share| {
+    test_axis.apply(&measuring_settings(&settings))?;
+    approach(test_axis, HOME_MM)?;
+    let (map, recordings) = static_friction::measure(test_axis, &request.friction, &mut |share| {
         report(step, share);
     })?;
     let friction = fit_map(&map, Exponent::Fixed(1.0))?;
 
     step += 1;
-    let quiet = quiet_settings(&settings, &plant.plant, rate_hz);
-    rig.apply(&quiet)?;
+    let quiet = low_bandwidth_settings(&settings, &plant.plant, rate_hz);
+    test_axis.apply(&quiet)?;
     let (_, breakaway_v) = friction.mean_levels_v();
     let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
-    let recording = virgin_curve::measure(rig, &sine, &mut |share| report(step, share))?;
+    let recording = virgin_curve::measure(test_axis, &sine, &mut |share| report(step, share))?;
     let sliding = friction.models();
     let gms = identify_elements(&recording, &sliding)?;
     if gms.prediction.relative_error > MOST_HYSTERESIS_ERROR {
@@ -203,7 +207,7 @@ pub fn commission(
     );
 
     step += 1;
-    let verdicts = verify(rig, &settings, request.trial, &mut |share| {
+    let verdicts = verify(test_axis, &settings, request.trial, &mut |share| {
         report(step, share)
     })?;
     Ok(Commissioned {
@@ -254,12 +258,12 @@ fn identify_elements(
 
 /// The response of the sliding axis, with less excitation as long as it slows the axis too much.
 fn sliding_response(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     progress: &mut dyn FnMut(f64),
 ) -> Result<FrfMeasurement, CommissionError> {
     let mut settings = FrfSettings::default();
     for _ in 0..HALVINGS {
-        match frf::measure(rig, &settings, progress) {
+        match frf::measure(test_axis, &settings, progress) {
             Err(FrfError::NotSliding { .. }) => {
                 settings.excitation = Excitation {
                     rms_v: 0.5 * settings.excitation.rms_v,
@@ -269,5 +273,5 @@ fn sliding_response(
             outcome => return Ok(outcome?),
         }
     }
-    Ok(frf::measure(rig, &settings, progress)?)
+    Ok(frf::measure(test_axis, &settings, progress)?)
 }

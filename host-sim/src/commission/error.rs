@@ -11,7 +11,7 @@ use crate::identify::plant::PlantError;
 use crate::identify::revise::ReviseError;
 use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
-use crate::rig::RigError;
+use crate::machine::ExperimentError;
 
 /// Why a commissioning ends early.
 #[derive(Debug, thiserror::Error)]
@@ -39,7 +39,7 @@ pub enum CommissionError {
     FrictionFit(#[from] FrictionFitError),
     /// A run of the slow sine.
     #[error("pre-sliding friction: {0}")]
-    Sine(#[from] RigError),
+    Sine(#[from] ExperimentError),
     /// The GMS model.
     #[error("pre-sliding friction: {0}")]
     Presliding(#[from] VirginCurveError),

@@ -1,6 +1,6 @@
 //! From measurements to parameters: the thesis' chapter 3.
 //!
-//! An experiment is run on a [`Rig`](crate::rig::Rig), or its recording read from a file; everything here works on
+//! An experiment is run on a [`TestAxis`](crate::rig::TestAxis), or its recording read from a file; everything here works on
 //! [`Recording`](crate::rig::Recording)s and knows nothing of where they come from.
 //!
 //! - [`excitation`]: voltages that make an axis show its response;

@@ -17,8 +17,9 @@ use rayon::prelude::*;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};
 use super::response::FrequencyResponse;
+use crate::machine::{Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
-use crate::rig::{Experiment, Recording, Rig, RigError, SimulatedRig};
+use crate::record::Recording;
 
 /// Which friction models stand beside the linear model, as in the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -115,7 +116,7 @@ pub enum ReviseError {
     },
     /// The model cannot be run as the axis was.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Experiment(#[from] ExperimentError),
     /// The settings are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -200,9 +201,9 @@ pub fn simulated_response(
     truth: AxisTruth,
 ) -> Result<FrequencyResponse, ReviseError> {
     // The candidate is without noise: the seed does not matter.
-    let mut rig = SimulatedRig::new(0, truth, 0);
-    rig.apply(measurement.settings)?;
-    let recording = rig.perform(measurement.experiment, &mut |_| {})?;
+    let mut test_axis = SimulatedTestAxis::new(0, truth, 0);
+    test_axis.apply(measurement.settings)?;
+    let recording = test_axis.perform(measurement.experiment, &mut |_| {})?;
     (measurement.estimate)(&recording).ok_or(ReviseError::NoResponse)
 }
 

@@ -72,7 +72,7 @@ pub enum RecordError {
         /// The column.
         column: &'static str,
         /// What is wrong with it.
-        fault: UselessFault,
+        fault: UnusableSignal,
     },
     /// There is no motion in so little.
     #[error("{}: {rows} rows of data; at least {MIN_ROWS} are needed", path.display())]
@@ -131,7 +131,7 @@ pub enum RecordError {
 
 /// Why a column cannot be identified from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum UselessFault {
+pub enum UnusableSignal {
     /// It never changes.
     Constant {
         /// Its value.
@@ -160,7 +160,7 @@ pub enum UselessFault {
     },
 }
 
-impl fmt::Display for UselessFault {
+impl fmt::Display for UnusableSignal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Constant { value } => write!(
@@ -331,7 +331,7 @@ impl fmt::Display for UnitFault {
 
 /// What looks odd but can be true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Doubt {
+pub enum RecordWarning {
     /// The measured position runs ahead of the reference: the two columns may be swapped.
     PositionLeads {
         /// By how much, s.
@@ -339,7 +339,7 @@ pub enum Doubt {
     },
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for RecordWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PositionLeads { lead_s } => write!(

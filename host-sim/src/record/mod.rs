@@ -17,14 +17,15 @@
 
 mod columns;
 mod error;
-mod experiment;
 mod force;
 mod plausible;
+mod recording;
 mod time;
 mod trace;
 
-pub use error::{Doubt, RecordError, TimeFault, UnitFault, UselessFault};
+pub use error::{RecordError, RecordWarning, TimeFault, UnitFault, UnusableSignal};
 pub use force::ForceRecord;
+pub use recording::Recording;
 pub use trace::{TraceError, write_trace};
 
 use std::path::Path;
@@ -48,7 +49,7 @@ pub struct Record {
     /// The controller's output, V.
     pub voltage_v: Option<Vec<f64>>,
     /// What looks odd but can be true.
-    pub doubts: Vec<Doubt>,
+    pub doubts: Vec<RecordWarning>,
 }
 
 /// What an axis can do: the yardstick for units.

@@ -1,7 +1,7 @@
 //! Can the axis have made these numbers, in the unit their column names?
 
 use super::columns::{Column, Columns};
-use super::{AxisLimits, Doubt, RecordError, UnitFault};
+use super::{AxisLimits, RecordError, RecordWarning, UnitFault};
 use std::path::Path;
 
 /// Fewest encoder counts that are a motion.
@@ -173,10 +173,10 @@ pub(super) fn doubts(
     reference_mm: &[f64],
     position_mm: Option<&[f64]>,
     sample_time_s: f64,
-) -> Vec<Doubt> {
+) -> Vec<RecordWarning> {
     let lead = position_mm.and_then(|position| lead_s(reference_mm, position, sample_time_s));
     lead.filter(|lead| *lead > MIN_LEAD_SAMPLES * sample_time_s)
-        .map(|lead_s| Doubt::PositionLeads { lead_s })
+        .map(|lead_s| RecordWarning::PositionLeads { lead_s })
         .into_iter()
         .collect()
 }

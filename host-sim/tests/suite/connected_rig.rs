@@ -9,12 +9,12 @@ use quadrant::link::message::{
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::safety::{AxisName, FaultCode};
 use quadrant::telemetry::MachineState;
-use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings};
-use quadrant_sim::console::rig::ConnectedRig;
+use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
+use quadrant_sim::console::rig::ConnectedAxis;
 use quadrant_sim::console::{Client, ClientError, SimulatedLink};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
+use quadrant_sim::machine::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::rig::{Drive, Experiment, Rig, RigError, SimulatedRig};
 
 fn client() -> Client {
     Client::open(SimulatedLink::start(1, None).unwrap()).unwrap()
@@ -231,9 +231,9 @@ fn sawtooth(count: usize) -> Vec<f64> {
 #[test]
 fn in_open_loop_the_recording_is_what_was_put_out() {
     let mut client = client();
-    let mut rig = ConnectedRig::new(&mut client, AxisName::X, 20.0).unwrap();
-    let limp = limp_settings(rig.settings());
-    rig.apply(&limp).unwrap();
+    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 20.0).unwrap();
+    let limp = zero_gain_settings(test_axis.settings());
+    test_axis.apply(&limp).unwrap();
     let experiment = Experiment {
         name: "a sawtooth".to_owned(),
         drive: Drive::OpenLoop,
@@ -241,7 +241,7 @@ fn in_open_loop_the_recording_is_what_was_put_out() {
         decimation: 1,
         time_limit_s: 30.0,
     };
-    let recording = rig.perform(&experiment, &mut |_| {}).unwrap();
+    let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     assert_eq!(recording.len(), 10_000);
     assert!((recording.sample_time_s - 2e-4).abs() < 1e-12);
     // The recording may begin a tick after the injection.
@@ -271,9 +271,9 @@ fn in_open_loop_the_recording_is_what_was_put_out() {
 #[test]
 fn in_closed_loop_injection_and_motion_begin_together() {
     let mut client = client();
-    let mut rig = ConnectedRig::new(&mut client, AxisName::X, 200.0).unwrap();
-    let measuring = measuring_settings(rig.settings());
-    rig.apply(&measuring).unwrap();
+    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 200.0).unwrap();
+    let measuring = measuring_settings(test_axis.settings());
+    test_axis.apply(&measuring).unwrap();
     let experiment = Experiment {
         name: "a move".to_owned(),
         drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
@@ -286,7 +286,7 @@ fn in_closed_loop_injection_and_motion_begin_together() {
         decimation: 1,
         time_limit_s: 30.0,
     };
-    let recording = rig.perform(&experiment, &mut |_| {}).unwrap();
+    let recording = test_axis.perform(&experiment, &mut |_| {}).unwrap();
     let moved = recording
         .reference_mm
         .iter()
@@ -317,7 +317,7 @@ fn in_closed_loop_injection_and_motion_begin_together() {
 #[test]
 fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
     let mut client = client();
-    let mut rig = ConnectedRig::new(&mut client, AxisName::X, 2.0).unwrap();
+    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 2.0).unwrap();
     let experiment = Experiment {
         name: "too much".to_owned(),
         drive: Drive::OpenLoop,
@@ -325,9 +325,9 @@ fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
         decimation: 1,
         time_limit_s: 30.0,
     };
-    let error = rig.perform(&experiment, &mut |_| {}).unwrap_err();
+    let error = test_axis.perform(&experiment, &mut |_| {}).unwrap_err();
     assert!(
-        matches!(&error, RigError::Fault { fault, .. } if fault.code == FaultCode::InjectionBounds),
+        matches!(&error, ExperimentError::Fault { fault, .. } if fault.code == FaultCode::InjectionBounds),
         "{error}"
     );
     let position_mm = client.status().unwrap().axes[0].position_mm;
@@ -337,13 +337,13 @@ fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
 #[test]
 fn the_motor_constant_of_the_connected_axis_is_that_of_the_axis_itself() {
     let mut client = client();
-    let mut rig = ConnectedRig::new(&mut client, AxisName::X, 20.0).unwrap();
-    let limp = limp_settings(rig.settings());
-    rig.apply(&limp).unwrap();
+    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 20.0).unwrap();
+    let limp = zero_gain_settings(test_axis.settings());
+    test_axis.apply(&limp).unwrap();
     let settings = MotorConstantSettings::default();
-    let connected = motor_constant::measure(&mut rig, &settings, &mut |_| {}).unwrap();
+    let connected = motor_constant::measure(&mut test_axis, &settings, &mut |_| {}).unwrap();
     let [truth, ..] = StageTruth::real().axes;
-    let mut direct = SimulatedRig::new(0, truth, 1);
+    let mut direct = SimulatedTestAxis::new(0, truth, 1);
     let direct = motor_constant::measure(&mut direct, &settings, &mut |_| {}).unwrap();
     let ratio = connected.gain_mm_per_v_s2 / direct.gain_mm_per_v_s2;
     println!(

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use proptest::prelude::*;
-use quadrant_sim::rig::Recording;
+use quadrant_sim::record::Recording;
 use tempfile::TempDir;
 
 /// Runs `quadrant identify`; what it said, and whether it succeeded.

@@ -2,11 +2,12 @@
 
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::settings::x_axis;
+use quadrant_sim::machine::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::rig::{Drive, Experiment, Recording, Rig, RigError, SimulatedRig};
+use quadrant_sim::record::Recording;
 
-fn rig(seed: u64) -> SimulatedRig {
-    SimulatedRig::new(0, StageTruth::real().axes[0].clone(), seed)
+fn test_axis(seed: u64) -> SimulatedTestAxis {
+    SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), seed)
 }
 
 fn experiment(drive: Drive, injection_v: Vec<f64>) -> Experiment {
@@ -28,14 +29,17 @@ fn moving(distance_mm: f64) -> Drive {
     }))
 }
 
-fn perform(rig: &mut SimulatedRig, experiment: &Experiment) -> Result<Recording, RigError> {
-    rig.perform(experiment, &mut |_| {})
+fn perform(
+    test_axis: &mut SimulatedTestAxis,
+    experiment: &Experiment,
+) -> Result<Recording, ExperimentError> {
+    test_axis.perform(experiment, &mut |_| {})
 }
 
 #[test]
 fn a_motion_is_recorded_from_its_start_to_its_end() {
-    let mut rig = rig(1);
-    let recording = perform(&mut rig, &experiment(moving(5.0), Vec::new())).unwrap();
+    let mut test_axis = test_axis(1);
+    let recording = perform(&mut test_axis, &experiment(moving(5.0), Vec::new())).unwrap();
     let (first, last) = (recording.reference_mm[0], recording.reference_mm.last());
     assert!((last.unwrap() - first - 5.0).abs() < 1e-3);
     let tracking = recording.reference_mm.iter().zip(&recording.position_mm);
@@ -45,18 +49,22 @@ fn a_motion_is_recorded_from_its_start_to_its_end() {
 
 #[test]
 fn the_axis_stays_where_an_experiment_left_it() {
-    let mut rig = rig(1);
-    perform(&mut rig, &experiment(moving(5.0), Vec::new())).unwrap();
-    let back = perform(&mut rig, &experiment(moving(-5.0), Vec::new())).unwrap();
+    let mut test_axis = test_axis(1);
+    perform(&mut test_axis, &experiment(moving(5.0), Vec::new())).unwrap();
+    let back = perform(&mut test_axis, &experiment(moving(-5.0), Vec::new())).unwrap();
     assert!((back.position_mm[0] - 5.0).abs() < 0.2);
     assert!(back.position_mm.last().unwrap().abs() < 0.2);
 }
 
 #[test]
 fn an_open_loop_gets_the_injection_and_nothing_else() {
-    let mut rig = rig(1);
+    let mut test_axis = test_axis(1);
     let injection: Vec<f64> = (0..500).map(|k| if k < 250 { 0.5 } else { -0.5 }).collect();
-    let recording = perform(&mut rig, &experiment(Drive::OpenLoop, injection.clone())).unwrap();
+    let recording = perform(
+        &mut test_axis,
+        &experiment(Drive::OpenLoop, injection.clone()),
+    )
+    .unwrap();
     assert_eq!(recording.len(), 500);
     // Half a step of the converter.
     let worst = injection
@@ -69,9 +77,9 @@ fn an_open_loop_gets_the_injection_and_nothing_else() {
 
 #[test]
 fn feedback_fights_an_injected_voltage() {
-    let mut rig = rig(1);
+    let mut test_axis = test_axis(1);
     let held = Drive::ClosedLoop(MotionSettings::Hold);
-    let recording = perform(&mut rig, &experiment(held, vec![1.0; 5000])).unwrap();
+    let recording = perform(&mut test_axis, &experiment(held, vec![1.0; 5000])).unwrap();
     let end = recording.len() - 1;
     // The friction takes a part; the feedback the rest, less what holds the axis off its reference.
     assert!(recording.voltage_v[end] < 0.25);
@@ -83,7 +91,7 @@ fn decimation_averages_the_voltage_and_drops_an_incomplete_sample() {
     let ramp: Vec<f64> = (0..1005).map(|k| 1e-5 * f64::from(k)).collect();
     let mut coarse = experiment(Drive::OpenLoop, ramp);
     coarse.decimation = 10;
-    let recording = perform(&mut rig(1), &coarse).unwrap();
+    let recording = perform(&mut test_axis(1), &coarse).unwrap();
     assert_eq!(recording.len(), 100);
     assert_eq!(recording.position_mm.len(), recording.voltage_v.len());
     assert!((recording.sample_time_s - 1e-3).abs() < 1e-12);
@@ -92,23 +100,30 @@ fn decimation_averages_the_voltage_and_drops_an_incomplete_sample() {
 
 #[test]
 fn an_axis_that_leaves_its_travel_is_stopped() {
-    let mut rig = rig(1);
+    let mut test_axis = test_axis(1);
     let push = experiment(Drive::OpenLoop, vec![0.5; 100_000]);
-    let error = perform(&mut rig, &push).unwrap_err();
-    assert!(matches!(error, RigError::Travel { .. }), "{error}");
+    let error = perform(&mut test_axis, &push).unwrap_err();
+    assert!(matches!(error, ExperimentError::Travel { .. }), "{error}");
 }
 
 #[test]
 fn an_axis_that_runs_away_is_stopped() {
-    let error = perform(&mut rig(1), &experiment(Drive::OpenLoop, vec![5.0; 10_000])).unwrap_err();
-    assert!(matches!(error, RigError::Overspeed { .. }), "{error}");
+    let error = perform(
+        &mut test_axis(1),
+        &experiment(Drive::OpenLoop, vec![5.0; 10_000]),
+    )
+    .unwrap_err();
+    assert!(
+        matches!(error, ExperimentError::Overspeed { .. }),
+        "{error}"
+    );
 }
 
 #[test]
 fn an_experiment_that_does_not_end_in_time_says_what_it_waited_for() {
     let mut endless = experiment(moving(50.0), Vec::new());
     endless.time_limit_s = 1.0;
-    let error = perform(&mut rig(1), &endless).unwrap_err();
+    let error = perform(&mut test_axis(1), &endless).unwrap_err();
     assert_eq!(
         error.to_string(),
         "test: not ended after 1 s: the motion has not ended"
@@ -117,26 +132,27 @@ fn an_experiment_that_does_not_end_in_time_says_what_it_waited_for() {
 
 #[test]
 fn a_fault_of_the_law_ends_the_experiment() {
-    let mut rig = rig(1);
+    let mut test_axis = test_axis(1);
     let held = Drive::ClosedLoop(MotionSettings::Hold);
     let kick: Vec<f64> = vec![8.0; 20_000];
-    let error = perform(&mut rig, &experiment(held, kick)).unwrap_err();
-    assert!(matches!(error, RigError::Fault { .. }), "{error}");
+    let error = perform(&mut test_axis, &experiment(held, kick)).unwrap_err();
+    assert!(matches!(error, ExperimentError::Fault { .. }), "{error}");
 }
 
 #[test]
 fn refused_settings_leave_the_old_ones_in_force() {
-    let mut rig = rig(1);
-    let before = rig.settings().clone();
+    let mut test_axis = test_axis(1);
+    let before = test_axis.settings().clone();
     let mut bad = x_axis();
     bad.feedback.pid.kp_v_per_mm = -1.0;
-    assert!(rig.apply(&bad).is_err());
-    assert_eq!(rig.settings(), &before);
+    assert!(test_axis.apply(&bad).is_err());
+    assert_eq!(test_axis.settings(), &before);
 }
 
 #[test]
 fn the_same_seed_gives_the_same_recording() {
-    let record = |seed| perform(&mut rig(seed), &experiment(moving(1.0), Vec::new())).unwrap();
+    let record =
+        |seed| perform(&mut test_axis(seed), &experiment(moving(1.0), Vec::new())).unwrap();
     assert_eq!(record(3), record(3));
     assert_ne!(record(3), record(4));
 }

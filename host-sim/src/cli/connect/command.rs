@@ -54,12 +54,12 @@ pub(super) enum Command {
     },
     /// Start the plan: the motions of `plan` or `circle`, from where the axes stand. `wait rest` waits for their end.
     Run,
-    /// Exchange the plan for that of a TOML file: `motions`, one for each axis.
+    /// SimulatedPeer the plan for that of a TOML file: `motions`, one for each axis.
     Plan {
         /// The file.
         file: PathBuf,
     },
-    /// Exchange the plan for a circle from where the axes stand; `run` starts it.
+    /// SimulatedPeer the plan for a circle from where the axes stand; `run` starts it.
     Circle(CircleOptions),
     /// Follow a part program in G-code from where the axes stand, and wait for its end.
     Stream(StreamOptions),

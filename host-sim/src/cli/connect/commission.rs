@@ -4,7 +4,7 @@ use anyhow::Context;
 use clap::Args;
 use quadrant::link::message::Body;
 use quadrant::safety::AxisName;
-use quadrant_sim::console::rig::{ConnectedRig, room_mm};
+use quadrant_sim::console::rig::{ConnectedAxis, room_mm};
 use quadrant_sim::console::{Client, settings};
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::json;
@@ -66,10 +66,10 @@ pub(super) fn travel_mm(
 pub(super) fn run(client: &mut Client, options: &Options) -> anyhow::Result<Answer> {
     let Options { axis, output, .. } = options;
     let travel_mm = travel_mm(client, *axis, options.travel)?;
-    let mut rig = ConnectedRig::new(client, *axis, travel_mm)?;
-    let before = rig.stage().clone();
+    let mut test_axis = ConnectedAxis::new(client, *axis, travel_mm)?;
+    let before = test_axis.stage().clone();
     let base = &before.axes[*axis as usize];
-    let outcome = options.request.run(&mut rig, base, output.seed);
+    let outcome = options.request.run(&mut test_axis, base, output.seed);
     // Whatever came of it, the outputs go off, and the machine has the settings that it had.
     client.order(Body::Disable)?;
     settings::load(client, &before).context("the machine did not take its old settings back")?;
@@ -77,7 +77,7 @@ pub(super) fn run(client: &mut Client, options: &Options) -> anyhow::Result<Answ
 
     let mut file = SettingsFile::new(before);
     let board = client.identity().board.clone();
-    let who = format!("the {axis} axis of {} ({board})", client.place());
+    let who = format!("the {axis} axis of {} ({board})", client.endpoint());
     let mut text = found.text();
     for line in found.keep(output, &mut file, *axis, &who)? {
         text.push_str(&line);

@@ -53,7 +53,7 @@ impl Session {
         let identity = self.client.identity();
         format!(
             "{}: {} with firmware {}",
-            self.client.place(),
+            self.client.endpoint(),
             identity.board,
             identity.firmware
         )

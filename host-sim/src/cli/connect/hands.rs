@@ -3,7 +3,7 @@
 use anyhow::{Context, bail};
 use quadrant::safety::Switches;
 use quadrant_sim::console::Client;
-use quadrant_sim::console::hands::{Hands, INPUTS, without};
+use quadrant_sim::console::hands::{INPUTS, SimulatedIo, without};
 use serde_json::json;
 
 use super::drive::{Answer, Session};
@@ -60,8 +60,8 @@ pub(super) fn log(session: &mut Session, options: &LogArguments) -> anyhow::Resu
     if options.elf.is_some() {
         bail!("log --elf: this is for the shell, and needs no connection");
     }
-    let place = session.client.place();
-    let Some(hands) = session.client.hands() else {
+    let place = session.client.endpoint();
+    let Some(hands) = session.client.simulated_io() else {
         bail!(
             "log: the firmware's log comes through the debug probe, not from {place}: `quadrant connect log --elf FILE`; \
              `events` shows what the link tells"
@@ -80,9 +80,9 @@ pub(super) fn log(session: &mut Session, options: &LogArguments) -> anyhow::Resu
     Ok(Answer::new("", json!({ "lines": lines.len() })))
 }
 
-fn hands<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mut dyn Hands> {
-    let place = client.place();
-    match client.hands() {
+fn hands<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mut dyn SimulatedIo> {
+    let place = client.endpoint();
+    match client.simulated_io() {
         Some(hands) => Ok(hands),
         None => bail!(
             "{what}: a program has no hands at {place}; do it yourself, or try it with --simulated or --emulated"

@@ -6,18 +6,20 @@ use anyhow::Context;
 use clap::{Args, Subcommand};
 use quadrant::safety::AxisName;
 use quadrant::settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings, quiet_settings};
+use quadrant_sim::commission::bootstrap::{
+    low_bandwidth_settings, measuring_settings, zero_gain_settings,
+};
 use quadrant_sim::console::Client;
-use quadrant_sim::console::rig::ConnectedRig;
+use quadrant_sim::console::rig::ConnectedAxis;
 use quadrant_sim::identify::frf::{self, FrfSettings};
 use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended, shuttle};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
 use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::identify::static_friction::{self, Exponent, StaticFrictionSettings, fit_map};
 use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::presentation::{friction_table, gms_table, motion_table, plant_tables};
 use quadrant_sim::report::Table;
-use quadrant_sim::rig::Rig;
 use serde_json::json;
 
 use super::command::axis_parser;
@@ -77,11 +79,11 @@ pub(super) fn run(client: &mut Client, command: &Command) -> anyhow::Result<Answ
         (Err(_), Command::MotorConstant(_)) => STEPS_TRAVEL_MM,
         (Err(_), _) => MOTION_TRAVEL_MM,
     };
-    let mut rig = ConnectedRig::new(client, options.axis, travel_mm)?;
-    let before = rig.settings().clone();
-    let outcome = measure(&mut rig, command, options, &before);
+    let mut test_axis = ConnectedAxis::new(client, options.axis, travel_mm)?;
+    let before = test_axis.settings().clone();
+    let outcome = measure(&mut test_axis, command, options, &before);
     // Whatever came of it, the machine keeps the settings that it had.
-    rig.apply(&before)?;
+    test_axis.apply(&before)?;
     let table = outcome?;
     let text = format!(
         "{}\n{}: the recording",
@@ -95,7 +97,7 @@ pub(super) fn run(client: &mut Client, command: &Command) -> anyhow::Result<Answ
 }
 
 fn measure(
-    rig: &mut ConnectedRig<'_>,
+    test_axis: &mut ConnectedAxis<'_>,
     command: &Command,
     options: &Options,
     before: &AxisSettings,
@@ -104,7 +106,7 @@ fn measure(
     let mut progress = |done: f64| bar.set_position((1000.0 * done) as u64);
     match command {
         Command::Motion(_) => {
-            let recording = shuttle(rig, ROUNDS, &mut progress)?;
+            let recording = shuttle(test_axis, ROUNDS, &mut progress)?;
             recording.write_csv(&options.out)?;
             let settings = MotionFitSettings::default();
             let candidates = fit_motion(&recording, &settings, &|_| {})?;
@@ -113,9 +115,9 @@ fn measure(
             Ok(motion_table(&chosen.model, None))
         }
         Command::StaticFriction(_) => {
-            rig.apply(&measuring_settings(before))?;
+            test_axis.apply(&measuring_settings(before))?;
             let settings = StaticFrictionSettings::default();
-            let (map, _) = static_friction::measure(rig, &settings, &mut progress)?;
+            let (map, _) = static_friction::measure(test_axis, &settings, &mut progress)?;
             map.write_csv(&options.out)?;
             Ok(friction_table(&fit_map(&map, Exponent::Free)?))
         }
@@ -123,30 +125,33 @@ fn measure(
             let plant = before.plant.context(
                 "the settings hold no linear model to make a quiet controller for; load commissioned settings first",
             )?;
-            let quiet = quiet_settings(before, &plant, rig.axis().rate_hz);
-            rig.apply(&quiet)?;
+            let quiet = low_bandwidth_settings(before, &plant, test_axis.info().rate_hz);
+            test_axis.apply(&quiet)?;
             let sine = VirginCurveSettings::outrunning(
                 quiet.feedback.pid.kp_v_per_mm,
                 before.friction.sliding.positive.curve.breakaway_v,
             );
-            let recording = virgin_curve::measure(rig, &sine, &mut progress)?;
+            let recording = virgin_curve::measure(test_axis, &sine, &mut progress)?;
             recording.write_csv(&options.out)?;
             let known = Some(&before.friction.sliding);
             let found = virgin_curve::identify(&recording, known, &Knots::Automatic(BLOCKS))?;
             Ok(gms_table(&found))
         }
         Command::Plant(_) => {
-            rig.apply(&measuring_settings(before))?;
-            let found = frf::measure(rig, &FrfSettings::default(), &mut progress)?;
+            test_axis.apply(&measuring_settings(before))?;
+            let found = frf::measure(test_axis, &FrfSettings::default(), &mut progress)?;
             let response = &found.estimate.response;
             response.write_csv(&options.out)?;
             let [parameters, _] = plant_tables(&fit_plant(response, &plant_fit())?);
             Ok(parameters)
         }
         Command::MotorConstant(_) => {
-            rig.apply(&limp_settings(before))?;
-            let found =
-                motor_constant::measure(rig, &MotorConstantSettings::default(), &mut progress)?;
+            test_axis.apply(&zero_gain_settings(before))?;
+            let found = motor_constant::measure(
+                test_axis,
+                &MotorConstantSettings::default(),
+                &mut progress,
+            )?;
             found.recording.write_csv(&options.out)?;
             Ok(quadrant_sim::presentation::motor_constant_table(
                 &found, None,

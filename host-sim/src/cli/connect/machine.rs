@@ -173,16 +173,16 @@ pub(super) fn wait(
     axes: &[AxisName],
     timeout: f64,
 ) -> anyhow::Result<Answer> {
-    let patience = seconds("--timeout", timeout)?;
+    let timeout = seconds("--timeout", timeout)?;
     if !axes.is_empty() && what != "homed" {
         bail!("wait {what}: axes belong behind `homed`");
     }
     match what {
         "rest" => {
-            settle::rest(client, patience)?;
+            settle::rest(client, timeout)?;
         }
         "homed" => {
-            settle::homed(client, some_or_all(axes), patience)?;
+            settle::homed(client, some_or_all(axes), timeout)?;
         }
         number => match number.parse() {
             Ok(time_s) => client.wait(seconds("wait", time_s)?)?,

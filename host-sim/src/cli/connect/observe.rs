@@ -139,8 +139,8 @@ pub(super) fn capture(client: &mut Client, command: &CaptureCommand) -> anyhow::
         CaptureCommand::State => Ok(state(&capture_state(client)?)),
         CaptureCommand::Stop => Ok(state(&disarm(client)?)),
         CaptureCommand::Read { out, timeout } => {
-            let patience = seconds("--timeout", *timeout)?;
-            let (samples, record) = read_capture(client, patience)?;
+            let timeout = seconds("--timeout", *timeout)?;
+            let (samples, record) = read_capture(client, timeout)?;
             let resolutions_mm = settings::resolutions_mm(client)?;
             let files = write(&samples, out, &resolutions_mm, false).context("capture")?;
             let mut answer = written(&samples, &files);

@@ -62,7 +62,7 @@ pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let mut dumped = SettingsFile::new(stage);
     let identity = client.identity();
     dumped.provenance.push(Provenance {
-        command: format!("quadrant connect dump, from {}", client.place()),
+        command: format!("quadrant connect dump, from {}", client.endpoint()),
         version: identity.firmware.as_str().to_owned(),
         axis: "all".to_owned(),
         records: Vec::new(),

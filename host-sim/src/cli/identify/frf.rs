@@ -82,7 +82,7 @@ impl Measurement {
     ) -> anyhow::Result<FrfMeasurement> {
         let bar = share("exciting the axis");
         let found = measure(
-            &mut axis.rig(output.seed),
+            &mut axis.test_axis(output.seed),
             &self.settings(output.seed),
             &mut |done| bar.set_position((1000.0 * done) as u64),
         )?;

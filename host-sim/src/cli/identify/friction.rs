@@ -57,9 +57,10 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 ..StaticFrictionSettings::default()
             };
             let bar = share("moving at constant velocity");
-            let (map, recordings) = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
-                bar.set_position((1000.0 * done) as u64);
-            })?;
+            let (map, recordings) =
+                measure(&mut axis.test_axis(output.seed), &settings, &mut |done| {
+                    bar.set_position((1000.0 * done) as u64);
+                })?;
             bar.finish_and_clear();
             for (index, recording) in recordings.iter().enumerate() {
                 recording

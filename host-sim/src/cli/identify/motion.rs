@@ -9,7 +9,7 @@ use quadrant_sim::identify::motion::{
     replay_open_loop, shuttle,
 };
 use quadrant_sim::presentation::{Reruns, candidates_table, motion_page, motion_table, provenance};
-use quadrant_sim::rig::Recording;
+use quadrant_sim::record::Recording;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
 use super::rig::Axis;
@@ -130,7 +130,7 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String)> {
         (None, Some(axis)) => {
             let output = &arguments.output;
             let bar = share("moving to and fro");
-            let recording = shuttle(&mut axis.rig(output.seed), ROUNDS, &mut |done| {
+            let recording = shuttle(&mut axis.test_axis(output.seed), ROUNDS, &mut |done| {
                 bar.set_position((1000.0 * done) as u64);
             })?;
             bar.finish_and_clear();

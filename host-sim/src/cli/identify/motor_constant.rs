@@ -90,7 +90,7 @@ fn measured(
     output: &Output,
 ) -> anyhow::Result<MotorConstant> {
     let bar = share("voltage steps in open loop");
-    let motor = measure(&mut axis.rig(output.seed), settings, &mut |done| {
+    let motor = measure(&mut axis.test_axis(output.seed), settings, &mut |done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();

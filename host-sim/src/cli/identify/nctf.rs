@@ -95,7 +95,7 @@ fn measured(axis: Axis, arguments: &Arguments) -> anyhow::Result<Characteristic>
         ..CharacteristicSettings::default()
     };
     let bar = share("coasting in open loop");
-    let found = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
+    let found = measure(&mut axis.test_axis(output.seed), &settings, &mut |done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use indicatif::ProgressDrawTarget;
-use quadrant_sim::rig::Recording;
+use quadrant_sim::record::Recording;
 
 use crate::cli::output::share;
 

@@ -173,14 +173,14 @@ impl Arguments {
 
     /// The axis of the simulated stage, excited at every amplitude; without settings it is commissioned first.
     fn measured(&self, bar: &ProgressBar) -> anyhow::Result<Measured> {
-        let mut rig = self.axis.rig(self.output.seed);
+        let mut test_axis = self.axis.test_axis(self.output.seed);
         let index = self.axis.index();
         let settings = match &self.settings {
             Some(path) => SettingsFile::read(path)?.stage.axes[index].clone(),
             None => {
                 let base = &StageSettings::default().axes[index];
                 let request = CommissionSettings::default();
-                commission(&mut rig, base, &request, &mut |_, done| {
+                commission(&mut test_axis, base, &request, &mut |_, done| {
                     bar.set_position((1000.0 * done) as u64);
                 })?
                 .settings
@@ -197,7 +197,11 @@ impl Arguments {
             };
             let averages = self.averages;
             measured.push(AtRest::measure(
-                &mut rig, &settings, excitation, averages, report,
+                &mut test_axis,
+                &settings,
+                excitation,
+                averages,
+                report,
             )?);
         }
         Ok((measured, settings, simulated(self.axis)))

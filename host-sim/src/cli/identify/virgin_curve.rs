@@ -5,10 +5,11 @@ use std::path::PathBuf;
 use anyhow::Context;
 use clap::Args;
 use quadrant::settings::AxisSettings;
-use quadrant_sim::commission::bootstrap::quiet_settings;
+use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveSettings, identify, measure};
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::presentation::{gms_table, presliding_section, provenance};
-use quadrant_sim::rig::{Recording, Rig};
+use quadrant_sim::record::Recording;
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::rig::Axis;
@@ -98,13 +99,13 @@ fn measured(
     settings: Option<&AxisSettings>,
 ) -> anyhow::Result<(Recording, VirginCurveSettings)> {
     let output = &arguments.output;
-    let mut rig = axis.rig(output.seed);
-    let base = settings.unwrap_or(rig.settings()).clone();
+    let mut test_axis = axis.test_axis(output.seed);
+    let base = settings.unwrap_or(test_axis.settings()).clone();
     let plant = base.plant.context(
         "the settings hold no linear model to make a quiet controller for; run `quadrant commission` first",
     )?;
-    let quiet = quiet_settings(&base, &plant, rig.axis().rate_hz);
-    rig.apply(&quiet)?;
+    let quiet = low_bandwidth_settings(&base, &plant, test_axis.info().rate_hz);
+    test_axis.apply(&quiet)?;
     let usual = VirginCurveSettings::outrunning(
         quiet.feedback.pid.kp_v_per_mm,
         base.friction.sliding.positive.curve.breakaway_v,
@@ -117,7 +118,7 @@ fn measured(
         cycles: arguments.cycles,
     };
     let bar = share("moving slowly to and fro");
-    let recording = measure(&mut rig, &sine, &mut |done| {
+    let recording = measure(&mut test_axis, &sine, &mut |done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();

@@ -8,7 +8,7 @@ use super::regressors::Regression;
 use super::signals::{MotionFitSettings, Signals};
 use super::solution::{MOST_DEAD_TIME_S, Solution};
 use crate::identify::setting::SettingError;
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// A model, and how it does where it was not fitted.
 #[derive(Clone, Debug, PartialEq)]

@@ -1,0 +1,144 @@
+//! An axis that experiments are run on.
+//!
+//! Identification asks a [`TestAxis`] for an [`Experiment`] and works on the [`Recording`] that comes back; one that is
+//! read from a file is the same.
+
+use quadrant::reference::MotionSettings;
+use quadrant::safety::Fault;
+use quadrant::settings::{AxisSettings, SettingsError};
+
+use crate::record::Recording;
+
+/// Who drives the amplifier besides the injected voltage.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Drive {
+    /// Nobody: the injected voltage alone.
+    OpenLoop,
+    /// The feedback law, along a motion from where the axis stands.
+    ClosedLoop(MotionSettings),
+}
+
+/// Motion and voltage that an axis is recorded under.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Experiment {
+    /// Name, for progress and messages: "friction at 2 mm/s".
+    pub name: String,
+    /// Who drives.
+    pub drive: Drive,
+    /// Voltage added at the amplifier's input, V, one value a control period from the first sample recorded; zero
+    /// after the last. The experiment lasts until both this and the motion have ended.
+    pub injection_v: Vec<f64>,
+    /// Control periods in a sample of the recording, at least 1: voltages are the mean over them, positions are those
+    /// at their beginning. An axis that cannot sample so often takes more.
+    pub decimation: usize,
+    /// Time after which the experiment is given up, s.
+    pub time_limit_s: f64,
+}
+
+/// Data of an axis, as far as identification may know them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisInfo {
+    /// Its name.
+    pub name: &'static str,
+    /// Control rate, Hz.
+    pub rate_hz: f64,
+    /// Length of an encoder count, mm.
+    pub resolution_mm: f64,
+    /// Largest voltage, V.
+    pub full_scale_v: f64,
+    /// Travel either way from where the axis stood first, mm; an experiment that leaves it is stopped.
+    pub travel_mm: f64,
+    /// Largest velocity, mm/s; an experiment that exceeds it is stopped.
+    pub max_velocity_mm_s: f64,
+}
+
+/// An axis that experiments can be run on.
+pub trait TestAxis {
+    /// Returns the data of the axis.
+    fn info(&self) -> AxisInfo;
+
+    /// Returns the settings in force.
+    fn settings(&self) -> &AxisSettings;
+
+    /// Puts settings in force for the experiments that follow.
+    ///
+    /// # Errors
+    /// Settings that are refused; the old ones stay in force.
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError>;
+
+    /// Runs an experiment from where the axis stands, and records it. `progress` is told the share that is done,
+    /// 0 to 1, a few times a second.
+    ///
+    /// # Errors
+    /// Whatever stopped the experiment; the outputs are off then.
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError>;
+}
+
+/// Why an experiment was stopped.
+#[derive(Clone, Debug, thiserror::Error)]
+pub enum ExperimentError {
+    /// The motion cannot be built.
+    #[error("{experiment}: the motion is refused: {source}")]
+    Motion {
+        /// The experiment.
+        experiment: String,
+        /// Why.
+        source: SettingsError,
+    },
+    /// The control law switched off.
+    #[error("{experiment}: fault {number} at tick {tick}: {cause}; {remedy}", number = .fault.code.number(),
+        tick = .fault.tick, cause = .fault.code.cause(), remedy = .fault.code.remedy())]
+    Fault {
+        /// The experiment.
+        experiment: String,
+        /// The fault.
+        fault: Fault,
+    },
+    /// The axis cannot do this.
+    #[error("{experiment}: {reason}")]
+    Impossible {
+        /// The experiment.
+        experiment: String,
+        /// What is missing, or what failed.
+        reason: String,
+    },
+    /// The axis left its travel.
+    #[error(
+        "{experiment}: the axis left its travel of +-{travel_mm} mm after {time_s:.3} s; \
+         lower the excitation's amplitude or duration, or raise its lowest frequency"
+    )]
+    Travel {
+        /// The experiment.
+        experiment: String,
+        /// The travel.
+        travel_mm: f64,
+        /// When, from the first sample.
+        time_s: f64,
+    },
+    /// The axis ran too fast.
+    #[error(
+        "{experiment}: the axis exceeded {max_velocity_mm_s} mm/s after {time_s:.3} s; lower the excitation's amplitude"
+    )]
+    Overspeed {
+        /// The experiment.
+        experiment: String,
+        /// The limit.
+        max_velocity_mm_s: f64,
+        /// When, from the first sample.
+        time_s: f64,
+    },
+    /// The experiment took too long.
+    #[error("{experiment}: not ended after {time_limit_s} s: {reason}")]
+    TimedOut {
+        /// The experiment.
+        experiment: String,
+        /// The limit.
+        time_limit_s: f64,
+        /// What was still to come.
+        reason: &'static str,
+    },
+}
