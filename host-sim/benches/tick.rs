@@ -9,33 +9,33 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::link::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::scenario::circle_and_sine;
 
 /// A machine on its stage, moving.
-struct TestAxis<S: Scalar> {
+struct Rig<S: Scalar> {
     machine: Machine<S, FIRMWARE_ELEMENTS>,
     plant: SimulatedStage,
     operator: Operator,
     tick: u32,
 }
 
-impl<S: Scalar> TestAxis<S> {
+impl<S: Scalar> Rig<S> {
     fn moving() -> Self {
         let job = circle_and_sine(0.5);
-        let mut test_axis = Self {
+        let mut rig = Self {
             machine: Machine::new(&job).expect("the default settings are valid"),
             plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1),
             operator: Operator::runs_the_plan(),
             tick: 0,
         };
         for _ in 0..20_000 {
-            test_axis.step();
+            rig.step();
         }
-        assert_eq!(test_axis.machine.state().safety(), SafetyState::Enabled);
-        assert!(test_axis.machine.state().is_running());
-        test_axis
+        assert_eq!(rig.machine.state().safety(), SafetyState::Enabled);
+        assert!(rig.machine.state().is_running());
+        rig
     }
 
     fn step(&mut self) {
@@ -48,8 +48,8 @@ impl<S: Scalar> TestAxis<S> {
 }
 
 fn law<S: Scalar>(criterion: &mut Criterion, name: &str) {
-    let mut test_axis = Rig::<S>::moving();
-    let counts = test_axis.plant.read_counters();
+    let mut rig = Rig::<S>::moving();
+    let counts = rig.plant.read_counters();
     let still = InputRecord::of_counts(counts, None);
     let mut group = criterion.benchmark_group("law");
     group.throughput(Throughput::Elements(100));
@@ -57,7 +57,7 @@ fn law<S: Scalar>(criterion: &mut Criterion, name: &str) {
     // and the machine is renewed before the following error becomes a fault.
     group.bench_function(name, |bencher| {
         bencher.iter_batched_ref(
-            || test_axis.machine.clone(),
+            || rig.machine.clone(),
             |machine| {
                 for _ in 0..100 {
                     black_box(machine.tick(black_box(&still)));
@@ -75,9 +75,9 @@ fn benches(criterion: &mut Criterion) {
     law::<Fixed>(criterion, "100 ticks, fixed");
     let mut group = criterion.benchmark_group("simulation");
     group.throughput(Throughput::Elements(1));
-    let mut test_axis = Rig::<f32>::moving();
+    let mut rig = Rig::<f32>::moving();
     group.bench_function("tick of law and stage, f32", |bencher| {
-        bencher.iter(|| test_axis.step())
+        bencher.iter(|| rig.step())
     });
     group.finish();
 }

@@ -1,41 +1,62 @@
 //! `quadrant commission`, and what it shares with `quadrant connect commission`.
 
 use std::fmt::Write as _;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use anyhow::Context;
 use clap::Args;
 use quadrant::safety::AxisName;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant::settings::AxisSettings;
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
-use quadrant_sim::machine::TestAxis;
+use quadrant_sim::machine::{TestAxis, TestMachine};
 use quadrant_sim::presentation::{
     commission_page, friction_table, gains_table, gms_table, motor_constant_table, plant_tables,
     provenance, revise_table, verdict_table,
 };
 use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use serde_json::{Value, json};
 
-use super::identify::rig::Axis;
+use super::axis::Axis;
+use super::endpoint::Endpoint;
 use super::output::{Output, command_line, share};
+use super::subject::{travel, travel_mm};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
-    /// The axis of the simulated stage.
+    /// The axis to commission.
     #[arg(long, value_enum)]
     axis: Axis,
+    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it),
+    /// emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
+    #[arg(long, default_value = "law", value_name = "MACHINE")]
+    machine: Endpoint,
+    /// Travel either way from where the axis stands, mm; without it, that to the soft limits of a homed axis.
+    #[arg(long, value_name = "MM", value_parser = travel)]
+    travel: Option<f64>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
+    /// Without them those of --into if it is there, else those that the machine has.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
+    /// Write the settings into this file; without it, into settings.toml in the folder for results.
+    #[arg(long, value_name = "FILE")]
+    into: Option<PathBuf>,
+    /// Let the settings that were found act on the machine. Without it the machine keeps those that it had.
+    #[arg(long)]
+    apply: bool,
+    /// Keep them in the machine's flash too.
+    #[arg(long, requires = "apply")]
+    store: bool,
     #[command(flatten)]
     request: Request,
     #[command(flatten)]
     output: Output,
 }
 
-/// What is asked of a commissioning, wherever the axis is.
+/// Options of a commissioning on any machine.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Request {
     /// Gain margin of the PID, dB.
@@ -50,42 +71,129 @@ pub(super) struct Request {
     quick: bool,
 }
 
-/// What a commissioning found.
-pub(super) struct Found {
-    pub(super) found: Commissioned,
+/// Results of a commissioning.
+struct Found {
+    found: Commissioned,
     checked: Option<CrossCheck>,
+}
+
+/// A commissioning of one axis of a machine.
+pub(super) struct Job<'a> {
+    pub(super) axis: AxisName,
+    /// Travel either way, mm; without it, that to the soft limits.
+    pub(super) travel_mm: Option<f64>,
+    /// Settings to start from; without them, those of the machine.
+    pub(super) start: Option<SettingsFile>,
+    /// File for the settings, in place of `settings.toml` in the folder for results.
+    pub(super) into: Option<&'a Path>,
+    pub(super) request: &'a Request,
+    pub(super) output: &'a Output,
+    /// True if the machine is to run on the new settings.
+    pub(super) apply: bool,
+    /// True if it is to keep them in its flash.
+    pub(super) store: bool,
+}
+
+/// A commissioning that is done: for a person, and as data.
+pub(super) struct Done {
+    pub(super) text: String,
+    pub(super) data: Value,
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         axis,
+        into,
         request,
         output,
         ..
     } = arguments;
-    let mut file = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?,
-        None => SettingsFile::new(StageSettings::default()),
+    let existing = into.as_deref().filter(|path| path.exists());
+    let start = arguments.settings.as_deref().or(existing);
+    let mut machine = arguments.machine.open(output.seed)?;
+    let job = Job {
+        axis: (*axis).into(),
+        travel_mm: arguments.travel,
+        start: start.map(SettingsFile::read).transpose()?,
+        into: into.as_deref(),
+        request,
+        output,
+        apply: arguments.apply,
+        store: arguments.store,
     };
-    let base = file.stage.axes[axis.index()].clone();
-    let found = request.run(&mut axis.test_axis(output.seed), &base, output.seed)?;
-    println!(
-        "Simulated, not measured: {} axis, seed {}\n",
-        axis.name(),
-        output.seed
-    );
-    print!("{}", found.text());
-    let who = format!("the {} axis of the simulated stage", axis.name());
-    let axis = AxisName::ALL[axis.index()];
-    for line in found.keep(output, &mut file, axis, &who)? {
-        println!("{line}");
+    let done = job.run(&mut *machine)?;
+    if machine.is_simulated() {
+        println!(
+            "Simulated, not measured: {} axis, seed {}\n",
+            axis.name(),
+            output.seed
+        );
     }
+    print!("{}", done.text);
     Ok(())
+}
+
+impl Job<'_> {
+    /// Commissions the axis, and writes everything that was found. The machine has its old settings afterwards unless the
+    /// new ones are to act, whatever came of it.
+    pub(super) fn run(self, machine: &mut dyn TestMachine) -> anyhow::Result<Done> {
+        let Self { axis, output, .. } = self;
+        let travel_mm = travel_mm(machine, axis, self.travel_mm, None)?;
+        let before = machine.settings()?;
+        let mut file = match self.start {
+            Some(file) => file,
+            None => SettingsFile::new(before.clone()),
+        };
+        let base = file.stage.axes[axis as usize].clone();
+        let outcome = {
+            let mut test_axis = machine.test_axis(axis, travel_mm)?;
+            self.request.run(&mut *test_axis, &base, output.seed)
+        };
+        machine
+            .load(&before)
+            .context("the machine did not take its old settings back")?;
+        let found = outcome?;
+
+        let who = format!("the {axis} axis of {}", machine.description());
+        let path = match self.into {
+            Some(path) => path.to_owned(),
+            None => output.file("settings.toml")?,
+        };
+        let mut text = found.text();
+        for line in found.keep(output, &mut file, &path, axis, &who)? {
+            text.push_str(&line);
+            text.push('\n');
+        }
+        if self.apply {
+            machine
+                .load(&file.stage)
+                .context("the settings that were found")?;
+            text.push_str("The settings act; the outputs are off.\n");
+        }
+        if self.store {
+            let origin = format!("quadrant {} commission {axis}", env!("CARGO_PKG_VERSION"));
+            machine.store(&origin)?;
+            text.push_str("They are kept for the next start.\n");
+        }
+        let verdict: Vec<_> = found
+            .found
+            .verdicts
+            .iter()
+            .map(|verdict| json!({ "law": verdict.law, "rms_um": 1e3 * verdict.score.rms_mm }))
+            .collect();
+        let data = json!({
+            "settings": path,
+            "verdict": verdict,
+            "applied": self.apply,
+            "stored": self.store,
+        });
+        Ok(Done { text, data })
+    }
 }
 
 impl Request {
     /// Commissions the test_axis's axis, with a bar for whoever watches.
-    pub(super) fn run(
+    fn run(
         &self,
         test_axis: &mut dyn TestAxis,
         base: &AxisSettings,
@@ -138,7 +246,7 @@ impl Found {
     }
 
     /// The tables for a terminal.
-    pub(super) fn text(&self) -> String {
+    fn text(&self) -> String {
         let mut text = String::new();
         for table in self.tables() {
             let _ = writeln!(text, "{}\n", table.to_text());
@@ -156,11 +264,12 @@ impl Found {
         text
     }
 
-    /// Writes everything: recordings, tables, the page, and the settings, which become those of `file`. Says what is where.
-    pub(super) fn keep(
+    /// Writes everything: recordings, tables, the page, and the settings, which become those of `file`. Returns lines that say what is where.
+    fn keep(
         &self,
         output: &Output,
         file: &mut SettingsFile,
+        path: &Path,
         axis: AxisName,
         who: &str,
     ) -> anyhow::Result<Vec<String>> {
@@ -180,10 +289,9 @@ impl Found {
                 .map(str::to_owned)
                 .into(),
         });
-        let settings = output.file("settings.toml")?;
-        file.write(&settings)?;
+        file.write(path)?;
         let page = commission_page(who, found, checked, provenance(&command, output.seed));
-        let mut lines = vec![format!("{}: the settings of the stage", settings.display())];
+        let mut lines = vec![format!("{}: the settings of the stage", path.display())];
         lines.extend(output.keep_page(&page, "commission.html")?);
         Ok(lines)
     }

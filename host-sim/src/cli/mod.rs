@@ -1,11 +1,14 @@
 //! The command line.
 
+mod axis;
 mod circle;
 mod commission;
 mod compare;
 mod completions;
 mod connect;
 mod design;
+mod endpoint;
+pub(crate) mod explain;
 mod friction;
 mod identify;
 mod laws;
@@ -17,6 +20,7 @@ mod replay_program;
 mod report;
 mod robustness;
 mod settings;
+mod subject;
 
 use clap::{Parser, Subcommand};
 

@@ -1,4 +1,4 @@
-//! Why the machine did not do what it was asked.
+//! Errors of a session with a machine.
 
 use std::io;
 use std::time::Duration;
@@ -7,33 +7,33 @@ use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::message::LinkError;
 use quadrant::settings::tree::TreeError;
 
-/// Why the machine did not do what it was asked.
+/// Reason why a request was not carried out.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
     /// The connection is broken.
     #[error("{endpoint}: {source}; {remedy}")]
     Connection {
-        /// Where.
+        /// Endpoint of the connection.
         endpoint: String,
-        /// Why.
+        /// The error that caused this.
         source: io::Error,
-        /// What to check.
+        /// Remedy, for the message.
         remedy: &'static str,
     },
-    /// No answer came.
+    /// No answer came in time.
     #[error(
         "{what}: no answer from {endpoint} within {waited_ms} ms, asked {attempts} times; {remedy}"
     )]
     Silent {
-        /// What was asked.
+        /// Name of the request.
         what: &'static str,
-        /// Where.
+        /// Endpoint of the connection.
         endpoint: String,
-        /// How long was waited in all, ms.
+        /// Waiting time of all attempts, ms.
         waited_ms: u128,
-        /// How often it was asked.
+        /// Number of attempts that were made.
         attempts: u32,
-        /// What to check.
+        /// Remedy, for the message.
         remedy: &'static str,
     },
     /// No answer came to a request that must not be made twice.
@@ -42,11 +42,11 @@ pub enum ClientError {
          was not asked again: look at `status`"
     )]
     Unsure {
-        /// What was asked.
+        /// Name of the request.
         what: &'static str,
-        /// Where.
+        /// Endpoint of the connection.
         endpoint: String,
-        /// How long was waited, ms.
+        /// Time waited for it, ms.
         waited_ms: u128,
     },
     /// The other end is of another release.
@@ -55,9 +55,9 @@ pub enum ClientError {
          release, or flash the firmware of this one (`quadrant connect flash`)"
     )]
     Version {
-        /// Where.
+        /// Endpoint of the connection.
         endpoint: String,
-        /// Its version.
+        /// Protocol version of the machine.
         theirs: u8,
     },
     /// The machine has restarted since the session was opened.
@@ -66,15 +66,15 @@ pub enum ClientError {
          positions are lost: look at `status`"
     )]
     Restarted {
-        /// What was asked.
+        /// Name of the request.
         what: &'static str,
     },
     /// The machine said no.
     #[error("{what}: {source}")]
     Refused {
-        /// What was asked.
+        /// Name of the request.
         what: &'static str,
-        /// Why.
+        /// The error that caused this.
         source: LinkError,
     },
     /// The machine answered something else.
@@ -82,23 +82,23 @@ pub enum ClientError {
         "{what}: {endpoint} answered with something else ({answer}); use host tools and firmware of one release"
     )]
     Unexpected {
-        /// What was asked.
+        /// Name of the request.
         what: &'static str,
-        /// Where.
+        /// Endpoint of the connection.
         endpoint: String,
-        /// What came.
+        /// Name of the reply that came.
         answer: &'static str,
     },
     /// A text is longer than the link carries.
     #[error("{what}: {text:?} is {length} bytes long, the link carries {most}; shorten it")]
     TooLong {
-        /// What it is.
+        /// Kind of the text.
         what: &'static str,
-        /// The text.
+        /// The text that is too long.
         text: String,
-        /// Its length, bytes.
+        /// Length of the text, bytes.
         length: usize,
-        /// The limit, bytes.
+        /// Longest text allowed, bytes.
         most: usize,
     },
     /// A setting that this program does not know, or a value that is none of it.
@@ -106,7 +106,7 @@ pub enum ClientError {
     Setting {
         /// Its path, and the value if there is one.
         path: String,
-        /// Why.
+        /// The error that caused this.
         source: TreeError,
     },
     /// A latched fault ended what was waited for.
@@ -116,29 +116,29 @@ pub enum ClientError {
         axis = .axis.map(|axis| format!(" of {axis}")).unwrap_or_default()
     )]
     Fault {
-        /// What was waited for.
+        /// Name of the condition.
         what: &'static str,
-        /// The fault's number.
+        /// Number of the fault code.
         code: u8,
-        /// Its name.
+        /// Name of the fault code.
         name: String,
-        /// Its axis.
+        /// Axis of the fault, if it has one.
         axis: Option<quadrant::safety::AxisName>,
-        /// When.
+        /// Control tick of the fault.
         tick: u32,
-        /// Its cause.
+        /// Cause, as the machine words it.
         cause: String,
-        /// What to do.
+        /// Remedy, for the message.
         remedy: String,
     },
-    /// What was waited for did not happen.
+    /// A condition was not met in time.
     #[error("{what}: not after {waited_s} s; {remedy}")]
     TimedOut {
-        /// What was waited for.
+        /// Name of the condition.
         what: &'static str,
-        /// How long, s.
+        /// Time waited for it, s.
         waited_s: f64,
-        /// What to do.
+        /// Remedy, for the message.
         remedy: &'static str,
     },
 }
@@ -161,7 +161,7 @@ impl ClientError {
     }
 }
 
-/// What to do about a fault: most remedies leave unsaid that it is latched.
+/// Returns a fault's remedy with the `reset` that most remedies leave unsaid.
 pub fn with_reset(remedy: &str) -> String {
     if remedy.contains("reset") {
         remedy.to_owned()

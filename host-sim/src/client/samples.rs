@@ -19,7 +19,7 @@ const GIVE_BACK: Duration = Duration::from_millis(500);
 /// Samples of some channels, evenly spaced but for samples that were lost.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Samples {
-    /// The channels.
+    /// Channels in the order of their words.
     pub channels: Vec<Channel>,
     /// Time from one sample to the next, s.
     pub sample_time_s: f64,
@@ -34,12 +34,12 @@ pub struct Samples {
 }
 
 impl Samples {
-    /// Samples.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.numbers.len()
     }
 
-    /// Whether there are none.
+    /// True if there are no samples.
     pub fn is_empty(&self) -> bool {
         self.numbers.is_empty()
     }
@@ -242,7 +242,7 @@ const fn is_recording(status: &CaptureStatus) -> bool {
     matches!(status.phase, CapturePhase::Armed | CapturePhase::Triggered)
 }
 
-/// How the capture is.
+/// Reads the state of the capture.
 ///
 /// # Errors
 /// A connection that is broken.

@@ -17,7 +17,7 @@ use crate::machine::{SimulatedIo, Transport};
 /// Notices that are kept until someone asks for them; of more, the oldest are dropped.
 const MOST_NOTICES: usize = 1 << 14;
 
-/// How long a host that jogs an axis asks nothing: half of what the machine waits for, and less.
+/// Longest silence of a host that jogs an axis: less than half of the machine's time-out.
 const ALIVE: Duration = Duration::from_millis(200);
 
 /// Times that a request which may be repeated is made before the machine counts as silent.
@@ -29,7 +29,7 @@ pub struct Client {
     receiver: Receiver,
     identity: Option<Identity>,
     next_id: u16,
-    /// When a request was last made.
+    /// Time of the last request.
     asked: Duration,
     /// A jog may be under way, which the machine ends when its host falls silent.
     jogs: bool,
@@ -59,7 +59,7 @@ impl Client {
         Ok(client)
     }
 
-    /// Who the machine is, as it said at the last greeting.
+    /// Returns the machine's identity, from the last greeting.
     ///
     /// # Panics
     /// Never: a session is open.
@@ -72,7 +72,7 @@ impl Client {
         self.transport.now()
     }
 
-    /// What is at the other end.
+    /// Returns the other end, for messages.
     pub fn endpoint(&self) -> String {
         self.transport.endpoint()
     }
@@ -119,7 +119,7 @@ impl Client {
         }
     }
 
-    /// How the machine is.
+    /// Reads the machine's status.
     ///
     /// # Errors
     /// As [`request`](Self::request).
@@ -368,7 +368,7 @@ impl Client {
     }
 }
 
-/// What a reply is, in a word.
+/// Returns the name of a reply.
 const fn reply_name(reply: &Reply) -> &'static str {
     match reply {
         Reply::Done => "done",

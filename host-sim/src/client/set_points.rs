@@ -78,7 +78,7 @@ fn point(
     }
 }
 
-/// Where the references of resting axes stand, mm: what a program's origin is laid on.
+/// Returns the references of resting axes, mm: the origin of a part program.
 pub fn references_mm(status: &Status) -> [f64; 3] {
     status
         .axes

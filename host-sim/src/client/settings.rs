@@ -133,7 +133,7 @@ pub fn apply(client: &mut Client) -> Result<Applied, ClientError> {
     }
 }
 
-/// Keeps what acts for the next start, with where it comes from.
+/// Stores the draft for the next start, with its origin.
 ///
 /// # Errors
 /// A memory that failed, or a connection that is broken.
@@ -142,7 +142,7 @@ pub fn store(client: &mut Client, provenance: &str) -> Result<(), ClientError> {
     client.order(Body::Settings(request))
 }
 
-/// Where the kept settings come from.
+/// Reads the origin of the stored settings.
 ///
 /// # Errors
 /// A connection that is broken.
@@ -166,7 +166,7 @@ pub fn resolutions_mm(client: &mut Client) -> Result<[f64; 3], ClientError> {
     Ok(resolutions)
 }
 
-/// Why the machine's settings and a file's do not go together.
+/// Error of loading a file's settings.
 #[derive(Debug, thiserror::Error)]
 pub enum ExchangeError {
     /// The link, or a value that the machine refuses.
@@ -201,14 +201,14 @@ pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
     Ok(settings)
 }
 
-/// What loading settings changed.
+/// Result of loading settings.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Loaded {
     /// The paths whose values changed.
     pub changed: Vec<String>,
     /// Settings of the machine, of a later release, that the file does not know; they stay as they are.
     pub left: Vec<String>,
-    /// What the machine says.
+    /// Reply of the machine.
     pub applied: Applied,
 }
 

@@ -1,4 +1,4 @@
-//! How long an answer is waited for, and what may be asked twice.
+//! Time-outs and idempotency of requests.
 
 use std::time::Duration;
 
@@ -12,11 +12,11 @@ pub(super) const ANSWER: Duration = Duration::from_millis(150);
 /// Time for an answer after which flash has been written, a sector of it erased.
 const STORED: Duration = Duration::from_secs(6);
 
-/// How long, and how often, a request is made that the machine is too busy for.
+/// Time for which, and pause after which, a request is repeated that the machine is too busy for.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
 pub(super) const BUSY_PAUSE: Duration = Duration::from_millis(5);
 
-/// What becomes of a request that is made twice.
+/// Effect of a request that is made twice.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Idempotency {
     /// Nothing: it only asks. It may be made of a machine that has restarted, too.
@@ -28,7 +28,7 @@ pub(super) enum Idempotency {
     NotIdempotent,
 }
 
-/// What becomes of a request that is made twice.
+/// Returns the idempotency of a request.
 pub(super) const fn idempotency(body: &Body) -> Idempotency {
     match body {
         Body::Hello
@@ -62,7 +62,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
     }
 }
 
-/// How long an answer is waited for.
+/// Returns the time-out of the answer.
 pub(super) const fn answer_timeout(body: &Body) -> Duration {
     match body {
         Body::Settings(SettingsRequest::Store(_)) => STORED,

@@ -31,24 +31,24 @@ pub struct Running<S: Scalar> {
     seen: Snapshot<S>,
     /// Requests of the operator at the machine.
     requests: VecDeque<Command>,
-    /// What the supervising task let through.
+    /// Command that the supervising task let through.
     command: Option<Command>,
 }
 
-/// What the application starts with.
+/// Start conditions of the application.
 #[derive(Clone, Copy, Debug)]
 pub struct Start<'a> {
     /// The settings of a machine whose flash is empty.
     pub defaults: &'a StageSettings,
-    /// The motions.
+    /// Motions that `run` starts.
     pub plan: &'a PlanSettings,
-    /// What the run before has left.
+    /// Fault that the run before has left.
     pub fault: Option<FaultCode>,
-    /// What the machine calls itself.
+    /// Name of the board in the greeting.
     pub board: &'static str,
     /// Rate of the timer that measures ticks, Hz.
     pub cycle_hz: u32,
-    /// What the control law computes with, for the host.
+    /// Number type of the control law, for the host.
     pub number: NumberType,
 }
 

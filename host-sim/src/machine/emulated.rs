@@ -98,7 +98,7 @@ impl EmulatedMachine {
         std::mem::take(&mut self.port.to_host)
     }
 
-    /// What the flash for settings holds.
+    /// Returns the content of the flash for settings.
     ///
     /// # Errors
     /// The shared memory fails.
@@ -198,7 +198,7 @@ struct HostPort {
 }
 
 impl HostPort {
-    /// What both rings are at a start.
+    /// Empties both rings, as at a start.
     fn reset(&self, memory: &Memory) -> Result<(), EmulatorError> {
         for word in [LINK_IN_WRITTEN, LINK_IN_TAKEN, LINK_OUT_SHOWN] {
             memory.set_word(word, 0)?;

@@ -34,7 +34,7 @@ impl FlashFile {
         })
     }
 
-    /// What it keeps.
+    /// Returns the content that it keeps.
     pub(super) fn content(&self) -> &[u8] {
         &self.kept
     }

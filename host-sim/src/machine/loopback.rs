@@ -18,12 +18,12 @@ pub trait SimulatedPeer {
     /// The machine's time that one exchange takes.
     fn period(&self) -> Duration;
 
-    /// What it is, for messages.
+    /// Name of the machine, for messages.
     fn endpoint(&self) -> String {
         "the simulated machine".to_owned()
     }
 
-    /// SimulatedIo at it.
+    /// Returns the simulated inputs, supply and log, if it has them.
     fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
         None
     }

@@ -7,7 +7,7 @@ use embedded_storage::nor_flash::{
 
 /// Size of a sector, as on the reference board.
 const SECTOR_BYTES: usize = 16 * 1024;
-/// Two sectors.
+/// Size of both sectors. together.
 const BYTES: usize = 2 * SECTOR_BYTES;
 
 /// Two sectors of 16 KiB.
@@ -20,7 +20,7 @@ impl MemoryFlash {
         (bytes.len() == BYTES).then_some(Self(bytes))
     }
 
-    /// What it holds.
+    /// Returns the bytes that it holds.
     pub fn bytes(&self) -> &[u8] {
         &self.0
     }

@@ -120,7 +120,7 @@ impl SimulatedMachine {
         self.pressed = switches;
     }
 
-    /// What the flash for settings holds.
+    /// Returns the flash for settings.
     pub fn flash(&self) -> &MemoryFlash {
         self.running.flash()
     }
@@ -135,7 +135,7 @@ impl SimulatedMachine {
         std::mem::take(&mut self.wire.to_host)
     }
 
-    /// Runs control ticks.
+    /// Runs `ticks` control ticks.
     pub fn run(&mut self, ticks: u32) {
         for _ in 0..ticks {
             self.step();

@@ -1,4 +1,4 @@
-//! What a person does at a machine beside the link: presses inputs, pulls the plug, reads the log on the debug probe.
+//! Fault injection at a machine that is not real, beside the link: inputs, supply, and the log on the debug probe.
 
 use std::io;
 
@@ -70,7 +70,7 @@ const fn of(axis: AxisName, switches: AxisSwitches) -> Switches {
     Switches::NONE.with_axis(axis, switches)
 }
 
-/// `pressed` without `released`.
+/// Returns `pressed` without `released`.
 pub const fn without(pressed: Switches, released: Switches) -> Switches {
     Switches::from_bits(pressed.bits() & !released.bits())
 }

@@ -9,10 +9,10 @@ use quadrant::settings::{AxisSettings, SettingsError};
 
 use crate::record::Recording;
 
-/// Who drives the amplifier besides the injected voltage.
+/// Source of the amplifier's voltage besides the injected one.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Drive {
-    /// Nobody: the injected voltage alone.
+    /// None: the injected voltage alone drives.
     OpenLoop,
     /// The feedback law, along a motion from where the axis stands.
     ClosedLoop(MotionSettings),
@@ -23,7 +23,7 @@ pub enum Drive {
 pub struct Experiment {
     /// Name, for progress and messages: "friction at 2 mm/s".
     pub name: String,
-    /// Who drives.
+    /// Source of the voltage besides the injected one.
     pub drive: Drive,
     /// Voltage added at the amplifier's input, V, one value a control period from the first sample recorded; zero
     /// after the last. The experiment lasts until both this and the motion have ended.
@@ -38,13 +38,13 @@ pub struct Experiment {
 /// Data of an axis, as far as identification may know them.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AxisInfo {
-    /// Its name.
+    /// Name in lower case: "x".
     pub name: &'static str,
-    /// Control rate, Hz.
+    /// Rate of the control law, Hz.
     pub rate_hz: f64,
     /// Length of an encoder count, mm.
     pub resolution_mm: f64,
-    /// Largest voltage, V.
+    /// Largest voltage of the amplifier, V.
     pub full_scale_v: f64,
     /// Travel either way from where the axis stood first, mm; an experiment that leaves it is stopped.
     pub travel_mm: f64,
@@ -78,32 +78,32 @@ pub trait TestAxis {
     ) -> Result<Recording, ExperimentError>;
 }
 
-/// Why an experiment was stopped.
+/// Reason why an experiment was stopped.
 #[derive(Clone, Debug, thiserror::Error)]
 pub enum ExperimentError {
     /// The motion cannot be built.
     #[error("{experiment}: the motion is refused: {source}")]
     Motion {
-        /// The experiment.
+        /// Name of the experiment.
         experiment: String,
-        /// Why.
+        /// The error that caused this.
         source: SettingsError,
     },
     /// The control law switched off.
     #[error("{experiment}: fault {number} at tick {tick}: {cause}; {remedy}", number = .fault.code.number(),
         tick = .fault.tick, cause = .fault.code.cause(), remedy = .fault.code.remedy())]
     Fault {
-        /// The experiment.
+        /// Name of the experiment.
         experiment: String,
-        /// The fault.
+        /// Fault of the law.
         fault: Fault,
     },
     /// The axis cannot do this.
     #[error("{experiment}: {reason}")]
     Impossible {
-        /// The experiment.
+        /// Name of the experiment.
         experiment: String,
-        /// What is missing, or what failed.
+        /// Description of what is missing, or failed.
         reason: String,
     },
     /// The axis left its travel.
@@ -112,11 +112,11 @@ pub enum ExperimentError {
          lower the excitation's amplitude or duration, or raise its lowest frequency"
     )]
     Travel {
-        /// The experiment.
+        /// Name of the experiment.
         experiment: String,
-        /// The travel.
+        /// Travel either way, mm.
         travel_mm: f64,
-        /// When, from the first sample.
+        /// Time from the first sample, s.
         time_s: f64,
     },
     /// The axis ran too fast.
@@ -124,21 +124,21 @@ pub enum ExperimentError {
         "{experiment}: the axis exceeded {max_velocity_mm_s} mm/s after {time_s:.3} s; lower the excitation's amplitude"
     )]
     Overspeed {
-        /// The experiment.
+        /// Name of the experiment.
         experiment: String,
-        /// The limit.
+        /// Limit that was exceeded.
         max_velocity_mm_s: f64,
-        /// When, from the first sample.
+        /// Time from the first sample, s.
         time_s: f64,
     },
     /// The experiment took too long.
     #[error("{experiment}: not ended after {time_limit_s} s: {reason}")]
     TimedOut {
-        /// The experiment.
+        /// Name of the experiment.
         experiment: String,
-        /// The limit.
+        /// Limit that was exceeded.
         time_limit_s: f64,
-        /// What was still to come.
+        /// Part of the experiment that was still to come.
         reason: &'static str,
     },
 }

@@ -23,10 +23,10 @@ pub trait Transport {
     /// Its clock: the time since it was opened; of a simulated machine the machine's time.
     fn now(&self) -> Duration;
 
-    /// What is at the other end, for messages: "serial port /dev/ttyACM0".
+    /// Returns the other end, for messages: "serial port /dev/ttyACM0".
     fn endpoint(&self) -> String;
 
-    /// What to check if the other end is silent.
+    /// Returns the remedy if the other end is silent.
     fn remedy(&self) -> &'static str;
 
     /// SimulatedIo at the machine, where a program can have any: at a simulated one.

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::columns::{self, Column};
-use super::{RecordError, UnusableSignal, time};
+use super::error::{RecordError, UnusableSignal};
+use super::time;
 use crate::plant::load::Force;
 
 /// Largest force that is believed, N: what a machine of this size never sees.

@@ -29,17 +29,17 @@ pub struct Recording {
 }
 
 impl Recording {
-    /// Samples.
+    /// Returns the number of samples.
     pub fn len(&self) -> usize {
         self.position_mm.len()
     }
 
-    /// Whether nothing was recorded.
+    /// True if nothing was recorded.
     pub fn is_empty(&self) -> bool {
         self.position_mm.is_empty()
     }
 
-    /// Its duration, s.
+    /// Returns its duration, s.
     pub fn duration_s(&self) -> f64 {
         self.len() as f64 * self.sample_time_s
     }

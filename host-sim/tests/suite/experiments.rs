@@ -10,7 +10,7 @@ use quadrant_sim::experiment::circle::run_circles;
 use quadrant_sim::experiment::comparison::{Configuration, run_configuration};
 use quadrant_sim::experiment::compensator::Setup;
 use quadrant_sim::experiment::recorded::{RecordedAxis, replay};
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::machine::{Machine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
 use quadrant_sim::record::Record;
 

@@ -116,6 +116,7 @@ fn what_was_measured_is_identified_again_from_its_files() {
         let record = format!("{step}/{file}");
         let mass = "--moving-mass-kg=12";
         let mut arguments = vec![step, "--record", &record, "--out", "again"];
+        arguments.extend(["--axis", "z", "--into", "stage.toml"]);
         if step == "motor-constant" {
             arguments.push(mass);
         }
@@ -127,6 +128,74 @@ fn what_was_measured_is_identified_again_from_its_files() {
             &text(at, &format!("{step}/{table}")),
             &text(at, &format!("again/{table}")),
         );
+    }
+    let written = SettingsFile::read(at.join("stage.toml")).unwrap();
+    let sets: Vec<&str> = written
+        .provenance
+        .iter()
+        .map(|origin| origin.sets[0].as_str())
+        .collect();
+    assert_eq!(sets, ["first PID", "friction", "friction"]);
+    let default = StageSettings::default();
+    let (found, [_, y, z]) = (&written.stage.axes[2], &default.axes);
+    assert_eq!(&written.stage.axes[1], y);
+    assert_ne!(found.friction.sliding, z.friction.sliding);
+    assert_ne!(found.friction.gms, z.friction.gms);
+    // A slow PID in place of the default one, and no model before one is identified.
+    let kp = found.feedback.pid.kp_v_per_mm;
+    assert!(kp > 0.0 && kp < 0.5 * z.feedback.pid.kp_v_per_mm, "{kp}");
+    assert_eq!(found.plant, None);
+}
+
+#[test]
+fn a_step_is_the_same_on_a_machine_and_in_the_console() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let shown = succeed(
+        at,
+        &[
+            "motor-constant",
+            "--machine",
+            "simulated",
+            "--axis",
+            "y",
+            "--into",
+            "stage.toml",
+            "--out",
+            "a",
+        ],
+    );
+    assert!(shown.contains("Simulated, not measured"), "{shown}");
+    let connect = "connect --simulated identify motor-constant y --out b.csv";
+    let words: Vec<&str> = connect.split(' ').collect();
+    let console = command::succeed(at, &words);
+    let row = |text: &str| {
+        let line = text.lines().find(|line| line.contains("mm/(V s"));
+        line.unwrap().to_owned()
+    };
+    assert_eq!(row(&shown), row(&console));
+    assert_eq!(
+        text(at, "a/motor-constant-recording.csv"),
+        text(at, "b.csv")
+    );
+    let dumped = SettingsFile::read(at.join("stage.toml")).unwrap();
+    assert_eq!(dumped.stage.axes[0], StageSettings::default().axes[0]);
+}
+
+#[test]
+fn a_machine_that_cannot_be_measured_is_refused_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (arguments, part) in [
+        ("plant --axis x --machine board", "serial:PORT"),
+        ("plant --axis x --machine serial:/dev/none", "dialout"),
+        ("frf --axis x --machine simulated", "--travel"),
+        ("frf --record a.csv --machine simulated", "--machine"),
+        ("plant --record a.csv --into stage.toml", "--axis"),
+    ] {
+        let words: Vec<&str> = arguments.split(' ').collect();
+        let said = fail(at, &words);
+        assert!(said.contains(part), "{arguments}: {said}");
     }
 }
 
@@ -181,6 +250,8 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
             "z",
             "--out",
             "b",
+            "--into",
+            "b/settings.toml",
         ],
     );
     let inertia = |folder: &str| value(&at.join(folder).join("motion-parameters.csv"), "M'");

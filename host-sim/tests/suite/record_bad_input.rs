@@ -57,7 +57,7 @@ fn spoilt(header: &str, edit: impl Fn(usize, &mut Vec<String>)) -> String {
     text
 }
 
-/// What `identify frf --record` says to a text; it must refuse.
+/// Returns the error of `identify frf --record` for a text that it must refuse.
 fn refusal(text: &str, options: &[&str]) -> String {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("bad.csv"), text).unwrap();

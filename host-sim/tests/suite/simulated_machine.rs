@@ -9,8 +9,8 @@ use quadrant::safety::{AxisName, Switches};
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant::telemetry::{Channel, MachineState};
 use quadrant_sim::experiment::compensator::identified;
+use quadrant_sim::machine::simulated::SimulatedMachine;
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::simulated_machine::SimulatedMachine;
 
 struct Session {
     machine: SimulatedMachine,

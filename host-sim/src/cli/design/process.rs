@@ -1,4 +1,4 @@
-//! What a design works on, by options.
+//! Options that name the model to design on.
 
 use std::path::PathBuf;
 
@@ -9,7 +9,7 @@ use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 
-use crate::cli::identify::rig::Axis;
+use crate::cli::axis::Axis;
 use crate::cli::output::Output;
 
 /// Options that name a model of an axis: numbers, or settings that hold one.
@@ -47,7 +47,7 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// The stage's settings.
+    /// Reads the stage's settings.
     pub(super) fn file(&self) -> anyhow::Result<SettingsFile> {
         Ok(match &self.settings {
             Some(path) => SettingsFile::read(path)?,
@@ -60,7 +60,7 @@ impl Model {
         &file.stage.axes[self.axis.index()]
     }
 
-    /// The model.
+    /// Returns the linear model, checked.
     pub(super) fn plant(&self, file: &SettingsFile) -> anyhow::Result<PlantModel> {
         let plant = match self.gain {
             None => self.axis(file).plant.with_context(|| {

@@ -26,7 +26,7 @@ pub(super) fn read(path: &Path) -> anyhow::Result<Recording> {
     Ok(recording)
 }
 
-/// What a page says of where its data come from.
+/// Returns the title of a page on saved recordings.
 pub(super) fn title(paths: &[PathBuf]) -> String {
     format!("recorded: {}", names(paths).join(", "))
 }

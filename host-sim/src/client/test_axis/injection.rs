@@ -8,12 +8,14 @@ use quadrant::settings::AxisSettings;
 use quadrant::telemetry::MachineState;
 use quadrant::units::DacCode;
 
-use super::{Injected, LOOK, Stop};
+use super::stop::{Injected, Stop};
 use crate::client::error::ClientError;
 use crate::client::samples::TelemetryRecorder;
 use crate::client::session::Client;
 use crate::machine::{Drive, Experiment};
 
+/// Time from one look at a braking machine to the next.
+const LOOK: Duration = Duration::from_millis(50);
 /// Pause before a full queue is asked again.
 const PAUSE: Duration = Duration::from_millis(2);
 /// Looks after which an injection that all values were sent of must have ended, and a stop.
@@ -87,7 +89,7 @@ impl Injection {
         Ok(())
     }
 
-    /// What was put out, once all of it was.
+    /// Waits for the end of the injection and returns its values.
     pub(super) fn finish(self, client: &mut Client) -> Result<Injected, Stop> {
         for _ in 0..LOOKS {
             let status = ask(
@@ -118,7 +120,7 @@ impl Injection {
     }
 }
 
-/// Why an injection ended early: the fault, once the axes have braked for it, if it was one.
+/// Returns the reason of an early end: the fault, once the axes have braked for it, if it was one.
 fn broken(client: &mut Client, injection: InjectStatus) -> Result<Stop, ClientError> {
     for _ in 0..LOOKS {
         let status = client.status()?;

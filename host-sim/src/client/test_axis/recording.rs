@@ -3,7 +3,7 @@
 use quadrant::settings::AxisSettings;
 use quadrant::units::DacCode;
 
-use super::Injected;
+use super::stop::Injected;
 use crate::client::samples::Samples;
 use crate::record::Recording;
 
@@ -11,10 +11,10 @@ use crate::record::Recording;
 const UNITS_PER_COUNT: f64 = 256.0;
 const REFERENCE_RANGE: f64 = 16_777_216.0;
 
-/// What an experiment is made of, beside its samples of reference, position and sum of codes.
+/// Data of an experiment beside its samples of reference, position and sum of codes.
 pub(super) struct Shape<'a> {
     pub(super) settings: &'a AxisSettings,
-    /// Where positions are counted from.
+    /// Origin of the positions, mm.
     pub(super) origin_mm: f64,
     /// Control periods that it lasts at least.
     pub(super) lasts: usize,

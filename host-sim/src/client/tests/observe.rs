@@ -10,7 +10,7 @@ use quadrant::telemetry::{AxisSignal, Channel, StageSignal};
 
 use super::connected;
 use crate::client::columns;
-use crate::client::samples::{Recording, Samples, arm, least_decimation, read_capture};
+use crate::client::samples::{Samples, TelemetryRecorder, arm, least_decimation, read_capture};
 use crate::client::set_points::{set_points, stream};
 use crate::client::test_axis::ConnectedAxis;
 use crate::machine::{Drive, Experiment, TestAxis};
@@ -37,7 +37,7 @@ fn move_x(client: &mut crate::client::Client, target_mm: f64) {
 #[test]
 fn a_recording_has_every_sample_at_its_tick() {
     let (mut client, _) = connected();
-    let mut recording = Recording::start(&mut client, &[TICK, ERROR], 5).unwrap();
+    let mut recording = TelemetryRecorder::start(&mut client, &[TICK, ERROR], 5).unwrap();
     for _ in 0..10 {
         recording
             .gather(&mut client, Duration::from_millis(20))
@@ -57,7 +57,7 @@ fn a_recording_has_every_sample_at_its_tick() {
 fn lost_samples_are_counted_and_leave_a_gap_in_time() {
     let (mut client, bench) = connected();
     bench.borrow_mut().lose_every = Some(50);
-    let mut recording = Recording::start(&mut client, &[TICK], 10).unwrap();
+    let mut recording = TelemetryRecorder::start(&mut client, &[TICK], 10).unwrap();
     recording
         .gather(&mut client, Duration::from_millis(200))
         .unwrap();
@@ -97,7 +97,7 @@ fn a_recorded_axis_is_what_the_other_commands_read() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("run.csv");
     let channels = [REFERENCE, POSITION, OUTPUT];
-    let mut recording = Recording::start(&mut client, &channels, 2).unwrap();
+    let mut recording = TelemetryRecorder::start(&mut client, &channels, 2).unwrap();
     move_x(&mut client, 2.0);
     recording
         .gather(&mut client, Duration::from_millis(300))

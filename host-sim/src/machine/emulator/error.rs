@@ -1,10 +1,10 @@
-//! Why the firmware could not be emulated.
+//! Errors of the emulation.
 
 use std::io;
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// Why the firmware could not be emulated.
+/// Reason why the firmware could not be emulated.
 #[derive(Debug, thiserror::Error)]
 pub enum EmulatorError {
     /// The image cannot be read.
@@ -13,17 +13,17 @@ pub enum EmulatorError {
         path.display()
     )]
     Image {
-        /// Where it should be.
+        /// Path that was read.
         path: PathBuf,
-        /// Why not.
+        /// The error that caused this.
         source: io::Error,
     },
     /// The file is no image for an Arm microcontroller.
     #[error("{} is no image of the firmware: {reason}; give the ELF file of `cargo xtask build --board mps2`", path.display())]
     NoImage {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong with it.
+        /// Description of the fault.
         reason: String,
     },
     /// QEMU does not start.
@@ -34,27 +34,27 @@ pub enum EmulatorError {
     /// A file or a process fails us.
     #[error("cannot {what}: {source}")]
     Io {
-        /// What was tried.
+        /// Action that failed, in words.
         what: String,
-        /// Why not.
+        /// The error that caused this.
         source: io::Error,
     },
     /// A job is larger than the shared memory's room for it.
     #[error("a job of {bytes} bytes, but there is room for {most}; shorten its motions")]
     JobTooLong {
-        /// Its size.
+        /// Its size in bytes.
         bytes: usize,
-        /// The limit.
+        /// Largest size in bytes.
         most: usize,
     },
-    /// What is to be the flash's content is of another size.
+    /// The content for the flash is of another size.
     #[error(
         "a flash of {bytes} bytes instead of {expected}; give a file that was left by --flash, or a new name"
     )]
     FlashSize {
-        /// Its size.
+        /// Its size in bytes.
         bytes: usize,
-        /// The flash's.
+        /// Size of the flash. in bytes.
         expected: usize,
     },
     /// The firmware ended before its first tick.
@@ -70,7 +70,7 @@ pub enum EmulatorError {
     Silent {
         /// The tick, counted from the firmware's start.
         tick: u32,
-        /// How long it was waited for.
+        /// Time waited for it.
         waited: Duration,
     },
     /// The firmware ended with an error.

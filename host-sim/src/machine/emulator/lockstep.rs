@@ -7,10 +7,13 @@ use quadrant::link::lockstep::{
 };
 use quadrant::stage::Outputs;
 
-use super::{Clock, Emulator, EmulatorError, Listener, Memory, Program};
+use super::error::EmulatorError;
+use super::memory::Memory;
+use super::process::{Clock, Emulator, Listener};
+use super::program::Program;
 
-/// How long the firmware may take to answer, in the host's time: a busy computer runs it slowly, but not this slowly.
-const PATIENCE: Duration = Duration::from_secs(30);
+/// Time-out of the firmware's answer, in the host's time: a busy computer runs it slowly, but not this slowly.
+const TIMEOUT: Duration = Duration::from_secs(30);
 /// Looks at the answer between two pauses.
 const LOOKS: u32 = 1 << 10;
 /// Pauses between two looks at the clock.
@@ -117,10 +120,10 @@ impl Lockstep {
                     false => Err(self.emulator.failure()?),
                 };
             }
-            if since.elapsed() >= PATIENCE {
+            if since.elapsed() >= TIMEOUT {
                 return Err(EmulatorError::Silent {
                     tick: self.tick,
-                    waited: PATIENCE,
+                    waited: TIMEOUT,
                 });
             }
         }

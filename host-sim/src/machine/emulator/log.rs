@@ -13,10 +13,10 @@ use defmt_decoder::{DecodeError, Table};
 use super::error::EmulatorError;
 use super::memory;
 
-/// What ends a frame.
+/// Byte that ends a frame.
 const DELIMITER: u8 = 0;
 
-/// What the firmware says.
+/// Reader of the firmware's log.
 pub(super) struct Log {
     file: File,
     read: u64,

@@ -63,7 +63,7 @@ impl Memory {
         Ok(memory)
     }
 
-    /// Where the file is.
+    /// Returns the path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }

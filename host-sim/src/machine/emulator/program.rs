@@ -59,7 +59,7 @@ impl Program {
         })
     }
 
-    /// Where it is.
+    /// Returns the path of the image.
     pub fn path(&self) -> &Path {
         &self.path
     }

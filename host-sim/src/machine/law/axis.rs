@@ -160,7 +160,7 @@ enum Law {
     },
 }
 
-/// What the law does in one control period with the outputs enabled.
+/// Output of the law in one control period with the outputs enabled.
 struct Step {
     code: DacCode,
     /// Reference minus position, mm.

@@ -55,7 +55,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         &self.state
     }
 
-    /// What the supervisor logged, with the control tick.
+    /// Returns the events of the supervisor, each with its control tick.
     pub fn events(&self) -> &[(u32, Event)] {
         &self.events
     }
@@ -87,7 +87,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         }
     }
 
-    /// One control period.
+    /// Runs one control period.
     pub fn tick(&mut self, input: &InputRecord) -> Outputs {
         self.feed_stream();
         let outputs = self.stage.tick(

@@ -11,7 +11,7 @@ pub(super) struct Recorder {
     injection_v: f64,
 }
 
-/// What one control period showed.
+/// Signals of one control period.
 pub(super) struct Period {
     pub(super) reference_mm: f64,
     pub(super) position_mm: f64,

@@ -1,4 +1,4 @@
-//! What stops an experiment: travel, speed, time.
+//! Limits that stop an experiment: travel, speed, time.
 
 use crate::machine::test_axis::{AxisInfo, Experiment, ExperimentError};
 
@@ -21,7 +21,7 @@ impl<'a> Watch<'a> {
         }
     }
 
-    /// Whether the experiment may go on after `ticks` recorded control periods; `waits_for` is what it has yet to do.
+    /// Checks the limits after `ticks` recorded control periods; `waits_for` is what the experiment has yet to do.
     pub(super) fn check(
         &mut self,
         ticks: usize,

@@ -19,12 +19,12 @@ use crate::machine::SimulatedPeer;
 const TICKS: u32 = 10;
 const ROOM: u16 = 16;
 
-/// What the test sees and does behind the client's back.
+/// Observations and disturbances of a test, unseen by the client.
 #[derive(Default)]
 pub(super) struct Bench {
     /// Names of the requests that arrived, in order.
     pub(super) requests: Vec<&'static str>,
-    /// How many of the next answers the line loses.
+    /// Number of the next answers that the line loses.
     pub(super) lose_answers: u32,
     /// Bytes that the line adds before each answer.
     pub(super) noise: Vec<u8>,
@@ -32,7 +32,7 @@ pub(super) struct Bench {
     pub(super) restart: bool,
     /// The fault that the next exchange finds.
     pub(super) fault: Option<u8>,
-    /// How many of the next requests are answered with `Busy`.
+    /// Number of the next requests that are answered with `Busy`.
     pub(super) busy: u32,
     /// Every how many telemetry samples one is lost.
     pub(super) lose_every: Option<u32>,
@@ -40,7 +40,7 @@ pub(super) struct Bench {
     pub(super) points: Vec<SetPoint>,
     /// The settings in force.
     pub(super) in_force: StageSettings,
-    /// The plan.
+    /// The plan, once one was sent.
     pub(super) plan: Option<quadrant::settings::PlanSettings>,
 }
 
@@ -190,7 +190,7 @@ impl Model {
     }
 }
 
-/// What a channel shows: positions as they are, and the tick where a test wants to recognise a sample.
+/// Returns the word of a channel: positions as they are, and the tick where a test wants to recognise a sample.
 fn read(channel: Channel, position_mm: &[f64; 3], tick: u32) -> u32 {
     let counts = |axis: quadrant::safety::AxisName| position_mm[axis as usize] / 0.0005;
     match channel {

@@ -1,4 +1,4 @@
-//! What the model does with each request.
+//! Answers of the model to each request.
 
 use heapless::String as Bounded;
 use quadrant::capture::{CaptureCause, CapturePhase, CaptureRecord};

@@ -9,11 +9,13 @@ use quadrant::link::message::{
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::safety::{AxisName, FaultCode};
 use quadrant::telemetry::MachineState;
+use quadrant_sim::client::test_axis::ConnectedAxis;
+use quadrant_sim::client::{Client, ClientError};
 use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
-use quadrant_sim::console::rig::ConnectedAxis;
-use quadrant_sim::console::{Client, ClientError, SimulatedLink};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
-use quadrant_sim::machine::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
+use quadrant_sim::machine::{
+    Drive, Experiment, ExperimentError, SimulatedLink, SimulatedTestAxis, TestAxis,
+};
 use quadrant_sim::plant::StageTruth;
 
 fn client() -> Client {

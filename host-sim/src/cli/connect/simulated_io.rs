@@ -1,13 +1,14 @@
-//! What a person does at a machine beside the link.
+//! Inputs, supply and log of a machine that is not real.
 
 use anyhow::{Context, bail};
 use quadrant::safety::Switches;
-use quadrant_sim::console::Client;
-use quadrant_sim::console::hands::{INPUTS, SimulatedIo, without};
+use quadrant_sim::client::Client;
+use quadrant_sim::machine::simulated_io::{INPUTS, SimulatedIo, without};
 use serde_json::json;
 
-use super::drive::{Answer, Session};
-use super::flash::LogArguments;
+use super::answer::Answer;
+use super::command::LogOptions;
+use super::session::Session;
 
 pub(super) fn press(session: &mut Session, names: &[String]) -> anyhow::Result<Answer> {
     let pressed = session.pressed.with(named(names));
@@ -25,7 +26,7 @@ pub(super) fn release(session: &mut Session, names: &[String]) -> anyhow::Result
 }
 
 fn hold(session: &mut Session, what: &str, pressed: Switches) -> anyhow::Result<Answer> {
-    hands(&mut session.client, what)?.press(pressed);
+    simulated_io(&mut session.client, what)?.press(pressed);
     session.pressed = pressed;
     let held: Vec<&str> = INPUTS
         .into_iter()
@@ -49,27 +50,27 @@ fn named(names: &[String]) -> Switches {
 }
 
 pub(super) fn power_cycle(client: &mut Client) -> anyhow::Result<Answer> {
-    hands(client, "power-cycle")?
+    simulated_io(client, "power-cycle")?
         .power_cycle()
         .context("power-cycle")?;
     Ok(Answer::done())
 }
 
-/// What the firmware has logged since the last time.
-pub(super) fn log(session: &mut Session, options: &LogArguments) -> anyhow::Result<Answer> {
+/// Prints the lines that the firmware has logged since the last call.
+pub(super) fn log(session: &mut Session, options: &LogOptions) -> anyhow::Result<Answer> {
     if options.elf.is_some() {
         bail!("log --elf: this is for the shell, and needs no connection");
     }
-    let place = session.client.endpoint();
-    let Some(hands) = session.client.simulated_io() else {
+    let endpoint = session.client.endpoint();
+    let Some(io) = session.client.simulated_io() else {
         bail!(
-            "log: the firmware's log comes through the debug probe, not from {place}: `quadrant connect log --elf FILE`; \
+            "log: the firmware's log comes through the debug probe, not from {endpoint}: `quadrant connect log --elf FILE`; \
              `events` shows what the link tells"
         );
     };
-    let Some(lines) = hands.log().context("log")? else {
+    let Some(lines) = io.log().context("log")? else {
         bail!(
-            "log: {place} runs without the firmware that logs; `events` shows what the link tells"
+            "log: {endpoint} runs without the firmware that logs; `events` shows what the link tells"
         );
     };
     for line in &lines {
@@ -80,12 +81,12 @@ pub(super) fn log(session: &mut Session, options: &LogArguments) -> anyhow::Resu
     Ok(Answer::new("", json!({ "lines": lines.len() })))
 }
 
-fn hands<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mut dyn SimulatedIo> {
-    let place = client.endpoint();
+fn simulated_io<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mut dyn SimulatedIo> {
+    let endpoint = client.endpoint();
     match client.simulated_io() {
-        Some(hands) => Ok(hands),
+        Some(io) => Ok(io),
         None => bail!(
-            "{what}: a program has no hands at {place}; do it yourself, or try it with --simulated or --emulated"
+            "{what}: a program has no hands at {endpoint}; do it yourself, or try it with --simulated or --emulated"
         ),
     }
 }
