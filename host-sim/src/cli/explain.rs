@@ -1,4 +1,4 @@
-//! Errors in words.
+//! Errors in words, their causes included.
 
 /// Returns an error and its causes; most messages contain their cause's already.
 pub(crate) fn explained(error: &anyhow::Error) -> String {

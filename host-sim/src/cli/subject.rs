@@ -1,4 +1,4 @@
-//! What a step measures: an axis of a machine, or a saved recording, with settings before and after.
+//! Subject of a step: an axis of a machine, or a saved recording, with settings before and after.
 
 use std::path::{Path, PathBuf};
 
@@ -38,7 +38,7 @@ pub(super) struct Subject {
 
 /// Option that names the settings to write.
 #[derive(Clone, Debug, Args)]
-pub(super) struct Into {
+pub(super) struct Destination {
     /// Write the result into the settings of --axis in this file; the other settings are those that the step started from.
     #[arg(long, value_name = "FILE", requires = "axis")]
     pub(super) into: Option<PathBuf>,
@@ -101,7 +101,7 @@ pub(super) fn on_axis<T>(
 }
 
 impl Subject {
-    /// Returns the axis.
+    /// Returns the axis, which must be given.
     pub(super) fn axis(&self) -> anyhow::Result<Axis> {
         self.axis
             .context("--axis is needed: which axis of the settings is it?")
@@ -146,7 +146,7 @@ impl Subject {
     }
 }
 
-impl Into {
+impl Destination {
     /// Writes what a step changes in the axis' settings, if that is asked for: into those that the step started from, else
     /// those of the machine, else the defaults.
     pub(super) fn write(

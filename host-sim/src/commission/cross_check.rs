@@ -1,4 +1,4 @@
-//! What a finished commissioning is held against: the response at rest, which friction bends, and an ordinary motion.
+//! Cross-checks of a finished commissioning: the response at rest, which friction bends, and an ordinary motion.
 
 use quadrant::settings::AxisSettings;
 
@@ -12,7 +12,7 @@ use crate::identify::revise::{ReviseError, Revision};
 use crate::machine::{TestAxis, approach};
 use crate::record::Recording;
 
-/// What the checks found.
+/// Results of the cross-checks.
 #[derive(Clone, Debug)]
 pub struct CrossCheck {
     /// The response at rest.

@@ -1,4 +1,4 @@
-//! Why a commissioning ends early.
+//! Reasons why a commissioning ends early.
 
 use quadrant::settings::SettingsError;
 
@@ -13,34 +13,34 @@ use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
 use crate::machine::ExperimentError;
 
-/// Why a commissioning ends early.
+/// Reason why a commissioning ends early.
 #[derive(Debug, thiserror::Error)]
 pub enum CommissionError {
     /// Settings that the firmware refuses.
     #[error("settings refused: {0}")]
     Settings(#[from] SettingsError),
-    /// The open-loop test.
+    /// The open-loop test failed.
     #[error("motor constant: {0}")]
     Motor(#[from] MotorConstantError),
-    /// The response.
+    /// The response was not measured.
     #[error("frequency response: {0}")]
     Response(#[from] FrfError),
-    /// The linear model.
+    /// The linear model was not found.
     #[error("linear model: {0}")]
     Plant(#[from] PlantError),
-    /// The PID.
+    /// The PID was not found.
     #[error("PID: {0}")]
     Pid(#[from] DesignError),
     /// The runs at constant velocity.
     #[error("friction at constant velocity: {0}")]
     Friction(#[from] StaticFrictionError),
-    /// Their model.
+    /// Their model was not found.
     #[error("friction model: {0}")]
     FrictionFit(#[from] FrictionFitError),
     /// A run of the slow sine.
     #[error("pre-sliding friction: {0}")]
     Sine(#[from] ExperimentError),
-    /// The GMS model.
+    /// The GMS model was not found.
     #[error("pre-sliding friction: {0}")]
     Presliding(#[from] VirginCurveError),
     /// The GMS model does not predict what was measured.
@@ -49,16 +49,16 @@ pub enum CommissionError {
          position or time; look for a bent screw, a tight guide, a cold machine"
     )]
     Hysteresis {
-        /// The miss.
+        /// RMS of the miss, %.
         percent: f64,
     },
     /// The response at rest.
     #[error("linear model with friction: {0}")]
     Revise(#[from] ReviseError),
-    /// The ordinary motion.
+    /// The ordinary motion gave no model.
     #[error("ordinary motion: {0}")]
     Motion(#[from] MotionFitError),
-    /// The verdict.
+    /// The sine could not be run.
     #[error("verdict: {0}")]
     Verify(#[from] VerifyError),
 }

@@ -7,10 +7,14 @@
 
 pub mod bootstrap;
 mod chain;
+mod commissioned;
 mod cross_check;
 mod error;
+mod models;
 pub mod verify;
 
-pub use chain::{CommissionSettings, Commissioned, commission};
+pub use chain::commission;
+pub use commissioned::{CommissionSettings, Commissioned};
 pub use cross_check::CrossCheck;
 pub use error::CommissionError;
+pub use models::Measurements;

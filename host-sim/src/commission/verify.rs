@@ -11,9 +11,9 @@ use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
 /// The sine on which settings are judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Amplitude, mm.
+    /// Amplitude of the sine, mm.
     pub amplitude_mm: f64,
-    /// Largest velocity, mm/s.
+    /// Largest velocity of the sine, mm/s.
     pub velocity_mm_s: f64,
 }
 
@@ -27,25 +27,25 @@ impl Default for Trial {
     }
 }
 
-/// What one law scored.
+/// Score of one law on the sine.
 #[derive(Clone, Debug)]
 pub struct Verdict {
-    /// The law.
+    /// Name of the law.
     pub law: &'static str,
     /// Its score, on the measured position.
     pub score: Score,
-    /// The scored cycles.
+    /// Recording of the scored cycles.
     pub recording: Recording,
 }
 
 /// Cycles at full speed, of which the last [`SCORED_CYCLES`] count.
 const CYCLES: f64 = 3.25;
-/// Cycles that count.
+/// Cycles that are scored.
 const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-/// Why a verdict cannot be had.
+/// Reason why the sine cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The settings are refused.

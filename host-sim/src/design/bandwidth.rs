@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 
 use quadrant::control::popov::PidGains;
 
+use super::form::Form;
 use super::margins::Margins;
-use super::process::{Form, Process};
+use super::process::Process;
 use super::shaping::{
     LARGEST_RATIO, SMALLEST_RATIO, ShapingError, proportional_derivative, scale_to_gain_margin,
 };

@@ -6,8 +6,9 @@
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
+use super::form::Form;
 use super::margins::{Margins, bisect};
-use super::process::{Form, Process};
+use super::process::Process;
 
 /// A figure as a publication prints it.
 #[derive(Clone, Copy, Debug, PartialEq)]

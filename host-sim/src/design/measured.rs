@@ -5,8 +5,8 @@ use std::f64::consts::{PI, TAU};
 use num_complex::Complex64;
 use quadrant::control::popov::PidGains;
 
+use super::form::Form;
 use super::loop_shape::{OpenLoop, controller_response};
-use super::process::Form;
 use crate::identify::response::{FrequencyResponse, ResponsePoint};
 
 /// A measured response of which the trustworthy lines are kept, to be read at any frequency of its band.

@@ -5,6 +5,7 @@
 //! How much *nonlinear* gain a design then bears is [`quadrant::control::popov::sector_bound`]'s answer.
 
 mod bandwidth;
+mod form;
 pub mod held_plant;
 pub mod integral_gain;
 pub mod loop_shape;
@@ -21,13 +22,14 @@ pub mod time_varying;
 #[cfg(test)]
 mod time_domain;
 
+pub use form::Form;
 pub use integral_gain::{
     Printed, PrintedMargins, largest_integral_gain, largest_integral_gain_where,
 };
 pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
-pub use process::{Form, Process};
+pub use process::Process;
 pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]

@@ -3,9 +3,10 @@
 use quadrant::control::popov::PidGains;
 
 use super::bandwidth::{NoLoop, PeakBounds, stiffest};
+use super::form::Form;
 use super::integral_gain::largest_integral_gain_where;
 use super::margins::{MarginError, Margins};
-use super::process::{Form, Process};
+use super::process::Process;
 use super::shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 /// What a PID is designed for.

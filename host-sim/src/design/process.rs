@@ -3,6 +3,7 @@
 
 use quadrant::control::{plant_model::PlantModel, popov::PidGains};
 
+use super::form::Form;
 use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 use super::margins::{MarginError, Margins, bisect, margins};
 use super::measured::{MeasuredLoop, MeasuredResponse};
@@ -15,20 +16,6 @@ pub enum Process {
     Model(PlantModel),
     /// Its measured frequency response.
     Measured(MeasuredResponse),
-}
-
-/// How the loop is closed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Form {
-    /// By a PID in continuous time: the form that textbooks and the thesis print margins of.
-    Continuous,
-    /// By the difference equations of the firmware, through the converter's hold.
-    Sampled {
-        /// Control period, s; above zero.
-        sample_time_s: f64,
-        /// From reading the encoder to writing the converter, s; zero or more.
-        computation_delay_s: f64,
-    },
 }
 
 /// A loop of either kind.

@@ -6,9 +6,10 @@ use std::fmt;
 use num_complex::Complex64;
 use quadrant::control::popov::PidGains;
 
+use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::margins::{MarginError, bisect, falling_phase_crossover};
-use super::process::{Form, Process};
+use super::process::Process;
 
 /// Why no gains have the margins asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! From measurements to parameters: the thesis' chapter 3.
 //!
-//! An experiment is run on a [`TestAxis`](crate::rig::TestAxis), or its recording read from a file; everything here works on
-//! [`Recording`](crate::rig::Recording)s and knows nothing of where they come from.
+//! An experiment is run on a [`TestAxis`](crate::machine::TestAxis), or its recording read from a file; everything here works on
+//! [`Recording`](crate::record::Recording)s and knows nothing of where they come from.
 //!
 //! - [`excitation`]: voltages that make an axis show its response;
 //! - [`frf`]: that response, measured;

@@ -112,7 +112,7 @@ pub enum RecordError {
         path: PathBuf,
         /// Median time from row to row.
         sample_time_s: f64,
-        /// Sampling rate, Hz.
+        /// Sampling rate of the record, Hz.
         rate_hz: f64,
         /// A guess at the reason, or nothing.
         hint: &'static str,

@@ -1,4 +1,4 @@
-//! A recorded motion.
+//! A recorded motion, checked when it is read.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub struct Record {
     pub time_s: Vec<f64>,
     /// Position asked for, mm.
     pub reference_mm: Vec<f64>,
-    /// Position measured, mm.
+    /// Position that was measured, mm.
     pub position_mm: Option<Vec<f64>>,
     /// The controller's output, V.
     pub voltage_v: Option<Vec<f64>>,

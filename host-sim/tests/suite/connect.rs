@@ -329,7 +329,7 @@ fn every_shell_gets_its_completions() {
 }
 
 #[test]
-fn hands_press_inputs_and_pull_the_plug() {
+fn inputs_are_pressed_and_the_supply_is_cut() {
     let folder = tempfile::tempdir().unwrap();
     let said = succeeds(
         folder.path(),

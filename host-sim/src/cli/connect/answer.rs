@@ -1,4 +1,4 @@
-//! Results of commands.
+//! Results of commands, and checks they share.
 
 use std::fmt::Display;
 use std::time::Duration;

@@ -426,7 +426,7 @@ fn input_parser() -> PossibleValuesParser {
 }
 
 impl Command {
-    /// Its name, for `--json` and messages.
+    /// Returns its name, for `--json` and messages.
     pub(super) const fn name(&self) -> &'static str {
         match self {
             Self::Hello => "hello",

@@ -17,7 +17,7 @@ struct Line {
 pub(super) enum Said {
     /// Nothing: it is empty or a comment.
     Nothing,
-    /// Ask the machine.
+    /// A command for the machine.
     Ask(Box<Command>),
     /// A text for a person: help.
     Show(String),

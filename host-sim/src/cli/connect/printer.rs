@@ -2,7 +2,7 @@
 
 use serde_json::{Value, json};
 
-/// Printer of results.
+/// Printer of results and errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Printer {
     pub(super) json: bool,

@@ -86,7 +86,7 @@ fn simulated_io<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mu
     match client.simulated_io() {
         Some(io) => Ok(io),
         None => bail!(
-            "{what}: a program has no hands at {endpoint}; do it yourself, or try it with --simulated or --emulated"
+            "{what}: {endpoint} has no simulated inputs; do it yourself, or try it with --simulated or --emulated"
         ),
     }
 }

@@ -15,7 +15,7 @@ use quadrant_sim::record::Recording;
 
 use super::{page, recorded};
 use crate::cli::output::{Output, command_line, share};
-use crate::cli::subject::{Into, Subject};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]
@@ -41,7 +41,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "DELTA")]
     exponent: Option<f64>,
     #[command(flatten)]
-    into: Into,
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -67,7 +67,7 @@ pub(in crate::cli) fn run_at_velocities(
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
-        into,
+        destination,
         output,
         ..
     } = arguments;
@@ -80,7 +80,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 stretch_mm: arguments.stretch_mm,
                 ..StaticFrictionSettings::default()
             };
-            let start = subject.start_axis(into.into.as_deref())?;
+            let start = subject.start_axis(destination.into.as_deref())?;
             let measured = subject.measure(
                 output.seed,
                 start.as_ref(),
@@ -111,7 +111,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     output.page(&page, "static-friction.html")?;
     let records = arguments.record.as_slice();
-    into.write(subject, stage, records, &["friction"], |settings| {
+    destination.write(subject, stage, records, &["friction"], |settings| {
         let gms = settings.friction.gms.clone();
         settings.friction = with_all_models(found.models(), gms);
     })

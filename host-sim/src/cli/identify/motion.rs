@@ -15,7 +15,7 @@ use quadrant_sim::record::Recording;
 
 use super::recorded;
 use crate::cli::output::{Output, command_line, share};
-use crate::cli::subject::{Into, Subject};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]
@@ -60,7 +60,7 @@ pub(in crate::cli) struct Arguments {
     )]
     rounds: usize,
     #[command(flatten)]
-    into: Into,
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -114,9 +114,13 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         provenance(&command_line(), output.seed),
     );
     output.page(&page, "motion.html")?;
-    let Arguments { subject, into, .. } = arguments;
+    let Arguments {
+        subject,
+        destination,
+        ..
+    } = arguments;
     let records = arguments.record.as_slice();
-    into.write(
+    destination.write(
         subject,
         stage,
         records,
@@ -162,7 +166,7 @@ pub(in crate::cli) fn move_to_and_fro(
 fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option<StageSettings>)> {
     let Arguments {
         subject,
-        into,
+        destination,
         output,
         ..
     } = arguments;
@@ -170,7 +174,7 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option
         let title = recorded::title(std::slice::from_ref(path));
         return Ok((recorded::read(path)?, title, None));
     }
-    let start = subject.start_axis(into.into.as_deref())?;
+    let start = subject.start_axis(destination.into.as_deref())?;
     let measured = subject.measure(
         output.seed,
         start.as_ref(),

@@ -13,7 +13,7 @@ use quadrant_sim::presentation::{motor_constant_section, motor_constant_table, p
 
 use super::{page, recorded};
 use crate::cli::output::{Output, command_line, share};
-use crate::cli::subject::{Into, Subject};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]
@@ -35,7 +35,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "KG", value_parser = above_zero)]
     moving_mass_kg: Option<f64>,
     #[command(flatten)]
-    into: Into,
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -59,7 +59,7 @@ fn dwell(text: &str) -> Result<f64, String> {
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
-        into,
+        destination,
         output,
         ..
     } = arguments;
@@ -74,7 +74,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             (found, recorded::title(paths), None)
         }
         None => {
-            let start = subject.start_axis(into.into.as_deref())?;
+            let start = subject.start_axis(destination.into.as_deref())?;
             let measured = subject.measure(
                 output.seed,
                 start.as_ref(),
@@ -100,7 +100,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .as_ref()
         .map_or(DEFAULT_RATE_HZ, |stage| stage.rate_hz);
     // What the constant is for: a controller that homes the axis and measures the rest.
-    into.write(subject, stage, records, &["first PID"], |settings| {
+    destination.write(subject, stage, records, &["first PID"], |settings| {
         *settings = bootstrap_settings(settings, motor.gain_mm_per_v_s2, rate_hz);
     })
 }

@@ -16,7 +16,7 @@ use quadrant_sim::presentation::{characteristic_section, characteristic_table, p
 use super::{page, recorded};
 use crate::cli::axis::Axis;
 use crate::cli::output::{Output, command_line, share};
-use crate::cli::subject::{Into, Subject};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify nctf`.
 #[derive(Clone, Debug, Args)]
@@ -38,7 +38,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "MM_S", value_parser = speed)]
     most_mm_s: Option<f64>,
     #[command(flatten)]
-    into: Into,
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -53,11 +53,13 @@ fn speed(text: &str) -> Result<f64, String> {
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
-        into,
+        destination,
         output,
         ..
     } = arguments;
-    let start = subject.start(into.into.as_deref())?.map(|file| file.stage);
+    let start = subject
+        .start(destination.into.as_deref())?
+        .map(|file| file.stage);
     let index = subject.axis.map_or(0, Axis::index);
     let (found, title, machine) = match &arguments.record {
         Some(path) => {
@@ -98,7 +100,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     output.page(&page, "nctf.html")?;
     let records = arguments.record.as_slice();
-    into.write(subject, machine, records, &["feedback.nctf"], |settings| {
+    destination.write(subject, machine, records, &["feedback.nctf"], |settings| {
         settings.feedback.nctf = Some(NctfGains {
             characteristic: points,
             gain_v_s_per_mm: surface.gain_v_s_per_mm,

@@ -13,7 +13,7 @@ use quadrant_sim::report::Block;
 use super::frf::Measurement;
 use super::{page, recorded};
 use crate::cli::output::{Output, command_line};
-use crate::cli::subject::{Into, Subject};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify plant`.
 #[derive(Clone, Debug, Args)]
@@ -32,7 +32,7 @@ pub(in crate::cli) struct Arguments {
     #[command(flatten)]
     measurement: Measurement,
     #[command(flatten)]
-    into: Into,
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -54,7 +54,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             (found, section, title, None)
         }
         None => {
-            let start = subject.start_axis(arguments.into.into.as_deref())?;
+            let start = subject.start_axis(arguments.destination.into.as_deref())?;
             let measured = arguments.measurement.run(subject, start.as_ref(), output)?;
             let response = &measured.found;
             let found = fit_plant(&response.estimate.response, &settings)?;
@@ -75,8 +75,8 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     output.page(&page, "plant.html")?;
     let records = arguments.record.as_slice();
-    let into = &arguments.into;
-    into.write(subject, stage, records, &["plant"], |settings| {
+    let destination = &arguments.destination;
+    destination.write(subject, stage, records, &["plant"], |settings| {
         settings.plant = Some(found.plant);
     })
 }

@@ -14,7 +14,7 @@ use quadrant_sim::record::Recording;
 
 use super::{page, recorded};
 use crate::cli::output::{Output, command_line, share};
-use crate::cli::subject::{Into, Subject};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]
@@ -41,7 +41,7 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_delimiter = ',', value_name = "UM,...")]
     knots_um: Vec<f64>,
     #[command(flatten)]
-    into: Into,
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -91,11 +91,11 @@ impl Sine {
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
-        into,
+        destination,
         output,
         ..
     } = arguments;
-    let start = subject.start_axis(into.into.as_deref())?;
+    let start = subject.start_axis(destination.into.as_deref())?;
     let (recording, title, stage) = match &arguments.record {
         Some(path) => {
             let paths = std::slice::from_ref(path);
@@ -146,7 +146,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     output.page(&page, "virgin-curve.html")?;
     let records = arguments.record.as_slice();
-    into.write(subject, stage, records, &["friction"], |settings| {
+    destination.write(subject, stage, records, &["friction"], |settings| {
         let sliding = settings.friction.sliding.clone();
         settings.friction = with_all_models(sliding, found.gms.clone());
     })

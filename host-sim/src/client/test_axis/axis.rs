@@ -39,7 +39,7 @@ pub struct ConnectedAxis<'a> {
     stage: StageSettings,
     travel_mm: f64,
     origin_mm: f64,
-    /// What the machine said to the settings that are to be in force.
+    /// Refusal of the settings that are to be in force.
     refused: Option<String>,
 }
 

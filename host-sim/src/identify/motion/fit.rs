@@ -7,6 +7,7 @@ use super::model::{MotionModel, Structure};
 use super::regressors::Regression;
 use super::signals::{MotionFitSettings, Signals};
 use super::solution::{MOST_DEAD_TIME_S, Solution};
+use super::uncertainty::estimates;
 use crate::identify::setting::SettingError;
 use crate::record::Recording;
 
@@ -150,7 +151,8 @@ fn candidate(
     let whole = Solution::find(&regression, structure, &all)?;
     let residual = whole.residual(&regression, &all);
     let row_s = signals.sample_time_s * settings.decimation(signals.sample_time_s) as f64;
-    let model = whole.model(&regression, structure, settings, &residual)?;
+    let mut model = whole.model(&regression, structure, settings, &residual)?;
+    model.estimates = estimates(&whole, &regression, structure, settings, &residual);
     let acceleration = signals.decimated(&signals.acceleration_mm_s2, settings);
     let voltage = regression.voltage_at(whole.dead_time_s);
     let friction = voltage

@@ -17,7 +17,7 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Lines of the log that an error carries.
 const LAST_WORDS: usize = 5;
 
-/// What drives the emulated machine's clocks.
+/// Source of the emulated machine's clocks.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Clock {
     /// The host's: fastest, but times are not reproducible. For lockstep, in which no time is looked at.
@@ -26,7 +26,7 @@ pub enum Clock {
     Instructions,
 }
 
-/// Who is told of each line of the firmware's log when it is read.
+/// Callback for each line of the firmware's log when it is read.
 pub type Listener = fn(&str);
 
 /// A running emulator. Dropping it ends it.
@@ -97,7 +97,7 @@ impl Emulator {
         self.child.stderr.take()
     }
 
-    /// How the emulator ended, if it has.
+    /// Returns the exit status of the emulator, once it has ended.
     ///
     /// # Errors
     /// The operating system does not say.
@@ -131,7 +131,7 @@ impl Emulator {
         Ok(())
     }
 
-    /// What to say of a firmware that failed.
+    /// Returns the error of a firmware that failed.
     ///
     /// # Errors
     /// As [`new_lines`](Self::new_lines).

@@ -1,5 +1,7 @@
 //! `quadrant commission`, and what it shares with `quadrant connect commission`.
 
+mod saved;
+
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -7,7 +9,7 @@ use std::time::Duration;
 use anyhow::Context;
 use clap::Args;
 use quadrant::safety::AxisName;
-use quadrant::settings::AxisSettings;
+use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
 use quadrant_sim::machine::{TestAxis, TestMachine};
@@ -32,10 +34,19 @@ pub(super) struct Arguments {
     axis: Axis,
     /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it),
     /// emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
-    #[arg(long, default_value = "law", value_name = "MACHINE")]
+    #[arg(
+        long,
+        default_value = "law",
+        value_name = "MACHINE",
+        conflicts_with = "record"
+    )]
     machine: Endpoint,
+    /// The folder of an earlier commissioning instead, whose recordings are identified anew; nothing moves, so there is no
+    /// verdict and no cross-check.
+    #[arg(long, value_name = "FOLDER")]
+    record: Option<PathBuf>,
     /// Travel either way from where the axis stands, mm; without it, that to the soft limits of a homed axis.
-    #[arg(long, value_name = "MM", value_parser = travel)]
+    #[arg(long, value_name = "MM", value_parser = travel, conflicts_with = "record")]
     travel: Option<f64>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
     /// Without them those of --into if it is there, else those that the machine has.
@@ -45,7 +56,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE")]
     into: Option<PathBuf>,
     /// Let the settings that were found act on the machine. Without it the machine keeps those that it had.
-    #[arg(long)]
+    #[arg(long, conflicts_with = "record")]
     apply: bool,
     /// Keep them in the machine's flash too.
     #[arg(long, requires = "apply")]
@@ -110,11 +121,15 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let existing = into.as_deref().filter(|path| path.exists());
     let start = arguments.settings.as_deref().or(existing);
+    let start = start.map(SettingsFile::read).transpose()?;
+    if let Some(folder) = &arguments.record {
+        return arguments.run_saved(folder, start);
+    }
     let mut machine = arguments.machine.open(output.seed)?;
     let job = Job {
         axis: (*axis).into(),
         travel_mm: arguments.travel,
-        start: start.map(SettingsFile::read).transpose()?,
+        start,
         into: into.as_deref(),
         request,
         output,
@@ -131,6 +146,34 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     print!("{}", done.text);
     Ok(())
+}
+
+impl Arguments {
+    /// Identifies the recordings of an earlier commissioning anew.
+    fn run_saved(&self, folder: &Path, start: Option<SettingsFile>) -> anyhow::Result<()> {
+        let Self { output, .. } = self;
+        let axis = AxisName::from(self.axis);
+        let mut file = start.unwrap_or_else(|| SettingsFile::new(StageSettings::default()));
+        let base = file.stage.axes[axis as usize].clone();
+        let found = Found {
+            found: saved::read(folder, base.encoder.resolution_mm)?.commissioned(
+                &base,
+                &self.request.settings(),
+                file.stage.rate_hz,
+            )?,
+            checked: None,
+        };
+        print!("{}", found.text());
+        let path = match &self.into {
+            Some(path) => path.clone(),
+            None => output.file("settings.toml")?,
+        };
+        let who = format!("the {axis} axis, recorded in {}", folder.display());
+        for line in found.keep(output, &mut file, &path, axis, &who)? {
+            println!("{line}");
+        }
+        Ok(())
+    }
 }
 
 impl Job<'_> {
@@ -192,6 +235,17 @@ impl Job<'_> {
 }
 
 impl Request {
+    fn settings(&self) -> CommissionSettings {
+        CommissionSettings {
+            target: Target::Margins {
+                gain_margin_db: self.gain_margin_db,
+                phase_margin_deg: self.phase_margin_deg,
+                crossover_hz: None,
+            },
+            ..CommissionSettings::default()
+        }
+    }
+
     /// Commissions the test_axis's axis, with a bar for whoever watches.
     fn run(
         &self,
@@ -199,14 +253,7 @@ impl Request {
         base: &AxisSettings,
         seed: u64,
     ) -> anyhow::Result<Found> {
-        let request = CommissionSettings {
-            target: Target::Margins {
-                gain_margin_db: self.gain_margin_db,
-                phase_margin_deg: self.phase_margin_deg,
-                crossover_hz: None,
-            },
-            ..CommissionSettings::default()
-        };
+        let request = self.settings();
         let bar = share("commissioning");
         let mut report = |step, done: f64| {
             bar.set_message(step);
@@ -237,8 +284,10 @@ impl Found {
             friction_table(friction),
             gms_table(&found.presliding.0),
             gains_table(found),
-            verdict_table(&found.verdicts),
         ];
+        if !found.verdicts.is_empty() {
+            tables.push(verdict_table(&found.verdicts));
+        }
         if let Some(checked) = &self.checked {
             tables.push(revise_table(&found.plant.plant, &checked.revisions));
         }
@@ -278,7 +327,7 @@ impl Found {
             output.keep_table(&table)?;
         }
         let command = command_line();
-        let records = write_records(output, found, checked)?;
+        let records = saved::write(output, found, checked)?;
         file.stage.axes[axis as usize] = found.settings.clone();
         file.provenance.push(Provenance {
             command: command.clone(),
@@ -295,41 +344,4 @@ impl Found {
         lines.extend(output.keep_page(&page, "commission.html")?);
         Ok(lines)
     }
-}
-
-/// Saves every recording that the settings rest on; their names.
-fn write_records(
-    output: &Output,
-    found: &Commissioned,
-    checked: Option<&CrossCheck>,
-) -> anyhow::Result<Vec<String>> {
-    let mut records = vec![(
-        "motor-constant-recording.csv".to_owned(),
-        &found.motor.recording,
-    )];
-    let responses = found.response.recordings.iter().enumerate();
-    records.extend(
-        responses.map(|(index, record)| (format!("frf-recording-{}.csv", index + 1), record)),
-    );
-    records.push(("virgin-curve-recording.csv".to_owned(), &found.presliding.1));
-    if let Some(CrossCheck { recordings, .. }) = checked {
-        let named = ["at-rest-recording.csv", "motion-recording.csv"].map(str::to_owned);
-        records.extend(named.into_iter().zip(recordings));
-    }
-    let mut names = Vec::new();
-    for (name, recording) in records {
-        recording.write_csv(output.file(&name)?)?;
-        names.push(name);
-    }
-    found
-        .response
-        .estimate
-        .response
-        .write_csv(output.file("frf.csv")?)?;
-    found
-        .friction
-        .0
-        .write_csv(output.file("friction-map.csv")?)?;
-    names.extend(["frf.csv", "friction-map.csv"].map(str::to_owned));
-    Ok(names)
 }
