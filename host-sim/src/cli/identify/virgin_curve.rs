@@ -147,7 +147,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     output.page(&page, "virgin-curve.html")?;
     let records = arguments.record.as_slice();
     destination.write(subject, stage, records, &["friction"], |settings| {
-        let sliding = settings.friction.sliding.clone();
+        let sliding = settings.friction.sliding;
         settings.friction = with_all_models(sliding, found.gms.clone());
     })
 }
