@@ -317,7 +317,13 @@ fn options_that_cannot_be_are_refused() {
     }
     let (done, message) = identify(
         GOOD.folder.path(),
-        &["frf", "--axis", "x", "--record", "m/frf-recording-1.csv"],
+        &[
+            "frf",
+            "--machine",
+            "law",
+            "--record",
+            "m/frf-recording-1.csv",
+        ],
     );
     assert!(
         !done && message.contains("cannot be used with"),
