@@ -9,13 +9,13 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
-use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::machine::benchmark_job::circle_and_sine;
+use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
-use quadrant_sim::scenario::circle_and_sine;
 
 /// A machine on its stage, moving.
 struct Rig<S: Scalar> {
-    machine: Machine<S, FIRMWARE_ELEMENTS>,
+    machine: LawMachine<S, FIRMWARE_ELEMENTS>,
     plant: SimulatedStage,
     operator: Operator,
     tick: u32,
@@ -25,7 +25,7 @@ impl<S: Scalar> Rig<S> {
     fn moving() -> Self {
         let job = circle_and_sine(0.5);
         let mut rig = Self {
-            machine: Machine::new(&job).expect("the default settings are valid"),
+            machine: LawMachine::new(&job).expect("the default settings are valid"),
             plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1),
             operator: Operator::runs_the_plan(),
             tick: 0,

@@ -1,7 +1,9 @@
-//! The simulated XYZ stage, and what is done around a controller: experiments, comparison, design.
+//! The host's tools: the simulated XYZ stage, machines that the control law runs on, and what is done around a controller.
 //!
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
-//! - [`machine`]: the firmware's application in this process, on the library's own control law;
+//! - [`machine`]: the control law alone, the firmware's application in this process, its image in QEMU, a board: one
+//!   interface to measure them all;
+//! - [`client`]: a session with a machine over the link;
 //! - [`experiment`]: runs of a machine on a stage, and their scores;
 //! - [`compare`], [`circle`], [`replay`]: the comparison, the circle test, recorded references and part programs, each with
 //!   its tables and figures;
@@ -12,11 +14,6 @@
 //! - [`gcode`]: part programs, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
 //! - [`settings_reference`]: the meaning of every setting, as a page;
-//! - [`scenario`]: the motion that the firmware is emulated with;
-//! - [`console`]: a machine with the firmware on it, or a simulated one, over the link;
-//! - [`emulator`]: QEMU with the firmware in it;
-//! - [`emulated_machine`]: the firmware's image in it on the simulated stage, as [`simulated_machine`] is without it;
-//! - [`rig`]: an axis that experiments are run on, simulated or real, and the recordings they leave;
 //! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have;
 //! - [`command`]: options that the commands of this package and of the studies share.
 #![forbid(unsafe_code)]
@@ -24,15 +21,11 @@
 #![allow(missing_docs)]
 
 pub mod circle;
+pub mod client;
 pub mod command;
 pub mod commission;
 pub mod compare;
-pub mod console;
 pub mod design;
-#[cfg(unix)]
-pub mod emulated_machine;
-#[cfg(unix)]
-pub mod emulator;
 pub mod experiment;
 pub mod gcode;
 pub mod identify;
@@ -42,8 +35,5 @@ pub mod plant;
 pub mod record;
 pub mod replay;
 pub use quadrant_report as report;
-pub mod rig;
-pub mod scenario;
 pub mod settings_file;
 pub mod settings_reference;
-pub mod simulated_machine;

@@ -8,7 +8,7 @@ use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant_sim::emulator::Program;
+use quadrant_sim::machine::emulator::Program;
 
 use crate::gdb::{Debugger, PROGRAM_COUNTER, Port, STACK_POINTER};
 use xtask::command;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::lockstep::{Job, Mode};
-use quadrant_sim::emulator::Memory;
+use quadrant_sim::machine::emulator::Memory;
 use serde::{Deserialize, Serialize};
 
 use crate::lockstep;

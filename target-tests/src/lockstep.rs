@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::lockstep::{
     InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
-use quadrant_sim::emulator::{Clock, Emulator, Lockstep, Memory};
+use quadrant_sim::machine::emulator::{Clock, Emulator, Lockstep, Memory};
 
 use crate::reference_model::{self, ReferenceModel, Tally};
 use xtask::image::{self, Board, Image, Scalar, Target};

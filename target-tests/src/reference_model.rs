@@ -8,10 +8,10 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::lockstep::{InputRecord, Job};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
-use quadrant_sim::emulator::Program;
-use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::machine::benchmark_job::circle_and_sine;
+use quadrant_sim::machine::emulator::Program;
+use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
-use quadrant_sim::scenario::circle_and_sine;
 use quadrant_sim::settings_file::SettingsFile;
 
 use xtask::image::{self, Image};
@@ -58,9 +58,9 @@ pub(crate) trait Law {
     fn tick(&mut self, input: &InputRecord) -> Outputs;
 }
 
-impl<S: Scalar> Law for Machine<S, FIRMWARE_ELEMENTS> {
+impl<S: Scalar> Law for LawMachine<S, FIRMWARE_ELEMENTS> {
     fn tick(&mut self, input: &InputRecord) -> Outputs {
-        Machine::tick(self, input)
+        LawMachine::tick(self, input)
     }
 }
 
@@ -94,7 +94,7 @@ impl ReferenceModel {
     /// the reference model of a firmware of a number type that runs a job.
     pub(crate) fn of(scalar: image::Scalar, job: Job) -> Result<Self> {
         fn law<S: Scalar>(job: &Job, _: PhantomData<S>) -> Result<Box<dyn Law>> {
-            Ok(Box::new(Machine::<S, FIRMWARE_ELEMENTS>::new(job)?))
+            Ok(Box::new(LawMachine::<S, FIRMWARE_ELEMENTS>::new(job)?))
         }
         Ok(Self {
             law: match scalar {

@@ -12,7 +12,7 @@ use crate::faults::case::{configuration, moving};
 use crate::faults::fixture::Fixture;
 use crate::interrupt_latency;
 use crate::trace::{Trace, Tracer};
-use quadrant_sim::emulator::{Emulator, Memory};
+use quadrant_sim::machine::emulator::{Emulator, Memory};
 use std::process::ChildStderr;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;

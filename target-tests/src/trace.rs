@@ -5,7 +5,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
 use anyhow::{Context, Result};
-use quadrant_sim::emulator::{self, Clock, Emulator, Memory};
+use quadrant_sim::machine::emulator::{self, Clock, Emulator, Memory};
 
 use crate::attribution::Attribution;
 use crate::gdb::{Debugger, Port};

@@ -13,7 +13,7 @@ use crate::circle::spikes::Spikes;
 use crate::experiment::configuration::{Configuration, ELEMENTS};
 use crate::experiment::run::{RunError, run};
 use crate::experiment::run_configuration::RunConfiguration;
-use crate::machine::Machine;
+use crate::machine::LawMachine;
 use crate::plant::SimulatedStage;
 use crate::report::decimate;
 
@@ -114,7 +114,7 @@ pub fn run_path<S: Scalar>(
     let preview_s = axes
         .iter()
         .fold(0.0_f64, |most, axis| most.max(axis.feedforward.preview_s));
-    let mut machine = Machine::<S, ELEMENTS>::new(&job).map_err(RunError::from)?;
+    let mut machine = LawMachine::<S, ELEMENTS>::new(&job).map_err(RunError::from)?;
     let mut plant = SimulatedStage::new(&setup.truth, rate_hz, seed);
     let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
     let most_ticks = samples(2.0 + 2.0 * LEAD_S + turns * turn_s);

@@ -6,10 +6,12 @@ mod compare;
 mod completions;
 mod connect;
 mod design;
+mod endpoint;
 mod identify;
 mod replay;
 mod replay_program;
 mod settings;
+mod subject;
 
 use clap::{Parser, Subcommand};
 

@@ -1,36 +1,39 @@
-//! The axis that an experiment is run on.
+//! The names of the axes on a command line.
 
 use clap::ValueEnum;
+use quadrant::axes::AxisName;
 
-use crate::plant::StageTruth;
-use crate::rig::SimulatedRig;
-
-/// An axis of the simulated stage.
+/// An axis of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Axis {
+    /// First axis of the stage.
     X,
+    /// Second axis; the heavier one of the simulated stage.
     Y,
+    /// Third axis; the vertical one.
     Z,
 }
 
 impl Axis {
-    /// Its place among the stage's axes.
+    /// Index among the stage's axes, 0 to 2.
     pub const fn index(self) -> usize {
         self as usize
     }
 
-    pub const fn name(self) -> &'static str {
-        ["x", "y", "z"][self as usize]
+    /// Name in lower case.
+    pub fn name(self) -> &'static str {
+        AxisName::ALL[self as usize].as_str()
     }
+}
 
-    /// The axis, with everything a real one has; `seed` decides its noise.
-    pub fn rig(self, seed: u64) -> SimulatedRig {
-        let [x, y, z] = StageTruth::real().axes;
-        let truth = match self {
-            Self::X => x,
-            Self::Y => y,
-            Self::Z => z,
-        };
-        SimulatedRig::new(self.index(), truth, seed)
+impl From<Axis> for AxisName {
+    fn from(axis: Axis) -> Self {
+        Self::ALL[axis.index()]
+    }
+}
+
+impl From<Axis> for quadrant::link::message::AxisName {
+    fn from(axis: Axis) -> Self {
+        AxisName::from(axis).into()
     }
 }

@@ -21,7 +21,11 @@ const FOLLOWING_ERROR_MM: f64 = 10.0;
 
 /// The settings with which an axis is measured first: `base` with a controller that needs nothing but A,
 /// `gain_mm_per_v_s2`, within a factor of two; no nonlinear gain, no feedforward, no model.
-pub fn first_settings(base: &AxisSettings, gain_mm_per_v_s2: f64, rate_hz: f64) -> AxisSettings {
+pub fn bootstrap_settings(
+    base: &AxisSettings,
+    gain_mm_per_v_s2: f64,
+    rate_hz: f64,
+) -> AxisSettings {
     let mut settings = measuring_settings(base);
     let crossover = TAU * CROSSOVER_HZ;
     // |L| = A Kp sqrt(1 + lead^2) / w^2 = 1 on the double integrator that every axis is above its damping's corner.
@@ -48,7 +52,7 @@ pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
 
 /// `base` with a law that does nothing: for experiments in open loop on an axis of which not even the sign is known, before
 /// and after which the loop is closed. Only friction holds it.
-pub fn limp_settings(base: &AxisSettings) -> AxisSettings {
+pub fn zero_gain_settings(base: &AxisSettings) -> AxisSettings {
     let mut settings = measuring_settings(base);
     settings.plant = None;
     settings.feedback.pid = PidGains {
@@ -62,7 +66,11 @@ pub fn limp_settings(base: &AxisSettings) -> AxisSettings {
 
 /// `base` with a PID that is quiet enough for the smallest motions: of an axis that is held by friction, the noise of a
 /// fast derivative shakes loose what is to be measured.
-pub fn quiet_settings(base: &AxisSettings, plant: &PlantModel, rate_hz: f64) -> AxisSettings {
+pub fn low_bandwidth_settings(
+    base: &AxisSettings,
+    plant: &PlantModel,
+    rate_hz: f64,
+) -> AxisSettings {
     let mut settings = measuring_settings(base);
     let crossover =
         (QUIET_PHASE_RAD / plant.delay_s.max(1.0 / rate_hz)).min(TAU * QUIET_CROSSOVER_HZ);
@@ -78,7 +86,7 @@ pub fn quiet_settings(base: &AxisSettings, plant: &PlantModel, rate_hz: f64) -> 
     settings
 }
 
-/// The quiet controller: phase that the dead time may turn at its crossover, rad; highest crossover, Hz; crossover over the
+/// The low-bandwidth controller: phase that the dead time may turn at its crossover, rad; highest crossover, Hz; crossover over the
 /// frequency from which the derivative acts; integral over proportional gain, 1/s; filter over the inverse crossover.
 const QUIET_PHASE_RAD: f64 = 0.27;
 const QUIET_CROSSOVER_HZ: f64 = 60.0;
@@ -104,7 +112,8 @@ mod tests {
                         stiffness_per_s2: 0.0,
                         delay_s,
                     };
-                    let settings = first_settings(&x_axis(), wrong * plant.gain_mm_per_v_s2, 1e4);
+                    let settings =
+                        bootstrap_settings(&x_axis(), wrong * plant.gain_mm_per_v_s2, 1e4);
                     let open_loop = SampledLoop::new(&plant, &settings.feedback.pid, 1e-4, 0.0);
                     // Without a delay nothing above makes it unstable, which the margins report as an error too.
                     if delay_s > 0.0 {
@@ -123,7 +132,7 @@ mod tests {
     fn the_quiet_controller_keeps_a_distance_from_instability() {
         for axis in [x_axis(), y_axis(), z_axis()] {
             let plant = axis.plant.unwrap();
-            let quiet = quiet_settings(&axis, &plant, 1e4);
+            let quiet = low_bandwidth_settings(&axis, &plant, 1e4);
             let margins =
                 margins(&SampledLoop::new(&plant, &quiet.feedback.pid, 1e-4, 0.0)).unwrap();
             assert!(margins.sensitivity_peak < 1.6, "{margins:?}");

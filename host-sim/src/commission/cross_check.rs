@@ -1,5 +1,4 @@
-//! Cross-checks of a finished commissioning: against the response at rest, which friction bends, and against an
-//! ordinary motion.
+//! Cross-checks of a finished commissioning: the response at rest, which friction bends, and an ordinary motion.
 
 use quadrant::settings::AxisSettings;
 
@@ -10,7 +9,8 @@ use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::motion::{Candidate, MotionFitSettings, fit_motion, recommended, shuttle};
 use crate::identify::response::FrequencyResponse;
 use crate::identify::revise::{ReviseError, Revision};
-use crate::rig::{Recording, Rig, approach};
+use crate::machine::{TestAxis, approach};
+use crate::record::Recording;
 
 /// Results of the cross-checks.
 #[derive(Clone, Debug)]
@@ -39,7 +39,7 @@ impl CrossCheck {
     /// # Errors
     /// A run that is stopped, or data that yield no model.
     pub fn run(
-        rig: &mut dyn Rig,
+        test_axis: &mut dyn TestAxis,
         settings: &AxisSettings,
         seed: u64,
         progress: &mut dyn FnMut(&'static str, f64),
@@ -56,14 +56,16 @@ impl CrossCheck {
             period_s: PERIOD_S,
             seed,
         };
-        rig.apply(&measuring_settings(settings))?;
-        approach(rig, 0.0)?;
-        let at_rest = AtRest::measure(rig, settings, excitation, PERIODS, &mut |share| {
+        test_axis.apply(&measuring_settings(settings))?;
+        approach(test_axis, 0.0)?;
+        let at_rest = AtRest::measure(test_axis, settings, excitation, PERIODS, &mut |share| {
             progress("response at rest", share);
         })?;
 
-        approach(rig, 0.0)?;
-        let moved = shuttle(rig, 1, &mut |share| progress("ordinary motion", share))?;
+        approach(test_axis, 0.0)?;
+        let moved = shuttle(test_axis, 1, &mut |share| {
+            progress("ordinary motion", share)
+        })?;
         let motion = MotionFitSettings {
             dead_time_s: Some(plant.delay_s + 0.5 * moved.sample_time_s),
             ..MotionFitSettings::default()

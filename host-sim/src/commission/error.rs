@@ -1,4 +1,4 @@
-//! Errors that end a commissioning.
+//! Reasons why a commissioning ends early.
 
 use quadrant::settings::SettingsError;
 
@@ -11,30 +11,36 @@ use crate::identify::plant::PlantError;
 use crate::identify::revise::ReviseError;
 use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
-use crate::rig::RigError;
+use crate::machine::ExperimentError;
 
-/// Errors that end a commissioning.
+/// Reason why a commissioning ends early.
 #[derive(Debug, thiserror::Error)]
 pub enum CommissionError {
     /// Settings that the firmware refuses.
     #[error("settings refused: {0}")]
     Settings(#[from] SettingsError),
+    /// The open-loop test failed.
     #[error("motor constant: {0}")]
     Motor(#[from] MotorConstantError),
+    /// The response was not measured.
     #[error("frequency response: {0}")]
     Response(#[from] FrfError),
+    /// The linear model was not found.
     #[error("linear model: {0}")]
     Plant(#[from] PlantError),
+    /// The PID was not found.
     #[error("PID: {0}")]
     Pid(#[from] DesignError),
     /// The runs at constant velocity.
     #[error("friction at constant velocity: {0}")]
     Friction(#[from] StaticFrictionError),
+    /// Their model was not found.
     #[error("friction model: {0}")]
     FrictionFit(#[from] FrictionFitError),
     /// A run of the slow sine.
     #[error("pre-sliding friction: {0}")]
-    Sine(#[from] RigError),
+    Sine(#[from] ExperimentError),
+    /// The GMS model was not found.
     #[error("pre-sliding friction: {0}")]
     Presliding(#[from] VirginCurveError),
     /// The GMS model does not predict what was measured.
@@ -42,12 +48,17 @@ pub enum CommissionError {
         "the GMS model misses the measured hysteresis by {percent:.1} % of the breakaway level: the axis' friction changes with \
          position or time; look for a bent screw, a tight guide, a cold machine"
     )]
-    Hysteresis { percent: f64 },
+    Hysteresis {
+        /// RMS of the miss, %.
+        percent: f64,
+    },
     /// The response at rest.
     #[error("linear model with friction: {0}")]
     Revise(#[from] ReviseError),
+    /// The ordinary motion gave no model.
     #[error("ordinary motion: {0}")]
     Motion(#[from] MotionFitError),
+    /// The sine could not be run.
     #[error("verdict: {0}")]
     Verify(#[from] VerifyError),
 }

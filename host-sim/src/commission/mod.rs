@@ -7,11 +7,15 @@
 
 pub mod bootstrap;
 mod chain;
+mod commissioned;
 mod cross_check;
 mod error;
+mod models;
 pub mod page;
 pub mod verify;
 
-pub use chain::{CommissionSettings, Commissioned, commission};
+pub use chain::commission;
+pub use commissioned::{CommissionSettings, Commissioned};
 pub use cross_check::CrossCheck;
 pub use error::CommissionError;
+pub use models::Measurements;

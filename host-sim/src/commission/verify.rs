@@ -6,14 +6,15 @@ use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::bootstrap::measuring_settings;
 use crate::experiment::metrics::{Score, score};
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// The sine on which settings are judged.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Trial {
-    /// Amplitude, mm.
+    /// Amplitude of the sine, mm.
     pub amplitude_mm: f64,
-    /// Largest velocity, mm/s.
+    /// Largest velocity of the sine, mm/s.
     pub velocity_mm_s: f64,
 }
 
@@ -27,22 +28,25 @@ impl Default for Trial {
     }
 }
 
-/// Result of one law's sine test.
+/// Score of one law on the sine.
 #[derive(Clone, Debug)]
 pub struct Verdict {
+    /// Name of the law.
     pub law: &'static str,
     /// Its score, on the measured position.
     pub score: Score,
+    /// Recording of the scored cycles.
     pub recording: Recording,
 }
 
 /// Cycles at full speed, of which the last [`SCORED_CYCLES`] count.
 const CYCLES: f64 = 3.25;
+/// Cycles that are scored.
 const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-/// Errors of a sine test.
+/// Reason why the sine cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
     /// The settings are refused.
@@ -50,7 +54,7 @@ pub enum VerifyError {
     Settings(#[from] SettingsError),
     /// The run was stopped.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    TestAxis(#[from] ExperimentError),
 }
 
 /// Runs the PID alone, the N-PID alone, and `settings` as they are, on the trial's sine.
@@ -58,7 +62,7 @@ pub enum VerifyError {
 /// # Errors
 /// Refused settings, or a run that is stopped.
 pub fn verify(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     settings: &AxisSettings,
     trial: Trial,
     progress: &mut dyn FnMut(f64),
@@ -77,22 +81,24 @@ pub fn verify(
     ];
     let mut verdicts = Vec::new();
     for (index, (law, settings)) in laws.into_iter().enumerate() {
-        rig.apply(&settings)?;
+        test_axis.apply(&settings)?;
         let share = |done: f64| (index as f64 + done) / 3.0;
-        verdicts.push(run(rig, law, trial, &mut |done| progress(share(done)))?);
+        verdicts.push(run(test_axis, law, trial, &mut |done| {
+            progress(share(done))
+        })?);
     }
     Ok(verdicts)
 }
 
 fn run(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     law: &'static str,
     trial: Trial,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Verdict, VerifyError> {
     let sine =
         HarmonicSettings::with_velocity(trial.amplitude_mm, trial.velocity_mm_s, CYCLES, LEAD_S);
-    let recording = rig.perform(
+    let recording = test_axis.perform(
         &Experiment {
             name: format!("{law} on a sine of {} mm", trial.amplitude_mm),
             drive: Drive::ClosedLoop(MotionSettings::Harmonic(sine)),

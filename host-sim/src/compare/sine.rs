@@ -9,7 +9,7 @@ use crate::experiment::configuration::{Configuration, ELEMENTS};
 use crate::experiment::metrics::{Score, score};
 use crate::experiment::run::{AxisTrace, RunError, run};
 use crate::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
-use crate::machine::{Machine, Operator};
+use crate::machine::{LawMachine, Operator};
 use crate::plant::{SimulatedStage, StageTruth};
 
 /// Amplitude of the sine, mm.
@@ -138,7 +138,7 @@ pub fn run_bench<S: Scalar>(
         .axes
         .each_ref()
         .map(|axis| axis.encoder.resolution_mm);
-    let mut machine = Machine::<S, ELEMENTS>::new(&bench.job)?;
+    let mut machine = LawMachine::<S, ELEMENTS>::new(&bench.job)?;
     let traces = run(
         &mut machine,
         &mut bench.plant,

@@ -1,6 +1,6 @@
-//! The form that a loop is closed in.
+//! Continuous or sampled: the form in which a loop is closed.
 
-/// The form that a loop is closed in.
+/// Form in which a loop is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
     /// By a PID in continuous time: the form that textbooks and the thesis print margins of.

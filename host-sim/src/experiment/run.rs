@@ -5,7 +5,7 @@ use quadrant::safety::SafetyState;
 use quadrant::scalar::Scalar;
 use quadrant::telemetry::AxisTelemetry;
 
-use crate::machine::{Machine, Operator};
+use crate::machine::{LawMachine, Operator};
 use crate::plant::SimulatedStage;
 
 /// Trace of one axis, a sample a control period from the start of the motion.
@@ -61,7 +61,7 @@ pub enum RunError {
 /// # Errors
 /// A fault, or a motion that does not end in time.
 pub fn run<S: Scalar, const N: usize>(
-    machine: &mut Machine<S, N>,
+    machine: &mut LawMachine<S, N>,
     plant: &mut SimulatedStage,
     resolution_mm: [f64; 3],
     most_ticks: usize,

@@ -7,7 +7,7 @@ use quadrant::settings::{AxisSettings, PlanSettings, StageSettings, StreamingSet
 use crate::experiment::configuration::ELEMENTS;
 use crate::experiment::metrics::{Score, score};
 use crate::experiment::run::{RunError, run};
-use crate::machine::Machine;
+use crate::machine::LawMachine;
 use crate::plant::{AxisTruth, SimulatedStage, StageTruth};
 
 /// A sine for an axis.
@@ -73,7 +73,7 @@ pub fn run_sine_tests(
     };
     let slowest_s = tests.map(SineTest::cycle_s).into_iter().fold(0.0, f64::max);
     let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * slowest_s;
-    let mut machine = Machine::<f32, ELEMENTS>::new(&job)?;
+    let mut machine = LawMachine::<f32, ELEMENTS>::new(&job)?;
     let truth = StageTruth {
         axes: [truth.clone(), truth.clone(), truth.clone()],
     };

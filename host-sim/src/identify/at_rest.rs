@@ -11,7 +11,8 @@ use super::revise::{
     ExplicitFriction, Measurement, ReviseError, Revision, candidate, revise, simulated_response,
 };
 use crate::commission::bootstrap::measuring_settings;
-use crate::rig::{Drive, Experiment, Recording, Rig};
+use crate::machine::{Drive, Experiment, TestAxis};
+use crate::record::Recording;
 
 /// An excitation at rest, and what it gave.
 #[derive(Clone, Debug)]
@@ -35,24 +36,24 @@ impl AtRest {
     /// # Errors
     /// Settings that are refused, or a run that is stopped.
     pub fn measure(
-        rig: &mut dyn Rig,
+        test_axis: &mut dyn TestAxis,
         settings: &AxisSettings,
         excitation: Excitation,
         periods: usize,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Self, ReviseError> {
         let settings = measuring_settings(settings);
-        rig.apply(&settings)?;
+        test_axis.apply(&settings)?;
         let request = FrfSettings {
             excitation,
             periods,
             bias_velocity_mm_s: 0.0,
             open_loop: false,
         };
-        let rate_hz = rig.axis().rate_hz;
+        let rate_hz = test_axis.info().rate_hz;
         let mut experiment = standstill(&request, rate_hz);
-        let recording = rig.perform(&experiment, progress)?;
-        // A model is run as the axis was: the rig may have recorded more coarsely.
+        let recording = test_axis.perform(&experiment, progress)?;
+        // A model is run as the axis was: the test_axis may have recorded more coarsely.
         experiment.decimation = (recording.sample_time_s * rate_hz).round() as usize;
         Ok(Self {
             excitation,

@@ -8,7 +8,8 @@
 use heapless::Vec as Points;
 use quadrant::control::nctf::{CharacteristicPoint, MAX_POINTS};
 
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Parameters of the test that finds the NCTF trajectory.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,7 +83,7 @@ pub enum CharacteristicError {
     NoPasses { passes: usize },
     /// The run was stopped.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Experiment(#[from] ExperimentError),
 }
 
 /// Voltage of the first try, V, and the factor to the next.
@@ -102,14 +103,14 @@ const REST: f64 = 5e-3;
 /// # Errors
 /// An axis that stays slow or does not come to rest; a run that is stopped.
 pub fn measure(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     settings: &CharacteristicSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Characteristic, CharacteristicError> {
-    let axis = rig.axis();
+    let axis = test_axis.info();
     let mut voltage_v = FIRST_V;
     loop {
-        let recording = rig.perform(
+        let recording = test_axis.perform(
             &Experiment {
                 name: format!("coasting after {voltage_v:.2} V"),
                 drive: Drive::OpenLoop,

@@ -1,7 +1,7 @@
 //! From measurements to parameters: the thesis' chapter 3.
 //!
-//! An experiment is run on a [`Rig`](crate::rig::Rig), or its recording read from a file; everything here works on
-//! [`Recording`](crate::rig::Recording)s and knows nothing of where they come from.
+//! An experiment is run on a [`TestAxis`](crate::machine::TestAxis), or its recording read from a file; everything here works on
+//! [`Recording`](crate::record::Recording)s and knows nothing of where they come from.
 //!
 //! - [`at_rest`]: the response of an axis at rest, at several amplitudes;
 //! - [`characteristic`]: the trajectory along which an axis comes to rest by itself, for NCTF;

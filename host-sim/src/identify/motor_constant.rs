@@ -6,7 +6,8 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Parameters of the test of acceleration per volt.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -84,7 +85,7 @@ pub enum MotorConstantError {
     NoPasses { passes: usize },
     /// The run was stopped.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Experiment(#[from] ExperimentError),
 }
 
 /// Upper level over the lower.
@@ -103,19 +104,19 @@ const LONGEST_DELAY_S: f64 = 6e-3;
 /// Largest relative standard error.
 const MOST_UNCERTAIN: f64 = 0.2;
 
-/// Runs the test on the rig's axis, with rising levels until the axis slides.
+/// Runs the test on the test_axis's axis, with rising levels until the axis slides.
 ///
 /// # Errors
 /// An axis that does not slide, moves the wrong way, or is too uncertain; a run that is stopped.
 pub fn measure(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     settings: &MotorConstantSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<MotorConstant, MotorConstantError> {
-    let axis = rig.axis();
+    let axis = test_axis.info();
     let mut level_v = settings.first_level_v;
     while level_v <= settings.most_level_v {
-        let recording = rig.perform(
+        let recording = test_axis.perform(
             &Experiment {
                 name: format!("steps between {level_v:.3} and {:.3} V", UPPER * level_v),
                 drive: Drive::OpenLoop,

@@ -18,8 +18,9 @@ use rayon::prelude::*;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};
 use super::response::FrequencyResponse;
+use crate::machine::{Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
-use crate::rig::{Experiment, Recording, Rig, RigError, SimulatedRig};
+use crate::record::Recording;
 
 /// Friction models beside the linear model, as in the thesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,7 +104,7 @@ pub enum ReviseError {
     Incoherent { lines: usize, least_coherence: f64 },
     /// The model cannot be run as the axis was.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Experiment(#[from] ExperimentError),
     /// The settings are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
@@ -187,9 +188,9 @@ pub fn simulated_response(
     truth: AxisTruth,
 ) -> Result<FrequencyResponse, ReviseError> {
     // The candidate is without noise: the seed does not matter.
-    let mut rig = SimulatedRig::new(0, truth, 0);
-    rig.apply(measurement.settings)?;
-    let recording = rig.perform(measurement.experiment, &mut |_| {})?;
+    let mut test_axis = SimulatedTestAxis::new(0, truth, 0);
+    test_axis.apply(measurement.settings)?;
+    let recording = test_axis.perform(measurement.experiment, &mut |_| {})?;
     (measurement.estimate)(&recording).ok_or(ReviseError::NoResponse)
 }
 

@@ -1,6 +1,7 @@
 //! From bytes to columns of finite numbers.
 
-use super::{MIN_ROWS, RecordError};
+use super::error::RecordError;
+use super::limits::MIN_ROWS;
 use csv::{ByteRecord, Reader, ReaderBuilder};
 use std::fs::File;
 use std::path::Path;
@@ -15,7 +16,7 @@ pub(super) struct Columns {
     pub(super) injection: Option<Column>,
 }
 
-/// One column.
+/// One column of a file.
 #[derive(Debug)]
 pub(super) struct Column {
     pub(super) name: &'static str,
@@ -71,7 +72,7 @@ const FORCES: [&[Name]; 3] = [
     &[("force_z_n", 1.0)],
 ];
 
-/// What a file must hold besides the time.
+/// Columns that a file must hold besides the time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// A motion to be followed: the reference.

@@ -1,6 +1,6 @@
-//! Why a record is refused, in words that lead to the fault.
+//! Reasons why a record is refused, in words that lead to the fault.
 
-use super::MIN_ROWS;
+use super::limits::MIN_ROWS;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -10,17 +10,17 @@ pub enum RecordError {
     /// The file cannot be opened or read.
     #[error("cannot read {}", path.display())]
     Read {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The error that caused this.
         source: std::io::Error,
     },
     /// The file is no CSV: rows of different length, or bytes that are no text.
     #[error("{}: {message}", path.display())]
     Malformed {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What is wrong where.
+        /// Description of the fault and its place.
         message: String,
     },
     /// A column is not there.
@@ -29,11 +29,11 @@ pub enum RecordError {
          position_mm, and voltage_v{hint}", path.display()
     )]
     MissingColumn {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// The column, or its alternatives.
         needed: &'static str,
-        /// The header's names.
+        /// Names in the header. of the file.
         found: String,
         /// A guess at the reason, or nothing.
         hint: &'static str,
@@ -41,43 +41,43 @@ pub enum RecordError {
     /// Two columns claim to be the same quantity.
     #[error("{}: columns {first} and {second} both hold the {quantity}; keep one", path.display())]
     AmbiguousColumn {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// What they hold.
+        /// Quantity that they hold.
         quantity: &'static str,
-        /// One of them.
+        /// The first of them.
         first: String,
-        /// The other.
+        /// The second of them.
         second: String,
     },
     /// A cell is not a finite number.
     #[error("{}, line {line}, column {column}: {value:?} is not {expected}", path.display())]
     Cell {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line.
+        /// Line number; the header is 1.
         line: u64,
-        /// The column.
+        /// Name of the column.
         column: String,
         /// The cell as it stands.
         value: String,
-        /// What is allowed.
+        /// Description of allowed values.
         expected: &'static str,
     },
     /// A column holds nothing that could be identified from.
     #[error("{}, column {column}: {fault}", path.display())]
     Useless {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The column.
+        /// Name of the column.
         column: &'static str,
-        /// What is wrong with it.
-        fault: UselessFault,
+        /// Description of the fault.
+        fault: UnusableSignal,
     },
     /// There is no motion in so little.
     #[error("{}: {rows} rows of data; at least {MIN_ROWS} are needed", path.display())]
     TooFewRows {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Rows after the header.
         rows: usize,
@@ -85,7 +85,7 @@ pub enum RecordError {
     /// More than memory is meant to bear.
     #[error("{}: more than {most_rows} rows of data; split the recording, or keep every tenth row of a slow one", path.display())]
     TooManyRows {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Rows that are allowed.
         most_rows: usize,
@@ -93,13 +93,13 @@ pub enum RecordError {
     /// Time does not run as a clock does.
     #[error("{}, line {line}, column t_s: {value} s {fault}", path.display())]
     Time {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The line.
+        /// Line number; the header is 1.
         line: u64,
-        /// The time there.
+        /// Time in that line, s.
         value: f64,
-        /// What is wrong with it.
+        /// Description of the fault.
         fault: TimeFault,
     },
     /// The sample rate is not one that anything is controlled at.
@@ -108,11 +108,11 @@ pub enum RecordError {
         path.display(), Brief(*sample_time_s), Brief(*rate_hz)
     )]
     SampleRate {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
         /// Median time from row to row.
         sample_time_s: f64,
-        /// Its inverse.
+        /// Sampling rate of the record, Hz.
         rate_hz: f64,
         /// A guess at the reason, or nothing.
         hint: &'static str,
@@ -120,47 +120,47 @@ pub enum RecordError {
     /// Numbers that the axis cannot have made, or not in this unit.
     #[error("{}, column {column}: {fault}", path.display())]
     Unit {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// The column.
+        /// Name of the column.
         column: String,
-        /// What does not fit.
+        /// Contradiction that was found.
         fault: UnitFault,
     },
 }
 
-/// Why a column cannot be identified from.
+/// Reason why a column cannot be identified from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum UselessFault {
-    /// It never changes.
+pub enum UnusableSignal {
+    /// The value never changes.
     Constant {
-        /// Its value.
+        /// The only value of the column.
         value: f64,
     },
     /// It is at the amplifier's limit too often.
     Saturated {
         /// Share of the rows, %.
         percent: f64,
-        /// The limit, V.
+        /// Limit of the amplifier, V.
         limit_v: f64,
         /// Line of the first of them.
         line: u64,
     },
     /// It is no voltage.
     NotVoltage {
-        /// Its largest magnitude.
+        /// Largest magnitude in the column.
         largest: f64,
     },
     /// It is no force in newtons.
     NotForce {
-        /// Its largest magnitude.
+        /// Largest magnitude in the column.
         largest: f64,
         /// The largest that is believed, N.
         most_n: f64,
     },
 }
 
-impl fmt::Display for UselessFault {
+impl fmt::Display for UnusableSignal {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::Constant { value } => write!(
@@ -194,7 +194,7 @@ impl fmt::Display for UselessFault {
     }
 }
 
-/// How a time column fails.
+/// Fault of a time column.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TimeFault {
     /// The same time twice.
@@ -208,7 +208,7 @@ pub enum TimeFault {
     Step {
         /// Time since the row before, s.
         step: f64,
-        /// Median step, s.
+        /// Median of the steps, s.
         median: f64,
     },
 }
@@ -241,18 +241,18 @@ impl fmt::Display for TimeFault {
     }
 }
 
-/// How a column's numbers contradict its unit or the axis.
+/// Contradiction between a column's numbers and its unit or the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum UnitFault {
     /// Further, faster or harder than the axis can.
     Exceeds {
         /// "travel", "speed" or "acceleration".
         what: &'static str,
-        /// Of the record.
+        /// Value of the record.
         value: f64,
-        /// Of the axis.
+        /// Value of the axis.
         limit: f64,
-        /// Unit of both.
+        /// Unit of both values.
         unit: &'static str,
         /// A thousandth of the record would fit in every respect.
         looks_like_mm: bool,
@@ -266,14 +266,14 @@ pub enum UnitFault {
     },
     /// The motion is lost in the encoder's resolution.
     Still {
-        /// Travel, mm.
+        /// Travel in the record, mm.
         travel_mm: f64,
-        /// Travel in counts.
+        /// Travel in the record, counts.
         counts: f64,
     },
     /// The measured motion is nothing like the one asked for.
     Disagrees {
-        /// Measured travel, mm.
+        /// Travel of the measured position, mm.
         travel_mm: f64,
         /// Travel asked for, mm.
         reference_mm: f64,
@@ -329,17 +329,17 @@ impl fmt::Display for UnitFault {
     }
 }
 
-/// What looks odd but can be true.
+/// Oddity of a record that can be true.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Doubt {
+pub enum RecordWarning {
     /// The measured position runs ahead of the reference: the two columns may be swapped.
     PositionLeads {
-        /// By how much, s.
+        /// Lead of the position, s.
         lead_s: f64,
     },
 }
 
-impl fmt::Display for Doubt {
+impl fmt::Display for RecordWarning {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::PositionLeads { lead_s } => write!(

@@ -3,7 +3,8 @@
 use std::path::Path;
 
 use super::columns::{self, Column};
-use super::{RecordError, UselessFault, time};
+use super::error::{RecordError, UnusableSignal};
+use super::time;
 use crate::plant::load::Force;
 
 /// Largest force that is believed, N: what a machine of this size never sees.
@@ -51,7 +52,7 @@ fn check(path: &Path, column: &Column) -> Result<(), RecordError> {
     Err(RecordError::Useless {
         path: path.to_owned(),
         column: column.name,
-        fault: UselessFault::NotForce {
+        fault: UnusableSignal::NotForce {
             largest,
             most_n: MOST_N,
         },

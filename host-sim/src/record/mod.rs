@@ -17,72 +17,17 @@
 
 mod columns;
 mod error;
-mod experiment;
 mod force;
+mod limits;
+mod motion;
 mod plausible;
+mod recording;
 mod time;
 mod trace;
 
-pub use error::{Doubt, RecordError, TimeFault, UnitFault, UselessFault};
+pub use error::{RecordError, RecordWarning, TimeFault, UnitFault, UnusableSignal};
 pub use force::ForceRecord;
+pub use limits::AxisLimits;
+pub use motion::Record;
+pub use recording::Recording;
 pub use trace::{TraceError, write_trace};
-
-use std::path::Path;
-
-use columns::Purpose;
-
-/// Fewest rows that make a motion.
-const MIN_ROWS: usize = 16;
-
-/// A recorded motion that passed every check.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Record {
-    /// Time from one sample to the next, s.
-    pub sample_time_s: f64,
-    /// Time of each sample as recorded, s.
-    pub time_s: Vec<f64>,
-    /// Position asked for, mm.
-    pub reference_mm: Vec<f64>,
-    /// Position measured, mm.
-    pub position_mm: Option<Vec<f64>>,
-    /// The controller's output, V.
-    pub voltage_v: Option<Vec<f64>>,
-    /// What looks odd but can be true.
-    pub doubts: Vec<Doubt>,
-}
-
-/// What an axis can do: the yardstick for units.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct AxisLimits {
-    /// Longest motion, mm.
-    pub travel_mm: f64,
-    /// Highest speed, mm/s.
-    pub max_velocity_mm_s: f64,
-    /// Highest acceleration, mm/s^2.
-    pub max_acceleration_mm_s2: f64,
-    /// One count of the encoder, mm.
-    pub resolution_mm: f64,
-}
-
-impl Record {
-    /// Reads and checks a record for an axis with `limits`.
-    pub fn read(path: impl AsRef<Path>, limits: &AxisLimits) -> Result<Self, RecordError> {
-        let path = path.as_ref();
-        let columns = columns::read(path, Purpose::Motion, &mut |_| {})?;
-        let sample_time_s = time::check(path, &columns.time)?;
-        plausible::check(path, &columns, sample_time_s, limits)?;
-        let reference_mm = columns
-            .reference
-            .map_or_else(Vec::new, columns::Column::into_mm);
-        let position_mm = columns.position.map(columns::Column::into_mm);
-        let doubts = plausible::doubts(&reference_mm, position_mm.as_deref(), sample_time_s);
-        Ok(Self {
-            sample_time_s,
-            time_s: columns.time.values,
-            reference_mm,
-            position_mm,
-            voltage_v: columns.voltage.map(|column| column.values),
-            doubts,
-        })
-    }
-}

@@ -1,7 +1,8 @@
 //! Can the axis have made these numbers, in the unit their column names?
 
 use super::columns::{Column, Columns};
-use super::{AxisLimits, Doubt, RecordError, UnitFault};
+use super::error::{RecordError, RecordWarning, UnitFault};
+use super::limits::AxisLimits;
 use std::path::Path;
 
 /// Fewest encoder counts that are a motion.
@@ -61,7 +62,7 @@ pub(super) fn check(
     }
 }
 
-/// Whether a measured position moves like a reference that moves by `reference_mm`, within what a controller can be to blame
+/// True if a measured position moves like a reference that moves by `reference_mm`, within what a controller can be to blame
 /// for.
 fn agreement(path: &Path, position: &Column, reference_mm: f64) -> Result<(), RecordError> {
     let travel_mm = travel_mm(position);
@@ -93,7 +94,7 @@ pub(super) fn check_experiment(path: &Path, columns: &Columns) -> Result<(), Rec
     }
 }
 
-/// What a reference asks of an axis.
+/// Demands of a reference on an axis.
 struct Motion {
     travel_mm: f64,
     velocity_mm_s: f64,
@@ -173,10 +174,10 @@ pub(super) fn doubts(
     reference_mm: &[f64],
     position_mm: Option<&[f64]>,
     sample_time_s: f64,
-) -> Vec<Doubt> {
+) -> Vec<RecordWarning> {
     let lead = position_mm.and_then(|position| lead_s(reference_mm, position, sample_time_s));
     lead.filter(|lead| *lead > MIN_LEAD_SAMPLES * sample_time_s)
-        .map(|lead_s| Doubt::PositionLeads { lead_s })
+        .map(|lead_s| RecordWarning::PositionLeads { lead_s })
         .into_iter()
         .collect()
 }

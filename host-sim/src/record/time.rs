@@ -1,7 +1,7 @@
 //! Is the time column a clock's?
 
 use super::columns::Column;
-use super::{RecordError, TimeFault};
+use super::error::{RecordError, TimeFault};
 use std::path::Path;
 
 /// Largest deviation of a step from the median step, as its share.

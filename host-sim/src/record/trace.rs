@@ -12,21 +12,21 @@ pub enum TraceError {
         "column {column} has {found} values, column {first} has {expected}; all columns of a trace need as many"
     )]
     Length {
-        /// The first column.
+        /// Name of the first column.
         first: String,
-        /// Its length.
+        /// Number of its values.
         expected: usize,
         /// The first that differs.
         column: String,
-        /// Its length.
+        /// Number of its values.
         found: usize,
     },
     /// The file cannot be written.
     #[error("cannot write {}", path.display())]
     Write {
-        /// The file.
+        /// Path of the file.
         path: PathBuf,
-        /// Why.
+        /// The error that caused this.
         source: io::Error,
     },
 }

@@ -13,7 +13,7 @@ use crate::experiment::metrics::{largest, rms};
 use crate::experiment::run::{AxisTrace, RunError, run};
 use crate::experiment::run_configuration::RunConfiguration;
 use crate::gcode::{Place, Trajectory, Vector};
-use crate::machine::Machine;
+use crate::machine::LawMachine;
 use crate::plant::SimulatedStage;
 
 /// The program's motion, sampled at the control rate.
@@ -118,7 +118,7 @@ fn run_one<S: Scalar>(
         ))
     });
     let resolution_mm = stage.axes.each_ref().map(|axis| axis.encoder.resolution_mm);
-    let mut machine = Machine::<S, ELEMENTS>::with_plan(stage.build()?, motions);
+    let mut machine = LawMachine::<S, ELEMENTS>::with_plan(stage.build()?, motions);
     let mut plant = SimulatedStage::new(&setup.truth, stage.rate_hz, seed);
     let most_ticks = tables.places.len() + 10_000;
     let traces = run(&mut machine, &mut plant, resolution_mm, most_ticks)?;

@@ -22,7 +22,7 @@ use crate::experiment::metrics::{largest, rms};
 use crate::experiment::run::{RunError, run};
 use crate::experiment::run_configuration::RunConfiguration;
 use crate::identify::single_state::with_all_models;
-use crate::machine::Machine;
+use crate::machine::LawMachine;
 use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
 use crate::record::{AxisLimits, Record};
 
@@ -310,7 +310,7 @@ fn run_record<S: Scalar>(
     let mut truth = StageTruth::ideal();
     truth.axes[0] = axis.truth.clone();
     let table = RecordedTable::new(positions, ticks_per_sample, settings.motion_scale(0));
-    let mut machine = Machine::<S, ELEMENTS>::with_plan(
+    let mut machine = LawMachine::<S, ELEMENTS>::with_plan(
         settings.build()?,
         [Motion::Recorded(table), Motion::Hold, Motion::Hold],
     );

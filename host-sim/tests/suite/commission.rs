@@ -5,6 +5,7 @@ use std::path::Path;
 
 use crate::command::succeed;
 use quadrant::feedforward::FeedforwardKind;
+use quadrant::settings::AxisSettings;
 use quadrant_sim::settings_file::SettingsFile;
 
 /// A column of the verdict, law by law.
@@ -50,6 +51,44 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
         ("PID", "N-PID + static + GMS")
     );
     assert!(*nonlinear < 0.85 * alone && *best < 0.1 * alone, "{rms:?}");
+
+    let again = succeed(
+        at,
+        &[
+            "commission",
+            "--axis",
+            "x",
+            "--record",
+            "x",
+            "--into",
+            "again.toml",
+            "--out",
+            "again",
+        ],
+    );
+    assert!(
+        !again.contains("Simulated") && !again.contains("Tracking error"),
+        "{again}"
+    );
+    let saved = SettingsFile::read(at.join("again.toml")).unwrap();
+    let [found, known] = [&saved.stage.axes[0], axis];
+    let close = |found: f64, known: f64, share: f64| {
+        assert!(
+            (found / known - 1.0).abs() < share,
+            "{found} is not {known}"
+        );
+    };
+    let kp = |of: &AxisSettings| of.feedback.pid.kp_v_per_mm;
+    close(kp(found), kp(known), 0.01);
+    let breakaway_v = |of: &AxisSettings| of.friction.sliding.positive.curve.breakaway_v;
+    close(breakaway_v(found), breakaway_v(known), 1e-6);
+    let stiffness = |of: &AxisSettings| -> f64 {
+        let elements = of.friction.gms.elements.iter();
+        elements.map(|element| element.stiffness_v_per_mm).sum()
+    };
+    close(stiffness(found), stiffness(known), 1e-3);
+    assert!(!at.join("again/verdict.csv").exists());
+    assert!(at.join("again/commission.html").exists());
 
     let mut reference = "t_s,reference_mm\n".to_owned();
     for index in 0..1500 {

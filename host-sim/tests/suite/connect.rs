@@ -34,7 +34,7 @@ fn session(folder: &Path, options: &[&str], script: &str) -> Output {
     child.wait_with_output().unwrap()
 }
 
-/// What a session that must succeed prints.
+/// Returns the output of a session that must succeed.
 fn succeeds(folder: &Path, options: &[&str], script: &str) -> String {
     let output = session(folder, options, script);
     let errors = String::from_utf8_lossy(&output.stderr).into_owned();
@@ -327,7 +327,7 @@ fn every_shell_gets_its_completions() {
 }
 
 #[test]
-fn hands_press_inputs_and_pull_the_plug() {
+fn inputs_are_pressed_and_the_supply_is_cut() {
     let folder = tempfile::tempdir().unwrap();
     let said = succeeds(
         folder.path(),

@@ -18,8 +18,9 @@ use quadrant::link::server::LinkServer;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_sim::machine::application::{Running, Start};
+use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::{SimulatedStage, StageTruth};
-use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 
 use crate::common::Noise;
 use crate::link_traffic::{arrival, framed};

@@ -10,8 +10,8 @@ use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::rig::SimulatedRig;
 use quadrant_sim::settings_file::SettingsFile;
 use rayon::prelude::*;
 
@@ -26,7 +26,7 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
         .zip(StageTruth::real().axes)
         .enumerate()
         .for_each(|(index, (axis, truth))| {
-            let mut rig = SimulatedRig::new(index, truth, 1);
+            let mut rig = SimulatedTestAxis::new(index, truth, 1);
             let request = CommissionSettings::default();
             *axis = commission(&mut rig, axis, &request, &mut |_, _| {})
                 .unwrap()

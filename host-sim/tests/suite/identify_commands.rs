@@ -116,6 +116,8 @@ fn what_was_measured_is_identified_again_from_its_files() {
         let record = format!("{step}/{file}");
         let mass = "--moving-mass-kg=12";
         let mut arguments = vec![step, "--record", &record, "--out", "again"];
+        let into = format!("{step}.toml");
+        arguments.extend(["--axis", "z", "--into", &into]);
         if step == "motor-constant" {
             arguments.push(mass);
         }
@@ -127,6 +129,74 @@ fn what_was_measured_is_identified_again_from_its_files() {
             &text(at, &format!("{step}/{table}")),
             &text(at, &format!("again/{table}")),
         );
+    }
+    let written = |step: &str, set: &str| {
+        let file = SettingsFile::read(at.join(format!("{step}.toml"))).unwrap();
+        assert_eq!(file.provenance[0].sets, [set]);
+        assert_eq!(file.stage.axes[1], StageSettings::simulated().axes[1]);
+        file.stage.axes[2].clone()
+    };
+    let z = &StageSettings::simulated().axes[2];
+    assert_ne!(
+        written("static-friction", "friction").friction.sliding,
+        z.friction.sliding
+    );
+    assert_ne!(
+        written("virgin-curve", "friction").friction.gms,
+        z.friction.gms
+    );
+    // A slow PID in place of the default one, and no model before one is identified.
+    let first = written("motor-constant", "first PID");
+    let kp = first.feedback.pid.kp_v_per_mm;
+    assert!(kp > 0.0 && kp < z.feedback.pid.kp_v_per_mm, "{kp}");
+    assert_eq!(first.plant, None);
+}
+
+#[test]
+fn a_step_is_the_same_on_a_machine_and_in_the_console() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let shown = succeed(
+        at,
+        &[
+            "motor-constant",
+            "--machine",
+            "simulated",
+            "--axis",
+            "y",
+            "--into",
+            "stage.toml",
+            "--out",
+            "a",
+        ],
+    );
+    assert!(shown.contains("Simulated, not measured"), "{shown}");
+    let connect = "connect --simulated identify motor-constant y --out b.csv";
+    let words: Vec<&str> = connect.split(' ').collect();
+    let console = command::succeed(at, &words);
+    assert!(console.contains("Motor constant"), "{console}");
+    // Another session, so other noise: a request more or less.
+    let rows = |name: &str| text(at, name).lines().count() as f64;
+    let ratio = rows("a/motor-constant-recording.csv") / rows("b.csv");
+    assert!((ratio - 1.0).abs() < 0.05, "{ratio}");
+    let dumped = SettingsFile::read(at.join("stage.toml")).unwrap();
+    assert_eq!(dumped.stage.axes[0], StageSettings::simulated().axes[0]);
+}
+
+#[test]
+fn a_machine_that_cannot_be_measured_is_refused_with_a_remedy() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (arguments, part) in [
+        ("plant --axis x --machine board", "serial:PORT"),
+        ("plant --axis x --machine serial:/dev/none", "dialout"),
+        ("frf --axis x --machine simulated", "--travel"),
+        ("frf --record a.csv --machine simulated", "--machine"),
+        ("plant --record a.csv --into stage.toml", "--axis"),
+    ] {
+        let words: Vec<&str> = arguments.split(' ').collect();
+        let said = fail(at, &words);
+        assert!(said.contains(part), "{arguments}: {said}");
     }
 }
 
@@ -181,6 +251,8 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
             "z",
             "--out",
             "b",
+            "--into",
+            "b/settings.toml",
         ],
     );
     let inertia = |folder: &str| value(&at.join(folder).join("motion-parameters.csv"), "M'");

@@ -3,14 +3,15 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::plant_model::PlantModel;
-use quadrant_sim::commission::bootstrap::first_settings;
+use quadrant_sim::commission::bootstrap::bootstrap_settings;
 use quadrant_sim::identify::excitation::Waveform;
 use quadrant_sim::identify::frf::{
     FrfError, FrfMeasurement, FrfSettings, SavedError, SavedSettings, measure, response_of,
 };
 use quadrant_sim::identify::response::FrequencyResponse;
+use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Recording, Rig, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 /// The sliding axis: the viscous friction is part of its damping, and there is no spring.
 fn sliding(truth: &AxisTruth) -> PlantModel {
@@ -28,11 +29,11 @@ fn x_truth() -> AxisTruth {
 }
 
 /// The x axis under the slow first controller.
-fn slow_rig(truth: &AxisTruth, seed: u64) -> SimulatedRig {
-    let mut rig = SimulatedRig::new(0, truth.clone(), seed);
-    let settings = first_settings(rig.settings(), truth.gain_mm_per_v_s2, 1e4);
-    rig.apply(&settings).unwrap();
-    rig
+fn slow_rig(truth: &AxisTruth, seed: u64) -> SimulatedTestAxis {
+    let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), seed);
+    let settings = bootstrap_settings(test_axis.settings(), truth.gain_mm_per_v_s2, 1e4);
+    test_axis.apply(&settings).unwrap();
+    test_axis
 }
 
 /// The default measurement with an excitation that leaves every pass sliding, whatever its phases.
@@ -43,8 +44,8 @@ fn gentle() -> FrfSettings {
     settings
 }
 
-fn measured(rig: &mut SimulatedRig, settings: &FrfSettings) -> FrfMeasurement {
-    measure(rig, settings, &mut |_| {}).unwrap()
+fn measured(test_axis: &mut SimulatedTestAxis, settings: &FrfSettings) -> FrfMeasurement {
+    measure(test_axis, settings, &mut |_| {}).unwrap()
 }
 
 /// Largest distance from the model over the lines with a coherence above 0.95, dB and deg, and how many lines these are.
@@ -106,12 +107,12 @@ fn a_stiff_loop_leaves_no_wrong_line_with_a_high_coherence() {
     let truth = x_truth();
     for seed in 1..=5 {
         // The axis' own controller: below its crossover the voltage hardly shows the injection.
-        let mut rig = SimulatedRig::new(0, truth.clone(), seed);
+        let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), seed);
         let mut settings = gentle();
         settings.excitation.rms_v = 0.05;
         settings.excitation.seed = 1000 * seed;
         settings.periods = 40;
-        let found = measured(&mut rig, &settings);
+        let found = measured(&mut test_axis, &settings);
         assert_true(&found.estimate.response, &sliding(&truth), 30);
     }
 }
@@ -121,13 +122,13 @@ fn under_feedback_h1_is_biased_and_the_instrument_is_not() {
     // Encoder noise of three counts and a weak excitation: the loop carries the noise into the voltage.
     let mut truth = x_truth();
     truth.imperfections.encoder_noise_mm = 1.5e-3;
-    let mut rig = SimulatedRig::new(0, truth.clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), 1);
     let mut settings = gentle();
     settings.excitation.rms_v = 0.0015;
     settings.excitation.band_hz = (80.0, 300.0);
     settings.excitation.rise_hz = 0.0;
     settings.periods = 800;
-    let found = measured(&mut rig, &settings);
+    let found = measured(&mut test_axis, &settings);
     let mean_ratio = |response: &FrequencyResponse| {
         let points = &response.points;
         let sum: num_complex::Complex64 = points

@@ -7,8 +7,9 @@ use quadrant_sim::identify::motion::{
     recommended, replay_closed_loop, replay_open_loop, shuttle,
 };
 use quadrant_sim::identify::setting::SettingError;
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Recording, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 /// Of the EMPS drive (see the record's own description).
 const FORCE_N_PER_V: f64 = 35.150_651_882_485_47;
@@ -98,8 +99,8 @@ fn the_models_of_emps_move_as_the_machine_did() {
 
 /// An ordinary motion of an axis of the simulated stage.
 fn simulated(index: usize, truth: &AxisTruth) -> Recording {
-    let mut rig = SimulatedRig::new(index, truth.clone(), 1);
-    shuttle(&mut rig, 2, &mut |_| {}).unwrap()
+    let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), 1);
+    shuttle(&mut test_axis, 2, &mut |_| {}).unwrap()
 }
 
 #[test]

@@ -3,14 +3,20 @@
 use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantError, MotorConstantSettings, evaluate, measure,
 };
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Recording, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 const RESOLUTION_MM: f64 = 5e-4;
 
 fn test_of(truth: &AxisTruth, index: usize, seed: u64) -> MotorConstant {
-    let mut rig = SimulatedRig::new(index, truth.clone(), seed);
-    measure(&mut rig, &MotorConstantSettings::default(), &mut |_| {}).unwrap()
+    let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
+    measure(
+        &mut test_axis,
+        &MotorConstantSettings::default(),
+        &mut |_| {},
+    )
+    .unwrap()
 }
 
 fn evaluated(recording: Recording) -> Result<MotorConstant, MotorConstantError> {
@@ -69,12 +75,12 @@ fn an_axis_that_moves_the_wrong_way_is_refused() {
 
 #[test]
 fn an_axis_that_friction_holds_is_refused() {
-    let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
     let settings = MotorConstantSettings {
         most_level_v: 0.04,
         ..MotorConstantSettings::default()
     };
-    let error = measure(&mut rig, &settings, &mut |_| {}).unwrap_err();
+    let error = measure(&mut test_axis, &settings, &mut |_| {}).unwrap_err();
     assert!(
         matches!(error, MotorConstantError::Still { level_v } if level_v == 0.04),
         "{error}"

@@ -3,12 +3,17 @@
 use quadrant_sim::identify::characteristic::{
     Characteristic, CharacteristicError, CharacteristicSettings, evaluate, measure,
 };
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Recording, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 fn coast(index: usize, truth: AxisTruth) -> Result<Characteristic, CharacteristicError> {
-    let mut rig = SimulatedRig::new(index, truth, 3);
-    measure(&mut rig, &CharacteristicSettings::default(), &mut |_| {})
+    let mut test_axis = SimulatedTestAxis::new(index, truth, 3);
+    measure(
+        &mut test_axis,
+        &CharacteristicSettings::default(),
+        &mut |_| {},
+    )
 }
 
 /// Distance in which the axis stops from a speed, by small steps of the equation of motion, mm.
@@ -76,12 +81,12 @@ fn control_follows_the_line_of_its_slope_up_to_the_knee_and_the_trajectory_beyon
 
 #[test]
 fn an_axis_that_stays_slow_and_recordings_that_are_no_test_are_refused() {
-    let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
     let weak = CharacteristicSettings {
         most_voltage_v: 0.15,
         ..CharacteristicSettings::default()
     };
-    let error = measure(&mut rig, &weak, &mut |_| {}).unwrap_err();
+    let error = measure(&mut test_axis, &weak, &mut |_| {}).unwrap_err();
     assert!(matches!(error, CharacteristicError::Slow { .. }), "{error}");
 
     let still = Recording {

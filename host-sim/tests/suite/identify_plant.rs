@@ -1,10 +1,10 @@
 //! The linear model of the simulated stage's axes, fitted to measured responses and judged against their truth.
 
-use quadrant_sim::commission::bootstrap::first_settings;
+use quadrant_sim::commission::bootstrap::bootstrap_settings;
 use quadrant_sim::identify::frf::{FrfMeasurement, FrfSettings, measure};
 use quadrant_sim::identify::plant::{PlantError, PlantFit, PlantFitSettings, Stiffness, fit_plant};
+use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Rig, SimulatedRig};
 
 const SLIDING: PlantFitSettings = PlantFitSettings {
     least_coherence: 0.9,
@@ -39,10 +39,10 @@ fn settings(seed: u64) -> FrfSettings {
 
 /// Measures under the slow first controller, which knows A with an error of a third.
 fn measured(index: usize, truth: &AxisTruth, settings: &FrfSettings, seed: u64) -> FrfMeasurement {
-    let mut rig = SimulatedRig::new(index, truth.clone(), seed);
-    let first = first_settings(rig.settings(), 1.3 * truth.gain_mm_per_v_s2, 1e4);
-    rig.apply(&first).unwrap();
-    measure(&mut rig, settings, &mut |_| {}).unwrap()
+    let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
+    let first = bootstrap_settings(test_axis.settings(), 1.3 * truth.gain_mm_per_v_s2, 1e4);
+    test_axis.apply(&first).unwrap();
+    measure(&mut test_axis, settings, &mut |_| {}).unwrap()
 }
 
 fn fitted(measurement: &FrfMeasurement) -> PlantFit {

@@ -6,12 +6,13 @@ use quadrant_sim::identify::at_rest::AtRest;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::identify::revise::{ExplicitFriction, ReviseError};
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::rig::{Recording, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 fn excited(rms_v: f64) -> (AtRest, AxisSettings) {
     let settings = identified_settings().unwrap().stage.axes[0].clone();
-    let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
     let excitation = Excitation {
         waveform: Waveform::Multisine,
         rms_v,
@@ -20,7 +21,7 @@ fn excited(rms_v: f64) -> (AtRest, AxisSettings) {
         period_s: 0.5,
         seed: 1,
     };
-    let measured = AtRest::measure(&mut rig, &settings, excitation, 6, &mut |_| {}).unwrap();
+    let measured = AtRest::measure(&mut test_axis, &settings, excitation, 6, &mut |_| {}).unwrap();
     (measured, settings)
 }
 

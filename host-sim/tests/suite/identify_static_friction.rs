@@ -6,15 +6,15 @@ use quadrant_sim::identify::static_friction::{
     Exponent, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings, fit_map,
     measure,
 };
+use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Rig, SimulatedRig};
 
 /// An axis under its own PID.
-fn rig(index: usize, truth: &AxisTruth, seed: u64) -> SimulatedRig {
-    let mut rig = SimulatedRig::new(index, truth.clone(), seed);
-    let settings = measuring_settings(rig.settings());
-    rig.apply(&settings).unwrap();
-    rig
+fn test_axis(index: usize, truth: &AxisTruth, seed: u64) -> SimulatedTestAxis {
+    let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
+    let settings = measuring_settings(test_axis.settings());
+    test_axis.apply(&settings).unwrap();
+    test_axis
 }
 
 /// The runs of a commissioning.
@@ -34,8 +34,8 @@ fn few_runs() -> StaticFrictionSettings {
     }
 }
 
-fn mapped(rig: &mut SimulatedRig, settings: &StaticFrictionSettings) -> FrictionMap {
-    measure(rig, settings, &mut |_| {}).unwrap().0
+fn mapped(test_axis: &mut SimulatedTestAxis, settings: &StaticFrictionSettings) -> FrictionMap {
+    measure(test_axis, settings, &mut |_| {}).unwrap().0
 }
 
 /// Friction of the positive direction by `factor`, of the negative by its mirror image around 1; nothing pushes.
@@ -61,7 +61,7 @@ fn leaning(factor: f64) -> AxisTruth {
 #[test]
 fn every_axis_shows_its_friction_in_both_directions() {
     for (index, truth) in StageTruth::real().axes.iter().enumerate() {
-        let map = mapped(&mut rig(index, truth, 1), &runs());
+        let map = mapped(&mut test_axis(index, truth, 1), &runs());
         let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
         let offset_v = truth.imperfections.offset_v;
         for (model, exact, pushed_v) in [
@@ -96,7 +96,7 @@ fn every_axis_shows_its_friction_in_both_directions() {
 #[test]
 fn a_friction_that_depends_on_direction_is_found() {
     for factor in [1.15, 0.9] {
-        let map = mapped(&mut rig(0, &leaning(factor), 2), &few_runs());
+        let map = mapped(&mut test_axis(0, &leaning(factor), 2), &few_runs());
         let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap().models();
         let ratio = found.positive.curve.coulomb_v / found.negative.curve.coulomb_v;
         let exact = factor / (2.0 - factor);
@@ -108,7 +108,7 @@ fn a_friction_that_depends_on_direction_is_found() {
 fn an_offset_of_the_amplifier_shows_as_the_difference_of_equal_frictions() {
     let mut truth = leaning(1.0);
     truth.imperfections.offset_v = 0.008;
-    let map = mapped(&mut rig(0, &truth, 3), &few_runs());
+    let map = mapped(&mut test_axis(0, &truth, 3), &few_runs());
     let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
     assert!((found.offset_v - 0.008).abs() < 5e-4, "{}", found.offset_v);
     let (coulomb_v, _) = found.mean_levels_v();
@@ -123,7 +123,7 @@ fn stick_slip_at_the_low_end_is_detected_and_does_not_count() {
         stretch_mm: 1.0,
         ..StaticFrictionSettings::default()
     };
-    let map = mapped(&mut rig(0, &StageTruth::real().axes[0], 1), &settings);
+    let map = mapped(&mut test_axis(0, &StageTruth::real().axes[0], 1), &settings);
     let slowest = map.runs.iter().filter(|run| run.velocity_mm_s.abs() < 0.04);
     assert!(slowest.clone().count() == 2 && slowest.clone().all(|run| run.stick_slip));
     let mut fast = map.runs.iter().filter(|run| run.velocity_mm_s.abs() > 1.0);
@@ -136,14 +136,20 @@ fn stick_slip_at_the_low_end_is_detected_and_does_not_count() {
 
 #[test]
 fn an_axis_under_its_own_controller_does_not_stick_and_slip() {
-    let map = mapped(&mut rig(0, &StageTruth::real().axes[0], 1), &few_runs());
+    let map = mapped(
+        &mut test_axis(0, &StageTruth::real().axes[0], 1),
+        &few_runs(),
+    );
     assert_eq!(map.runs.len(), 16);
     assert!(map.runs.iter().all(|run| !run.stick_slip));
 }
 
 #[test]
 fn a_map_that_is_too_thin_or_has_wrong_signs_is_refused() {
-    let mut map = mapped(&mut rig(0, &StageTruth::real().axes[0], 1), &few_runs());
+    let mut map = mapped(
+        &mut test_axis(0, &StageTruth::real().axes[0], 1),
+        &few_runs(),
+    );
     let thin = FrictionMap {
         runs: map.runs[3..].to_vec(),
     };
@@ -167,12 +173,12 @@ fn a_map_that_is_too_thin_or_has_wrong_signs_is_refused() {
 
 #[test]
 fn runs_that_cannot_be_made_are_refused_before_the_axis_moves() {
-    let mut rig = rig(0, &StageTruth::real().axes[0], 1);
+    let mut test_axis = test_axis(0, &StageTruth::real().axes[0], 1);
     let far = StaticFrictionSettings {
         velocities_mm_s: (1.0, 90.0),
         ..StaticFrictionSettings::default()
     };
-    let error = measure(&mut rig, &far, &mut |_| {}).unwrap_err();
+    let error = measure(&mut test_axis, &far, &mut |_| {}).unwrap_err();
     assert!(
         matches!(error, StaticFrictionError::Travel { velocity_mm_s, .. } if velocity_mm_s > 50.0),
         "{error}"
@@ -188,7 +194,7 @@ fn runs_that_cannot_be_made_are_refused_before_the_axis_moves() {
             ..runs()
         },
     ] {
-        let error = measure(&mut rig, &settings, &mut |_| {}).unwrap_err();
+        let error = measure(&mut test_axis, &settings, &mut |_| {}).unwrap_err();
         assert!(matches!(error, StaticFrictionError::Setting(_)), "{error}");
     }
 }

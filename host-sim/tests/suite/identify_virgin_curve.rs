@@ -5,23 +5,24 @@ use std::f64::consts::TAU;
 use quadrant::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
 use quadrant::friction::stribeck::{SlidingTable, StaticFriction};
 use quadrant::friction::{Direction, PerDirection};
-use quadrant_sim::commission::bootstrap::quiet_settings;
+use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::identify::virgin_curve::{
     Knots, VirginCurveError, VirginCurveSettings, identify, measure,
 };
+use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::{Recording, Rig, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 /// An axis under the quiet controller, and the amplitude that a commissioning chooses, mm.
-fn quiet_rig(index: usize, seed: u64) -> (SimulatedRig, f64) {
+fn quiet_rig(index: usize, seed: u64) -> (SimulatedTestAxis, f64) {
     let truth = StageTruth::real().axes[index].clone();
     let breakaway_v = truth.friction.positive.curve.breakaway_v;
-    let mut rig = SimulatedRig::new(index, truth, seed);
-    let plant = rig.settings().plant.unwrap();
-    let quiet = quiet_settings(rig.settings(), &plant, rig.axis().rate_hz);
-    rig.apply(&quiet).unwrap();
+    let mut test_axis = SimulatedTestAxis::new(index, truth, seed);
+    let plant = test_axis.settings().plant.unwrap();
+    let quiet = low_bandwidth_settings(test_axis.settings(), &plant, test_axis.info().rate_hz);
+    test_axis.apply(&quiet).unwrap();
     let usual = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
-    (rig, usual.amplitude_mm)
+    (test_axis, usual.amplitude_mm)
 }
 
 fn sine(amplitude_mm: f64) -> VirginCurveSettings {
@@ -32,8 +33,8 @@ fn sine(amplitude_mm: f64) -> VirginCurveSettings {
 }
 
 fn recorded(index: usize, seed: u64) -> Recording {
-    let (mut rig, amplitude_mm) = quiet_rig(index, seed);
-    measure(&mut rig, &sine(amplitude_mm), &mut |_| {}).unwrap()
+    let (mut test_axis, amplitude_mm) = quiet_rig(index, seed);
+    measure(&mut test_axis, &sine(amplitude_mm), &mut |_| {}).unwrap()
 }
 
 fn refusal(recording: &Recording, knots: &Knots) -> VirginCurveError {
@@ -89,13 +90,13 @@ fn without_the_static_friction_the_record_s_own_plateau_stands_for_it() {
 fn too_small_an_amplitude_is_refused_with_one_that_suffices() {
     for index in 0..3 {
         // The thesis' 10 um, which the quiet controller does not turn into enough voltage.
-        let (mut rig, _) = quiet_rig(index, 3);
-        let record = measure(&mut rig, &VirginCurveSettings::default(), &mut |_| {}).unwrap();
+        let (mut test_axis, _) = quiet_rig(index, 3);
+        let record = measure(&mut test_axis, &VirginCurveSettings::default(), &mut |_| {}).unwrap();
         let error = refusal(&record, &Knots::Automatic(4));
         let VirginCurveError::NoPlateau { needed_um, .. } = error else {
             panic!("{error}");
         };
-        let larger = measure(&mut rig, &sine(1e-3 * needed_um), &mut |_| {}).unwrap();
+        let larger = measure(&mut test_axis, &sine(1e-3 * needed_um), &mut |_| {}).unwrap();
         let found = identify(&larger, None, &Knots::Automatic(4)).unwrap();
         assert!(found.prediction.relative_error < 0.06);
     }
@@ -103,12 +104,12 @@ fn too_small_an_amplitude_is_refused_with_one_that_suffices() {
 
 #[test]
 fn an_axis_that_hardly_moves_is_refused() {
-    let (mut rig, usual_mm) = quiet_rig(0, 4);
+    let (mut test_axis, usual_mm) = quiet_rig(0, 4);
     let short = VirginCurveSettings {
         cycles: 1.0,
         ..sine(usual_mm)
     };
-    let record = measure(&mut rig, &short, &mut |_| {}).unwrap();
+    let record = measure(&mut test_axis, &short, &mut |_| {}).unwrap();
     let error = refusal(&record, &Knots::Automatic(4));
     assert!(
         matches!(error, VirginCurveError::TooFewReversals { reversals, .. } if reversals < 4),

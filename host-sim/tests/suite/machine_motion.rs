@@ -14,7 +14,7 @@ use quadrant::reference::{
 use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::units::Position;
-use quadrant_sim::machine::Machine;
+use quadrant_sim::machine::LawMachine;
 use quadrant_sim::plant::{MarkTruth, SimulatedStage, StageTruth};
 
 /// Length of a count, mm.
@@ -23,7 +23,7 @@ const COUNT_MM: f64 = 5e-4;
 /// Machine and stage under one clock.
 struct Bench {
     settings: StageSettings,
-    machine: Machine<f32, 4>,
+    machine: LawMachine<f32, 4>,
     plant: SimulatedStage,
 }
 
@@ -34,7 +34,7 @@ impl Bench {
             plan: PlanSettings::default(),
         };
         let mut bench = Self {
-            machine: Machine::new(&job).expect("valid"),
+            machine: LawMachine::new(&job).expect("valid"),
             plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 7),
             settings: job.stage,
         };

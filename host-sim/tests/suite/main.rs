@@ -7,7 +7,7 @@ mod command;
 mod commission;
 mod connect;
 mod connect_commission;
-mod connected_rig;
+mod connected_axis;
 mod default_gains;
 mod design_commands;
 mod design_npid;
@@ -38,8 +38,8 @@ mod record_experiment;
 mod record_large;
 mod record_refusals;
 mod record_trace;
-mod rig;
 mod simulated_machine;
+mod test_axis;
 mod transcript;
 
 #[allow(dead_code, reason = "the law's tests use the rest")]

@@ -6,7 +6,7 @@ use std::process::Command;
 use std::sync::LazyLock;
 
 use proptest::prelude::*;
-use quadrant_sim::rig::Recording;
+use quadrant_sim::record::Recording;
 use tempfile::TempDir;
 
 /// Runs `quadrant identify`; what it said, and whether it succeeded.
@@ -57,7 +57,7 @@ fn spoilt(header: &str, edit: impl Fn(usize, &mut Vec<String>)) -> String {
     text
 }
 
-/// What `identify frf --record` says to a text; it must refuse.
+/// Returns the error of `identify frf --record` for a text that it must refuse.
 fn refusal(text: &str, options: &[&str]) -> String {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("bad.csv"), text).unwrap();
@@ -317,7 +317,13 @@ fn options_that_cannot_be_are_refused() {
     }
     let (done, message) = identify(
         GOOD.folder.path(),
-        &["frf", "--axis", "x", "--record", "m/frf-recording-1.csv"],
+        &[
+            "frf",
+            "--machine",
+            "law",
+            "--record",
+            "m/frf-recording-1.csv",
+        ],
     );
     assert!(
         !done && message.contains("cannot be used with"),

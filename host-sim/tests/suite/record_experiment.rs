@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use quadrant_sim::rig::Recording;
+use quadrant_sim::record::Recording;
 
 fn read(text: &str) -> Result<Recording, String> {
     let folder = tempfile::tempdir().unwrap();

@@ -9,9 +9,10 @@ use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
+use quadrant_sim::machine::{Drive, Experiment, SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::record::RecordError;
-use quadrant_sim::rig::{Drive, Experiment, Recording, Rig, SimulatedRig};
+use quadrant_sim::record::Recording;
 
 const ROWS: usize = 10_000_000;
 /// Rows of a stretch that repeats in the file.
@@ -20,7 +21,7 @@ const RATE_HZ: f64 = 1e4;
 
 /// An axis shaken in open loop.
 fn shaken() -> Recording {
-    let mut rig = SimulatedRig::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
     let excitation = Excitation {
         waveform: Waveform::Random,
         rms_v: 0.3,
@@ -30,17 +31,18 @@ fn shaken() -> Recording {
         seed: 1,
     };
     let periods = STRETCH / excitation.period(RATE_HZ);
-    rig.perform(
-        &Experiment {
-            name: "a long recording".to_owned(),
-            drive: Drive::OpenLoop,
-            injection_v: excitation.samples(RATE_HZ, periods),
-            decimation: 1,
-            time_limit_s: 1e3,
-        },
-        &mut |_| {},
-    )
-    .unwrap()
+    test_axis
+        .perform(
+            &Experiment {
+                name: "a long recording".to_owned(),
+                drive: Drive::OpenLoop,
+                injection_v: excitation.samples(RATE_HZ, periods),
+                decimation: 1,
+                time_limit_s: 1e3,
+            },
+            &mut |_| {},
+        )
+        .unwrap()
 }
 
 fn write_rows(path: &Path, recording: &Recording, rows: usize) {

@@ -6,11 +6,12 @@ use quadrant::link::message::{
     AxisSet, Body, CaptureRequest, Event, LinkError, Message, Notice, Reply, Request, Response,
     SettingsRequest, Status, StreamRequest, TelemetryRequest, Value,
 };
+
 use quadrant::safety::Switches;
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_sim::machine::simulated::SimulatedMachine;
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::simulated_machine::SimulatedMachine;
 
 struct Session {
     machine: SimulatedMachine,

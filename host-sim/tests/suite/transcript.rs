@@ -11,7 +11,7 @@ const SETTINGS: &str = include_str!("../../data/identified-stage.toml");
 /// Before the firmware's log, in the transcript of the emulated board.
 const LOG: &str = "> log\n";
 
-/// What a machine prints, and the folder with its files.
+/// Transcript of a machine, and the folder with its files.
 struct Told {
     transcript: String,
     folder: tempfile::TempDir,
@@ -91,7 +91,7 @@ fn number(lines: &[&str], words: &str, before: &str) -> f64 {
     word.trim_end_matches(',').parse().unwrap()
 }
 
-/// Checks what must be true of a session whatever its numbers are.
+/// Checks what is true of a story whatever its numbers are.
 fn check(told: &Told) {
     let lines: Vec<&str> = told.transcript.lines().collect();
     // Bumpless: from tick to tick, the output steps no further than it did before the change.

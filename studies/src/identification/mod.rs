@@ -9,8 +9,8 @@ pub mod page;
 use indicatif::ProgressBar;
 use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisTruth, StageTruth};
-use quadrant_sim::rig::SimulatedRig;
 use rayon::prelude::*;
 
 /// Encoder noise of the runs, over that of the simulated stage.
@@ -130,7 +130,7 @@ pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, Commission
     let mut truth = StageTruth::real().axes[axis].clone();
     truth.imperfections.encoder_noise_mm *= noise;
     let base = StageSettings::simulated().axes[axis].clone();
-    let mut rig = SimulatedRig::new(axis, truth.clone(), seed);
+    let mut rig = SimulatedTestAxis::new(axis, truth.clone(), seed);
     let found = commission(
         &mut rig,
         &base,

@@ -6,8 +6,8 @@ use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::identify::characteristic::{
     CharacteristicError, CharacteristicSettings, measure,
 };
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::StageTruth;
-use quadrant_sim::rig::SimulatedRig;
 
 use crate::laws::comparison::{LawOutcome, compare_laws};
 use crate::laws::tuning::{TunedLaw, TuningError, tune_all};
@@ -58,7 +58,7 @@ pub fn run_study(
 ) -> Result<LawsStudy, LawsError> {
     let settings = &stage.axes[index];
     let truth = &StageTruth::real().axes[index];
-    let mut rig = SimulatedRig::new(index, truth.clone(), seed);
+    let mut rig = SimulatedTestAxis::new(index, truth.clone(), seed);
     let characteristic = measure(&mut rig, &CharacteristicSettings::default(), &mut |_| {})?;
     let laws = tune_all(settings, &characteristic, stage.rate_hz, seed, &|share| {
         advance(TUNING_SHARE * share);

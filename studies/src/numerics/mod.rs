@@ -14,7 +14,7 @@ use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_configuratio
 use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::machine::Machine;
+use quadrant_sim::machine::LawMachine;
 use rayon::prelude::*;
 
 /// Deviation of a number type from `f64`: the worst over all velocities and both kinds of model knowledge.
@@ -95,9 +95,9 @@ fn shadow(numerics: &mut Numerics, setup: &RunConfiguration, seed: u64) -> Resul
         most_ticks,
         mut operator,
     } = Bench::new(numerics.configuration, setup, AMPLITUDE_MM, seed);
-    let mut exact = Machine::<f64, ELEMENTS>::new(&job)?;
-    let mut single = Machine::<f32, ELEMENTS>::new(&job)?;
-    let mut fixed = Machine::<Fixed, ELEMENTS>::new(&job)?;
+    let mut exact = LawMachine::<f64, ELEMENTS>::new(&job)?;
+    let mut single = LawMachine::<f32, ELEMENTS>::new(&job)?;
+    let mut fixed = LawMachine::<Fixed, ELEMENTS>::new(&job)?;
     for tick in 0..most_ticks {
         let input = InputRecord::of_counts(plant.read_counters(), operator.request(tick as u32));
         let outputs = exact.tick(&input);
@@ -111,8 +111,8 @@ fn shadow(numerics: &mut Numerics, setup: &RunConfiguration, seed: u64) -> Resul
 }
 
 fn differ<S: Scalar>(
-    exact: &Machine<f64, ELEMENTS>,
-    other: &Machine<S, ELEMENTS>,
+    exact: &LawMachine<f64, ELEMENTS>,
+    other: &LawMachine<S, ELEMENTS>,
     deviation: &mut Deviation,
 ) {
     let axes = exact.state().axes().iter().zip(other.state().axes());

@@ -11,9 +11,9 @@ use quadrant_sim::design::robustness::{Uncertainty, robustness};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::time_varying::VaryingLoop;
 use quadrant_sim::design::{Form, Process};
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::StageTruth;
 use quadrant_sim::report::Section;
-use quadrant_sim::rig::SimulatedRig;
 
 use crate::report::{Context, Progress};
 use crate::thesis::chapter3::chapter3_sections;
@@ -33,7 +33,7 @@ pub(super) fn identification(
     progress: &Progress,
 ) -> anyhow::Result<Vec<Section>> {
     let [truth, ..] = StageTruth::real().axes;
-    let mut rig = SimulatedRig::new(0, truth, context.seed);
+    let mut rig = SimulatedTestAxis::new(0, truth, context.seed);
     let found = commission(
         &mut rig,
         &StageSettings::simulated().axes[0],

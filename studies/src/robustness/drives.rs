@@ -2,8 +2,8 @@
 
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionError, CommissionSettings, commission};
+use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisTruth, EncoderSide, StageTruth};
-use quadrant_sim::rig::SimulatedRig;
 use rayon::prelude::*;
 
 use crate::robustness::Scenario;
@@ -55,7 +55,7 @@ pub fn commission_drive(
     truth: &AxisTruth,
     seed: u64,
 ) -> Result<AxisSettings, CommissionError> {
-    let mut rig = SimulatedRig::new(index, truth.clone(), seed);
+    let mut rig = SimulatedTestAxis::new(index, truth.clone(), seed);
     let base = StageSettings::simulated().axes[index].clone();
     let request = CommissionSettings::default();
     Ok(commission(&mut rig, &base, &request, &mut |_, _| {})?.settings)

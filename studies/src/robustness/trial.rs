@@ -10,7 +10,7 @@ use quadrant_sim::compare::sine::AMPLITUDE_MM;
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
 use quadrant_sim::experiment::run::AxisTrace;
-use quadrant_sim::machine::{Machine, Operator};
+use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisTruth, SimulatedAxis};
 
@@ -157,7 +157,7 @@ impl Trial<'_> {
     pub(super) fn run(&self) -> Result<Ended, Stopped> {
         // The idle axes are like it, so that none waits for another.
         let [axis, ..] = &self.stage.axes;
-        let mut machine = Machine::<f32, ELEMENTS>::new(&Job {
+        let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job {
             stage: StageSettings {
                 axes: [axis.clone(), axis.clone(), axis.clone()],
                 ..self.stage.clone()

@@ -6,8 +6,8 @@ use quadrant_sim::identify::pages::linear::{plant_tables, response_section};
 use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
 use quadrant_sim::identify::pages::revise::revise_sections;
 use quadrant_sim::pages::{lines, series};
+use quadrant_sim::record::Recording;
 use quadrant_sim::report::{Block, Colour, Figure, Section, Style};
-use quadrant_sim::rig::Recording;
 
 use crate::thesis::numbers::{Number, number};
 

@@ -4,7 +4,7 @@
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
-use quadrant_sim::commission::bootstrap::quiet_settings;
+use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::compare::comparison::{Comparison, Request};
 use quadrant_sim::compare::sine::AMPLITUDE_MM;
 use quadrant_sim::experiment::configuration::Configuration;
@@ -12,8 +12,8 @@ use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::identify::virgin_curve;
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveError, VirginCurveSettings};
+use quadrant_sim::machine::{ExperimentError, SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::Imperfections;
-use quadrant_sim::rig::{Rig, RigError, SimulatedRig, approach};
 use rayon::prelude::*;
 
 /// Elements of the GMS models that are identified: up to the firmware's room. From nine on the search for the
@@ -146,7 +146,7 @@ pub enum StudyError {
     Settings(#[from] SettingsError),
     /// The run of the slow sine.
     #[error("GMS elements: {0}")]
-    Rig(#[from] RigError),
+    Rig(#[from] ExperimentError),
     #[error("GMS elements: {0}")]
     Identification(#[from] VirginCurveError),
     /// Settings without a model.
@@ -183,8 +183,8 @@ fn identify_elements(
     let sliding = &x.friction.sliding;
     let breakaway_v =
         0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
-    let mut rig = SimulatedRig::new(0, setup.truth.axes[0].clone(), seed);
-    let quiet = quiet_settings(x, &plant, rate_hz);
+    let mut rig = SimulatedTestAxis::new(0, setup.truth.axes[0].clone(), seed);
+    let quiet = low_bandwidth_settings(x, &plant, rate_hz);
     rig.apply(&quiet)?;
     approach(&mut rig, 0.0)?;
     let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);

@@ -7,13 +7,13 @@ use quadrant::safety::FaultCode;
 use quadrant::settings::StageSettings;
 use quadrant::stage::Outputs;
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
-use quadrant_sim::simulated_machine::MemoryFlash;
+use quadrant_sim::machine::memory_flash::MemoryFlash;
 
 use super::case::{configuration, moving};
 use super::finding::{Finding, latched, log_contains};
 use super::fixture::Fixture;
 use crate::reference_model;
-use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use quadrant_sim::machine::emulator::{Clock, Emulator, Memory};
 use xtask::image::Image;
 
 /// What ends a firmware, what the next one finds, and what it says of it.

@@ -8,8 +8,8 @@ use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::MarkTruth;
-use quadrant_sim::simulated_machine::MemoryFlash;
 
 use super::fixture::{Configuration, Fixture, InputFault};
 use super::streams;

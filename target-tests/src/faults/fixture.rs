@@ -16,9 +16,10 @@ use quadrant::motion::MotionMode;
 use quadrant::safety::{AxisSwitches, FaultCode};
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
-use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use quadrant_sim::machine::application::{Running, Start};
+use quadrant_sim::machine::emulator::{Clock, Emulator, Memory};
+use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::{MarkTruth, SimulatedStage, StageTruth};
-use quadrant_sim::simulated_machine::{MemoryFlash, Running, Start};
 
 use self::link::HostLink;
 use super::serial_ring::SerialRing;

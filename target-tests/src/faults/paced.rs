@@ -11,7 +11,7 @@ use quadrant::stage::Outputs;
 use super::finding::{Finding, are_off, log_contains};
 use crate::lockstep;
 use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
-use quadrant_sim::emulator::{Clock, Emulator, Memory};
+use quadrant_sim::machine::emulator::{Clock, Emulator, Memory};
 use xtask::image::Image;
 
 /// Ticks of the runs.

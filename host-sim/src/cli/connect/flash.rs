@@ -1,38 +1,15 @@
-//! What goes through a board's debug probe: `quadrant connect flash` and `log`.
+//! A board's debug probe: `quadrant connect flash` and `log --elf`.
 
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use anyhow::{Context, bail};
-use clap::Args;
 
-/// Options of `flash`.
-#[derive(Clone, Debug, Args)]
-pub(super) struct Arguments {
-    /// The firmware: the ELF file that `cargo build --profile firmware` leaves in target/thumbv7em-none-eabihf/firmware.
-    elf: PathBuf,
-    /// The chip, as probe-rs calls it.
-    #[arg(long, default_value = "STM32F446RETx")]
-    chip: String,
-    /// Stay, and show the firmware's log (defmt) until Ctrl-C.
-    #[arg(long)]
-    run: bool,
-}
-
-/// Options of `log`.
-#[derive(Clone, Debug, Args)]
-pub(super) struct LogArguments {
-    /// The firmware that is on the board: the ELF file it was flashed from, for its strings.
-    #[arg(long, value_name = "FILE")]
-    pub(super) elf: Option<PathBuf>,
-    /// The chip, as probe-rs calls it.
-    #[arg(long, default_value = "STM32F446RETx", requires = "elf")]
-    chip: String,
-}
+use super::command::{FlashOptions, LogOptions};
 
 /// Shows the log of a board that runs, until Ctrl-C.
-pub(super) fn log(elf: &PathBuf, arguments: &LogArguments) -> anyhow::Result<()> {
+pub(super) fn log(elf: &PathBuf, arguments: &LogOptions) -> anyhow::Result<()> {
     exists(elf)?;
     probe_rs(&["attach", "--chip", &arguments.chip], Some(elf))
 }
@@ -48,7 +25,7 @@ fn exists(elf: &Path) -> anyhow::Result<()> {
 }
 
 /// Flashes the firmware and lets it start.
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(super) fn run(arguments: &FlashOptions) -> anyhow::Result<()> {
     exists(&arguments.elf)?;
     if arguments.run {
         return probe_rs(&["run", "--chip", &arguments.chip], Some(&arguments.elf));

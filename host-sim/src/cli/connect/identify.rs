@@ -1,90 +1,45 @@
-//! `identify`: measurements on the connected machine, and what they say.
-
-use std::path::PathBuf;
+//! `identify`: measurements on the connected machine, by the code of `quadrant identify`.
 
 use anyhow::Context;
-use clap::{Args, Subcommand};
 use quadrant::axes::AxisName;
 use quadrant::settings::AxisSettings;
-use quadrant_sim::command::output::share;
-use quadrant_sim::commission::bootstrap::{limp_settings, measuring_settings, quiet_settings};
-use quadrant_sim::console::Client;
-use quadrant_sim::console::rig::ConnectedRig;
-use quadrant_sim::identify::frf::{self, FrfSettings};
-use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended, shuttle};
-use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
+use quadrant_sim::client::Client;
+use quadrant_sim::identify::frf::FrfSettings;
+use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended};
+use quadrant_sim::identify::motor_constant::MotorConstantSettings;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
-use quadrant_sim::identify::pages::linear::plant_tables;
+use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::motion::motion_table;
 use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
-use quadrant_sim::identify::static_friction::{self, Exponent, StaticFrictionSettings, fit_map};
-use quadrant_sim::identify::virgin_curve::{self, Knots, VirginCurveSettings};
+use quadrant_sim::identify::static_friction::{Exponent, StaticFrictionSettings, fit_map};
+use quadrant_sim::identify::virgin_curve::{self, Knots};
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::report::Table;
-use quadrant_sim::rig::Rig;
 use serde_json::json;
 
-use super::command::axis_parser;
-use super::commission::{travel, travel_mm};
-use super::drive::Answer;
+use super::answer::Answer;
+use super::command::{IdentifyCommand, IdentifyOptions};
+use crate::cli::identify::{frf, friction, motion, motor_constant, virgin_curve as sine};
+use crate::cli::subject::{on_axis, travel_mm};
 
-/// The measurements.
-#[derive(Clone, Debug, Subcommand)]
-pub(super) enum Command {
-    /// Move the axis to and fro by up to 60 mm, and find inertia and friction in that motion.
-    Motion(Options),
-    /// Move the axis at 16 velocities from 0.1 to 40 mm/s, both ways, and fit the static model; within +-100 mm.
-    StaticFriction(Options),
-    /// Move the axis in a slow sine of micrometres under a quiet controller, and identify the GMS model; needs a plant in the
-    /// settings.
-    VirginCurve(Options),
-    /// Measure the acceleration per volt in open loop, within some millimetres; needs nothing that works but encoder and
-    /// amplifier.
-    MotorConstant(Options),
-    /// Excite the axis while it moves at 37 mm/s, measure its frequency response, position over voltage, and fit the linear
-    /// model; the file holds the response.
-    Plant(Options),
-}
-
-/// Options of a measurement.
-#[derive(Clone, Debug, Args)]
-pub(super) struct Options {
-    /// The axis: x, y or z.
-    #[arg(value_parser = axis_parser())]
-    axis: AxisName,
-    /// How far the axis may go from where it stands, either way, mm; without it, as far as its soft limits, once it is homed.
-    #[arg(long, value_name = "MM", value_parser = travel)]
-    travel: Option<f64>,
-    /// File for the recording, CSV, which `quadrant identify ... --record` reads; of a response, which `--frf` does.
-    #[arg(long, value_name = "FILE")]
-    out: PathBuf,
-}
-
-/// Travel of an axis that is not homed and has none stated, mm: of voltage steps, and of motions.
-const STEPS_TRAVEL_MM: f64 = 20.0;
-const MOTION_TRAVEL_MM: f64 = 200.0;
-/// Moves to and fro.
+/// Times that the axis moves to and fro.
 const ROUNDS: usize = 1;
-/// Slip-blocks.
+/// Slip-blocks of the GMS model.
 const BLOCKS: usize = 4;
 
-pub(super) fn run(client: &mut Client, command: &Command) -> anyhow::Result<Answer> {
-    let (Command::Motion(options)
-    | Command::StaticFriction(options)
-    | Command::VirginCurve(options)
-    | Command::MotorConstant(options)
-    | Command::Plant(options)) = command;
-    let travel_mm = match (travel_mm(client, options.axis, options.travel), command) {
-        (Ok(travel_mm), _) => travel_mm,
-        (Err(error), Command::Plant(_)) => return Err(error),
-        (Err(_), Command::MotorConstant(_)) => STEPS_TRAVEL_MM,
-        (Err(_), _) => MOTION_TRAVEL_MM,
+pub(super) fn run(client: &mut Client, command: &IdentifyCommand) -> anyhow::Result<Answer> {
+    let (options, fallback_mm) = match command {
+        IdentifyCommand::Motion(options) => (options, Some(motion::TRAVEL_MM)),
+        IdentifyCommand::StaticFriction(options) => (options, Some(friction::TRAVEL_MM)),
+        IdentifyCommand::VirginCurve(options) => (options, Some(sine::TRAVEL_MM)),
+        IdentifyCommand::MotorConstant(options) => (options, Some(motor_constant::TRAVEL_MM)),
+        IdentifyCommand::Plant(options) => (options, None),
     };
-    let mut rig = ConnectedRig::new(client, options.axis, travel_mm)?;
-    let before = rig.settings().clone();
-    let outcome = measure(&mut rig, command, options, &before);
-    // Whatever came of it, the machine keeps the settings that it had.
-    rig.apply(&before)?;
-    let table = outcome?;
+    let axis = AxisName::from(options.axis);
+    let travel_mm = travel_mm(client, axis, options.travel, fallback_mm)?;
+    let table = on_axis(client, axis, travel_mm, None, |test_axis, base| {
+        measure(test_axis, base, command, options)
+    })?;
     let text = format!(
         "{}\n{}: the recording",
         table.to_text(),
@@ -97,16 +52,14 @@ pub(super) fn run(client: &mut Client, command: &Command) -> anyhow::Result<Answ
 }
 
 fn measure(
-    rig: &mut ConnectedRig<'_>,
-    command: &Command,
-    options: &Options,
-    before: &AxisSettings,
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    command: &IdentifyCommand,
+    options: &IdentifyOptions,
 ) -> anyhow::Result<Table> {
-    let bar = share("measuring");
-    let mut progress = |done: f64| bar.set_position((1000.0 * done) as u64);
     match command {
-        Command::Motion(_) => {
-            let recording = shuttle(rig, ROUNDS, &mut progress)?;
+        IdentifyCommand::Motion(_) => {
+            let recording = motion::move_to_and_fro(test_axis, ROUNDS)?;
             recording.write_csv(&options.out)?;
             let settings = MotionFitSettings::default();
             let candidates = fit_motion(&recording, &settings, &|_| {})?;
@@ -114,50 +67,36 @@ fn measure(
                 recommended(&candidates).context("no model of the motion is one of friction")?;
             Ok(motion_table(&chosen.model, None))
         }
-        Command::StaticFriction(_) => {
-            rig.apply(&measuring_settings(before))?;
+        IdentifyCommand::StaticFriction(_) => {
             let settings = StaticFrictionSettings::default();
-            let (map, _) = static_friction::measure(rig, &settings, &mut progress)?;
+            let (map, _) = friction::run_at_velocities(test_axis, base, &settings)?;
             map.write_csv(&options.out)?;
             Ok(friction_table(&fit_map(&map, Exponent::Free)?))
         }
-        Command::VirginCurve(_) => {
-            let plant = before.plant.context(
-                "the settings hold no linear model to make a quiet controller for; load commissioned settings first",
-            )?;
-            let quiet = quiet_settings(before, &plant, rig.axis().rate_hz);
-            rig.apply(&quiet)?;
-            let sine = VirginCurveSettings::outrunning(
-                quiet.feedback.pid.kp_v_per_mm,
-                before.friction.sliding.positive.curve.breakaway_v,
-            );
-            let recording = virgin_curve::measure(rig, &sine, &mut progress)?;
+        IdentifyCommand::VirginCurve(_) => {
+            let (recording, _) = sine::Sine::default().measure(test_axis, base)?;
             recording.write_csv(&options.out)?;
-            let known = Some(&before.friction.sliding);
+            let known = Some(&base.friction.sliding);
             let found = virgin_curve::identify(&recording, known, &Knots::Automatic(BLOCKS))?;
             Ok(gms_table(&found))
         }
-        Command::Plant(_) => {
-            rig.apply(&measuring_settings(before))?;
-            let found = frf::measure(rig, &FrfSettings::default(), &mut progress)?;
+        IdentifyCommand::Plant(_) => {
+            let found = frf::excite(test_axis, base, &FrfSettings::default())?;
             let response = &found.estimate.response;
             response.write_csv(&options.out)?;
             let [parameters, _] = plant_tables(&fit_plant(response, &plant_fit())?);
             Ok(parameters)
         }
-        Command::MotorConstant(_) => {
-            rig.apply(&limp_settings(before))?;
-            let found =
-                motor_constant::measure(rig, &MotorConstantSettings::default(), &mut progress)?;
+        IdentifyCommand::MotorConstant(_) => {
+            let settings = MotorConstantSettings::default();
+            let found = motor_constant::step_voltage(test_axis, base, &settings)?;
             found.recording.write_csv(&options.out)?;
-            Ok(quadrant_sim::identify::pages::linear::motor_constant_table(
-                &found, None,
-            ))
+            Ok(motor_constant_table(&found, None))
         }
     }
 }
 
-/// A model without a spring: what an axis on its guides is.
+/// A model without a spring: that of an axis on its guides.
 fn plant_fit() -> PlantFitSettings {
     PlantFitSettings {
         stiffness: Stiffness::Zero,

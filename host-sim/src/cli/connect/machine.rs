@@ -1,15 +1,16 @@
-//! What the machine is, how it is, and orders to it.
+//! Identity and status of the machine, and orders to it.
 
 use std::fmt::Write as _;
 
 use anyhow::bail;
 use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSet, Body, Status};
-use quadrant_sim::console::{Client, settle, with_reset};
+use quadrant_sim::client::{Client, settle, with_reset};
 use serde_json::json;
 
+use super::answer::{Answer, name, seconds};
 use super::command::Command;
-use super::drive::{Answer, seconds};
+use quadrant_sim::command::axis::Axis;
 
 pub(super) fn hello(client: &mut Client) -> anyhow::Result<Answer> {
     // Asked again: the machine may have been exchanged since.
@@ -95,15 +96,6 @@ fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
     text
 }
 
-/// A value's name as it is serialised, in lower case.
-pub(super) fn name(value: &impl serde::Serialize) -> String {
-    match serde_json::to_value(value) {
-        Ok(serde_json::Value::String(name)) => name.to_lowercase(),
-        Ok(other) => other.to_string(),
-        Err(_) => String::new(),
-    }
-}
-
 pub(super) fn fault(client: &mut Client) -> anyhow::Result<Answer> {
     let Some(fault) = client.fault()? else {
         return Ok(Answer::new("no fault", json!(null)));
@@ -159,30 +151,30 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
     Ok(Answer::done())
 }
 
-fn some_or_all(axes: &[AxisName]) -> AxisSet {
+fn some_or_all(axes: &[Axis]) -> AxisSet {
     if axes.is_empty() {
         AxisSet::ALL
     } else {
-        axes.iter().map(|&axis| axis.into()).collect()
+        axes.iter().copied().map(Into::into).collect()
     }
 }
 
 pub(super) fn wait(
     client: &mut Client,
     what: &str,
-    axes: &[AxisName],
+    axes: &[Axis],
     timeout: f64,
 ) -> anyhow::Result<Answer> {
-    let patience = seconds("--timeout", timeout)?;
+    let timeout = seconds("--timeout", timeout)?;
     if !axes.is_empty() && what != "homed" {
         bail!("wait {what}: axes belong behind `homed`");
     }
     match what {
         "rest" => {
-            settle::rest(client, patience)?;
+            settle::rest(client, timeout)?;
         }
         "homed" => {
-            settle::homed(client, some_or_all(axes), patience)?;
+            settle::homed(client, some_or_all(axes), timeout)?;
         }
         number => match number.parse() {
             Ok(time_s) => client.wait(seconds("wait", time_s)?)?,

@@ -1,37 +1,37 @@
-//! `quadrant connect`.
+//! The command `quadrant connect`: the console.
 
+mod answer;
 mod command;
 mod commission;
-mod drive;
+mod dispatch;
 mod flash;
-mod hands;
 mod identify;
+mod line;
 mod machine;
 mod observe;
 mod printer;
 mod program;
 mod scope;
 mod script;
+mod session;
 mod settings;
+mod simulated_io;
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::Context;
 use clap::Args;
-use quadrant_sim::console::{Client, SerialTransport, SimulatedLink, TcpTransport};
+use quadrant_sim::client::Client;
 
-use command::Command;
-use drive::Session;
-use printer::Printer;
-
-/// Where `cargo xtask build --board mps2` leaves the image, from the workspace's folder.
-const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
+use self::command::Command;
+use self::printer::Printer;
+use self::session::Session;
+use crate::cli::endpoint::{DEFAULT_IMAGE, LinkEndpoint};
 
 /// Options of `quadrant connect`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    place: Place,
+    machine: MachineOptions,
     /// Seed of the simulated stage's noise; the same seed gives the same results.
     #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp"])]
     seed: u64,
@@ -51,10 +51,10 @@ pub(super) struct Arguments {
     command: Option<Command>,
 }
 
-/// What is at the other end.
+/// Options that name the machine, one at most.
 #[derive(Clone, Debug, Args)]
 #[group(required = false, multiple = false)]
-struct Place {
+struct MachineOptions {
     /// A board at a serial port, such as /dev/ttyACM0 or COM3; 921600 baud.
     #[arg(long, value_name = "PATH")]
     port: Option<String>,
@@ -88,7 +88,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         None | Some(Command::Script) => {
             script::run(&mut session, arguments.echo, arguments.keep_going)?
         }
-        Some(command) => session.run(command, ""),
+        Some(command) => dispatch::run(&mut session, command, ""),
     };
     if succeeded {
         Ok(())
@@ -100,45 +100,16 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
-    let place = &arguments.place;
-    let flash = arguments.flash.as_deref();
-    let client = match (&place.port, &place.tcp, &place.emulated, place.simulated) {
-        (Some(path), ..) => {
-            let port = SerialTransport::open(path).with_context(|| {
-                format!(
-                    "serial port {path} cannot be opened; check the cable, the name (on Linux `ls /dev/ttyACM* \
-                     /dev/ttyUSB*`), that no other program has it, and that you may use it (group dialout)"
-                )
-            })?;
-            Client::open(port)
-        }
-        (_, Some(address), ..) => {
-            let socket = TcpTransport::connect(address).with_context(|| {
-                format!(
-                    "tcp:{address} does not answer; check the address and that the machine runs"
-                )
-            })?;
-            Client::open(socket)
-        }
-        (_, _, Some(image), _) => return emulated(image, arguments.seed, flash),
-        (.., true) => Client::open(SimulatedLink::start(arguments.seed, flash)?),
+    let named = &arguments.machine;
+    let endpoint = match (&named.port, &named.tcp, &named.emulated, named.simulated) {
+        (Some(path), ..) => LinkEndpoint::Serial(path.clone()),
+        (_, Some(address), ..) => LinkEndpoint::Tcp(address.clone()),
+        (_, _, Some(image), _) => LinkEndpoint::Emulated(image.clone()),
+        (.., true) => LinkEndpoint::Simulated,
         _ => anyhow::bail!(
             "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \
              without one"
         ),
     };
-    Ok(client?)
-}
-
-#[cfg(unix)]
-fn emulated(image: &Path, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
-    let link = quadrant_sim::console::EmulatedLink::start(image, seed, flash)?;
-    Ok(Client::open(link)?)
-}
-
-#[cfg(not(unix))]
-fn emulated(_: &Path, _: u64, _: Option<&Path>) -> anyhow::Result<Client> {
-    anyhow::bail!(
-        "--emulated: QEMU shares memory through a file on Unix systems alone; --simulated works here"
-    )
+    endpoint.connect(arguments.seed, arguments.flash.as_deref())
 }

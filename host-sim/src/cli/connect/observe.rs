@@ -1,21 +1,19 @@
-//! Recordings, captures, events.
+//! Recordings, captures and events of the connected machine.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::link::message::{CaptureStatus, Event, Notice};
-use quadrant::link::message::{Edge, Level, Trigger};
-use quadrant_sim::console::samples::{
-    Recording, Samples, arm, capture_state, disarm, least_decimation, read_capture,
+use quadrant::link::message::{CaptureStatus, Edge, Event, Level, Notice, Trigger};
+use quadrant_sim::client::samples::{
+    Samples, TelemetryRecorder, arm, capture_state, disarm, least_decimation, read_capture,
 };
-use quadrant_sim::console::{Client, columns, settings};
+use quadrant_sim::client::{Client, columns, settings};
 use serde_json::{Value, json};
 
-use super::command::{ArmOptions, CaptureCommand, RecordOptions};
-use super::drive::{Answer, Session, seconds};
-use super::machine::name;
-use super::script::{self, Said};
+use super::answer::{Answer, name, seconds};
+use super::command::{ArmOptions, CaptureCommand, CrossedEdge, RecordOptions, TriggerEvent};
+use super::session::Session;
 
 /// Time from one look at what has come to the next.
 const LOOK: Duration = Duration::from_millis(50);
@@ -24,18 +22,12 @@ const TAIL: Duration = Duration::from_millis(100);
 /// Longest recording without a duration, s.
 const MOST: Duration = Duration::from_secs(3600);
 
-pub(super) fn record(session: &mut Session, options: &RecordOptions) -> anyhow::Result<Answer> {
-    let then = match options.then.as_slice() {
-        [] => None,
-        words => {
-            let line = words.join(" ");
-            match script::parse(&line) {
-                Ok(Said::Ask(command)) => Some(command),
-                Ok(_) => bail!("record: `{line}` is no command of the machine"),
-                Err(error) => bail!("record: {error}"),
-            }
-        }
-    };
+/// Records channels, and writes them; `then` is run once sampling has begun, and says if it succeeded.
+pub(super) fn record(
+    session: &mut Session,
+    options: &RecordOptions,
+    then: impl FnOnce(&mut Session) -> bool,
+) -> anyhow::Result<Answer> {
     let due = match options.seconds {
         Some(time_s) => Some(seconds("--seconds", time_s)?),
         None => None,
@@ -46,11 +38,9 @@ pub(super) fn record(session: &mut Session, options: &RecordOptions) -> anyhow::
     let every = options
         .every
         .unwrap_or_else(|| least_decimation(options.channels.len(), rate_hz));
-    let mut recording = Recording::start(client, &options.channels, every)?;
+    let mut recording = TelemetryRecorder::start(client, &options.channels, every)?;
     let began = client.now();
-    if let Some(command) = then
-        && !session.run(&command, "record")
-    {
+    if !then(session) {
         recording.finish(&mut session.client)?;
         bail!("record: nothing was written");
     }
@@ -132,15 +122,15 @@ pub(super) fn capture(client: &mut Client, command: &CaptureCommand) -> anyhow::
                 &options.channels,
                 options.every,
                 options.pre_trigger,
-                trigger(options)?,
+                trigger(options),
             )?;
             Ok(state(&status))
         }
         CaptureCommand::State => Ok(state(&capture_state(client)?)),
         CaptureCommand::Stop => Ok(state(&disarm(client)?)),
         CaptureCommand::Read { out, timeout } => {
-            let patience = seconds("--timeout", *timeout)?;
-            let (samples, record) = read_capture(client, patience)?;
+            let timeout = seconds("--timeout", *timeout)?;
+            let (samples, record) = read_capture(client, timeout)?;
             let resolutions_mm = settings::resolutions_mm(client)?;
             let files = write(&samples, out, &resolutions_mm, false).context("capture")?;
             let mut answer = written(&samples, &files);
@@ -156,26 +146,25 @@ pub(super) fn capture(client: &mut Client, command: &CaptureCommand) -> anyhow::
     }
 }
 
-fn trigger(options: &ArmOptions) -> anyhow::Result<Trigger> {
+fn trigger(options: &ArmOptions) -> Trigger {
     if let (Some(channel), Some(level)) = (options.channel, options.level) {
-        let edge = match options.edge.as_str() {
-            "rising" => Edge::Rising,
-            "falling" => Edge::Falling,
-            _ => Edge::Either,
+        let edge = match options.edge {
+            CrossedEdge::Rising => Edge::Rising,
+            CrossedEdge::Falling => Edge::Falling,
+            CrossedEdge::Either => Edge::Either,
         };
-        return Ok(Trigger::Level(Level {
+        return Trigger::Level(Level {
             channel,
             edge,
             level,
-        }));
+        });
     }
-    Ok(match options.on.as_str() {
-        "now" => Trigger::Now,
-        "command" => Trigger::Command,
-        "motion" => Trigger::MotionStart,
-        "fault" => Trigger::Fault,
-        other => bail!("--on {other}: give now, command, fault or motion"),
-    })
+    match options.on {
+        TriggerEvent::Now => Trigger::Now,
+        TriggerEvent::Command => Trigger::Command,
+        TriggerEvent::Motion => Trigger::MotionStart,
+        TriggerEvent::Fault => Trigger::Fault,
+    }
 }
 
 fn state(status: &CaptureStatus) -> Answer {

@@ -2,14 +2,14 @@
 
 use serde_json::{Value, json};
 
-/// Where results go.
+/// Printer of results and errors.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Printer {
     pub(super) json: bool,
 }
 
 impl Printer {
-    /// What came of a command: for a person, or as data.
+    /// Prints the result of a command: for a person, or as data.
     pub(super) fn result(&self, command: &str, text: &str, result: &Value) {
         if self.json {
             println!("{}", json!({ "command": command, "result": result }));
@@ -18,7 +18,7 @@ impl Printer {
         }
     }
 
-    /// That a command failed; `place` is where it stands, such as "line 3".
+    /// Prints the error of a command; `place` is its line, such as "line 3".
     pub(super) fn error(&self, command: &str, place: &str, error: &str) {
         if self.json {
             println!("{}", json!({ "command": command, "error": error }));

@@ -9,13 +9,13 @@ use indicatif::ProgressBar;
 use quadrant::link::message::Body;
 use quadrant::reference::{Plane, Sense, circle};
 use quadrant::settings::PlanSettings;
-use quadrant_sim::console::set_points::{references_mm, set_points, stream};
-use quadrant_sim::console::{Client, settings, settle};
+use quadrant_sim::client::set_points::{references_mm, set_points, stream};
+use quadrant_sim::client::{Client, settings, settle};
 use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use serde_json::json;
 
-use super::command::{CircleOptions, StreamOptions};
-use super::drive::Answer;
+use super::answer::Answer;
+use super::command::{CircleOptions, PlaneName, StreamOptions};
 
 pub(super) fn plan(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let text =
@@ -37,10 +37,10 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
             bail!("{name} {value}: it must be above 0 and at most {most}");
         }
     }
-    let plane = match options.plane.as_str() {
-        "yz" => Plane::Yz,
-        "zx" => Plane::Zx,
-        _ => Plane::Xy,
+    let (plane, plane_name) = match options.plane {
+        PlaneName::Xy => (Plane::Xy, "xy"),
+        PlaneName::Yz => (Plane::Yz, "yz"),
+        PlaneName::Zx => (Plane::Zx, "zx"),
     };
     let sense = if options.clockwise {
         Sense::Clockwise
@@ -61,8 +61,8 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
     let turn_s = TAU * options.radius_mm / feed_mm_s;
     let duration_s = options.turns * turn_s + 2.0 * options.lead_s;
     let text = format!(
-        "a circle of {} mm in {} at {feed_mm_s:.3} mm/s: {duration_s:.3} s; `run` starts it",
-        options.radius_mm, options.plane
+        "a circle of {} mm in {plane_name} at {feed_mm_s:.3} mm/s: {duration_s:.3} s; `run` starts it",
+        options.radius_mm
     );
     Ok(Answer::new(text, json!({ "duration_s": duration_s })))
 }

@@ -6,13 +6,14 @@ use std::time::Duration;
 
 use anyhow::{Context, bail};
 use quadrant::link::message::Channel;
-use quadrant_sim::console::samples::{Recording, Samples, least_decimation};
-use quadrant_sim::console::{columns, plot, settings};
+use quadrant_sim::client::samples::{Samples, TelemetryRecorder, least_decimation};
+use quadrant_sim::client::{columns, plot, settings};
 use quadrant_sim::report::{Figure, Lines, Plot, Series, Style};
 use serde_json::json;
 
+use super::answer::{Answer, seconds};
 use super::command::ScopeOptions;
-use super::drive::{Answer, Session, seconds};
+use super::session::Session;
 
 /// Time from one picture to the next.
 const PICTURE: Duration = Duration::from_millis(100);
@@ -49,7 +50,7 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
     let client = &mut session.client;
     let resolutions_mm = settings::resolutions_mm(client)?;
     let every = least_decimation(options.channels.len(), client.identity().rate_hz);
-    let mut recording = Recording::start(client, &options.channels, every)?;
+    let mut recording = TelemetryRecorder::start(client, &options.channels, every)?;
     let due = client.now() + duration;
     while client.now() < due {
         let left = due.saturating_sub(client.now());

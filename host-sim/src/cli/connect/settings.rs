@@ -1,16 +1,16 @@
-//! The machine's settings.
+//! Commands that concern the machine's settings.
 
 use std::path::Path;
 
 use anyhow::{Context, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
-use quadrant_sim::console::Client;
-use quadrant_sim::console::settings::{self, whole_path};
+use quadrant_sim::client::Client;
+use quadrant_sim::client::settings::{self, whole_path};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
+use super::answer::Answer;
 use super::command::Command;
-use super::drive::Answer;
 
 pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
     let path = whole_path(path);
@@ -62,7 +62,7 @@ pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let mut dumped = SettingsFile::new(stage);
     let identity = client.identity();
     dumped.provenance.push(Provenance {
-        command: format!("quadrant connect dump, from {}", client.place()),
+        command: format!("quadrant connect dump, from {}", client.endpoint()),
         version: identity.firmware.as_str().to_owned(),
         axis: "all".to_owned(),
         records: Vec::new(),

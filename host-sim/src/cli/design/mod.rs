@@ -1,4 +1,4 @@
-//! `quadrant design`.
+//! The command `quadrant design`.
 
 mod npid;
 mod pid;

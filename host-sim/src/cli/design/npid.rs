@@ -1,4 +1,4 @@
-//! `quadrant design npid`.
+//! The command `quadrant design npid`.
 
 use anyhow::bail;
 use clap::Args;

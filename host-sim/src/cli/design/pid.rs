@@ -1,4 +1,4 @@
-//! `quadrant design pid`.
+//! The command `quadrant design pid`.
 
 use std::path::PathBuf;
 
@@ -28,7 +28,7 @@ pub(in crate::cli) struct Arguments {
     /// Gain margin, dB. With a crossover and no --phase-margin-deg of its own, the smallest allowed.
     #[arg(long, value_name = "DB")]
     gain_margin_db: Option<f64>,
-    /// Phase margin, deg.
+    /// Phase margin of the loop, deg.
     #[arg(long, value_name = "DEG")]
     phase_margin_deg: Option<f64>,
     /// Crossover, Hz. Together with both margins it must come out of them, and bounds Ki.
@@ -37,7 +37,7 @@ pub(in crate::cli) struct Arguments {
     /// Bound on |S|: the stiffest PID under it and --complementary-peak.
     #[arg(long, value_name = "PEAK", conflicts_with_all = ["gain_margin_db", "phase_margin_deg", "crossover_hz"])]
     sensitivity_peak: Option<f64>,
-    /// Bound on |T|.
+    /// Bound on |T|, the complementary sensitivity.
     #[arg(long, value_name = "PEAK", default_value_t = 1.3)]
     complementary_peak: f64,
     /// Share of both bounds that is left to integral action, 0 to 0.5: more integrates faster, at less stiffness.

@@ -1,4 +1,4 @@
-//! What a design works on, by options.
+//! Options that name the model to design on.
 
 use std::path::PathBuf;
 
@@ -6,10 +6,11 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::Output;
 use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
+
+use quadrant_sim::command::axis::Axis;
 
 /// Options that name a model of an axis: numbers, or settings that hold one.
 #[derive(Clone, Debug, Args)]
@@ -46,7 +47,7 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// The stage's settings.
+    /// Reads the stage's settings.
     pub(super) fn file(&self) -> anyhow::Result<SettingsFile> {
         Ok(match &self.settings {
             Some(path) => SettingsFile::read(path)?,
@@ -59,7 +60,7 @@ impl Model {
         &file.stage.axes[self.axis.index()]
     }
 
-    /// The model.
+    /// Returns the linear model, checked.
     pub(super) fn plant(&self, file: &SettingsFile) -> anyhow::Result<PlantModel> {
         let plant = match self.gain {
             None => self.axis(file).plant.with_context(|| {

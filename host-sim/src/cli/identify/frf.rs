@@ -1,18 +1,21 @@
-//! `quadrant identify frf`.
+//! The command `quadrant identify frf`.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant::settings::AxisSettings;
+use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::frf::{
     FrfMeasurement, FrfSettings, SavedSettings, measure, response_of,
 };
 use quadrant_sim::identify::pages::linear::response_section;
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 
-use super::{page, recorded, simulated};
+use super::{page, recorded};
+use crate::cli::subject::{Measured, Subject};
+use quadrant_sim::command::output::{Output, command_line, share};
 
 /// The settling time of a fresh measurement, s.
 const SETTLING_S: f64 = 0.7;
@@ -20,14 +23,8 @@ const SETTLING_S: f64 = 0.7;
 /// Options of `quadrant identify frf`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage.
-    #[arg(
-        long,
-        value_enum,
-        required_unless_present = "record",
-        conflicts_with = "record"
-    )]
-    axis: Option<Axis>,
+    #[command(flatten)]
+    subject: Subject,
     /// Saved recordings instead, made alike: CSV files with t_s, position_mm (or position_m), voltage_v, injection_v and,
     /// if the axis moved, reference_mm. Of the excitation's options only the band and the period count then.
     #[arg(long, value_name = "FILE", num_args = 1..)]
@@ -41,20 +38,20 @@ pub(in crate::cli) struct Arguments {
     output: Output,
 }
 
-/// How a response is measured.
+/// Options of a measured response.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Measurement {
-    /// What is injected.
+    /// Waveform of the injected voltage.
     #[arg(long, value_enum, default_value_t = Waveform::Multisine)]
     waveform: Waveform,
     /// RMS of the excitation, V. Without it 0.08 for a multisine and 0.035 for the others while the axis moves, 0.3 at
     /// standstill.
     #[arg(long, value_name = "V")]
     amplitude_v: Option<f64>,
-    /// Lowest frequency, Hz.
+    /// Lowest frequency of the excitation, Hz.
     #[arg(long, default_value_t = 4.0, value_name = "HZ")]
     from_hz: f64,
-    /// Highest frequency, Hz.
+    /// Highest frequency of the excitation, Hz.
     #[arg(long, default_value_t = 400.0, value_name = "HZ")]
     to_hz: f64,
     /// Frequency up to which a multisine's amplitudes rise, Hz.
@@ -75,24 +72,23 @@ pub(in crate::cli) struct Measurement {
 }
 
 impl Measurement {
-    /// Runs it on an axis of the simulated stage, and saves recordings and response.
-    pub(in crate::cli) fn run(
+    /// Runs it on the axis of a machine, under the settings' PID alone, and saves recordings and response.
+    pub(super) fn run(
         &self,
-        axis: Axis,
+        subject: &Subject,
+        start: Option<&AxisSettings>,
         output: &Output,
-    ) -> anyhow::Result<FrfMeasurement> {
-        let bar = share("exciting the axis");
-        let found = measure(
-            &mut axis.rig(output.seed),
-            &self.settings(output.seed),
-            &mut |done| bar.set_position((1000.0 * done) as u64),
-        )?;
-        bar.finish_and_clear();
+    ) -> anyhow::Result<Measured<FrfMeasurement>> {
+        let settings = self.settings(output.seed);
+        let measured = subject.measure(output.seed, start, None, |test_axis, base| {
+            excite(test_axis, base, &settings)
+        })?;
+        let found = &measured.found;
         for (index, recording) in found.recordings.iter().enumerate() {
             recording.write_csv(output.file(&format!("frf-recording-{}.csv", index + 1))?)?;
         }
         found.estimate.response.write_csv(output.file("frf.csv")?)?;
-        Ok(found)
+        Ok(measured)
     }
 
     /// The velocity of the axis, mm/s: it slides under feedback only.
@@ -131,6 +127,21 @@ impl Measurement {
     }
 }
 
+/// Measures the response of an axis under the PID of `base` alone.
+pub(in crate::cli) fn excite(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    settings: &FrfSettings,
+) -> anyhow::Result<FrfMeasurement> {
+    test_axis.apply(&measuring_settings(base))?;
+    let bar = share("exciting the axis");
+    let found = measure(test_axis, settings, &mut |done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(found)
+}
+
 /// The response of saved recordings, which is saved too.
 fn response_of_saved(arguments: &Arguments) -> anyhow::Result<FrfMeasurement> {
     let Arguments {
@@ -155,14 +166,18 @@ fn response_of_saved(arguments: &Arguments) -> anyhow::Result<FrfMeasurement> {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let Arguments { record, output, .. } = arguments;
-    let (found, title) = match arguments.axis {
-        Some(axis) => {
-            let found = arguments.measurement.run(axis, output)?;
-            println!("Simulated, not measured.");
-            (found, simulated(axis))
-        }
-        None => (response_of_saved(arguments)?, recorded::title(record)),
+    let Arguments {
+        subject,
+        record,
+        output,
+        ..
+    } = arguments;
+    let (found, title) = if record.is_empty() {
+        let start = subject.start_axis(None)?;
+        let measured = arguments.measurement.run(subject, start.as_ref(), output)?;
+        (measured.found, measured.title)
+    } else {
+        (response_of_saved(arguments)?, recorded::title(record))
     };
     let points = &found.estimate.response.points;
     let coherent = points.iter().filter(|point| point.coherence > 0.95).count();

@@ -1,36 +1,35 @@
-//! `quadrant identify static-friction`.
+//! The command `quadrant identify static-friction`.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant::settings::AxisSettings;
+use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::pages::friction::{friction_section, friction_table};
+use quadrant_sim::identify::single_state::with_all_models;
 use quadrant_sim::identify::static_friction::{
     Exponent, FrictionMap, StaticFrictionSettings, fit_map, measure,
 };
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
+use quadrant_sim::record::Recording;
 
-use super::{page, recorded, simulated};
+use super::{page, recorded};
+use crate::cli::subject::{Destination, Subject};
+use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage.
-    #[arg(
-        long,
-        value_enum,
-        required_unless_present = "record",
-        conflicts_with = "record"
-    )]
-    axis: Option<Axis>,
+    #[command(flatten)]
+    subject: Subject,
     /// A recorded friction map instead, as this command saves it: velocity_mm_s, voltage_v, deviation_v, stick_slip.
     #[arg(long, visible_alias = "map", value_name = "FILE")]
     record: Option<PathBuf>,
-    /// Slowest velocity, mm/s.
+    /// Velocity of the slowest run, mm/s.
     #[arg(long, default_value_t = 0.1, value_name = "MM_S")]
     from_mm_s: f64,
-    /// Fastest velocity, mm/s.
+    /// Velocity of the fastest run, mm/s.
     #[arg(long, default_value_t = 40.0, value_name = "MM_S")]
     to_mm_s: f64,
     /// Velocities, even on a log scale, each run both ways.
@@ -43,37 +42,64 @@ pub(in crate::cli) struct Arguments {
     #[arg(long, value_name = "DELTA")]
     exponent: Option<f64>,
     #[command(flatten)]
+    destination: Destination,
+    #[command(flatten)]
     output: Output,
 }
 
+/// Travel of an axis of which none is known, mm.
+pub(in crate::cli) const TRAVEL_MM: f64 = 200.0;
+
+/// Moves an axis at constant velocities under the PID of `base` alone.
+pub(in crate::cli) fn run_at_velocities(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    settings: &StaticFrictionSettings,
+) -> anyhow::Result<(FrictionMap, Vec<Recording>)> {
+    test_axis.apply(&measuring_settings(base))?;
+    let bar = share("moving at constant velocity");
+    let found = measure(test_axis, settings, &mut |done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(found)
+}
+
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let output = &arguments.output;
+    let Arguments {
+        subject,
+        destination,
+        output,
+        ..
+    } = arguments;
     let exponent = arguments.exponent.map_or(Exponent::Free, Exponent::Fixed);
-    let (map, title) = match (&arguments.record, arguments.axis) {
-        (None, Some(axis)) => {
+    let (map, title, stage) = match &arguments.record {
+        None => {
             let settings = StaticFrictionSettings {
                 velocities_mm_s: (arguments.from_mm_s, arguments.to_mm_s),
                 count: arguments.velocities,
                 stretch_mm: arguments.stretch_mm,
                 ..StaticFrictionSettings::default()
             };
-            let bar = share("moving at constant velocity");
-            let (map, recordings) = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
-                bar.set_position((1000.0 * done) as u64);
-            })?;
-            bar.finish_and_clear();
+            let start = subject.start_axis(destination.into.as_deref())?;
+            let measured = subject.measure(
+                output.seed,
+                start.as_ref(),
+                Some(TRAVEL_MM),
+                |test_axis, base| run_at_velocities(test_axis, base, &settings),
+            )?;
+            let (map, recordings) = measured.found;
             for (index, recording) in recordings.iter().enumerate() {
                 recording
                     .write_csv(output.file(&format!("friction-recording-{}.csv", index + 1))?)?;
             }
-            println!("Simulated, not measured.");
-            (map, simulated(axis))
+            (map, measured.title, Some(measured.stage))
         }
-        (Some(path), _) => (
+        Some(path) => (
             FrictionMap::read_csv(path)?,
             recorded::title(std::slice::from_ref(path)),
+            None,
         ),
-        (None, None) => return Ok(()),
     };
     map.write_csv(output.file("friction-map.csv")?)?;
     let found = fit_map(&map, exponent)?;
@@ -84,5 +110,10 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         vec![friction_section(&map, &found)],
         provenance(&command_line(), output.seed),
     );
-    output.page(&page, "static-friction.html")
+    output.page(&page, "static-friction.html")?;
+    let records = arguments.record.as_slice();
+    destination.write(subject, stage, records, &["friction"], |settings| {
+        let gms = settings.friction.gms.clone();
+        settings.friction = with_all_models(found.models(), gms);
+    })
 }

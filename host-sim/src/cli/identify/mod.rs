@@ -1,17 +1,17 @@
-//! `quadrant identify`.
+//! The command `quadrant identify`.
 
-mod frf;
-mod friction;
-mod motion;
-mod motor_constant;
+pub(super) mod frf;
+pub(super) mod friction;
+pub(super) mod motion;
+pub(super) mod motor_constant;
 mod nctf;
 mod plant;
 mod recorded;
 mod revise;
-mod virgin_curve;
+pub(super) mod virgin_curve;
+// The old name, until the studies have their own command.
 
 use clap::Subcommand;
-use quadrant_sim::command::axis::Axis;
 use quadrant_sim::report::{Page, Provenance, Section};
 
 /// The steps from measurements to parameters.
@@ -56,9 +56,4 @@ fn page(title: &str, axis: &str, sections: Vec<Section>, provenance: Provenance)
         provenance,
         sections,
     }
-}
-
-/// What an axis of the simulated stage is called.
-fn simulated(axis: Axis) -> String {
-    format!("{} axis of the simulated stage", axis.name())
 }

@@ -1,28 +1,28 @@
-//! `quadrant identify motion`.
+//! The command `quadrant identify motion`.
 
 use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant::settings::StageSettings;
 use quadrant_sim::identify::motion::{
-    CascadeLoop, MotionFitSettings, MotionModel, fit_motion, recommended, replay_closed_loop,
-    replay_open_loop, shuttle,
+    CascadeLoop, MotionFitSettings, fit_motion, recommended, replay_closed_loop, replay_open_loop,
+    shuttle,
 };
 use quadrant_sim::identify::pages::motion::{Reruns, candidates_table, motion_page, motion_table};
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::rig::Recording;
-use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use quadrant_sim::record::Recording;
 
-use super::{recorded, simulated};
+use super::recorded;
+use crate::cli::subject::{Destination, Subject};
+use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage, which is moved to and fro; with --record, which axis of --settings it is.
-    #[arg(long, value_enum, required_unless_present = "record")]
-    axis: Option<Axis>,
+    #[command(flatten)]
+    subject: Subject,
     /// A recorded motion: a CSV file with t_s, position_mm (or position_m), voltage_v and, for a closed loop, reference_mm (or
     /// reference_m).
     #[arg(long, value_name = "FILE")]
@@ -52,9 +52,16 @@ pub(in crate::cli) struct Arguments {
     /// Velocity gain kv of that cascade, V s/m.
     #[arg(long, value_name = "V_S_PER_M", requires = "cascade_kp")]
     cascade_kv: Option<f64>,
-    /// Settings into whose axis --axis the model and the friction are written, as a new file.
-    #[arg(long, value_name = "FILE", requires = "axis")]
-    settings: Option<PathBuf>,
+    /// Times that the axis is moved to and fro.
+    #[arg(
+        long,
+        default_value_t = 2,
+        value_name = "TIMES",
+        conflicts_with = "record"
+    )]
+    rounds: usize,
+    #[command(flatten)]
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -70,7 +77,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bail!("--force-per-volt {force}: it must be above zero");
     }
     let cascade = cascade(arguments)?;
-    let (recording, subject) = recording(arguments)?;
+    let (recording, title, stage) = recording(arguments)?;
     let settings = MotionFitSettings {
         cutoff_hz: arguments.cutoff_hz,
         edge_s: arguments.edge_s,
@@ -101,10 +108,29 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     for table in &tables {
         output.table(table)?;
     }
-    let command = command_line();
-    let page = motion_page(&subject, tables, chosen, provenance(&command, output.seed));
+    let page = motion_page(
+        &title,
+        tables,
+        chosen,
+        provenance(&command_line(), output.seed),
+    );
     output.page(&page, "motion.html")?;
-    write_settings(arguments, &chosen.model, &command)
+    let Arguments {
+        subject,
+        destination,
+        ..
+    } = arguments;
+    let records = arguments.record.as_slice();
+    destination.write(
+        subject,
+        stage,
+        records,
+        &["friction", "plant"],
+        |settings| {
+            settings.plant = Some(chosen.model.plant());
+            settings.friction = chosen.model.friction_settings();
+        },
+    )
 }
 
 fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {
@@ -121,56 +147,47 @@ fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {
     }))
 }
 
-/// The record, and what a page calls it.
-fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String)> {
-    match (&arguments.record, arguments.axis) {
-        (Some(path), _) => {
-            let title = recorded::title(std::slice::from_ref(path));
-            Ok((recorded::read(path)?, title))
-        }
-        (None, Some(axis)) => {
-            let output = &arguments.output;
-            let bar = share("moving to and fro");
-            let recording = shuttle(&mut axis.rig(output.seed), ROUNDS, &mut |done| {
-                bar.set_position((1000.0 * done) as u64);
-            })?;
-            bar.finish_and_clear();
-            println!("Simulated, not measured.");
-            recording.write_csv(output.file("motion-recording.csv")?)?;
-            Ok((recording, simulated(axis)))
-        }
-        (None, None) => bail!("--record or --axis is needed"),
-    }
+/// Travel of an axis of which none is known, mm.
+pub(in crate::cli) const TRAVEL_MM: f64 = 200.0;
+
+/// Moves an axis to and fro, under the settings in force.
+pub(in crate::cli) fn move_to_and_fro(
+    test_axis: &mut dyn TestAxis,
+    rounds: usize,
+) -> anyhow::Result<Recording> {
+    let bar = share("moving to and fro");
+    let recording = shuttle(test_axis, rounds, &mut |done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.finish_and_clear();
+    Ok(recording)
 }
 
-/// Rounds of the simulated stage's motion.
-const ROUNDS: usize = 2;
-
-/// Writes model and friction into the settings of the axis.
-fn write_settings(arguments: &Arguments, model: &MotionModel, command: &str) -> anyhow::Result<()> {
-    let (Some(path), Some(axis)) = (&arguments.settings, arguments.axis) else {
-        return Ok(());
-    };
-    let mut file = SettingsFile::read(path)?;
-    let settings = &mut file.stage.axes[axis.index()];
-    settings.plant = Some(model.plant());
-    settings.friction = model.friction_settings();
-    file.provenance.push(Provenance {
-        command: command.to_owned(),
-        version: env!("CARGO_PKG_VERSION").to_owned(),
-        axis: axis.name().to_owned(),
-        records: arguments
-            .record
-            .iter()
-            .map(|path| path.display().to_string())
-            .collect(),
-        sets: ["friction", "plant"].map(str::to_owned).into(),
-    });
-    let path = arguments.output.file("settings.toml")?;
-    file.write(&path)?;
-    println!(
-        "{}: the settings with this friction and model; the feedback gains are as they were, design them anew",
-        path.display()
-    );
-    Ok(())
+/// The record, its title on a page, and the settings of the machine, if one was measured.
+fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option<StageSettings>)> {
+    let Arguments {
+        subject,
+        destination,
+        output,
+        ..
+    } = arguments;
+    if let Some(path) = &arguments.record {
+        let title = recorded::title(std::slice::from_ref(path));
+        return Ok((recorded::read(path)?, title, None));
+    }
+    let start = subject.start_axis(destination.into.as_deref())?;
+    let measured = subject.measure(
+        output.seed,
+        start.as_ref(),
+        Some(TRAVEL_MM),
+        |test_axis, base| {
+            if start.is_some() {
+                test_axis.apply(base)?;
+            }
+            move_to_and_fro(test_axis, arguments.rounds)
+        },
+    )?;
+    let recording = measured.found;
+    recording.write_csv(output.file("motion-recording.csv")?)?;
+    Ok((recording, measured.title, Some(measured.stage)))
 }

@@ -1,30 +1,27 @@
-//! `quadrant identify motor-constant`.
+//! The command `quadrant identify motor-constant`.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant::settings::AxisSettings;
+use quadrant_sim::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
 use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantSettings, evaluate, measure,
 };
 use quadrant_sim::identify::pages::linear::motor_constant_table;
 use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 
-use super::{page, recorded, simulated};
+use super::{page, recorded};
+use crate::cli::subject::{Destination, Subject};
+use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage.
-    #[arg(
-        long,
-        value_enum,
-        required_unless_present = "record",
-        conflicts_with = "record"
-    )]
-    axis: Option<Axis>,
+    #[command(flatten)]
+    subject: Subject,
     /// A saved test instead, of voltage steps between two levels of one sign, passes both ways: a CSV file with t_s,
     /// position_mm (or position_m), voltage_v.
     #[arg(long, value_name = "FILE")]
@@ -39,6 +36,8 @@ pub(in crate::cli) struct Arguments {
     /// Moving mass, kg: with it the force per volt is given too.
     #[arg(long, value_name = "KG", value_parser = above_zero)]
     moving_mass_kg: Option<f64>,
+    #[command(flatten)]
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -60,19 +59,34 @@ fn dwell(text: &str) -> Result<f64, String> {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let output = &arguments.output;
+    let Arguments {
+        subject,
+        destination,
+        output,
+        ..
+    } = arguments;
     let settings = MotorConstantSettings {
         dwell_s: arguments.dwell_s,
         ..MotorConstantSettings::default()
     };
-    let (motor, title) = match (&arguments.record, arguments.axis) {
-        (Some(path), _) => {
+    let (motor, title, stage) = match &arguments.record {
+        Some(path) => {
             let found = evaluate(recorded::read(path)?, &settings, arguments.resolution_mm)?;
             let paths = std::slice::from_ref(path);
-            (found, recorded::title(paths))
+            (found, recorded::title(paths), None)
         }
-        (None, Some(axis)) => (measured(axis, &settings, output)?, simulated(axis)),
-        (None, None) => return Ok(()),
+        None => {
+            let start = subject.start_axis(destination.into.as_deref())?;
+            let measured = subject.measure(
+                output.seed,
+                start.as_ref(),
+                Some(TRAVEL_MM),
+                |test_axis, base| step_voltage(test_axis, base, &settings),
+            )?;
+            let path = output.file("motor-constant-recording.csv")?;
+            measured.found.recording.write_csv(path)?;
+            (measured.found, measured.title, Some(measured.stage))
+        }
     };
     let mass = arguments.moving_mass_kg;
     output.table(&motor_constant_table(&motor, mass))?;
@@ -82,22 +96,33 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         vec![motor_constant_section(&motor, mass)],
         provenance(&command_line(), output.seed),
     );
-    output.page(&page, "motor-constant.html")
+    output.page(&page, "motor-constant.html")?;
+    let records = arguments.record.as_slice();
+    let rate_hz = stage
+        .as_ref()
+        .map_or(DEFAULT_RATE_HZ, |stage| stage.rate_hz);
+    // What the constant is for: a controller that homes the axis and measures the rest.
+    destination.write(subject, stage, records, &["first PID"], |settings| {
+        *settings = bootstrap_settings(settings, motor.gain_mm_per_v_s2, rate_hz);
+    })
 }
 
-/// The test on an axis of the simulated stage, whose recording is saved.
-fn measured(
-    axis: Axis,
+/// Travel of an axis of which none is known, mm.
+pub(in crate::cli) const TRAVEL_MM: f64 = 20.0;
+/// Control rate of a saved test's axis, Hz.
+const DEFAULT_RATE_HZ: f64 = 1e4;
+
+/// Steps the voltage of an axis in open loop, under a law that does nothing.
+pub(in crate::cli) fn step_voltage(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
     settings: &MotorConstantSettings,
-    output: &Output,
 ) -> anyhow::Result<MotorConstant> {
+    test_axis.apply(&zero_gain_settings(base))?;
     let bar = share("voltage steps in open loop");
-    let motor = measure(&mut axis.rig(output.seed), settings, &mut |done| {
+    let motor = measure(test_axis, settings, &mut |done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();
-    println!("Simulated, not measured.");
-    let path = output.file("motor-constant-recording.csv")?;
-    motor.recording.write_csv(path)?;
     Ok(motor)
 }

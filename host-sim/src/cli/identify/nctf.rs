@@ -1,31 +1,29 @@
-//! `quadrant identify nctf`.
+//! The command `quadrant identify nctf`.
 
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant::control::nctf::NctfGains;
 use quadrant::control::surface::SurfaceGains;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant::settings::AxisSettings;
+use quadrant_sim::commission::bootstrap::zero_gain_settings;
 use quadrant_sim::identify::characteristic::{
     Characteristic, CharacteristicSettings, evaluate, measure,
 };
 use quadrant_sim::identify::pages::characteristic::{characteristic_section, characteristic_table};
+use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::settings_file::SettingsFile;
 
-use super::{page, recorded, simulated};
+use super::{page, recorded};
+use crate::cli::subject::{Destination, Subject};
+use quadrant_sim::command::axis::Axis;
+use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify nctf`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage.
-    #[arg(
-        long,
-        value_enum,
-        required_unless_present = "record",
-        conflicts_with = "record"
-    )]
-    axis: Option<Axis>,
+    #[command(flatten)]
+    subject: Subject,
     /// A saved test instead, in which the axis is driven and then left alone, both ways: a CSV file with t_s, position_mm
     /// (or position_m), voltage_v.
     #[arg(long, value_name = "FILE")]
@@ -37,12 +35,11 @@ pub(in crate::cli) struct Arguments {
     /// Length of an encoder count in a saved test, mm.
     #[arg(long, default_value_t = 5e-4, value_name = "MM")]
     resolution_mm: f64,
-    /// Settings whose PID decides the slope at the origin; without them, the default's.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
     /// Largest velocity of the trajectory, mm/s; without it, the settings' limit.
     #[arg(long, value_name = "MM_S", value_parser = speed)]
     most_mm_s: Option<f64>,
+    #[command(flatten)]
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -55,20 +52,37 @@ fn speed(text: &str) -> Result<f64, String> {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let output = &arguments.output;
-    let (found, title) = match (&arguments.record, arguments.axis) {
-        (Some(path), _) => {
+    let Arguments {
+        subject,
+        destination,
+        output,
+        ..
+    } = arguments;
+    let start = subject
+        .start(destination.into.as_deref())?
+        .map(|file| file.stage);
+    let index = subject.axis.map_or(0, Axis::index);
+    let (found, title, machine) = match &arguments.record {
+        Some(path) => {
             let found = evaluate(recorded::read(path)?, arguments.resolution_mm)?;
-            (found, recorded::title(std::slice::from_ref(path)))
+            (found, recorded::title(std::slice::from_ref(path)), None)
         }
-        (None, Some(axis)) => (measured(axis, arguments)?, simulated(axis)),
-        (None, None) => return Ok(()),
+        None => {
+            let settings = CharacteristicSettings {
+                velocity_mm_s: arguments.velocity_mm_s,
+                ..CharacteristicSettings::default()
+            };
+            let start = start.as_ref().map(|stage| &stage.axes[index]);
+            let measured = subject.measure(output.seed, start, None, |test_axis, base| {
+                coast(test_axis, base, &settings)
+            })?;
+            let path = output.file("nctf-recording.csv")?;
+            measured.found.recording.write_csv(path)?;
+            (measured.found, measured.title, Some(measured.stage))
+        }
     };
-    let stage = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?.stage,
-        None => quadrant::settings::StageSettings::simulated(),
-    };
-    let settings = &stage.axes[arguments.axis.map_or(0, Axis::index)];
+    let stage = start.or_else(|| machine.clone()).unwrap_or_default();
+    let settings = &stage.axes[index];
     let Some(surface) = SurfaceGains::from_pid(&settings.feedback.pid) else {
         anyhow::bail!(
             "feedback.pid has complex zeros, so no trajectory's slope belongs to it: lower its integral gain"
@@ -85,24 +99,28 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         vec![characteristic_section(&found, surface.slope_per_s, &points)],
         provenance(&command_line(), output.seed),
     );
-    output.page(&page, "nctf.html")
+    output.page(&page, "nctf.html")?;
+    let records = arguments.record.as_slice();
+    destination.write(subject, machine, records, &["feedback.nctf"], |settings| {
+        settings.feedback.nctf = Some(NctfGains {
+            characteristic: points,
+            gain_v_s_per_mm: surface.gain_v_s_per_mm,
+            integral_per_s: surface.integral_per_s,
+        });
+    })
 }
 
-/// The test on an axis of the simulated stage, whose recording is saved.
-fn measured(axis: Axis, arguments: &Arguments) -> anyhow::Result<Characteristic> {
-    let output = &arguments.output;
-    let settings = CharacteristicSettings {
-        velocity_mm_s: arguments.velocity_mm_s,
-        ..CharacteristicSettings::default()
-    };
+/// Drives an axis in open loop and leaves it alone, under a law that does nothing.
+fn coast(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    settings: &CharacteristicSettings,
+) -> anyhow::Result<Characteristic> {
+    test_axis.apply(&zero_gain_settings(base))?;
     let bar = share("coasting in open loop");
-    let found = measure(&mut axis.rig(output.seed), &settings, &mut |done| {
+    let found = measure(test_axis, settings, &mut |done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();
-    println!("Simulated, not measured.");
-    found
-        .recording
-        .write_csv(output.file("nctf-recording.csv")?)?;
     Ok(found)
 }

@@ -1,9 +1,8 @@
-//! `quadrant identify plant`.
+//! The command `quadrant identify plant`.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line};
 use quadrant_sim::identify::pages::linear::{
     fitted_response_section, plant_tables, response_section,
@@ -14,30 +13,27 @@ use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Block;
 
 use super::frf::Measurement;
-use super::{page, simulated};
+use super::{page, recorded};
+use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify plant`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage, whose response is measured first.
-    #[arg(
-        long,
-        value_enum,
-        required_unless_present = "frf",
-        conflicts_with = "frf"
-    )]
-    axis: Option<Axis>,
-    /// A measured response, as `quadrant identify frf` saves it.
-    #[arg(long, value_name = "FILE")]
-    frf: Option<PathBuf>,
+    #[command(flatten)]
+    subject: Subject,
+    /// A measured response instead, as `quadrant identify frf` saves it.
+    #[arg(long, visible_alias = "frf", value_name = "FILE")]
+    record: Option<PathBuf>,
     /// Lowest coherence of a line that counts.
     #[arg(long, default_value_t = 0.9)]
     least_coherence: f64,
-    /// Whether the model has a spring to ground.
+    /// The model's spring to ground.
     #[arg(long, value_enum, default_value_t = Stiffness::Zero)]
     stiffness: Stiffness,
     #[command(flatten)]
     measurement: Measurement,
+    #[command(flatten)]
+    destination: Destination,
     #[command(flatten)]
     output: Output,
 }
@@ -49,22 +45,23 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         stiffness: arguments.stiffness,
         ..PlantFitSettings::default()
     };
-    let (found, mut section, title) = match (&arguments.frf, arguments.axis) {
-        (Some(path), _) => {
+    let subject = &arguments.subject;
+    let (found, mut section, title, stage) = match &arguments.record {
+        Some(path) => {
             let response = FrequencyResponse::read_csv(path)?;
             let found = fit_plant(&response, &settings)?;
             let section = fitted_response_section(&response, &found.plant);
-            let name = path.file_name().unwrap_or(path.as_os_str()).display();
-            (found, section, format!("recorded: {name}"))
+            let title = recorded::title(std::slice::from_ref(path));
+            (found, section, title, None)
         }
-        (None, Some(axis)) => {
-            let measured = arguments.measurement.run(axis, output)?;
-            println!("Simulated, not measured.");
-            let found = fit_plant(&measured.estimate.response, &settings)?;
-            let section = response_section(&measured, Some(&found.plant));
-            (found, section, simulated(axis))
+        None => {
+            let start = subject.start_axis(arguments.destination.into.as_deref())?;
+            let measured = arguments.measurement.run(subject, start.as_ref(), output)?;
+            let response = &measured.found;
+            let found = fit_plant(&response.estimate.response, &settings)?;
+            let section = response_section(response, Some(&found.plant));
+            (found, section, measured.title, Some(measured.stage))
         }
-        (None, None) => return Ok(()),
     };
     let tables = plant_tables(&found);
     for table in &tables {
@@ -77,5 +74,10 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         vec![section],
         provenance(&command_line(), output.seed),
     );
-    output.page(&page, "plant.html")
+    output.page(&page, "plant.html")?;
+    let records = arguments.record.as_slice();
+    let destination = &arguments.destination;
+    destination.write(subject, stage, records, &["plant"], |settings| {
+        settings.plant = Some(found.plant);
+    })
 }

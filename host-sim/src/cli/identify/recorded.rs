@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressDrawTarget;
 use quadrant_sim::command::output::share;
-use quadrant_sim::rig::Recording;
+use quadrant_sim::record::Recording;
 
 /// Reading that is done sooner needs no bar.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -25,7 +25,7 @@ pub(super) fn read(path: &Path) -> anyhow::Result<Recording> {
     Ok(recording)
 }
 
-/// What a page says of where its data come from.
+/// Returns the title of a page on saved recordings.
 pub(super) fn title(paths: &[PathBuf]) -> String {
     format!("recorded: {}", names(paths).join(", "))
 }

@@ -1,4 +1,4 @@
-//! `quadrant identify revise`.
+//! The command `quadrant identify revise`.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -7,7 +7,6 @@ use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::ProgressBar;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, share};
 use quadrant_sim::commission::{CommissionSettings, commission};
 use quadrant_sim::identify::at_rest::AtRest;
@@ -15,24 +14,21 @@ use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::pages::revise::{AmplitudeResponse, revise_page, revise_table};
 use quadrant_sim::identify::revise::ExplicitFriction;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::settings_file::SettingsFile;
 
-use super::{recorded, simulated};
+use super::recorded;
+use crate::cli::endpoint::Endpoint;
+use crate::cli::subject::Subject;
+use quadrant_sim::command::axis::Axis;
 
 /// Options of `quadrant identify revise`.
 #[derive(Clone, Debug, Args)]
 pub(in crate::cli) struct Arguments {
-    /// The axis of the simulated stage; with --record, which axis of --settings it is.
-    #[arg(long, value_enum)]
-    axis: Axis,
+    #[command(flatten)]
+    subject: Subject,
     /// A recording of the axis at rest under its own PID instead, excited by an injected voltage: a CSV file with t_s,
     /// position_mm (or position_m), reference_mm, voltage_v and injection_v, a row each control period.
     #[arg(long, value_name = "FILE", requires = "settings", conflicts_with_all = ["amplitude_v", "further_v", "averages"])]
     record: Option<PathBuf>,
-    /// Settings with the model, the friction and the PID of the axis, as `quadrant commission` writes them; without it the
-    /// axis is commissioned first.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
     /// RMS of the excitation that the model is revised at, V.
     #[arg(long, default_value_t = 0.4, value_name = "V")]
     amplitude_v: f64,
@@ -56,17 +52,19 @@ pub(in crate::cli) struct Arguments {
 }
 
 pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let Arguments { axis, output, .. } = arguments;
+    let Arguments {
+        subject, output, ..
+    } = arguments;
     arguments.check()?;
     let bar = share("commissioning");
-    let (measured, settings, subject) = match &arguments.record {
+    let (measured, settings, title) = match &arguments.record {
         Some(path) => arguments.recorded(path)?,
         None => arguments.measured(&bar)?,
     };
     let original = settings.plant.with_context(|| {
         format!(
             "the settings hold no model of the {} axis: commission it",
-            axis.name()
+            subject.axis.map_or("", Axis::name)
         )
     })?;
     bar.set_message("revising the model, three times");
@@ -95,7 +93,6 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     bar.finish_and_clear();
 
     if arguments.record.is_none() {
-        println!("Simulated, not measured.");
         for (at, number) in measured.iter().zip(1..) {
             let file = output.file(&format!("revise-recording-{number}.csv"))?;
             at.recording.write_csv(file)?;
@@ -104,7 +101,7 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     response.write_csv(output.file("revise-frf.csv")?)?;
     output.table(&revise_table(&original, &revisions))?;
     let page = revise_page(
-        &subject,
+        &title,
         &response,
         &original,
         &revisions,
@@ -157,13 +154,14 @@ impl Arguments {
         }
     }
 
-    /// A saved recording.
+    /// Reads a saved recording of the axis at rest.
     fn recorded(&self, path: &Path) -> anyhow::Result<Measured> {
-        let stage = match &self.settings {
-            Some(settings) => SettingsFile::read(settings)?.stage,
+        let axis = self.subject.axis()?;
+        let stage = match self.subject.start(None)? {
+            Some(file) => file.stage,
             None => bail!("--record needs --settings"),
         };
-        let settings = stage.axes[self.axis.index()].clone();
+        let settings = stage.axes[axis.index()].clone();
         let recording = recorded::read(path)?;
         let square: f64 = recording.injection_v.iter().map(|v| v * v).sum();
         let rms_v = (square / recording.len() as f64).sqrt();
@@ -172,35 +170,40 @@ impl Arguments {
         Ok((vec![saved], settings, subject))
     }
 
-    /// The axis of the simulated stage, excited at every amplitude; without settings it is commissioned first.
+    /// The axis, excited at every amplitude. One of the law alone is commissioned first, unless settings are given.
     fn measured(&self, bar: &ProgressBar) -> anyhow::Result<Measured> {
-        let mut rig = self.axis.rig(self.output.seed);
-        let index = self.axis.index();
-        let settings = match &self.settings {
-            Some(path) => SettingsFile::read(path)?.stage.axes[index].clone(),
-            None => {
-                let base = &StageSettings::simulated().axes[index];
-                let request = CommissionSettings::default();
-                commission(&mut rig, base, &request, &mut |_, done| {
-                    bar.set_position((1000.0 * done) as u64);
-                })?
-                .settings
-            }
-        };
-        bar.set_message("exciting the axis at rest");
+        let start = self.subject.start_axis(None)?;
+        let unknown = start.is_none() && self.subject.machine == Endpoint::Law;
         let amplitudes_v = self.amplitudes_v();
-        let mut measured = Vec::new();
-        for (rms_v, place) in amplitudes_v.iter().zip(0..) {
-            let excitation = self.excitation(*rms_v);
-            let report = &mut |share: f64| {
-                let done = (f64::from(place) + share) / amplitudes_v.len() as f64;
-                bar.set_position((1000.0 * done) as u64);
-            };
-            let averages = self.averages;
-            measured.push(AtRest::measure(
-                &mut rig, &settings, excitation, averages, report,
-            )?);
-        }
-        Ok((measured, settings, simulated(self.axis)))
+        let measured =
+            self.subject
+                .measure(self.output.seed, start.as_ref(), None, |test_axis, base| {
+                    let settings = if unknown {
+                        let base = &StageSettings::simulated().axes[self.subject.axis()?.index()];
+                        let request = CommissionSettings::default();
+                        commission(test_axis, base, &request, &mut |_, done| {
+                            bar.set_position((1000.0 * done) as u64);
+                        })?
+                        .settings
+                    } else {
+                        base.clone()
+                    };
+                    bar.set_message("exciting the axis at rest");
+                    let mut measured = Vec::new();
+                    for (rms_v, index) in amplitudes_v.iter().zip(0..) {
+                        let excitation = self.excitation(*rms_v);
+                        let report = &mut |share: f64| {
+                            let done = (f64::from(index) + share) / amplitudes_v.len() as f64;
+                            bar.set_position((1000.0 * done) as u64);
+                        };
+                        let averages = self.averages;
+                        measured.push(AtRest::measure(
+                            test_axis, &settings, excitation, averages, report,
+                        )?);
+                    }
+                    Ok((measured, settings))
+                })?;
+        let (at_rest, settings) = measured.found;
+        Ok((at_rest, settings, measured.title))
     }
 }

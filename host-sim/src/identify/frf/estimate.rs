@@ -10,7 +10,7 @@ use num_complex::Complex64;
 use rustfft::{Fft, FftPlanner};
 
 use super::super::response::{FrequencyResponse, ResponsePoint};
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// Estimator of the response: the quotient of spectra that it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]

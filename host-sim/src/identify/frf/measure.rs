@@ -7,7 +7,8 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 use super::estimate::{Estimate, Estimator, estimate};
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::setting::SettingError;
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Parameters of a frequency response measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -86,7 +87,7 @@ pub enum FrfError {
     },
     /// The experiment was stopped.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Experiment(#[from] ExperimentError),
 }
 
 /// Time at constant velocity before the first block, s: transients have died away.
@@ -142,16 +143,16 @@ impl FrfSettings {
     }
 }
 
-/// Measures the response of the rig's axis, under the settings that are in force.
+/// Measures the response of the test_axis's axis, under the settings that are in force.
 ///
 /// # Errors
 /// Settings that cannot be, too little travel, or a run that is stopped.
 pub fn measure(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     settings: &FrfSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<FrfMeasurement, FrfError> {
-    let axis = rig.axis();
+    let axis = test_axis.info();
     settings.check(axis.rate_hz)?;
     let period = settings.excitation.period(axis.rate_hz);
     let moves = settings.bias_velocity_mm_s != 0.0;
@@ -176,7 +177,7 @@ pub fn measure(
             (standstill(settings, axis.rate_hz), settings.periods)
         };
         let done = blocks.len() as f64;
-        let recording = rig.perform(&experiment, &mut |share| {
+        let recording = test_axis.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);
         })?;
         let period = in_samples(period, &recording, axis.rate_hz)?;
@@ -228,7 +229,7 @@ fn in_samples(period: usize, recording: &Recording, rate_hz: f64) -> Result<usiz
         return Err(SettingError {
             field: "period",
             value: period as f64 / rate_hz,
-            expected: "it must be a whole number of the samples that the rig records",
+            expected: "it must be a whole number of the samples that the test_axis records",
         });
     }
     Ok(period / every)

@@ -10,7 +10,7 @@ use rustfft::FftPlanner;
 
 use super::{Estimator, FrfMeasurement, estimate};
 use crate::identify::setting::SettingError;
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// Parameters of the conversion of recordings into a response.
 #[derive(Clone, Copy, Debug, PartialEq)]

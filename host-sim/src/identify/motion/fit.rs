@@ -9,7 +9,7 @@ use super::signals::{MotionFitSettings, Signals};
 use super::solution::{MOST_DEAD_TIME_S, Solution};
 use super::uncertainty::estimates;
 use crate::identify::setting::SettingError;
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// A model, and how it does where it was not fitted.
 #[derive(Clone, Debug, PartialEq)]

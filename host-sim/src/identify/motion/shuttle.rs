@@ -2,7 +2,8 @@
 
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Velocities of the moves, mm/s: each there and back.
 const VELOCITIES_MM_S: [f64; 6] = [5.0, 80.0, 10.0, 40.0, 20.0, 120.0];
@@ -24,10 +25,10 @@ const SINE_LEAD_S: f64 = 0.5;
 /// # Errors
 /// A move that is stopped.
 pub fn shuttle(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     rounds: usize,
     progress: &mut dyn FnMut(f64),
-) -> Result<Recording, RigError> {
+) -> Result<Recording, ExperimentError> {
     let there_and_back = VELOCITIES_MM_S.into_iter().flat_map(|velocity_mm_s| {
         let distance_mm = LENGTH_MM.min(velocity_mm_s * LONGEST_S);
         [distance_mm, -distance_mm].map(|distance_mm| {
@@ -56,7 +57,7 @@ pub fn shuttle(
             decimation: 1,
             time_limit_s: 60.0,
         };
-        let recording = rig.perform(&experiment, &mut |share| {
+        let recording = test_axis.perform(&experiment, &mut |share| {
             progress((index as f64 + share) / motions.len() as f64);
         })?;
         joined.sample_time_s = recording.sample_time_s;

@@ -1,7 +1,7 @@
 //! From position and voltage to what a regression needs.
 
 use super::zero_phase::low_pass;
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// Parameters of the preparation of a motion record, and of the models fitted to it.
 #[derive(Clone, Debug, PartialEq)]

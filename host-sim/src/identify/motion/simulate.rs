@@ -4,7 +4,7 @@ use quadrant::units::DacCode;
 
 use super::model::MotionModel;
 use crate::plant::SimulatedAxis;
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// A position loop around a velocity loop, as many machines have it: `u = kv (kp (reference - position) - velocity)`, the
 /// velocity by differencing the mean of each two neighbouring positions.

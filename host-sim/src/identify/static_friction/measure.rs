@@ -4,7 +4,8 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::map::{FrictionMap, FrictionRun};
 use crate::identify::setting::SettingError;
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Parameters of the measurement of the friction-velocity map.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +50,7 @@ pub enum StaticFrictionError {
     },
     /// A run was stopped.
     #[error(transparent)]
-    Rig(#[from] RigError),
+    Experiment(#[from] ExperimentError),
 }
 
 /// Acceleration and jerk of the moves.
@@ -129,17 +130,17 @@ impl StaticFrictionSettings {
     }
 }
 
-/// Measures the map on the rig's axis, under the settings that are in force.
+/// Measures the map on the test_axis's axis, under the settings that are in force.
 ///
 /// # Errors
 /// Settings that cannot be, too little travel, or a run that is stopped.
 pub fn measure(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     settings: &StaticFrictionSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<(FrictionMap, Vec<Recording>), StaticFrictionError> {
     settings.check()?;
-    let travel_mm = TRAVEL_SHARE * rig.axis().travel_mm;
+    let travel_mm = TRAVEL_SHARE * test_axis.info().travel_mm;
     for velocity_mm_s in settings.velocities() {
         let needed_mm = settings.length_mm(velocity_mm_s);
         if needed_mm > travel_mm {
@@ -159,7 +160,7 @@ pub fn measure(
         for direction in [1.0, -1.0] {
             let length_mm = settings.length_mm(velocity_mm_s);
             let run_s = length_mm / velocity_mm_s;
-            let recording = rig.perform(
+            let recording = test_axis.perform(
                 &Experiment {
                     name: format!("friction at {:.3} mm/s", direction * velocity_mm_s),
                     drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
@@ -169,7 +170,7 @@ pub fn measure(
                         max_jerk_mm_s3: JERK_MM_S3,
                     })),
                     injection_v: Vec::new(),
-                    decimation: ((run_s * rig.axis().rate_hz / SAMPLES) as usize).max(1),
+                    decimation: ((run_s * test_axis.info().rate_hz / SAMPLES) as usize).max(1),
                     time_limit_s: 10.0 + 1.5 * run_s,
                 },
                 &mut |share| progress((done_s + share * run_s) / all_s),
@@ -179,7 +180,7 @@ pub fn measure(
                 &recording,
                 settings,
                 direction * velocity_mm_s,
-                rig.axis().resolution_mm,
+                test_axis.info().resolution_mm,
             ));
             recordings.push(recording);
         }

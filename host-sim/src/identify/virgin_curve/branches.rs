@@ -1,6 +1,6 @@
 //! From a recorded hysteresis to the virgin curve.
 
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// One point of the virgin curve.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -10,7 +10,7 @@ use super::plateau::{check_plateau, plateau};
 use super::predict::{Prediction, predict};
 use super::shape::{Shape, parameters};
 use crate::identify::fit::{Fit, Loss, Parameter, fit_nearest, fit_with_step};
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// An identified GMS model.
 #[derive(Clone, Debug)]

@@ -2,7 +2,8 @@
 
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 
-use crate::rig::{Drive, Experiment, Recording, Rig, RigError};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Parameters of the hysteresis measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,18 +45,18 @@ impl VirginCurveSettings {
 /// Rate of the recording, Hz.
 const RATE_HZ: f64 = 1000.0;
 
-/// Measures the hysteresis on the rig's axis, under the settings that are in force.
+/// Measures the hysteresis on the test_axis's axis, under the settings that are in force.
 ///
 /// # Errors
 /// A run that is stopped.
 pub fn measure(
-    rig: &mut dyn Rig,
+    test_axis: &mut dyn TestAxis,
     settings: &VirginCurveSettings,
     progress: &mut dyn FnMut(f64),
-) -> Result<Recording, RigError> {
+) -> Result<Recording, ExperimentError> {
     let lead_s = 0.5 / settings.frequency_hz;
     let duration_s = settings.cycles / settings.frequency_hz + 2.0 * lead_s;
-    rig.perform(
+    test_axis.perform(
         &Experiment {
             name: format!("hysteresis over {:.1} um", 1e3 * settings.amplitude_mm),
             drive: Drive::ClosedLoop(MotionSettings::Harmonic(HarmonicSettings {
@@ -66,7 +67,7 @@ pub fn measure(
                 lead_s,
             })),
             injection_v: Vec::new(),
-            decimation: ((rig.axis().rate_hz / RATE_HZ) as usize).max(1),
+            decimation: ((test_axis.info().rate_hz / RATE_HZ) as usize).max(1),
             time_limit_s: 20.0 + 2.0 * duration_s,
         },
         progress,

@@ -6,7 +6,7 @@ use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use super::branches::{Smooth, VirginCurve, VirginPoint, range};
 use super::error::VirginCurveError;
 use crate::identify::fit::{Loss, Parameter, fit};
-use crate::rig::Recording;
+use crate::record::Recording;
 
 /// Slope at the end of the curve over its slope at the beginning below which it is flat.
 const FLAT: f64 = 0.04;

@@ -1,4 +1,4 @@
-//! The time column.
+//! Refusals for the time column.
 
 use super::{HEADER, good, read, record, refusal};
 use quadrant_sim::record::{RecordError, TimeFault};

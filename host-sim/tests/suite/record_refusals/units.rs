@@ -1,7 +1,7 @@
 //! Units, and what an axis can do.
 
 use super::{HEADER, LIMITS, RATE_HZ, good, motion, read, read_with, record, refusal};
-use quadrant_sim::record::{AxisLimits, Doubt, RecordError, UnitFault};
+use quadrant_sim::record::{AxisLimits, RecordError, RecordWarning, UnitFault};
 
 #[test]
 fn millimetres_labelled_metres_are_recognised() {
@@ -133,7 +133,7 @@ fn a_reference_in_whole_counts_is_not_taken_for_a_hard_one() {
 #[test]
 fn swapped_columns_raise_a_doubt() {
     let record = read(&record("t_s,position_m,reference_m", |_, _| ())).unwrap();
-    let [Doubt::PositionLeads { lead_s }] = record.doubts[..] else {
+    let [RecordWarning::PositionLeads { lead_s }] = record.doubts[..] else {
         panic!("{:?}", record.doubts)
     };
     assert!((lead_s - 0.005).abs() < 1e-4, "{lead_s}");

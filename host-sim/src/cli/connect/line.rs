@@ -1,0 +1,107 @@
+//! One line of a script, or what a person types at the prompt.
+
+use clap::Parser;
+use clap::error::ErrorKind;
+
+use super::command::Command;
+
+/// Grammar of a line.
+#[derive(Debug, Parser)]
+#[command(name = "", no_binary_name = true, disable_version_flag = true)]
+struct Line {
+    #[command(subcommand)]
+    command: Command,
+}
+
+/// Meaning of a line.
+pub(super) enum Said {
+    /// Nothing: it is empty or a comment.
+    Nothing,
+    /// A command for the machine.
+    Ask(Box<Command>),
+    /// A text for a person: help.
+    Show(String),
+}
+
+/// Reads a line: words as a shell reads them, `#` begins a comment.
+///
+/// # Errors
+/// A command that there is not, or one that lacks something.
+pub(super) fn parse(line: &str) -> Result<Said, String> {
+    let Some(words) = shlex::split(line) else {
+        return Err("a quotation mark is not closed".to_owned());
+    };
+    if words.is_empty() {
+        return Ok(Said::Nothing);
+    }
+    match Line::try_parse_from(words) {
+        Ok(Line {
+            command: Command::Script | Command::Flash(_),
+        }) => Err("this command is for the shell, not for a script".to_owned()),
+        Ok(line) => Ok(Said::Ask(Box::new(line.command))),
+        Err(error) => match error.kind() {
+            ErrorKind::DisplayHelp | ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand => {
+                Ok(Said::Show(error.to_string()))
+            }
+            _ => {
+                let text = error.to_string();
+                let text = text.strip_prefix("error: ").unwrap_or(&text);
+                // The first paragraph; a script's reader wants no usage.
+                Err(text.split("\n\n").next().unwrap_or(text).trim().to_owned())
+            }
+        },
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Command, Said, parse};
+
+    #[test]
+    fn comments_and_empty_lines_say_nothing() {
+        for line in ["", "   ", "# enable", "  # move x 1"] {
+            assert!(matches!(parse(line), Ok(Said::Nothing)), "{line:?}");
+        }
+        let Ok(Said::Ask(command)) = parse("wait rest # and then") else {
+            panic!("not understood");
+        };
+        assert_eq!(command.name(), "wait");
+    }
+
+    #[test]
+    fn positions_may_be_negative() {
+        let Ok(Said::Ask(command)) = parse("move x -12.5 --velocity 20") else {
+            panic!("not understood");
+        };
+        assert!(
+            matches!(*command, Command::Move { target_mm, velocity, .. } if (target_mm, velocity) == (-12.5, 20.0))
+        );
+        assert!(matches!(parse("jog z -2"), Ok(Said::Ask(_))));
+        assert!(matches!(
+            parse("set x/limits/travel_mm/negative -3"),
+            Ok(Said::Ask(_))
+        ));
+    }
+
+    #[test]
+    fn what_is_not_understood_is_named_in_a_line() {
+        for (line, part) in [
+            ("fly", "fly"),
+            ("move q 1", "q"),
+            ("move x", "TARGET_MM"),
+            ("get 'x", "quotation"),
+            ("record --channels w.error --out a.csv", "w.error"),
+        ] {
+            let Err(error) = parse(line) else {
+                panic!("{line} was understood");
+            };
+            assert!(error.contains(part), "{line}: {error}");
+        }
+    }
+
+    #[test]
+    fn help_is_text_and_no_error() {
+        assert!(matches!(parse("help"), Ok(Said::Show(text)) if text.contains("record")));
+        assert!(matches!(parse("move --help"), Ok(Said::Show(text)) if text.contains("mm/s")));
+    }
+}

@@ -1,0 +1,92 @@
+//! Inputs, supply and log of a machine that is not real.
+
+use anyhow::{Context, bail};
+use quadrant::safety::Switches;
+use quadrant_sim::client::Client;
+use quadrant_sim::machine::simulated_io::{INPUTS, SimulatedIo, without};
+use serde_json::json;
+
+use super::answer::Answer;
+use super::command::LogOptions;
+use super::session::Session;
+
+pub(super) fn press(session: &mut Session, names: &[String]) -> anyhow::Result<Answer> {
+    let pressed = session.pressed.with(named(names));
+    hold(session, "press", pressed)
+}
+
+/// Without names, lets go of all.
+pub(super) fn release(session: &mut Session, names: &[String]) -> anyhow::Result<Answer> {
+    let pressed = if names.is_empty() {
+        Switches::NONE
+    } else {
+        without(session.pressed, named(names))
+    };
+    hold(session, "release", pressed)
+}
+
+fn hold(session: &mut Session, what: &str, pressed: Switches) -> anyhow::Result<Answer> {
+    simulated_io(&mut session.client, what)?.press(pressed);
+    session.pressed = pressed;
+    let held: Vec<&str> = INPUTS
+        .into_iter()
+        .filter(|(_, switches)| pressed.bits() & switches.bits() != 0)
+        .map(|(name, _)| name)
+        .collect();
+    let text = if held.is_empty() {
+        "nothing is pressed".to_owned()
+    } else {
+        format!("pressed: {}", held.join(", "))
+    };
+    Ok(Answer::new(text, json!({ "pressed": held })))
+}
+
+/// All inputs of these names.
+fn named(names: &[String]) -> Switches {
+    INPUTS
+        .into_iter()
+        .filter(|(name, _)| names.iter().any(|named| named == name))
+        .fold(Switches::NONE, |all, (_, switches)| all.with(switches))
+}
+
+pub(super) fn power_cycle(client: &mut Client) -> anyhow::Result<Answer> {
+    simulated_io(client, "power-cycle")?
+        .power_cycle()
+        .context("power-cycle")?;
+    Ok(Answer::done())
+}
+
+/// Prints the lines that the firmware has logged since the last call.
+pub(super) fn log(session: &mut Session, options: &LogOptions) -> anyhow::Result<Answer> {
+    if options.elf.is_some() {
+        bail!("log --elf: this is for the shell, and needs no connection");
+    }
+    let endpoint = session.client.endpoint();
+    let Some(io) = session.client.simulated_io() else {
+        bail!(
+            "log: the firmware's log comes through the debug probe, not from {endpoint}: `quadrant connect log --elf FILE`; \
+             `events` shows what the link tells"
+        );
+    };
+    let Some(lines) = io.log().context("log")? else {
+        bail!(
+            "log: {endpoint} runs without the firmware that logs; `events` shows what the link tells"
+        );
+    };
+    for line in &lines {
+        session
+            .printer
+            .result("log", line, &json!({ "line": line }));
+    }
+    Ok(Answer::new("", json!({ "lines": lines.len() })))
+}
+
+fn simulated_io<'a>(client: &'a mut Client, what: &str) -> anyhow::Result<&'a mut dyn SimulatedIo> {
+    let endpoint = client.endpoint();
+    match client.simulated_io() {
+        Some(io) => Ok(io),
+        None => bail!(
+            "{what}: {endpoint} has no simulated inputs; do it yourself, or try it with --simulated or --emulated"
+        ),
+    }
+}

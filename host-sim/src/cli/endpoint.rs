@@ -1,0 +1,138 @@
+//! The machine that a command line names, and the way to it.
+
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+
+use anyhow::Context;
+use quadrant_sim::client::Client;
+use quadrant_sim::machine::{LawStage, Machine, SerialTransport, SimulatedLink, TcpTransport};
+
+/// Image that `cargo xtask build --board mps2` leaves, from the workspace's folder.
+pub(super) const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
+
+/// A machine, as `--machine` names it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum Endpoint {
+    /// The control law alone on the simulated stage.
+    Law,
+    /// A machine that speaks the link's protocol.
+    Link(LinkEndpoint),
+}
+
+/// A machine that speaks the link's protocol.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub(super) enum LinkEndpoint {
+    /// The firmware's application in this process.
+    Simulated,
+    /// The firmware's image in QEMU.
+    Emulated(PathBuf),
+    /// A board at a serial port.
+    Serial(String),
+    /// A machine behind a socket.
+    Tcp(String),
+}
+
+impl FromStr for Endpoint {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let link = match text.split_once(':') {
+            None => match text {
+                "law" => return Ok(Self::Law),
+                "simulated" => LinkEndpoint::Simulated,
+                "emulated" => LinkEndpoint::Emulated(DEFAULT_IMAGE.into()),
+                _ => return Err(Self::EXPECTED.to_owned()),
+            },
+            Some(("emulated", image)) => LinkEndpoint::Emulated(image.into()),
+            Some(("serial", port)) => LinkEndpoint::Serial(port.to_owned()),
+            Some(("tcp", address)) => LinkEndpoint::Tcp(address.to_owned()),
+            Some(_) => return Err(Self::EXPECTED.to_owned()),
+        };
+        Ok(Self::Link(link))
+    }
+}
+
+impl Endpoint {
+    const EXPECTED: &str =
+        "give law, simulated, emulated, emulated:ELF, serial:PORT or tcp:HOST:PORT";
+
+    /// Opens the machine; `seed` decides the noise of a simulated stage.
+    pub(super) fn open(&self, seed: u64) -> anyhow::Result<Box<dyn Machine>> {
+        Ok(match self {
+            Self::Law => Box::new(LawStage::new(seed)),
+            Self::Link(link) => Box::new(link.connect(seed, None)?),
+        })
+    }
+}
+
+impl LinkEndpoint {
+    /// Opens a session; `seed` decides the noise of a simulated stage, and a file keeps the flash of its machine.
+    pub(super) fn connect(&self, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
+        let client = match self {
+            Self::Simulated => Client::open(SimulatedLink::start(seed, flash)?),
+            Self::Emulated(image) => return emulated(image, seed, flash),
+            Self::Serial(path) => {
+                let port = SerialTransport::open(path).with_context(|| {
+                    format!(
+                        "serial port {path} cannot be opened; check the cable, the name (on Linux `ls /dev/ttyACM* \
+                         /dev/ttyUSB*`), that no other program has it, and that you may use it (group dialout)"
+                    )
+                })?;
+                Client::open(port)
+            }
+            Self::Tcp(address) => {
+                let socket = TcpTransport::connect(address).with_context(|| {
+                    format!(
+                        "tcp:{address} does not answer; check the address and that the machine runs"
+                    )
+                })?;
+                Client::open(socket)
+            }
+        };
+        Ok(client?)
+    }
+}
+
+#[cfg(unix)]
+fn emulated(image: &Path, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
+    let link = quadrant_sim::machine::EmulatedLink::start(image, seed, flash)?;
+    Ok(Client::open(link)?)
+}
+
+#[cfg(not(unix))]
+fn emulated(_: &Path, _: u64, _: Option<&Path>) -> anyhow::Result<Client> {
+    anyhow::bail!(
+        "emulated: QEMU shares memory through a file on Unix systems alone; the simulated machine works here"
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{Endpoint, LinkEndpoint};
+
+    #[test]
+    fn every_machine_has_a_name_and_others_are_refused_with_them() {
+        let link = |text: &str| match text.parse() {
+            Ok(Endpoint::Link(link)) => link,
+            other => panic!("{text}: {other:?}"),
+        };
+        assert_eq!("law".parse(), Ok(Endpoint::Law));
+        assert_eq!(link("simulated"), LinkEndpoint::Simulated);
+        assert_eq!(
+            link("emulated:a.elf"),
+            LinkEndpoint::Emulated("a.elf".into())
+        );
+        assert_eq!(
+            link("serial:/dev/ttyACM0"),
+            LinkEndpoint::Serial("/dev/ttyACM0".to_owned())
+        );
+        assert_eq!(
+            link("tcp:shop:7000"),
+            LinkEndpoint::Tcp("shop:7000".to_owned())
+        );
+        for text in ["", "board", "usb:1"] {
+            let refused = text.parse::<Endpoint>().unwrap_err();
+            assert!(refused.contains("serial:PORT"), "{text}: {refused}");
+        }
+    }
+}

@@ -1,0 +1,182 @@
+//! Errors of a session with a machine.
+
+use std::io;
+use std::time::Duration;
+
+use quadrant::link::PROTOCOL_VERSION;
+use quadrant::link::message::LinkError;
+use quadrant::settings::tree::TreeError;
+
+/// Reason why a request was not carried out.
+#[derive(Debug, thiserror::Error)]
+pub enum ClientError {
+    /// The connection is broken.
+    #[error("{endpoint}: {source}; {remedy}")]
+    Connection {
+        /// Endpoint of the connection.
+        endpoint: String,
+        /// The error that caused this.
+        source: io::Error,
+        /// Remedy, for the message.
+        remedy: &'static str,
+    },
+    /// No answer came in time.
+    #[error(
+        "{what}: no answer from {endpoint} within {waited_ms} ms, asked {attempts} times; {remedy}"
+    )]
+    Silent {
+        /// Name of the request.
+        what: &'static str,
+        /// Endpoint of the connection.
+        endpoint: String,
+        /// Waiting time of all attempts, ms.
+        waited_ms: u128,
+        /// Number of attempts that were made.
+        attempts: u32,
+        /// Remedy, for the message.
+        remedy: &'static str,
+    },
+    /// No answer came to a request that must not be made twice.
+    #[error(
+        "{what}: no answer from {endpoint} within {waited_ms} ms; it may have been done or not, and doing it twice may harm, so it \
+         was not asked again: look at `status`"
+    )]
+    Unsure {
+        /// Name of the request.
+        what: &'static str,
+        /// Endpoint of the connection.
+        endpoint: String,
+        /// Time waited for it, ms.
+        waited_ms: u128,
+    },
+    /// The other end is of another release.
+    #[error(
+        "{endpoint} speaks protocol version {theirs}, this program version {PROTOCOL_VERSION}; use the program of the firmware's \
+         release, or flash the firmware of this one (`quadrant connect flash`)"
+    )]
+    Version {
+        /// Endpoint of the connection.
+        endpoint: String,
+        /// Protocol version of the machine.
+        theirs: u8,
+    },
+    /// The machine has restarted since the session was opened.
+    #[error(
+        "{what}: the machine has restarted, so this was not done; the session is open again, but outputs are off and home \
+         positions are lost: look at `status`"
+    )]
+    Restarted {
+        /// Name of the request.
+        what: &'static str,
+    },
+    /// The machine said no.
+    #[error("{what}: {source}")]
+    Refused {
+        /// Name of the request.
+        what: &'static str,
+        /// The error that caused this.
+        source: LinkError,
+    },
+    /// The machine answered something else.
+    #[error(
+        "{what}: {endpoint} answered with something else ({answer}); use host tools and firmware of one release"
+    )]
+    Unexpected {
+        /// Name of the request.
+        what: &'static str,
+        /// Endpoint of the connection.
+        endpoint: String,
+        /// Name of the reply that came.
+        answer: &'static str,
+    },
+    /// A text is longer than the link carries.
+    #[error("{what}: {text:?} is {length} bytes long, the link carries {most}; shorten it")]
+    TooLong {
+        /// Kind of the text.
+        what: &'static str,
+        /// The text that is too long.
+        text: String,
+        /// Length of the text, bytes.
+        length: usize,
+        /// Longest text allowed, bytes.
+        most: usize,
+    },
+    /// A setting that this program does not know, or a value that is none of it.
+    #[error("{path}: {source}")]
+    Setting {
+        /// Its path, and the value if there is one.
+        path: String,
+        /// The error that caused this.
+        source: TreeError,
+    },
+    /// A latched fault ended what was waited for.
+    #[error(
+        "{what}: fault {code} {name}{axis} at tick {tick}: {cause}; {remedy}",
+        remedy = with_reset(.remedy),
+        axis = .axis.map(|axis| format!(" of {axis}")).unwrap_or_default()
+    )]
+    Fault {
+        /// Name of the condition.
+        what: &'static str,
+        /// Number of the fault code.
+        code: u8,
+        /// Name of the fault code.
+        name: String,
+        /// Axis of the fault, if it has one.
+        axis: Option<quadrant::axes::AxisName>,
+        /// Control tick of the fault.
+        tick: u32,
+        /// Cause, as the machine words it.
+        cause: String,
+        /// Remedy, for the message.
+        remedy: String,
+    },
+    /// A condition was not met in time.
+    #[error("{what}: not after {waited_s} s; {remedy}")]
+    TimedOut {
+        /// Name of the condition.
+        what: &'static str,
+        /// Time waited for it, s.
+        waited_s: f64,
+        /// Remedy, for the message.
+        remedy: &'static str,
+    },
+}
+
+impl ClientError {
+    pub(super) const fn silent(
+        what: &'static str,
+        endpoint: String,
+        waited: Duration,
+        attempts: u32,
+        remedy: &'static str,
+    ) -> Self {
+        Self::Silent {
+            what,
+            endpoint,
+            waited_ms: waited.as_millis(),
+            attempts,
+            remedy,
+        }
+    }
+}
+
+/// Returns a fault's remedy with the `reset` that most remedies leave unsaid.
+pub fn with_reset(remedy: &str) -> String {
+    if remedy.contains("reset") {
+        remedy.to_owned()
+    } else {
+        format!("{remedy}, then `reset`")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::with_reset;
+
+    #[test]
+    fn a_reset_is_told_of_once() {
+        assert_eq!(with_reset("find the cause"), "find the cause, then `reset`");
+        assert_eq!(with_reset("reset, and enable"), "reset, and enable");
+    }
+}

@@ -1,0 +1,388 @@
+//! The client's end of the link: requests and their answers, and the notices between them.
+
+use std::collections::VecDeque;
+use std::io;
+use std::time::Duration;
+
+use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
+use quadrant::link::message::{
+    Body, FaultReport, Identity, LinkError, Message, Notice, Reply, Request, Status,
+};
+use quadrant::link::message::{MachineState, TelemetryBlock};
+
+use super::error::ClientError;
+use super::timeout::{ANSWER, BUSY, BUSY_PAUSE, Idempotency, answer_timeout, idempotency};
+use crate::machine::{SimulatedIo, Transport};
+
+/// Notices that are kept until someone asks for them; of more, the oldest are dropped.
+const MOST_NOTICES: usize = 1 << 14;
+
+/// Longest silence of a host that jogs an axis: less than half of the machine's time-out.
+const ALIVE: Duration = Duration::from_millis(200);
+
+/// Times that a request which may be repeated is made before the machine counts as silent.
+const ATTEMPTS: u32 = 4;
+
+/// A session with a machine.
+pub struct Client {
+    transport: Box<dyn Transport>,
+    receiver: Receiver,
+    identity: Option<Identity>,
+    next_id: u16,
+    /// Time of the last request.
+    asked: Duration,
+    /// A jog may be under way, which the machine ends when its host falls silent.
+    jogs: bool,
+    notices: VecDeque<Notice>,
+    dropped_notices: u64,
+}
+
+impl Client {
+    /// Opens a session.
+    ///
+    /// # Errors
+    /// A machine that is silent or of another release.
+    pub fn open(transport: impl Transport + 'static) -> Result<Self, ClientError> {
+        let mut client = Self {
+            transport: Box::new(transport),
+            receiver: Receiver::new(),
+            identity: None,
+            next_id: 1,
+            asked: Duration::ZERO,
+            jogs: false,
+            notices: VecDeque::new(),
+            dropped_notices: 0,
+        };
+        // Ends whatever the other end takes for a frame's beginning.
+        client.send(&[DELIMITER])?;
+        client.greet()?;
+        Ok(client)
+    }
+
+    /// Returns the machine's identity, from the last greeting.
+    ///
+    /// # Panics
+    /// Never: a session is open.
+    pub fn identity(&self) -> &Identity {
+        self.identity.as_ref().expect("a session is open")
+    }
+
+    /// Time by the connection's clock: the machine's time, if it is a simulated one.
+    pub fn now(&self) -> Duration {
+        self.transport.now()
+    }
+
+    /// Returns the other end, for messages.
+    pub fn endpoint(&self) -> String {
+        self.transport.endpoint()
+    }
+
+    /// SimulatedIo at the machine, if it is not a real one.
+    pub fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
+        self.transport.simulated_io()
+    }
+
+    /// Asks, and waits for the answer. A request that may be made twice is made again if none comes; one that is refused
+    /// because the machine is busy is made again for two seconds.
+    ///
+    /// # Errors
+    /// No answer, a refusal, or a machine that has restarted.
+    pub fn request(&mut self, body: Body) -> Result<Reply, ClientError> {
+        let what = body.name();
+        let idempotency = idempotency(&body);
+        let busy_until = self.now() + BUSY;
+        loop {
+            match self.ask(&body)? {
+                Ok(reply) => return Ok(reply),
+                Err(LinkError::Busy(_)) if self.now() < busy_until => self.wait(BUSY_PAUSE)?,
+                Err(LinkError::NoHello) if !matches!(body, Body::Hello) => {
+                    self.greet()?;
+                    if idempotency != Idempotency::Query {
+                        return Err(ClientError::Restarted { what });
+                    }
+                }
+                Err(LinkError::Version { mine: theirs, .. }) => return Err(self.version(theirs)),
+                Err(source) => return Err(ClientError::Refused { what, source }),
+            }
+        }
+    }
+
+    /// Asks for something that is only to be done.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn order(&mut self, body: Body) -> Result<(), ClientError> {
+        let what = body.name();
+        match self.request(body)? {
+            Reply::Done => Ok(()),
+            other => Err(self.unexpected(what, &other)),
+        }
+    }
+
+    /// Reads the machine's status.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn status(&mut self) -> Result<Status, ClientError> {
+        match self.request(Body::Status)? {
+            Reply::Status(status) => Ok(status),
+            other => Err(self.unexpected("status", &other)),
+        }
+    }
+
+    /// The latched fault, if there is one.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn fault(&mut self) -> Result<Option<FaultReport>, ClientError> {
+        match self.request(Body::Fault)? {
+            Reply::Fault(fault) => Ok(fault),
+            other => Err(self.unexpected("fault", &other)),
+        }
+    }
+
+    /// The next notice, waiting for it at most for `timeout`.
+    ///
+    /// # Errors
+    /// A connection that is broken, or a machine of another release.
+    pub fn notice(&mut self, timeout: Duration) -> Result<Option<Notice>, ClientError> {
+        let due = self.now() + timeout;
+        while self.notices.is_empty() && self.now() < due {
+            self.receive(due)?;
+        }
+        Ok(self.notices.pop_front())
+    }
+
+    /// Takes the notices that have come.
+    pub fn take_notices(&mut self) -> impl Iterator<Item = Notice> + use<> {
+        std::mem::take(&mut self.notices).into_iter()
+    }
+
+    /// Takes the blocks of telemetry that have come, and leaves the other notices.
+    pub fn take_blocks(&mut self) -> Vec<TelemetryBlock> {
+        let mut blocks = Vec::new();
+        let mut others = VecDeque::new();
+        for notice in self.notices.drain(..) {
+            match notice {
+                Notice::Telemetry(block) => blocks.push(block),
+                other => others.push_back(other),
+            }
+        }
+        self.notices = others;
+        blocks
+    }
+
+    /// Notices that nobody asked for in time.
+    pub const fn dropped_notices(&self) -> u64 {
+        self.dropped_notices
+    }
+
+    /// Lets time pass, and keeps the notices that come.
+    ///
+    /// # Errors
+    /// As [`notice`](Self::notice).
+    pub fn wait(&mut self, time: Duration) -> Result<(), ClientError> {
+        let due = self.now() + time;
+        while self.now() < due {
+            self.keep_alive()?;
+            self.receive(due)?;
+        }
+        Ok(())
+    }
+
+    /// Lets the machine know that its host is there, if an axis jogs and nothing was asked for a while: it stops a jog whose
+    /// host has fallen silent. Whoever lets time pass without [`wait`](Self::wait) calls this a few times a second.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn keep_alive(&mut self) -> Result<(), ClientError> {
+        if self.jogs && self.now().saturating_sub(self.asked) >= ALIVE {
+            self.status()?;
+        }
+        Ok(())
+    }
+
+    /// An error if a fault is latched: what ended `what`.
+    ///
+    /// # Errors
+    /// The fault; or as [`request`](Self::request).
+    pub fn refuse_fault(&mut self, what: &'static str, status: &Status) -> Result<(), ClientError> {
+        if status.state != MachineState::Fault {
+            return Ok(());
+        }
+        match self.fault()? {
+            Some(fault) => Err(ClientError::Fault {
+                what,
+                code: fault.code,
+                name: fault.name.as_str().to_owned(),
+                axis: fault.axis.map(Into::into),
+                tick: fault.tick,
+                cause: fault.cause.as_str().to_owned(),
+                remedy: fault.remedy.as_str().to_owned(),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    pub(super) fn unexpected(&self, what: &'static str, reply: &Reply) -> ClientError {
+        ClientError::Unexpected {
+            what,
+            endpoint: self.endpoint(),
+            answer: reply_name(reply),
+        }
+    }
+
+    fn greet(&mut self) -> Result<(), ClientError> {
+        match self.ask(&Body::Hello)? {
+            Ok(Reply::Identity(identity)) => {
+                self.identity = Some(identity);
+                Ok(())
+            }
+            Ok(other) => Err(self.unexpected("hello", &other)),
+            Err(LinkError::Version { mine: theirs, .. }) => Err(self.version(theirs)),
+            Err(source) => Err(ClientError::Refused {
+                what: "hello",
+                source,
+            }),
+        }
+    }
+
+    /// Makes one request, more than once if it may be and nothing comes back. All attempts have one number, so that a late
+    /// answer to the first is an answer.
+    fn ask(&mut self, body: &Body) -> Result<Result<Reply, LinkError>, ClientError> {
+        let id = self.next_id;
+        self.next_id = self.next_id.wrapping_add(1);
+        let request = Request {
+            id,
+            body: body.clone(),
+        };
+        let mut buffer = [0; FRAME_BYTES];
+        let bytes = frame::encode(&request, &mut buffer)
+            .expect("every request fits a frame")
+            .to_vec();
+        let attempts = match idempotency(body) {
+            Idempotency::NotIdempotent => 1,
+            Idempotency::Query | Idempotency::Idempotent => ATTEMPTS,
+        };
+        match body {
+            Body::Jog { velocity_mm_s, .. } => self.jogs = *velocity_mm_s != 0.0,
+            Body::Stop | Body::Disable => self.jogs = false,
+            _ => {}
+        }
+        let began = self.now();
+        self.asked = began;
+        for attempt in 0..attempts {
+            if attempt > 0 {
+                // What the line did to the last one may have begun a frame.
+                self.send(&[DELIMITER])?;
+            }
+            self.send(&bytes)?;
+            let due = self.now() + answer_timeout(body);
+            while self.now() < due {
+                if let Some(result) = self.receive_for(id, due)? {
+                    return Ok(result);
+                }
+            }
+        }
+        let waited = self.now().saturating_sub(began);
+        Err(match attempts {
+            1 => ClientError::Unsure {
+                what: body.name(),
+                endpoint: self.endpoint(),
+                waited_ms: waited.as_millis(),
+            },
+            _ => ClientError::silent(
+                body.name(),
+                self.endpoint(),
+                waited,
+                attempts,
+                self.transport.remedy(),
+            ),
+        })
+    }
+
+    fn send(&mut self, bytes: &[u8]) -> Result<(), ClientError> {
+        self.transport
+            .send(bytes)
+            .map_err(|source| self.broken(source))
+    }
+
+    fn receive(&mut self, due: Duration) -> Result<(), ClientError> {
+        // No request has this number: it is the next one's.
+        self.receive_for(self.next_id, due).map(|_| ())
+    }
+
+    /// Takes what comes next, until `due` at most: notices are kept, and the answer to request `id` is given.
+    fn receive_for(
+        &mut self,
+        id: u16,
+        due: Duration,
+    ) -> Result<Option<Result<Reply, LinkError>>, ClientError> {
+        let mut buffer = [0; FRAME_BYTES];
+        let timeout = due.saturating_sub(self.now()).min(ANSWER);
+        let count = self
+            .transport
+            .receive(&mut buffer, timeout)
+            .map_err(|source| self.broken(source))?;
+        let mut answer = None;
+        for &byte in &buffer[..count] {
+            let Some(payload) = self.receiver.push(byte) else {
+                continue;
+            };
+            match frame::decode::<Message>(payload) {
+                Ok(Message::Response(response)) if response.id == id => {
+                    answer = Some(response.result);
+                }
+                // An answer to what was given up, or a second one.
+                Ok(Message::Response(_)) => {}
+                Ok(Message::Notice(notice)) => self.keep(notice),
+                Err(DecodeError::Version(theirs)) => return Err(self.version(theirs)),
+                // A message that a later release of this version has added.
+                Err(DecodeError::Malformed) => {}
+            }
+        }
+        Ok(answer)
+    }
+
+    fn keep(&mut self, notice: Notice) {
+        if self.notices.len() == MOST_NOTICES {
+            self.notices.pop_front();
+            self.dropped_notices += 1;
+        }
+        self.notices.push_back(notice);
+    }
+
+    fn broken(&self, source: io::Error) -> ClientError {
+        ClientError::Connection {
+            endpoint: self.endpoint(),
+            source,
+            remedy: self.transport.remedy(),
+        }
+    }
+
+    fn version(&self, theirs: u8) -> ClientError {
+        ClientError::Version {
+            endpoint: self.endpoint(),
+            theirs,
+        }
+    }
+}
+
+/// Returns the name of a reply.
+const fn reply_name(reply: &Reply) -> &'static str {
+    match reply {
+        Reply::Done => "done",
+        Reply::Identity(_) => "an identity",
+        Reply::Status(_) => "a status",
+        Reply::Fault(_) => "a fault",
+        Reply::Stream(_) => "the state of a stream",
+        Reply::Value(_) => "a value",
+        Reply::Paths(_) => "paths",
+        Reply::Applied(_) => "applied settings",
+        Reply::Provenance(_) => "a provenance",
+        Reply::Telemetry { .. } => "a telemetry selection",
+        Reply::Capture(_) => "the state of a capture",
+        Reply::Words(_) => "words of a capture",
+        Reply::Inject(_) => "the state of an injection",
+    }
+}

@@ -1,0 +1,284 @@
+//! The machine's settings: leaf by leaf, and as a file.
+
+use heapless::{String as Bounded, Vec as Bytes};
+use quadrant::link::message::{
+    Applied, Body, Path as LeafPath, Reply, SettingsRequest, Value as LeafValue,
+};
+use quadrant::settings::tree::{TreeError, expand, is_part};
+use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
+use serde_json::Value;
+
+use super::error::ClientError;
+use super::session::Client;
+
+/// Room for every value as JSON.
+const JSON_BYTES: usize = 2048;
+
+/// The whole path of what a person may write: `x/limits/max_velocity_mm_s` for `/axes/0/limits/max_velocity_mm_s`. What is
+/// longer than any path stays as it is.
+pub fn whole_path(path: &str) -> String {
+    expand(path).map_or_else(|| path.to_owned(), |path| path.as_str().to_owned())
+}
+
+/// The value of a leaf in the machine's draft, or whether a part that may be left out is there.
+///
+/// # Errors
+/// A path that there is not, or a connection that is broken.
+pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
+    let value = get_bytes(client, path)?;
+    let unknown = |source| ClientError::Setting {
+        path: path.to_owned(),
+        source,
+    };
+    // Settings with every part, into which the value is put to read it as text.
+    let mut own = StageSettings::simulated();
+    own.set_bytes(path, value.kind, &value.bytes)
+        .map_err(unknown)?;
+    let mut json = [0; JSON_BYTES];
+    let length = own.get_json(path, &mut json).map_err(unknown)?;
+    let json = String::from_utf8_lossy(&json[..length]);
+    Ok(serde_json::from_str(&json).unwrap_or_else(|_| Value::from(json)))
+}
+
+fn get_bytes(client: &mut Client, path: &str) -> Result<LeafValue, ClientError> {
+    let request = SettingsRequest::Get(bounded("path", path)?);
+    match client.request(Body::Settings(request))? {
+        Reply::Value(value) => Ok(value),
+        other => Err(client.unexpected("get", &other)),
+    }
+}
+
+/// Changes a leaf of the machine's draft, makes a part (`"present"`), or leaves it out (`null`). A value that is no JSON is
+/// taken for a text: `n-pid` for `"n-pid"`.
+///
+/// # Errors
+/// A path that there is not, a value of another type, or a connection that is broken.
+pub fn set(client: &mut Client, path: &str, value: &str) -> Result<(), ClientError> {
+    let json = match serde_json::from_str::<Value>(value) {
+        Ok(_) => value.to_owned(),
+        Err(_) => Value::from(value).to_string(),
+    };
+    let wrong = |source| ClientError::Setting {
+        path: format!("{path} = {json}"),
+        source,
+    };
+    let mut own = StageSettings::simulated();
+    own.set_json(path, json.as_bytes()).map_err(wrong)?;
+    set_bytes(client, path, bytes_of(&own, path).map_err(wrong)?)
+}
+
+fn bytes_of(settings: &StageSettings, path: &str) -> Result<LeafValue, TreeError> {
+    let mut bytes = Bytes::new();
+    // Cannot fail: that is its capacity.
+    let _ = bytes.resize_default(MAX_VALUE_BYTES);
+    let (kind, length) = settings.get_bytes(path, &mut bytes)?;
+    bytes.truncate(length);
+    Ok(LeafValue { kind, bytes })
+}
+
+fn set_bytes(client: &mut Client, path: &str, value: LeafValue) -> Result<(), ClientError> {
+    let path = bounded("path", path)?;
+    client.order(Body::Settings(SettingsRequest::Set { path, value }))
+}
+
+/// The paths of the machine's draft that begin with `prefix`.
+///
+/// # Errors
+/// A connection that is broken.
+pub fn list(client: &mut Client, prefix: &str) -> Result<Vec<String>, ClientError> {
+    let mut paths = Vec::new();
+    let mut cursor = 0;
+    loop {
+        match client.request(Body::Settings(SettingsRequest::List { cursor }))? {
+            Reply::Paths(page) => {
+                let found = page.paths.iter().map(LeafPath::as_str);
+                paths.extend(
+                    found
+                        .filter(|path| path.starts_with(prefix))
+                        .map(str::to_owned),
+                );
+                match page.next {
+                    Some(next) if next > cursor => cursor = next,
+                    _ => return Ok(paths),
+                }
+            }
+            other => return Err(client.unexpected("list", &other)),
+        }
+    }
+}
+
+/// Lets the draft act, checked as a whole.
+///
+/// # Errors
+/// The first value that the machine refuses, or a connection that is broken.
+pub fn apply(client: &mut Client) -> Result<Applied, ClientError> {
+    match client.request(Body::Settings(SettingsRequest::Apply))? {
+        Reply::Applied(applied) => Ok(applied),
+        other => Err(client.unexpected("apply", &other)),
+    }
+}
+
+/// Stores the draft for the next start, with its origin.
+///
+/// # Errors
+/// A memory that failed, or a connection that is broken.
+pub fn store(client: &mut Client, provenance: &str) -> Result<(), ClientError> {
+    let request = SettingsRequest::Store(bounded("provenance", provenance)?);
+    client.order(Body::Settings(request))
+}
+
+/// Reads the origin of the stored settings.
+///
+/// # Errors
+/// A connection that is broken.
+pub fn provenance(client: &mut Client) -> Result<String, ClientError> {
+    match client.request(Body::Settings(SettingsRequest::Provenance))? {
+        Reply::Provenance(provenance) => Ok(provenance.as_str().to_owned()),
+        other => Err(client.unexpected("provenance", &other)),
+    }
+}
+
+/// The length of a count of each axis, mm.
+///
+/// # Errors
+/// A connection that is broken.
+pub fn resolutions_mm(client: &mut Client) -> Result<[f64; 3], ClientError> {
+    let mut resolutions = [0.0; 3];
+    for (axis, resolution) in resolutions.iter_mut().enumerate() {
+        let value = get(client, &format!("/axes/{axis}/encoder/resolution_mm"))?;
+        *resolution = value.as_f64().unwrap_or(f64::NAN);
+    }
+    Ok(resolutions)
+}
+
+/// Error of loading a file's settings.
+#[derive(Debug, thiserror::Error)]
+pub enum ExchangeError {
+    /// The link, or a value that the machine refuses.
+    #[error(transparent)]
+    Client(#[from] ClientError),
+    /// The machine lacks settings that the file has.
+    #[error(
+        "the machine has no setting {path}, which the file has; use host tools and firmware of one release"
+    )]
+    Unknown {
+        /// The first of them.
+        path: String,
+    },
+    /// The machine refuses the whole, or a leaf; its draft is what acts again.
+    #[error("{0}; nothing was changed")]
+    Reverted(ClientError),
+}
+
+/// Reads all settings of the machine's draft.
+///
+/// # Errors
+/// A connection that is broken, or a machine of a later release.
+pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
+    let mut settings = StageSettings::simulated();
+    // In the machine's order a part comes before its leaves.
+    for path in list(client, "")? {
+        let LeafValue { kind, bytes } = get_bytes(client, &path)?;
+        settings
+            .set_bytes(&path, kind, &bytes)
+            .map_err(|source| ClientError::Setting { path, source })?;
+    }
+    Ok(settings)
+}
+
+/// Result of loading settings.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loaded {
+    /// The paths whose values changed.
+    pub changed: Vec<String>,
+    /// Settings of the machine, of a later release, that the file does not know; they stay as they are.
+    pub left: Vec<String>,
+    /// Reply of the machine.
+    pub applied: Applied,
+}
+
+/// Writes all settings to the machine's draft, only those that differ, and lets them act as a whole. If the machine
+/// refuses one of them, or the whole, its draft is reverted.
+///
+/// # Errors
+/// What the machine refuses; a connection that is broken.
+pub fn load(client: &mut Client, settings: &StageSettings) -> Result<Loaded, ExchangeError> {
+    let outcome = write_draft(client, settings).and_then(|(changed, left)| {
+        let applied = apply(client)?;
+        Ok(Loaded {
+            changed,
+            left,
+            applied,
+        })
+    });
+    match outcome {
+        Err(ExchangeError::Client(error @ ClientError::Refused { .. })) => {
+            client.order(Body::Settings(SettingsRequest::Revert))?;
+            Err(ExchangeError::Reverted(error))
+        }
+        Err(error @ ExchangeError::Unknown { .. }) => {
+            client.order(Body::Settings(SettingsRequest::Revert))?;
+            Err(error)
+        }
+        other => other,
+    }
+}
+
+/// Makes the draft what is wanted; gives the paths that changed, and those that are not in `wanted`.
+fn write_draft(
+    client: &mut Client,
+    wanted: &StageSettings,
+) -> Result<(Vec<String>, Vec<String>), ExchangeError> {
+    let mut changed = Vec::new();
+    // First the parts that may be left out: they bring leaves, or take them away.
+    let (parts, _) = list(client, "")?
+        .into_iter()
+        .partition(|path| is_part(path));
+    let parts: Vec<String> = parts;
+    for path in &parts {
+        change(client, path, wanted, &mut changed)?;
+    }
+    let paths = list(client, "")?;
+    let mut left = Vec::new();
+    for path in paths.iter().filter(|path| !is_part(path)) {
+        if !change(client, path, wanted, &mut changed)? {
+            left.push(path.clone());
+        }
+    }
+    let mut unknown = None;
+    let _ = wanted.list("", &mut |path| {
+        if unknown.is_none() && !paths.iter().any(|known| known == path) {
+            unknown = Some(path.to_owned());
+        }
+    });
+    match unknown {
+        Some(path) => Err(ExchangeError::Unknown { path }),
+        None => Ok((changed, left)),
+    }
+}
+
+/// Makes one leaf or part what is wanted; says whether that is known.
+fn change(
+    client: &mut Client,
+    path: &str,
+    wanted: &StageSettings,
+    changed: &mut Vec<String>,
+) -> Result<bool, ClientError> {
+    let Ok(value) = bytes_of(wanted, path) else {
+        return Ok(false);
+    };
+    if get_bytes(client, path)? != value {
+        set_bytes(client, path, value)?;
+        changed.push(path.to_owned());
+    }
+    Ok(true)
+}
+
+fn bounded<const N: usize>(what: &'static str, text: &str) -> Result<Bounded<N>, ClientError> {
+    Bounded::try_from(text).map_err(|_| ClientError::TooLong {
+        what,
+        text: text.to_owned(),
+        length: text.len(),
+        most: N,
+    })
+}

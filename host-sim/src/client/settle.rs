@@ -1,0 +1,84 @@
+//! Waiting for the machine.
+
+use std::time::Duration;
+
+use quadrant::link::message::MachineState;
+use quadrant::link::message::{AxisMode, AxisSet, Status};
+
+use super::error::ClientError;
+use super::session::Client;
+
+/// Time in which an order that was acknowledged has reached the control law.
+const ARRIVAL: Duration = Duration::from_millis(20);
+/// Time from one look at the machine to the next.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Waits until no motion is under way.
+///
+/// # Errors
+/// A fault, a motion that has not ended after `timeout`, or a connection that is broken.
+pub fn rest(client: &mut Client, timeout: Duration) -> Result<Status, ClientError> {
+    until(
+        client,
+        "wait rest",
+        timeout,
+        "the motion has not ended; `stop` ends it",
+        |status| !status.running && status.state != MachineState::Homing,
+    )
+}
+
+/// Waits until axes are homed.
+///
+/// # Errors
+/// A fault, homing that was given up or has not ended after `timeout`, or a connection that is broken.
+pub fn homed(client: &mut Client, axes: AxisSet, timeout: Duration) -> Result<Status, ClientError> {
+    let all_homed = |status: &Status| axes.iter().all(|axis| status.homed.contains(axis));
+    // An axis knows where it is before it has moved to where homing ends.
+    let homing = |status: &Status| {
+        let mut modes = axes.iter().map(|axis| status.axes[axis as usize].mode);
+        modes.any(|mode| mode == AxisMode::Home)
+    };
+    let status = until(
+        client,
+        "wait homed",
+        timeout,
+        "homing has not ended; check that the switch is reached, `stop` ends it",
+        |status| !homing(status),
+    )?;
+    if all_homed(&status) {
+        Ok(status)
+    } else {
+        Err(ClientError::TimedOut {
+            what: "wait homed",
+            waited_s: 0.0,
+            remedy: "nothing is homing these axes: give `home` first",
+        })
+    }
+}
+
+/// Looks at the machine until a condition holds.
+fn until(
+    client: &mut Client,
+    what: &'static str,
+    timeout: Duration,
+    remedy: &'static str,
+    mut is_so: impl FnMut(&Status) -> bool,
+) -> Result<Status, ClientError> {
+    let due = client.now() + timeout;
+    client.wait(ARRIVAL)?;
+    loop {
+        let status = client.status()?;
+        client.refuse_fault(what, &status)?;
+        if is_so(&status) {
+            return Ok(status);
+        }
+        if client.now() >= due {
+            return Err(ClientError::TimedOut {
+                what,
+                waited_s: timeout.as_secs_f64(),
+                remedy,
+            });
+        }
+        client.wait(LOOK)?;
+    }
+}

@@ -1,0 +1,210 @@
+//! An axis of a connected machine, under experiments.
+
+use std::time::Duration;
+
+use quadrant::axes::AxisName;
+use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
+use quadrant::reference::MotionSettings;
+use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+
+use super::injection::Injection;
+use super::recording::Shape;
+use super::stop::Stop;
+use crate::client::error::ClientError;
+use crate::client::samples::{TelemetryRecorder, least_decimation};
+use crate::client::session::Client;
+use crate::client::settings;
+use crate::client::settle;
+use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
+
+/// Time from one look at the telemetry to the next.
+const LOOK: Duration = Duration::from_millis(50);
+/// Time recorded after the motion, so that the last block has come.
+const TAIL: Duration = Duration::from_millis(30);
+/// Time for whatever moves to come to rest before an experiment.
+const BEFORE: Duration = Duration::from_secs(60);
+/// Time in which the outputs come on.
+const ENABLING: Duration = Duration::from_millis(100);
+
+/// An axis of a connected machine.
+///
+/// Experiments run under the machine's own limits and faults, and are recorded by telemetry: as often as they ask for, if
+/// the line carries three channels so often, else as often as it does; a sample's voltage is the mean over all of its
+/// control periods in any case. Positions are counted from where the axis stood when this was made.
+pub struct ConnectedAxis<'a> {
+    client: &'a mut Client,
+    axis: AxisName,
+    stage: StageSettings,
+    travel_mm: f64,
+    origin_mm: f64,
+    /// Refusal of the settings that are to be in force.
+    refused: Option<String>,
+}
+
+impl<'a> ConnectedAxis<'a> {
+    /// An axis of the machine, whose settings are read. Experiments keep it within `travel_mm` of where it stands, either
+    /// way.
+    ///
+    /// # Errors
+    /// A connection that is broken, or a machine of another release.
+    pub fn new(
+        client: &'a mut Client,
+        axis: AxisName,
+        travel_mm: f64,
+    ) -> Result<Self, ClientError> {
+        let stage = settings::dump(client)?;
+        let origin_mm = client.status()?.axes[axis as usize].position_mm;
+        Ok(Self {
+            client,
+            axis,
+            stage,
+            travel_mm,
+            origin_mm,
+            refused: None,
+        })
+    }
+
+    fn run(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, Stop> {
+        let here = self.enabled()?;
+        let motion = match experiment.drive {
+            Drive::ClosedLoop(motion) => Some(motion),
+            Drive::OpenLoop => None,
+        };
+        let moves = motion.is_some_and(|motion| motion != MotionSettings::Hold);
+        let mut motions = [MotionSettings::Hold; 3];
+        motions[self.axis as usize] = motion.unwrap_or(MotionSettings::Hold);
+        self.client
+            .order(Body::SetPlan(PlanSettings { motions }.into()))?;
+        let channels = [
+            AxisSignal::Reference,
+            AxisSignal::Position,
+            AxisSignal::CodeSum,
+        ]
+        .map(|signal| Channel::Axis(self.axis.into(), signal));
+        let rate_hz = self.client.identity().rate_hz;
+        let wanted = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
+        let every = wanted.max(least_decimation(channels.len(), rate_hz));
+        let injects = motion.is_none() || experiment.injection_v.iter().any(|volts| *volts != 0.0);
+
+        let began = self.client.now();
+        let mut telemetry = TelemetryRecorder::start(self.client, &channels, every)?;
+        let mut injection = None;
+        if injects {
+            let room_mm = self.travel_mm - if moves { 0.0 } else { here.abs() };
+            let mut plan = Injection::new(
+                experiment,
+                self.settings(),
+                self.axis.into(),
+                room_mm,
+                moves,
+            );
+            plan.send(self.client, &mut telemetry)?;
+            injection = Some(plan);
+        } else if moves {
+            self.client.order(Body::Run)?;
+        }
+        let lasts = experiment.injection_v.len();
+        let least = Duration::from_secs_f64(lasts as f64 / rate_hz);
+        loop {
+            telemetry.gather(self.client, LOOK)?;
+            let elapsed = self.client.now().saturating_sub(began);
+            progress((elapsed.as_secs_f64() / experiment.time_limit_s).min(1.0));
+            let status = self.client.status()?;
+            self.client.refuse_fault("the experiment", &status)?;
+            // Axes that brake for a fault have it latched when they stand.
+            let ends = !status.running && status.state != MachineState::Stopping;
+            if elapsed >= least && ends {
+                break;
+            }
+            if elapsed.as_secs_f64() > experiment.time_limit_s {
+                self.client.order(Body::Stop)?;
+                return Err(Stop::TimedOut);
+            }
+        }
+        telemetry.gather(self.client, TAIL)?;
+        let injected = match injection {
+            Some(injection) => Some(injection.finish(self.client)?),
+            None => None,
+        };
+        let samples = telemetry.finish(self.client)?;
+        progress(1.0);
+        if samples.lost() > 0 {
+            return Err(Stop::Lost(samples.lost()));
+        }
+        let shape = Shape {
+            settings: self.settings(),
+            origin_mm: self.origin_mm,
+            lasts,
+            moves,
+            injected: injected.as_ref(),
+        };
+        shape.recording(&samples).ok_or(Stop::Short)
+    }
+
+    /// Waits for rest, with the outputs on; says where the axis is.
+    fn enabled(&mut self) -> Result<f64, ClientError> {
+        let mut status = settle::rest(self.client, BEFORE)?;
+        if status.state != MachineState::Enabled {
+            self.client.order(Body::Enable)?;
+            let due = self.client.now() + ENABLING;
+            while status.state != MachineState::Enabled && self.client.now() < due {
+                status = self.client.status()?;
+            }
+        }
+        Ok(status.axes[self.axis as usize].position_mm - self.origin_mm)
+    }
+}
+
+impl TestAxis for ConnectedAxis<'_> {
+    fn info(&self) -> AxisInfo {
+        let settings = self.settings();
+        AxisInfo {
+            name: self.axis.as_str(),
+            rate_hz: self.client.identity().rate_hz,
+            resolution_mm: settings.encoder.resolution_mm,
+            full_scale_v: settings.amplifier.full_scale_v,
+            travel_mm: self.travel_mm,
+            max_velocity_mm_s: settings.limits.max_velocity_mm_s,
+        }
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        &self.stage.axes[self.axis as usize]
+    }
+
+    /// Checks the settings here and loads them into the machine. What the machine says against them is told by the next
+    /// experiment, which is not run.
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError> {
+        let mut stage = self.stage.clone();
+        stage.axes[self.axis as usize] = settings.clone();
+        stage.validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)?;
+        match settings::load(self.client, &stage) {
+            Ok(_) => {
+                self.stage = stage;
+                self.refused = None;
+            }
+            Err(error) => self.refused = Some(error.to_string()),
+        }
+        Ok(())
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        if let Some(refused) = &self.refused {
+            return Err(ExperimentError::Impossible {
+                experiment: experiment.name.clone(),
+                reason: format!("its settings did not take effect: {refused}"),
+            });
+        }
+        self.run(experiment, progress)
+            .map_err(|stop| stop.into_error(experiment))
+    }
+}

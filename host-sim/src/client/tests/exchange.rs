@@ -1,0 +1,113 @@
+//! Settings to and from the machine.
+
+use quadrant::control::feedback::LawKind;
+use quadrant::link::message::AxisName;
+use quadrant::link::message::AxisSet;
+use quadrant::settings::StageSettings;
+
+use super::connected;
+use crate::client::settings::{self, ExchangeError, whole_path};
+
+#[test]
+fn paths_may_be_written_short() {
+    let whole = "/axes/1/limits/max_velocity_mm_s";
+    for path in [
+        whole,
+        "axes/1/limits/max_velocity_mm_s",
+        "/axes/y/limits/max_velocity_mm_s",
+        "y/limits/max_velocity_mm_s",
+        "1/limits/max_velocity_mm_s",
+    ] {
+        assert_eq!(whole_path(path), whole, "{path}");
+    }
+    assert_eq!(whole_path("rate_hz"), "/rate_hz");
+    assert_eq!(whole_path("z"), "/axes/2");
+    assert_eq!(whole_path(""), "/");
+}
+
+#[test]
+fn what_is_dumped_is_what_the_machine_has() {
+    let (mut client, bench) = connected();
+    assert_eq!(
+        settings::dump(&mut client).unwrap(),
+        bench.borrow().in_force
+    );
+}
+
+#[test]
+fn what_is_loaded_is_what_acts_parts_and_lists_included() {
+    let (mut client, bench) = connected();
+    let mut wanted = StageSettings::simulated();
+    wanted.axes[0].feedback.law = LawKind::Pid;
+    wanted.axes[0].feedback.nonlinear = None;
+    wanted.axes[1].plant = None;
+    wanted.axes[1].feedback.pid.kp_v_per_mm = 1.0 / 3.0;
+    let loaded = settings::load(&mut client, &wanted).unwrap();
+    assert_eq!(bench.borrow().in_force, wanted);
+    let changed = [AxisName::X, AxisName::Y].into_iter().collect::<AxisSet>();
+    assert_eq!(loaded.applied.changed, changed);
+    assert_eq!(loaded.changed.len(), 4, "{:?}", loaded.changed);
+    assert!(loaded.left.is_empty());
+    // And back: the parts that were left out come again.
+    let loaded = settings::load(&mut client, &StageSettings::simulated()).unwrap();
+    assert_eq!(bench.borrow().in_force, StageSettings::simulated());
+    assert!(
+        loaded
+            .changed
+            .iter()
+            .any(|path| path == "/axes/0/feedback/nonlinear")
+    );
+    // A second time there is nothing to do.
+    let loaded = settings::load(&mut client, &StageSettings::simulated()).unwrap();
+    assert!(loaded.changed.is_empty(), "{:?}", loaded.changed);
+}
+
+#[test]
+fn what_the_machine_refuses_is_reverted() {
+    let (mut client, bench) = connected();
+    let mut bad = StageSettings::simulated();
+    bad.axes[2].encoder.resolution_mm = 7.0;
+    let error = settings::load(&mut client, &bad).unwrap_err();
+    assert!(matches!(error, ExchangeError::Reverted(_)), "{error}");
+    let text = error.to_string();
+    assert!(text.contains("z.encoder.resolution_mm = 7"), "{text}");
+    assert!(text.contains("nothing was changed"), "{text}");
+    assert_eq!(bench.borrow().in_force, StageSettings::simulated());
+    assert_eq!(
+        settings::dump(&mut client).unwrap(),
+        StageSettings::simulated()
+    );
+}
+
+#[test]
+fn a_name_needs_no_quotes_and_a_number_none_either() {
+    let (mut client, bench) = connected();
+    settings::set(&mut client, "/axes/0/feedback/law", "pid").unwrap();
+    settings::set(&mut client, "/axes/0/feedback/pid/kp_v_per_mm", "0.5").unwrap();
+    settings::apply(&mut client).unwrap();
+    let bench = bench.borrow();
+    assert_eq!(bench.in_force.axes[0].feedback.law, LawKind::Pid);
+    assert_eq!(bench.in_force.axes[0].feedback.pid.kp_v_per_mm, 0.5);
+}
+
+#[test]
+fn a_path_that_there_is_not_is_named() {
+    let (mut client, _) = connected();
+    let error = settings::get(&mut client, "/axes/0/nonsense")
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("/axes/0/nonsense"), "{error}");
+    let long = "x".repeat(400);
+    let error = settings::get(&mut client, &long).unwrap_err().to_string();
+    assert!(error.contains("400 bytes long"), "{error}");
+}
+
+#[test]
+fn provenance_is_kept_with_what_is_stored() {
+    let (mut client, _) = connected();
+    settings::store(&mut client, "quadrant commission --axis x").unwrap();
+    assert_eq!(
+        settings::provenance(&mut client).unwrap(),
+        "quadrant commission --axis x"
+    );
+}

@@ -1,0 +1,19 @@
+//! The client before a model of the machine.
+
+mod exchange;
+mod lines;
+mod model;
+mod observe;
+mod session;
+
+use std::cell::RefCell;
+use std::rc::Rc;
+
+use super::session::Client;
+use crate::machine::Loopback;
+use model::{Bench, Model};
+
+fn connected() -> (Client, Rc<RefCell<Bench>>) {
+    let (model, bench) = Model::new();
+    (Client::open(Loopback::new(model)).unwrap(), bench)
+}

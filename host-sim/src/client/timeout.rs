@@ -1,0 +1,71 @@
+//! Time-outs and idempotency of requests.
+
+use std::time::Duration;
+
+use quadrant::link::message::{
+    Body, CaptureRequest, InjectRequest, SettingsRequest, StreamRequest,
+};
+
+/// Time for an answer: a request is served within two runs of the link's task, 2 ms, and a frame each way takes 12 ms.
+pub(super) const ANSWER: Duration = Duration::from_millis(150);
+
+/// Time for an answer after which flash has been written, a sector of it erased.
+const STORED: Duration = Duration::from_secs(6);
+
+/// Time for which, and pause after which, a request is repeated that the machine is too busy for.
+pub(super) const BUSY: Duration = Duration::from_secs(2);
+pub(super) const BUSY_PAUSE: Duration = Duration::from_millis(5);
+
+/// Effect of a request that is made twice.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Idempotency {
+    /// Nothing: it only asks. It may be made of a machine that has restarted, too.
+    Query,
+    /// The same as of one: it says what should be, or has a number.
+    Idempotent,
+    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and a second
+    /// motion is refused while the first is under way.
+    NotIdempotent,
+}
+
+/// Returns the idempotency of a request.
+pub(super) const fn idempotency(body: &Body) -> Idempotency {
+    match body {
+        Body::Hello
+        | Body::Status
+        | Body::Fault
+        | Body::Settings(
+            SettingsRequest::Get(_) | SettingsRequest::List { .. } | SettingsRequest::Provenance,
+        )
+        | Body::Capture(CaptureRequest::State | CaptureRequest::Read { .. }) => Idempotency::Query,
+        // A later selection outdates an earlier one, whose blocks have another generation.
+        Body::Telemetry(_)
+        | Body::Enable
+        | Body::Disable
+        | Body::Stop
+        | Body::Jog { .. }
+        | Body::SetPlan(_)
+        | Body::Stream(StreamRequest::Points { .. } | StreamRequest::Close)
+        | Body::Inject(InjectRequest::Values { .. } | InjectRequest::Close)
+        | Body::Settings(
+            SettingsRequest::Set { .. } | SettingsRequest::Revert | SettingsRequest::Defaults,
+        ) => Idempotency::Idempotent,
+        Body::ResetFault
+        | Body::Run
+        | Body::Home(_)
+        | Body::Move { .. }
+        | Body::Stream(StreamRequest::Open { .. })
+        | Body::Inject(InjectRequest::Open { .. })
+        | Body::Settings(SettingsRequest::Apply | SettingsRequest::Store(_))
+        | Body::Capture(CaptureRequest::Arm { .. } | CaptureRequest::Disarm)
+        | Body::Reboot => Idempotency::NotIdempotent,
+    }
+}
+
+/// Returns the time-out of the answer.
+pub(super) const fn answer_timeout(body: &Body) -> Duration {
+    match body {
+        Body::Settings(SettingsRequest::Store(_)) => STORED,
+        _ => ANSWER,
+    }
+}

@@ -1,0 +1,222 @@
+//! From the measurements of a commissioning to its models and settings: without an axis.
+
+use quadrant::control::pid::PidGains;
+use quadrant::control::popov::sector_bound;
+use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant::friction::PerDirection;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::friction::stribeck::StaticFriction;
+use quadrant::settings::{AxisSettings, FeedbackSettings};
+
+use super::commissioned::{CommissionSettings, Commissioned};
+use super::error::CommissionError;
+use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
+use crate::design::{Form, PidRequest, Process, design_pid};
+use crate::identify::frf::FrfMeasurement;
+use crate::identify::motor_constant::MotorConstant;
+use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
+use crate::identify::single_state::with_all_models;
+use crate::identify::static_friction::{Exponent, FrictionFit, FrictionMap, fit_map};
+use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveError};
+use crate::record::Recording;
+
+/// Elements that find their own knots.
+const FEW_ELEMENTS: usize = 4;
+/// Share of the largest force at which the pre-sliding range ends, the last knot over that range, and the exponent with which
+/// knots are denser near zero.
+const RISEN: f64 = 0.95;
+const SPREAD: f64 = 1.7;
+const DENSITY: f64 = 1.6;
+/// Largest relative error of the predicted hysteresis.
+const MOST_HYSTERESIS_ERROR: f64 = 0.10;
+
+/// Measurements of a commissioning.
+#[derive(Clone, Debug)]
+pub struct Measurements {
+    /// Motor constant, from the open-loop test.
+    pub motor: MotorConstant,
+    /// Response of the sliding axis.
+    pub response: FrfMeasurement,
+    /// Voltages at constant velocities.
+    pub map: FrictionMap,
+    /// Recordings of its runs, as far as they are there.
+    pub runs: Vec<Recording>,
+    /// Recording of the slow sine.
+    pub presliding: Recording,
+}
+
+/// Models of the axis, and its PID.
+pub(super) struct Models {
+    pub(super) plant: PlantFit,
+    pub(super) pid: PidGains,
+    pub(super) friction: FrictionFit,
+    pub(super) gms: GmsFit,
+}
+
+/// Fits the linear model to the response.
+pub(super) fn plant(response: &FrfMeasurement) -> Result<PlantFit, CommissionError> {
+    Ok(fit_plant(
+        &response.estimate.response,
+        &PlantFitSettings {
+            stiffness: Stiffness::Zero,
+            ..PlantFitSettings::default()
+        },
+    )?)
+}
+
+/// Designs the PID on the linear model.
+pub(super) fn pid(
+    plant: &PlantFit,
+    base: &AxisSettings,
+    request: &CommissionSettings,
+) -> Result<PidGains, CommissionError> {
+    let design = PidRequest {
+        target: request.target,
+        form: Form::Continuous,
+        derivative_filter_s: base.feedback.pid.derivative_filter_s,
+        ki_v_per_mm_s: None,
+    };
+    Ok(design_pid(&Process::Model(plant.plant), &design)?.gains)
+}
+
+/// Fits the static friction model to the map.
+pub(super) fn friction(map: &FrictionMap) -> Result<FrictionFit, CommissionError> {
+    Ok(fit_map(map, Exponent::Fixed(1.0))?)
+}
+
+/// Identifies the GMS model from the slow sine.
+///
+/// # Errors
+/// A model that does not predict the recording.
+pub(super) fn presliding(
+    recording: &Recording,
+    friction: &FrictionFit,
+) -> Result<GmsFit, CommissionError> {
+    let gms = identify_elements(recording, &friction.models())?;
+    if gms.prediction.relative_error > MOST_HYSTERESIS_ERROR {
+        return Err(CommissionError::Hysteresis {
+            percent: 100.0 * gms.prediction.relative_error,
+        });
+    }
+    Ok(gms)
+}
+
+impl Measurements {
+    /// Identifies all models and makes the settings, as a commissioning does that measured this; without a verdict.
+    ///
+    /// # Errors
+    /// The first step that fails, with the reason.
+    pub fn commissioned(
+        self,
+        base: &AxisSettings,
+        request: &CommissionSettings,
+        rate_hz: f64,
+    ) -> Result<Commissioned, CommissionError> {
+        let plant = plant(&self.response)?;
+        let pid = pid(&plant, base, request)?;
+        let friction = friction(&self.map)?;
+        let gms = presliding(&self.presliding, &friction)?;
+        let models = Models {
+            plant,
+            pid,
+            friction,
+            gms,
+        };
+        Ok(models.commissioned(self, base, request, rate_hz))
+    }
+}
+
+impl Models {
+    /// Makes the settings, N-PID and combined feedforward included; the verdict is still to come.
+    pub(super) fn commissioned(
+        self,
+        measurements: Measurements,
+        base: &AxisSettings,
+        request: &CommissionSettings,
+        rate_hz: f64,
+    ) -> Commissioned {
+        let Self {
+            plant,
+            pid,
+            friction,
+            gms,
+        } = self;
+        let (_, breakaway_v) = friction.mean_levels_v();
+        let bound = sector_bound(&plant.plant, &pid, 1.0 / rate_hz);
+        let nonlinear = choose_nonlinear(
+            &pid,
+            bound,
+            &NonlinearRule {
+                sector_share: request.sector_share,
+                range: Range::Breakaway(breakaway_v),
+            },
+        );
+        let mut settings = base.clone();
+        settings.plant = Some(plant.plant);
+        settings.feedback = FeedbackSettings {
+            integral_limit_v: base.feedback.integral_limit_v,
+            transfer_s: base.feedback.transfer_s,
+            ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
+        };
+        settings.friction = with_all_models(friction.models(), gms.gms.clone());
+        settings.feedforward.kind = FeedforwardKind::Combined;
+        settings.feedforward.gains = FeedforwardGains {
+            level: 1.0,
+            viscous: 1.0,
+            gms: 1.0,
+            inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
+        };
+        settings.feedforward.preview_s = plant.plant.delay_s;
+        let margins = Process::Model(plant.plant).margins(
+            &pid,
+            Form::Sampled {
+                sample_time_s: 1.0 / rate_hz,
+                computation_delay_s: 0.0,
+            },
+        );
+        Commissioned {
+            motor: measurements.motor,
+            response: measurements.response,
+            plant,
+            margins,
+            friction: (measurements.map, friction, measurements.runs),
+            presliding: (gms, measurements.presliding),
+            sector_bound: bound,
+            settings,
+            verdicts: Vec::new(),
+        }
+    }
+}
+
+/// The GMS model on as many elements as the firmware has room for, if that predicts the record better than few do.
+///
+/// Few elements find their own knots. For many the record is too noisy: knots wander off beyond it, and the search may not
+/// end. Theirs are spread over the pre-sliding range, denser near zero, where the curve bends most; only shares are searched.
+fn identify_elements(
+    recording: &Recording,
+    sliding: &PerDirection<StaticFriction>,
+) -> Result<GmsFit, VirginCurveError> {
+    let identify = |knots| virgin_curve::identify(recording, Some(sliding), &knots);
+    let few = identify(Knots::Automatic(FEW_ELEMENTS))?;
+    let top_v = few
+        .curve
+        .points
+        .iter()
+        .map(|point| point.force_v)
+        .fold(0.0, f64::max);
+    let rising = few
+        .curve
+        .points
+        .iter()
+        .find(|point| point.force_v >= RISEN * top_v);
+    let range_mm = rising.map_or(0.0, |point| point.displacement_mm);
+    let knot = |index: usize| {
+        let place = index as f64 / FIRMWARE_ELEMENTS as f64;
+        SPREAD * range_mm * place.powf(DENSITY)
+    };
+    let many = identify(Knots::At((1..=FIRMWARE_ELEMENTS).map(knot).collect()));
+    Ok(match many {
+        Ok(many) if many.prediction.relative_error < few.prediction.relative_error => many,
+        _ => few,
+    })
+}

@@ -1,0 +1,160 @@
+//! The firmware's application in this process, between two starts: control interrupt, supervising task and server, one
+//! after the other in the order in which the target runs them.
+
+use std::collections::VecDeque;
+
+use quadrant::app::{
+    Axis, Control, Inputs, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
+    TimingStatistics,
+};
+use quadrant::command::Command;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::hal::Serial;
+use quadrant::link::message::NumberType;
+use quadrant::lockstep::InputRecord;
+use quadrant::safety::FaultCode;
+use quadrant::scalar::Scalar;
+use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant::stage::{Outputs, StageState};
+use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
+
+use super::memory_flash::MemoryFlash;
+
+/// Words of the capture, as on the reference board.
+const CAPTURE_WORDS: usize = quadrant::app::capture::CAPTURE_WORDS;
+/// Requests of the operator at the machine that may wait, as in the firmware.
+const REQUESTS: usize = 3;
+
+/// The application, as it runs between two starts.
+pub struct Running<S: Scalar> {
+    control: Control<'static, 'static, S>,
+    supervision: Supervision,
+    server: Server<'static, 'static, S, MemoryFlash>,
+    seen: Snapshot<S>,
+    /// Requests of the operator at the machine.
+    requests: VecDeque<Command>,
+    /// Command that the supervising task let through.
+    command: Option<Command>,
+}
+
+/// Start conditions of the application.
+#[derive(Clone, Copy, Debug)]
+pub struct Start<'a> {
+    /// The settings of a machine whose flash is empty.
+    pub defaults: &'a StageSettings,
+    /// Motions that `run` starts.
+    pub plan: &'a PlanSettings,
+    /// Fault that the run before has left.
+    pub fault: Option<FaultCode>,
+    /// Name of the board in the greeting.
+    pub board: &'static str,
+    /// Rate of the timer that measures ticks, Hz.
+    pub cycle_hz: u32,
+    /// Number type of the control law, for the host.
+    pub number: NumberType,
+}
+
+impl<S: Scalar> Running<S> {
+    /// As the firmware does after a reset.
+    ///
+    /// # Errors
+    /// The first of the settings for an empty flash that is refused.
+    pub fn start(start: Start<'_>, flash: MemoryFlash) -> Result<Self, SettingsError> {
+        let Start { defaults, .. } = start;
+        let mut fault = None;
+        let mut store = Store::new(flash, 0);
+        // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
+        let buffer: &'static mut [u8; BUFFER_BYTES] = Box::leak(Box::new([0; BUFFER_BYTES]));
+        let settings: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
+        let draft: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
+        let loaded = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
+        let provenance = match loaded {
+            Ok(Some(Loaded { provenance, .. })) => provenance,
+            Ok(None) => {
+                settings.copy_from(defaults);
+                Default::default()
+            }
+            Err(LoadError::Decode(_) | LoadError::Log(_)) => {
+                settings.copy_from(defaults);
+                fault = Some(FaultCode::SettingsInvalid);
+                Default::default()
+            }
+        };
+        let resolution_mm = settings
+            .axes
+            .each_ref()
+            .map(|axis| axis.encoder.resolution_mm);
+        let stage = settings.build::<S, FIRMWARE_ELEMENTS>()?;
+        let plan = start.plan.build(settings)?;
+        let (axes, streaming) = stage.into_axes();
+        let back_buffer: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
+        let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
+        let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
+        let (control_ends, ends) = queues.split();
+        let mut control = Control::new(axes, streaming, plan, control_ends);
+        if let Some(code) = start.fault.or(fault) {
+            control.start_faulted(code);
+        }
+        Ok(Self {
+            control,
+            supervision: Supervision::new(resolution_mm),
+            server: Server::new(ServerParts {
+                ends,
+                back_buffer,
+                settings,
+                draft,
+                provenance,
+                store,
+                buffer,
+                capture: Box::leak(vec![0; CAPTURE_WORDS].into_boxed_slice()),
+                board: start.board,
+                cycle_hz: start.cycle_hz,
+                number: start.number,
+            }),
+            seen: Snapshot::default(),
+            requests: VecDeque::new(),
+            command: None,
+        })
+    }
+
+    /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
+    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
+        let outputs = self.control.tick(&Inputs {
+            command: self.command.take(),
+            link_lost: self.server.link_lost(),
+            ..inputs.inputs()
+        });
+        if self.requests.len() < REQUESTS {
+            self.requests.extend(inputs.request);
+        }
+        let Some(seen) = self.control.observe(0) else {
+            return (outputs, Poll::Continue);
+        };
+        self.seen = seen;
+        let supervised = self.supervision.run(
+            &seen,
+            self.requests.pop_front(),
+            self.server.is_commissioned(),
+        );
+        self.command = supervised.command;
+        self.control
+            .show_glitches(self.supervision.glitch_readings());
+        for event in supervised.events.into_iter().flatten() {
+            self.server.push_event(seen.tick, event);
+        }
+        let after = self
+            .server
+            .poll(serial, &self.seen, TimingStatistics::default());
+        (outputs, after)
+    }
+
+    /// The flash that settings are stored in.
+    pub fn flash(&self) -> &MemoryFlash {
+        self.server.flash()
+    }
+
+    /// The control law's memory.
+    pub fn state(&self) -> &StageState<S, FIRMWARE_ELEMENTS> {
+        self.control.state()
+    }
+}

@@ -1,0 +1,15 @@
+//! QEMU with the firmware in it, and the memory through which a host plays its stage
+//! ([`quadrant::lockstep`] is its map).
+
+mod error;
+mod lockstep;
+mod log;
+mod memory;
+mod process;
+mod program;
+
+pub use self::error::EmulatorError;
+pub use self::lockstep::Lockstep;
+pub use self::memory::Memory;
+pub use self::process::{Clock, Emulator, Listener, command_line};
+pub use self::program::Program;

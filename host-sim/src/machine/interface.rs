@@ -1,0 +1,65 @@
+//! A machine whose axes can be measured.
+
+use std::error::Error;
+
+use quadrant::axes::AxisName;
+use quadrant::settings::{SettingsError, StageSettings};
+
+use super::test_axis::TestAxis;
+
+/// A machine with three axes: the one start of identification and commissioning.
+pub trait Machine {
+    /// Name for messages and pages, such as "the simulated stage".
+    fn description(&self) -> String;
+
+    /// True if no real axis moves.
+    fn is_simulated(&mut self) -> bool;
+
+    /// Reads the settings that measurements start from.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    fn settings(&mut self) -> Result<StageSettings, MachineError>;
+
+    /// Returns the travel that an axis has either way from where it stands, mm; `None` if it is not known.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    fn free_travel_mm(&mut self, axis: AxisName) -> Result<Option<f64>, MachineError>;
+
+    /// Returns an axis for experiments, which keep it within `travel_mm` of where it stands, either way.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    fn test_axis(
+        &mut self,
+        axis: AxisName,
+        travel_mm: f64,
+    ) -> Result<Box<dyn TestAxis + '_>, MachineError>;
+
+    /// Switches the outputs off and puts settings in force.
+    ///
+    /// # Errors
+    /// Settings that are refused; the old ones stay in force.
+    fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError>;
+
+    /// Keeps the settings in force for the next start, with the text that says where they come from.
+    ///
+    /// # Errors
+    /// A machine without a flash, or a flash that failed.
+    fn store(&mut self, provenance: &str) -> Result<(), MachineError>;
+}
+
+/// Reason why a machine cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MachineError {
+    /// Settings that are refused.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The control law alone has no flash.
+    #[error("the control law alone has no flash to store settings in: take another --machine")]
+    NoFlash,
+    /// The connection failed, or the machine refused.
+    #[error(transparent)]
+    Connection(Box<dyn Error + Send + Sync>),
+}

@@ -1,0 +1,242 @@
+//! One axis of the simulated stage as a test_axis: its truth is on the other side of encoder and converter.
+
+use quadrant::control::feedback::LawKind;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::lockstep::InputRecord;
+use quadrant::reference::MotionSettings;
+use quadrant::safety::SafetyState;
+use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+use quadrant::units::DacCode;
+
+use super::controller::{LawMachine, Operator};
+use super::recorder::{Period, Recorder};
+use super::watch::Watch;
+use crate::machine::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+use crate::plant::{AxisTruth, SimulatedAxis};
+use crate::record::Recording;
+
+/// Room for GMS elements in the law.
+const ELEMENTS: usize = quadrant::friction::gms::MAX_ELEMENTS;
+/// Travel either way, mm.
+pub(super) const TRAVEL_MM: f64 = 200.0;
+/// Control periods between two reports of progress.
+const PROGRESS_TICKS: usize = 20_000;
+/// Names of the axes.
+const NAMES: [&str; 3] = ["x", "y", "z"];
+
+/// One axis of the simulated stage.
+///
+/// The injected voltage enters between the law's output and the converter, as it would through a summing amplifier,
+/// and only while the law has the outputs enabled.
+#[derive(Clone, Debug)]
+pub struct SimulatedTestAxis {
+    name: &'static str,
+    plant: SimulatedAxis,
+    full_scale_v: f64,
+    resolution_mm: f64,
+    /// Travel either way, mm.
+    travel_mm: f64,
+    /// The axis under test is the first; the others stand still.
+    stage: StageSettings,
+}
+
+impl SimulatedTestAxis {
+    /// Axis 0 to 2 with `truth`, under the default settings of that axis without feedforward and nonlinear gain; `seed`
+    /// decides the noise.
+    pub fn new(index: usize, truth: AxisTruth, seed: u64) -> Self {
+        let mut stage = StageSettings::simulated();
+        let mut axis = stage.axes[index].clone();
+        axis.feedback.law = LawKind::Pid;
+        axis.feedforward.kind = FeedforwardKind::None;
+        stage.axes[0] = axis;
+        Self {
+            name: NAMES[index],
+            full_scale_v: truth.full_scale_v,
+            resolution_mm: truth.resolution_mm,
+            travel_mm: TRAVEL_MM,
+            plant: SimulatedAxis::new(truth, stage.rate_hz, seed),
+            stage,
+        }
+    }
+
+    /// The same axis with another travel either way, mm.
+    #[must_use]
+    pub fn with_travel_mm(mut self, travel_mm: f64) -> Self {
+        self.travel_mm = travel_mm;
+        self
+    }
+
+    /// The axis itself, with its truth: for judging, not for identifying.
+    pub fn plant(&self) -> &SimulatedAxis {
+        &self.plant
+    }
+
+    fn volts(&self, code: DacCode) -> f64 {
+        f64::from(code.0) * self.full_scale_v / DacCode::FULL_SCALE
+    }
+
+    fn code(&self, volts: f64) -> DacCode {
+        DacCode::saturating((volts / self.full_scale_v * DacCode::FULL_SCALE).round() as i32)
+    }
+
+    /// Runs the experiment until it ends; what follows, the outputs off, is the caller's.
+    fn drive(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let mut law = self.law(experiment)?;
+        let mut watch = Watch::new(experiment, self.info());
+        let mut recorder = Recorder::new(experiment.decimation, self.stage.rate_hz);
+        let expected = experiment.injection_v.len().max(1);
+        loop {
+            let raw = self.plant.read_counter();
+            let position_mm = f64::from(raw as i32) * self.resolution_mm;
+            let Some(step) = law.step(raw, experiment)? else {
+                self.plant.step(DacCode::ZERO, false);
+                continue;
+            };
+            let done = recorder.ticks();
+            let injection_v = experiment.injection_v.get(done).copied();
+            if injection_v.is_none() && step.motion_ended {
+                progress(1.0);
+                return Ok(recorder.finish());
+            }
+            let waits_for = if step.motion_ended {
+                "the injection has not ended"
+            } else {
+                "the motion has not ended"
+            };
+            watch.check(done, position_mm, waits_for)?;
+            if done.is_multiple_of(PROGRESS_TICKS) {
+                progress((done as f64 / expected as f64).min(1.0));
+            }
+            let injection_v = injection_v.unwrap_or(0.0);
+            let sum = i32::from(step.code.0) + i32::from(self.code(injection_v).0);
+            let code = DacCode::saturating(sum);
+            recorder.push(Period {
+                reference_mm: position_mm + step.error_mm,
+                position_mm,
+                voltage_v: self.volts(code),
+                injection_v,
+            });
+            self.plant.step(code, true);
+        }
+    }
+
+    fn law(&self, experiment: &Experiment) -> Result<Law, ExperimentError> {
+        let Drive::ClosedLoop(motion) = &experiment.drive else {
+            return Ok(Law::OpenLoop);
+        };
+        let plan = PlanSettings {
+            motions: [*motion, MotionSettings::Hold, MotionSettings::Hold],
+        };
+        let build = || {
+            let plan = plan.build(&self.stage)?;
+            Ok(LawMachine::with_plan(self.stage.build()?, plan))
+        };
+        let machine = build().map_err(|source| ExperimentError::Motion {
+            experiment: experiment.name.clone(),
+            source,
+        })?;
+        Ok(Law::ClosedLoop {
+            machine: Box::new(machine),
+            operator: Operator::runs_the_plan(),
+            tick: 0,
+            waits_for_motion: *motion != MotionSettings::Hold,
+        })
+    }
+}
+
+/// The law's side of an experiment.
+enum Law {
+    OpenLoop,
+    ClosedLoop {
+        machine: Box<LawMachine<f32, ELEMENTS>>,
+        operator: Operator,
+        tick: u32,
+        /// There is a motion, and it has not begun.
+        waits_for_motion: bool,
+    },
+}
+
+/// Output of the law in one control period with the outputs enabled.
+struct Step {
+    code: DacCode,
+    /// Reference minus position, mm.
+    error_mm: f64,
+    motion_ended: bool,
+}
+
+impl Law {
+    /// One control period; nothing while the outputs are off.
+    fn step(&mut self, raw: u32, experiment: &Experiment) -> Result<Option<Step>, ExperimentError> {
+        let Self::ClosedLoop {
+            machine,
+            operator,
+            tick,
+            waits_for_motion,
+        } = self
+        else {
+            return Ok(Some(Step {
+                code: DacCode::ZERO,
+                error_mm: 0.0,
+                motion_ended: true,
+            }));
+        };
+        let outputs = machine.tick(&InputRecord::of_counts(
+            [raw, 0, 0],
+            operator.request(*tick),
+        ));
+        *tick += 1;
+        let state = machine.state();
+        if let SafetyState::Faulted(fault) = state.safety() {
+            return Err(ExperimentError::Fault {
+                experiment: experiment.name.clone(),
+                fault,
+            });
+        }
+        let running = state.is_running();
+        *waits_for_motion &= !running;
+        Ok(outputs.enabled.then(|| Step {
+            code: outputs.codes[0],
+            error_mm: f64::from(state.axes()[0].telemetry().error_mm()),
+            motion_ended: !*waits_for_motion && !running,
+        }))
+    }
+}
+
+impl TestAxis for SimulatedTestAxis {
+    fn info(&self) -> AxisInfo {
+        AxisInfo {
+            name: self.name,
+            rate_hz: self.stage.rate_hz,
+            resolution_mm: self.resolution_mm,
+            full_scale_v: self.full_scale_v,
+            travel_mm: self.travel_mm,
+            max_velocity_mm_s: self.settings().limits.max_velocity_mm_s,
+        }
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        &self.stage.axes[0]
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError> {
+        let mut stage = self.stage.clone();
+        stage.axes[0] = settings.clone();
+        stage.validate(ELEMENTS)?;
+        self.stage = stage;
+        Ok(())
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let outcome = self.drive(experiment, progress);
+        self.plant.step(DacCode::ZERO, false);
+        outcome
+    }
+}

@@ -1,0 +1,149 @@
+//! The firmware's application on the host: control tick and supervisor in the order in which the target runs them.
+
+use std::collections::VecDeque;
+
+use quadrant::admission::StageView;
+use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::lockstep::{InputRecord, Job};
+use quadrant::reference::{Motion, Segment};
+use quadrant::scalar::Scalar;
+use quadrant::settings::SettingsError;
+use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
+
+/// Control law, supervisor, and what passes between them.
+#[derive(Clone, Debug)]
+pub struct LawMachine<S: Scalar, const N: usize> {
+    stage: Stage<S, N>,
+    plan: Plan<S>,
+    state: StageState<S, N>,
+    supervisor: Supervisor,
+    requests: VecDeque<Command>,
+    /// Segments of a stream on their way to the axes.
+    segments: [VecDeque<Segment>; 3],
+    command: Option<Command>,
+    events: Vec<(u32, Event)>,
+}
+
+impl<S: Scalar, const N: usize> LawMachine<S, N> {
+    /// A machine that is to run `job`.
+    ///
+    /// # Errors
+    /// The first of the job's settings that is refused.
+    pub fn new(job: &Job) -> Result<Self, SettingsError> {
+        Ok(Self::with_plan(
+            job.stage.build()?,
+            job.plan.build(&job.stage)?,
+        ))
+    }
+
+    /// A machine on built settings, with a plan that settings cannot hold, such as a recorded table.
+    pub fn with_plan(stage: Stage<S, N>, plan: impl Into<Plan<S>>) -> Self {
+        Self {
+            stage,
+            plan: plan.into(),
+            state: StageState::default(),
+            supervisor: Supervisor::default(),
+            requests: VecDeque::new(),
+            segments: Default::default(),
+            command: None,
+            events: Vec::new(),
+        }
+    }
+
+    /// The control law's memory.
+    pub fn state(&self) -> &StageState<S, N> {
+        &self.state
+    }
+
+    /// Returns the events of the supervisor, each with its control tick.
+    pub fn events(&self) -> &[(u32, Event)] {
+        &self.events
+    }
+
+    /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.
+    pub fn set_motion(&mut self, axis: AxisName, motion: Motion<S>) {
+        self.plan[axis as usize] = motion;
+    }
+
+    /// Appends a segment of each axis to the stream's queues.
+    pub fn stream(&mut self, segments: [Segment; 3]) {
+        for (queue, segment) in self.segments.iter_mut().zip(segments) {
+            queue.push_back(segment);
+        }
+    }
+
+    /// Segments of the stream that the slowest axis has not taken yet.
+    pub fn queued_segments(&self) -> usize {
+        self.segments.iter().map(VecDeque::len).max().unwrap_or(0)
+    }
+
+    fn feed_stream(&mut self) {
+        for (name, queue) in AxisName::ALL.into_iter().zip(&mut self.segments) {
+            if self.state.axes()[name as usize].wants_segment()
+                && let Some(segment) = queue.pop_front()
+            {
+                self.state.offer_segment(name, segment);
+            }
+        }
+    }
+
+    /// Runs one control period.
+    pub fn tick(&mut self, input: &InputRecord) -> Outputs {
+        self.feed_stream();
+        let outputs = self.stage.tick(
+            &self.plan,
+            &mut self.state,
+            &Inputs {
+                command: self.command.take(),
+                ..input.inputs()
+            },
+        );
+        self.requests.extend(input.request);
+        if self.state.tick().is_multiple_of(PERIOD_TICKS) {
+            self.supervise();
+        }
+        outputs
+    }
+
+    fn supervise(&mut self) {
+        let view = StageView::of(&self.state);
+        let decision = self.supervisor.step(view, self.requests.pop_front());
+        self.command = decision.command;
+        let tick = self.state.tick();
+        self.events.extend(
+            decision
+                .events
+                .into_iter()
+                .flatten()
+                .map(|event| (tick, event)),
+        );
+    }
+}
+
+/// Requests at their ticks: what a person at the console would do.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Operator {
+    script: VecDeque<(u32, Command)>,
+}
+
+/// Tick at which [`Operator::runs_the_plan`] enables, and at which it starts the plan.
+const ENABLE_TICK: u32 = 100;
+const RUN_TICK: u32 = 200;
+
+impl Operator {
+    /// Enables, and starts the plan.
+    pub fn runs_the_plan() -> Self {
+        Self {
+            script: VecDeque::from([(ENABLE_TICK, Command::Enable), (RUN_TICK, Command::Run)]),
+        }
+    }
+
+    /// The request at a tick; ticks are asked for in order.
+    pub fn request(&mut self, tick: u32) -> Option<Command> {
+        self.script
+            .pop_front_if(|(due, _)| *due <= tick)
+            .map(|(_, command)| command)
+    }
+}

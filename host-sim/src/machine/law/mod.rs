@@ -1,0 +1,15 @@
+//! The control law on the simulated stage, without firmware and link: the fastest machine, in every number type.
+//!
+//! - [`LawMachine`]: control tick and supervisor, in the order in which the target runs them;
+//! - [`SimulatedTestAxis`]: one axis of the simulated stage under it, to be measured;
+//! - [`LawStage`]: its three axes.
+
+mod axis;
+mod controller;
+mod recorder;
+mod stage;
+mod watch;
+
+pub use axis::SimulatedTestAxis;
+pub use controller::{LawMachine, Operator};
+pub use stage::LawStage;

@@ -1,0 +1,72 @@
+//! Gathers control periods into the samples of a recording.
+
+use crate::record::Recording;
+
+/// A recording in the making.
+pub(super) struct Recorder {
+    recording: Recording,
+    decimation: usize,
+    ticks: usize,
+    voltage_v: f64,
+    injection_v: f64,
+}
+
+/// Signals of one control period.
+pub(super) struct Period {
+    pub(super) reference_mm: f64,
+    pub(super) position_mm: f64,
+    pub(super) voltage_v: f64,
+    pub(super) injection_v: f64,
+}
+
+impl Recorder {
+    /// `decimation` control periods at `rate_hz` make a sample.
+    pub(super) fn new(decimation: usize, rate_hz: f64) -> Self {
+        let decimation = decimation.max(1);
+        Self {
+            recording: Recording {
+                sample_time_s: decimation as f64 / rate_hz,
+                ..Recording::default()
+            },
+            decimation,
+            ticks: 0,
+            voltage_v: 0.0,
+            injection_v: 0.0,
+        }
+    }
+
+    /// Control periods so far.
+    pub(super) fn ticks(&self) -> usize {
+        self.ticks
+    }
+
+    pub(super) fn push(&mut self, period: Period) {
+        let Self {
+            recording,
+            decimation,
+            ..
+        } = self;
+        if self.ticks.is_multiple_of(*decimation) {
+            recording.reference_mm.push(period.reference_mm);
+            recording.position_mm.push(period.position_mm);
+        }
+        self.voltage_v += period.voltage_v;
+        self.injection_v += period.injection_v;
+        self.ticks += 1;
+        if self.ticks.is_multiple_of(*decimation) {
+            let count = *decimation as f64;
+            recording.voltage_v.push(self.voltage_v / count);
+            recording.injection_v.push(self.injection_v / count);
+            self.voltage_v = 0.0;
+            self.injection_v = 0.0;
+        }
+    }
+
+    /// The recording, without an incomplete last sample.
+    pub(super) fn finish(mut self) -> Recording {
+        let complete = self.recording.voltage_v.len();
+        self.recording.reference_mm.truncate(complete);
+        self.recording.position_mm.truncate(complete);
+        self.recording
+    }
+}

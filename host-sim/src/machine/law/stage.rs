@@ -1,0 +1,69 @@
+//! The simulated stage under the control law alone, as a machine.
+
+use quadrant::axes::AxisName;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::settings::StageSettings;
+
+use super::axis::{SimulatedTestAxis, TRAVEL_MM};
+use crate::machine::interface::{Machine, MachineError};
+use crate::machine::test_axis::TestAxis;
+use crate::plant::StageTruth;
+
+/// The simulated stage, with everything a real one has, under the control law alone.
+#[derive(Clone, Debug)]
+pub struct LawStage {
+    truth: StageTruth,
+    seed: u64,
+    settings: StageSettings,
+}
+
+impl LawStage {
+    /// A stage on the default settings; `seed` decides its noise.
+    pub fn new(seed: u64) -> Self {
+        Self {
+            truth: StageTruth::real(),
+            seed,
+            settings: StageSettings::simulated(),
+        }
+    }
+}
+
+impl Machine for LawStage {
+    fn description(&self) -> String {
+        "the simulated stage".to_owned()
+    }
+
+    fn is_simulated(&mut self) -> bool {
+        true
+    }
+
+    fn settings(&mut self) -> Result<StageSettings, MachineError> {
+        Ok(self.settings.clone())
+    }
+
+    fn free_travel_mm(&mut self, _: AxisName) -> Result<Option<f64>, MachineError> {
+        Ok(Some(TRAVEL_MM))
+    }
+
+    /// The axis as it was switched on, under its PID alone.
+    fn test_axis(
+        &mut self,
+        axis: AxisName,
+        travel_mm: f64,
+    ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
+        let truth = self.truth.axes[axis as usize].clone();
+        let test_axis =
+            SimulatedTestAxis::new(axis as usize, truth, self.seed).with_travel_mm(travel_mm);
+        Ok(Box::new(test_axis))
+    }
+
+    fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
+        settings.validate(FIRMWARE_ELEMENTS)?;
+        self.settings.copy_from(settings);
+        Ok(())
+    }
+
+    fn store(&mut self, _: &str) -> Result<(), MachineError> {
+        Err(MachineError::NoFlash)
+    }
+}

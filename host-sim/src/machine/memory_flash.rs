@@ -1,0 +1,85 @@
+//! A flash in memory: bits are written from one to zero, and erased a sector at a time.
+
+use embedded_storage::nor_flash::{
+    ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
+    check_write,
+};
+
+/// Size of a sector, as on the reference board.
+const SECTOR_BYTES: usize = 16 * 1024;
+/// Size of both sectors. together.
+const BYTES: usize = 2 * SECTOR_BYTES;
+
+/// Two sectors of 16 KiB.
+#[derive(Clone, Debug)]
+pub struct MemoryFlash(Vec<u8>);
+
+impl MemoryFlash {
+    /// A flash that holds `bytes`, if they are as many as it has.
+    pub fn of(bytes: Vec<u8>) -> Option<Self> {
+        (bytes.len() == BYTES).then_some(Self(bytes))
+    }
+
+    /// Returns the bytes that it holds.
+    pub fn bytes(&self) -> &[u8] {
+        &self.0
+    }
+
+    /// The same, to be damaged.
+    pub fn bytes_mut(&mut self) -> &mut [u8] {
+        &mut self.0
+    }
+}
+
+impl Default for MemoryFlash {
+    fn default() -> Self {
+        Self(vec![0xFF; BYTES])
+    }
+}
+
+/// An access that the flash cannot do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FlashError(NorFlashErrorKind);
+
+impl NorFlashError for FlashError {
+    fn kind(&self) -> NorFlashErrorKind {
+        self.0
+    }
+}
+
+impl ErrorType for MemoryFlash {
+    type Error = FlashError;
+}
+
+impl ReadNorFlash for MemoryFlash {
+    const READ_SIZE: usize = 1;
+
+    fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
+        check_read(self, offset, bytes.len()).map_err(FlashError)?;
+        bytes.copy_from_slice(&self.0[offset as usize..][..bytes.len()]);
+        Ok(())
+    }
+
+    fn capacity(&self) -> usize {
+        self.0.len()
+    }
+}
+
+impl NorFlash for MemoryFlash {
+    const WRITE_SIZE: usize = 4;
+    const ERASE_SIZE: usize = SECTOR_BYTES;
+
+    fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
+        check_erase(self, from, to).map_err(FlashError)?;
+        self.0[from as usize..to as usize].fill(0xFF);
+        Ok(())
+    }
+
+    fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
+        check_write(self, offset, bytes.len()).map_err(FlashError)?;
+        for (cell, byte) in self.0[offset as usize..].iter_mut().zip(bytes) {
+            *cell &= byte;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,60 @@
+//! Machines: everything that runs the control law on a stage, and the ways to it.
+//!
+//! ```text
+//!   identify, commission --> Machine --> TestAxis
+//!                              |
+//!        +---------------------+----------------------+
+//!        | LawStage                                   | client::Client
+//!        | the law alone, without firmware            | the link's protocol, over a Transport:
+//!        |                                            |   Loopback        SerialTransport, TcpTransport
+//!        |                                            |   |            |         |
+//!   SimulatedStage <-- SimulatedMachine --------------+   |            |         a board
+//!   (crate::plant)     the firmware's application         |            |
+//!        ^-------------------------------- EmulatedMachine: its image in QEMU
+//! ```
+//!
+//! - [`Machine`], [`TestAxis`]: a machine and an axis that are measured, whatever they are made of;
+//! - [`law`]: the control law and the supervisor alone;
+//! - [`simulated`], [`application`], [`memory_flash`]: the firmware's application in this process;
+//! - [`emulated`], [`emulator`]: the firmware's image in QEMU;
+//! - [`Transport`], [`SerialTransport`], [`TcpTransport`], [`Loopback`]: bytes to a machine and back;
+//! - [`simulated_io`]: fault injection at machines that are not real: inputs, supply, log.
+//!
+//! Nothing here knows the client: [`client`](crate::client) is built on this.
+
+pub mod application;
+mod approach;
+pub mod benchmark_job;
+#[cfg(unix)]
+pub mod emulated;
+#[cfg(unix)]
+mod emulated_link;
+#[cfg(unix)]
+pub mod emulator;
+mod flash_file;
+mod interface;
+pub mod law;
+mod loopback;
+pub mod memory_flash;
+mod serial;
+pub mod simulated;
+pub mod simulated_io;
+mod simulated_link;
+mod stream;
+mod tcp;
+mod test_axis;
+mod timing;
+mod transport;
+
+pub use approach::approach;
+#[cfg(unix)]
+pub use emulated_link::EmulatedLink;
+pub use interface::{Machine, MachineError};
+pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
+pub use loopback::{Loopback, SimulatedPeer};
+pub use serial::{BAUD, SerialTransport};
+pub use simulated_io::SimulatedIo;
+pub use simulated_link::SimulatedLink;
+pub use tcp::TcpTransport;
+pub use test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+pub use transport::Transport;

@@ -1,0 +1,99 @@
+//! Fault injection at a machine that is not real, beside the link: inputs, supply, and the log on the debug probe.
+
+use std::io;
+
+use quadrant::axes::AxisName;
+use quadrant::safety::{AxisSwitches, Switches};
+
+/// SimulatedIo at a machine that is not a real one.
+pub trait SimulatedIo {
+    /// Holds these inputs pressed, beside those that the stage presses itself, and no others.
+    fn press(&mut self, switches: Switches);
+
+    /// Cuts the supply, lets the stage coast, and switches it on again; what is in flash stays.
+    ///
+    /// # Errors
+    /// A machine that does not start.
+    fn power_cycle(&mut self) -> io::Result<()>;
+
+    /// The lines that the firmware has logged since the last call; nothing, where there is no log.
+    ///
+    /// # Errors
+    /// A log that cannot be read.
+    fn log(&mut self) -> io::Result<Option<Vec<String>>>;
+}
+
+/// Inputs that can be pressed, by name.
+pub const INPUTS: [(&str, Switches); 13] = [
+    ("emergency-stop", Switches::EMERGENCY_STOP),
+    (
+        "x.negative-limit",
+        of(AxisName::X, AxisSwitches::NEGATIVE_LIMIT),
+    ),
+    (
+        "x.positive-limit",
+        of(AxisName::X, AxisSwitches::POSITIVE_LIMIT),
+    ),
+    ("x.home", of(AxisName::X, AxisSwitches::HOME)),
+    (
+        "x.amplifier-fault",
+        of(AxisName::X, AxisSwitches::AMPLIFIER_FAULT),
+    ),
+    (
+        "y.negative-limit",
+        of(AxisName::Y, AxisSwitches::NEGATIVE_LIMIT),
+    ),
+    (
+        "y.positive-limit",
+        of(AxisName::Y, AxisSwitches::POSITIVE_LIMIT),
+    ),
+    ("y.home", of(AxisName::Y, AxisSwitches::HOME)),
+    (
+        "y.amplifier-fault",
+        of(AxisName::Y, AxisSwitches::AMPLIFIER_FAULT),
+    ),
+    (
+        "z.negative-limit",
+        of(AxisName::Z, AxisSwitches::NEGATIVE_LIMIT),
+    ),
+    (
+        "z.positive-limit",
+        of(AxisName::Z, AxisSwitches::POSITIVE_LIMIT),
+    ),
+    ("z.home", of(AxisName::Z, AxisSwitches::HOME)),
+    (
+        "z.amplifier-fault",
+        of(AxisName::Z, AxisSwitches::AMPLIFIER_FAULT),
+    ),
+];
+
+const fn of(axis: AxisName, switches: AxisSwitches) -> Switches {
+    Switches::NONE.with_axis(axis, switches)
+}
+
+/// Returns `pressed` without `released`.
+pub const fn without(pressed: Switches, released: Switches) -> Switches {
+    Switches::from_bits(pressed.bits() & !released.bits())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_input_has_a_name_and_bits_of_its_own() {
+        let mut all = Switches::NONE;
+        for (name, switches) in INPUTS {
+            assert_eq!(all.bits() & switches.bits(), 0, "{name}");
+            all = all.with(switches);
+        }
+        let limit = Switches::NONE.with_axis(AxisName::Y, AxisSwitches::POSITIVE_LIMIT);
+        assert!(INPUTS.contains(&("y.positive-limit", limit)));
+        assert!(
+            without(all, Switches::EMERGENCY_STOP)
+                .axis(AxisName::Y)
+                .at_limit()
+        );
+        assert!(!without(all, Switches::EMERGENCY_STOP).emergency_stop());
+    }
+}

@@ -1,0 +1,16 @@
+//! Times that the simulated and the emulated machine have in common, so that a session is the same on both.
+
+use std::time::Duration;
+
+use quadrant::app::supervisor::PERIOD_TICKS;
+use quadrant::settings::StageSettings;
+
+/// Bytes that the port carries in a run of the server: 921 600 baud for a millisecond.
+pub(super) const PORT_BYTES: usize = 92;
+/// Ticks without supply in a power cycle: 1 s at 10 kHz.
+pub(super) const OFF_TICKS: u32 = 10_000;
+
+/// Time between two runs of the server, each of which reads its port once.
+pub(super) fn server_period(settings: &StageSettings) -> Duration {
+    Duration::from_secs_f64(f64::from(PERIOD_TICKS) / settings.rate_hz)
+}

@@ -1,0 +1,36 @@
+//! Bytes to a machine and back, and the clock by which they are waited for.
+
+use std::io;
+use std::time::Duration;
+
+use super::simulated_io::SimulatedIo;
+
+/// A connection that carries bytes both ways, and the clock by which it waits.
+pub trait Transport {
+    /// Sends all of the bytes.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Waits until bytes have come, at most for `timeout` of its own clock, and says how many it wrote to `buffer`: 0 if
+    /// none came.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    fn receive(&mut self, buffer: &mut [u8], timeout: Duration) -> io::Result<usize>;
+
+    /// Its clock: the time since it was opened; of a simulated machine the machine's time.
+    fn now(&self) -> Duration;
+
+    /// Returns the other end, for messages: "serial port /dev/ttyACM0".
+    fn endpoint(&self) -> String;
+
+    /// Returns the remedy if the other end is silent.
+    fn remedy(&self) -> &'static str;
+
+    /// SimulatedIo at the machine, where a program can have any: at a simulated one.
+    fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
+        None
+    }
+}

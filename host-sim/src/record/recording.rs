@@ -1,0 +1,172 @@
+//! Recordings of experiments: in memory, and as CSV files, which are checked when they are read.
+
+use std::path::Path;
+
+use super::columns::{self, Columns, Purpose};
+use super::error::{RecordError, UnusableSignal};
+use super::trace::{TraceError, write_trace};
+use super::{plausible, time};
+
+/// Largest voltage of an amplifier's input, V.
+const MOST_VOLTS: f64 = 20.0;
+/// The usual limit of an amplifier's input, V, and the share of rows that may lie there.
+const LIMIT_V: f64 = 10.0;
+const MOST_SATURATED: f64 = 0.01;
+
+/// The signals of one experiment on one axis, sampled evenly. All columns have one length.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Recording {
+    /// Time from one sample to the next, s.
+    pub sample_time_s: f64,
+    /// Position asked for, mm; the measured position in open loop.
+    pub reference_mm: Vec<f64>,
+    /// Position measured at the beginning of the sample's period, mm.
+    pub position_mm: Vec<f64>,
+    /// Voltage commanded at the amplifier's input, held over the sample's period, V; injection included.
+    pub voltage_v: Vec<f64>,
+    /// The part of it that was injected, V.
+    pub injection_v: Vec<f64>,
+}
+
+impl Recording {
+    /// Returns the number of samples.
+    pub fn len(&self) -> usize {
+        self.position_mm.len()
+    }
+
+    /// True if nothing was recorded.
+    pub fn is_empty(&self) -> bool {
+        self.position_mm.is_empty()
+    }
+
+    /// Returns its duration, s.
+    pub fn duration_s(&self) -> f64 {
+        self.len() as f64 * self.sample_time_s
+    }
+
+    /// The samples of a range.
+    pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
+        let part = |signal: &[f64]| signal[range.clone()].to_vec();
+        Self {
+            sample_time_s: self.sample_time_s,
+            reference_mm: part(&self.reference_mm),
+            position_mm: part(&self.position_mm),
+            voltage_v: part(&self.voltage_v),
+            injection_v: part(&self.injection_v),
+        }
+    }
+
+    /// Writes it as CSV: `t_s`, `reference_mm`, `position_mm`, `voltage_v`, `injection_v`.
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), TraceError> {
+        let time: Vec<f64> = (0..self.len())
+            .map(|index| index as f64 * self.sample_time_s)
+            .collect();
+        write_trace(
+            path,
+            &[
+                ("t_s", &time),
+                ("reference_mm", &self.reference_mm),
+                ("position_mm", &self.position_mm),
+                ("voltage_v", &self.voltage_v),
+                ("injection_v", &self.injection_v),
+            ],
+        )
+    }
+
+    /// Reads and checks a recorded experiment: `t_s`, `position_m` or `position_mm`, `voltage_v`; optional `reference_m` or
+    /// `reference_mm` (else the position stands for it) and `injection_v` (else nothing was injected).
+    ///
+    /// # Errors
+    /// A file that cannot be read, with gaps or uneven time, or whose position or voltage cannot be identified from; names
+    /// line or column, the value, and what is allowed.
+    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+        Self::read_csv_with(path, &mut |_| {})
+    }
+
+    /// As [`read_csv`](Self::read_csv), for long files: `progress` is told the share that is read, 0 to 1.
+    ///
+    /// # Errors
+    /// As [`read_csv`](Self::read_csv).
+    pub fn read_csv_with(
+        path: impl AsRef<Path>,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Self, RecordError> {
+        let path = path.as_ref();
+        let columns = columns::read(path, Purpose::Experiment, progress)?;
+        let sample_time_s = time::check(path, &columns.time)?;
+        check(path, &columns)?;
+        plausible::check_experiment(path, &columns)?;
+        // A long recording need not hold its time as well.
+        drop(columns.time);
+        let position_mm = columns
+            .position
+            .map_or_else(Vec::new, columns::Column::into_mm);
+        let voltage_v = columns
+            .voltage
+            .map_or_else(Vec::new, |column| column.values);
+        let rows = position_mm.len();
+        Ok(Self {
+            sample_time_s,
+            reference_mm: columns
+                .reference
+                .map_or_else(|| position_mm.clone(), columns::Column::into_mm),
+            injection_v: columns
+                .injection
+                .map_or_else(|| vec![0.0; rows], |column| column.values),
+            position_mm,
+            voltage_v,
+        })
+    }
+}
+
+fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    let refuse = |column, fault| {
+        Err(RecordError::Useless {
+            path: path.to_owned(),
+            column,
+            fault,
+        })
+    };
+    for (name, column) in [
+        ("position", &columns.position),
+        ("voltage_v", &columns.voltage),
+    ] {
+        if let Some(values) = column.as_ref().map(|column| &column.values)
+            && let Some(first) = values.first()
+            && values.iter().all(|value| value == first)
+        {
+            return refuse(name, UnusableSignal::Constant { value: *first });
+        }
+    }
+    let Some(voltage) = &columns.voltage else {
+        return Ok(());
+    };
+    let largest = voltage
+        .values
+        .iter()
+        .fold(0.0_f64, |most, value| most.max(value.abs()));
+    if largest > MOST_VOLTS {
+        return refuse("voltage_v", UnusableSignal::NotVoltage { largest });
+    }
+    let at_limit = |value: &f64| value.abs() >= 0.9999 * LIMIT_V;
+    let saturated = voltage
+        .values
+        .iter()
+        .filter(|value| at_limit(value))
+        .count();
+    let share = saturated as f64 / voltage.values.len() as f64;
+    match voltage.values.iter().position(at_limit) {
+        Some(first) if share > MOST_SATURATED => refuse(
+            "voltage_v",
+            UnusableSignal::Saturated {
+                percent: 100.0 * share,
+                limit_v: LIMIT_V,
+                line: voltage.line(first),
+            },
+        ),
+        _ => Ok(()),
+    }
+}
