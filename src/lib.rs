@@ -45,7 +45,7 @@
 //! use quadrant::stage::{Inputs, Stage, StageState};
 //!
 //! let stage: Stage<f32> = StageSettings::simulated().build()?;
-//! let plan = [Motion::Hold, Motion::Hold, Motion::Hold];
+//! let plan = PerAxis::from_fn(|_| Motion::Hold);
 //! let mut state = StageState::default();
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
 //! assert!(stage.tick(&plan, &mut state, &enable).enabled);

@@ -348,7 +348,7 @@ impl Crate {
     }
 }
 
-/// What attributes say about the module that follows.
+/// Attributes of the module that follows.
 #[derive(Debug, Default)]
 struct Attribute {
     path: Option<String>,

@@ -1,4 +1,4 @@
-//! Who may know whom.
+//! Layers: the imports that each part of the tree may have.
 
 use std::collections::BTreeSet;
 use std::fs;

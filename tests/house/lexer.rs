@@ -122,7 +122,7 @@ fn block_comment(rest: &str) -> usize {
     rest.len()
 }
 
-/// Where the text of a raw string begins, and its number of hashes.
+/// Returns the beginning of a raw string's text, and its number of hashes.
 fn raw_string(rest: &str) -> Option<(usize, usize)> {
     let after = ["r", "br", "cr"]
         .iter()
@@ -132,7 +132,7 @@ fn raw_string(rest: &str) -> Option<(usize, usize)> {
     (rest.as_bytes().get(open) == Some(&b'"')).then_some((open + 1, hashes))
 }
 
-/// Where a quoted text that begins at `open` ends.
+/// Returns the end of a quoted text that begins at `open`.
 fn quoted(rest: &str, open: usize, quote: char) -> usize {
     let mut escaped = false;
     for (at, character) in rest[open..].char_indices() {

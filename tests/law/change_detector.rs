@@ -1,4 +1,4 @@
-//! What the board's own log finds worth telling.
+//! Changes of state that the board's own log reports.
 
 use quadrant::admission::StageView;
 use quadrant::app::{

@@ -1,4 +1,4 @@
-//! What the fields of the settings must hold together.
+//! Relations that the fields of the settings must keep.
 
 use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;

@@ -119,7 +119,7 @@ fn write(settings: &mut StageSettings, path: &str, number: f64) -> Result<(), Tr
     Ok(())
 }
 
-/// Whether a leaf is a whole number.
+/// Returns true if a leaf is a whole number.
 pub(crate) fn is_whole(path: &str) -> bool {
     ["counter_bits", "counts_per_index", "index_tolerance_counts"]
         .iter()

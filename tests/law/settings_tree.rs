@@ -258,7 +258,7 @@ fn a_list_of_paths_is_complete_without_repetition_and_can_be_limited() {
     assert_eq!((result, none), (Err(TreeError::NotFound), vec![]));
 }
 
-/// What `quadrant dump` and `load` do.
+/// As the console's `dump` and `load` do.
 #[test]
 fn a_dump_makes_the_same_settings_again() {
     for original in [StageSettings::simulated(), bare()] {
@@ -276,7 +276,7 @@ fn a_dump_makes_the_same_settings_again() {
     }
 }
 
-/// What a host does that leaves JSON to itself.
+/// As a host does that leaves JSON to itself.
 #[test]
 fn a_dump_in_bytes_makes_the_same_settings_again() {
     let mut longest = 0;

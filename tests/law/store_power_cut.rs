@@ -102,7 +102,7 @@ fn no_cut_loses_the_settings() {
     assert_eq!(lost, 0);
 }
 
-/// What one cut leaves behind is there at the next.
+/// Remains of one cut are there at the next.
 #[test]
 fn cuts_upon_cuts_lose_nothing() {
     let mut noise = Noise::new(7);

@@ -1,4 +1,4 @@
-//! What can be reached from a function by direct calls and jumps.
+//! Functions that can be reached from a function by direct calls and jumps.
 
 use std::collections::BTreeMap;
 
@@ -22,7 +22,7 @@ pub struct CallGraph<'a> {
     pub indirect: Vec<String>,
 }
 
-/// Where an instruction may go besides the next one.
+/// Destinations of an instruction besides the next one.
 pub enum Flow {
     /// Nowhere.
     Onward,
@@ -81,7 +81,7 @@ impl<'a> CallGraph<'a> {
     }
 }
 
-/// Where the instruction at `index` of a function may go.
+/// Returns the destinations of the instruction at `index` of a function.
 pub fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flow {
     let Instruction {
         mnemonic, operands, ..

@@ -17,7 +17,7 @@ pub fn root() -> PathBuf {
     })
 }
 
-/// Whether a program is in the search path.
+/// Returns true if a program is in the search path.
 pub fn exists(program: &str) -> bool {
     std::env::var_os("PATH").is_some_and(|path| {
         std::env::split_paths(&path).any(|folder| folder.join(program).is_file())

@@ -1,4 +1,4 @@
-//! What each function of an image takes of the stack, what it calls, and which functions are called by their address.
+//! Stack frame and calls of each function of an image, and the functions that are called by their address.
 
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -160,7 +160,7 @@ fn registers(list: &str) -> u32 {
         .sum()
 }
 
-/// What may be addresses in a function: words among its instructions, and constants made of two halves.
+/// Returns the words that may be addresses in a function: among its instructions, and constants made of two halves.
 fn pointers_in_code(function: &Function) -> Vec<u32> {
     let mut pointers = Vec::new();
     let mut halves: BTreeMap<&str, u32> = BTreeMap::new();

@@ -35,7 +35,7 @@ pub enum Scalar {
     Fixed,
 }
 
-/// Which image.
+/// Board and number type of an image.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Target {
     /// The machine.
@@ -123,9 +123,9 @@ impl fmt::Display for Target {
 
 /// A linked image.
 pub struct Image {
-    /// What it was built for.
+    /// Target that it was built for.
     pub target: Target,
-    /// Where it is.
+    /// Path of the file.
     pub path: PathBuf,
     /// Its bytes.
     pub elf: Vec<u8>,
@@ -215,7 +215,7 @@ impl Image {
         Ok(symbol.address())
     }
 
-    /// How much of the machine's memories the image takes.
+    /// Returns the memory that the image takes.
     pub fn footprint(&self) -> Result<Footprint> {
         use object::ObjectSection;
         let file = object::File::parse(&*self.elf).context("the image is not an ELF file")?;
@@ -252,7 +252,7 @@ impl Image {
     }
 }
 
-/// How much of the machine's memories an image takes, in bytes.
+/// Memory that an image takes, in bytes.
 pub struct Footprint {
     target: Target,
     flash: u64,

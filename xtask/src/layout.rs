@@ -1,4 +1,4 @@
-//! Where an image lies in the machine's memories, and how much of them it takes.
+//! Place of an image in the machine's memories, and its sizes.
 //!
 //! Two promises of the linker scripts are held against the linked image: the stack is below everything else in RAM, so
 //! that growing too far is a fault and nothing worse; and flashing an image never touches the sectors of the stored
@@ -20,16 +20,16 @@ const SETTINGS: Range<u64> = 0x0800_4000..0x0800_C000;
 /// Growth that is no news, share of the committed size: compilers differ by as much.
 const TOLERANCE: f64 = 0.02;
 
-/// What an image takes, bytes.
+/// Memory that an image takes, bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub(crate) struct Sizes {
     /// Code, constants, and the first values of variables.
     pub(crate) flash: u64,
     /// Variables.
     pub(crate) variables: u64,
-    /// What is set aside for the stack.
+    /// Stack set aside.
     pub(crate) stack: u64,
-    /// What may be in use of it at most: [`crate::stack`].
+    /// Bound of the stack in use: [`crate::stack`].
     pub(crate) stack_bound: u64,
 }
 
@@ -135,7 +135,7 @@ fn erasing_calls_nothing(image: &Image) -> Result<()> {
     Ok(())
 }
 
-/// Whether an instruction is a branch to anywhere but into the function itself and back to its caller.
+/// Returns true if an instruction is a branch to anywhere but into the function itself and back to its caller.
 fn leaves(instruction: &Instruction, symbol: &str) -> bool {
     let own = [format!("<{symbol}>"), format!("<{symbol}+")];
     let is_own = own.iter().any(|own| instruction.operands.contains(own));

@@ -10,7 +10,7 @@ use crate::image::Image;
 
 /// One instruction.
 pub struct Instruction {
-    /// Where it is.
+    /// Address of the instruction.
     pub address: u32,
     /// Its name, without a width suffix.
     pub mnemonic: String,

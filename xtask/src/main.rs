@@ -24,7 +24,7 @@ use xtask::{command, prove};
 #[derive(Parser)]
 #[command(name = "cargo xtask", bin_name = "cargo xtask")]
 struct Cli {
-    /// How the firmware is compiled [default: what `setup` chose last]
+    /// Compiler of the firmware [default: the one that `setup` chose last]
     #[arg(long, global = true, env = "QUADRANT_TOOLCHAIN", value_enum)]
     toolchain: Option<Choice>,
 
@@ -78,7 +78,7 @@ struct Forwarded {
     options: Vec<OsString>,
 }
 
-/// Which image.
+/// Options that choose an image.
 #[derive(Args, Clone, Copy)]
 struct TargetArgs {
     /// The machine

@@ -1,4 +1,4 @@
-//! What takes how much of an image's flash, by module.
+//! Flash of an image by module.
 
 use std::collections::BTreeMap;
 

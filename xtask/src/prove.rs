@@ -103,7 +103,7 @@ pub fn prove(image: &Image) -> Result<()> {
     Ok(())
 }
 
-/// Why a function must not be reachable, if so.
+/// Returns the reason for which a function must not be reachable, if there is one.
 fn forbidden_function(function: &Function) -> Option<&'static str> {
     let Function { symbol, name, .. } = function;
     let by_name = FORBIDDEN_NAMES.iter().find(|(part, _)| name.contains(part));

@@ -15,7 +15,7 @@ struct Tool {
     package: &'static str,
 }
 
-/// What is needed whichever compiler is used.
+/// Tools that are needed whichever compiler is used.
 const TOOLS: [Tool; 3] = [
     Tool {
         program: "qemu-system-arm",
@@ -32,7 +32,7 @@ const TOOLS: [Tool; 3] = [
     },
 ];
 
-/// What Debian's compiler is made of, by a file of each package.
+/// Packages of Debian's compiler, by a file of each.
 const COMPILER: [(&str, &str); 4] = [
     ("/usr/bin/rustc", "rustc-web"),
     ("/usr/bin/cargo", "cargo-web"),

@@ -23,11 +23,11 @@ use xtask::image::Image;
 
 /// Of a floating-point unit's context, the words to align it included: what the processor saves for a handler.
 const EXCEPTION_FRAME_BYTES: u32 = 4 * 27;
-/// Where every panic goes.
+/// Function in which every panic ends.
 const PANIC: &str = "__rustc::rust_begin_unwind";
 /// The start, after which its frame is gone.
 const START: &str = "__rtic_init_resources";
-/// Where interrupts go that nobody asked for.
+/// Handler of interrupts that nobody asked for.
 const STRAY: &str = "DefaultHandler";
 /// Beginnings of names, without angle brackets, of functions that write text and format nothing.
 const PADDING: [&str; 3] = [
@@ -35,7 +35,7 @@ const PADDING: [&str; 3] = [
     "core::fmt::Formatter::write_formatted_parts",
     "char as core::fmt::Debug",
 ];
-/// What formatters call to format something else.
+/// Function by which formatters format something else.
 const WRITE: &str = "core::fmt::write";
 /// Frames that are worth a line.
 const WORTH_BYTES: u32 = 128;
@@ -109,18 +109,18 @@ fn unique(vectors: &[u32]) -> Vec<u32> {
     vectors
 }
 
-/// Whether something that is called by its address writes text.
+/// Returns true if a function that is called by its address writes text.
 fn writes(name: &str) -> bool {
     let (_, method) = name.rsplit_once("::").unwrap_or_default();
     name.contains(" as core::fmt::Write>::") && matches!(method, "write_str" | "write_char")
 }
 
-/// Whether something that is called by its address formats a value.
+/// Returns true if a function that is called by its address formats a value.
 fn formats(name: &str) -> bool {
     name.contains(" as core::fmt::") && name.ends_with(">::fmt")
 }
 
-/// Whether an address that `caller` calls may be that of `callee`.
+/// Returns true if an address that `caller` calls may be that of `callee`.
 fn may_call(caller: &str, callee: &str) -> bool {
     let plain = caller.replace(['<', '>'], "");
     if PADDING.iter().any(|start| plain.starts_with(start)) || writes(caller) {

@@ -20,7 +20,7 @@ const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
 /// Output of the checks beside the host's tests.
 const FIRMWARE_LOG: &str = "target/xtask/firmware.log";
 
-/// What was checked, and how it went.
+/// Steps of the test, and their results.
 #[derive(Default)]
 struct Report {
     steps: Vec<(String, f64, Result<()>)>,
@@ -116,7 +116,7 @@ fn announce(choice: Choice) -> Result<()> {
     Ok(())
 }
 
-/// What becomes of a compiler's warnings.
+/// Returns the treatment of a compiler's warnings.
 fn lints(compiler: &str) -> &'static str {
     if toolchain::denies_warnings(compiler) {
         "warnings are errors"
@@ -134,7 +134,7 @@ fn deny(compiler: &str) -> &'static [&'static str] {
     }
 }
 
-/// What runs on the host alone.
+/// Checks that run on the host alone.
 fn host(report: &mut Report) -> Result<()> {
     let deny = deny(&toolchain::host_compiler()?);
     let cargo = || command::command("cargo");
@@ -263,7 +263,7 @@ pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
     Ok(report.finish())
 }
 
-/// What is emulated.
+/// Checks that run in the emulator.
 fn emulated(report: &mut Report, toolchain: Toolchain) {
     let mut step = |name: &str, verb: &[&str]| {
         report.step(name, || {

@@ -1,4 +1,4 @@
-//! Which compiler builds the firmware.
+//! Compilers of the firmware.
 
 use std::fs;
 use std::path::PathBuf;
@@ -19,7 +19,7 @@ pub fn denies_warnings(compiler: &str) -> bool {
     release.is_some_and(|release| LINTED_WITH.contains(&release))
 }
 
-/// What the user asks for.
+/// Compiler that the user asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub enum Choice {
     /// rustup if it can add the targets, else Debian
@@ -30,7 +30,7 @@ pub enum Choice {
     Debian,
 }
 
-/// What it comes down to.
+/// Compiler in use.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Toolchain {
@@ -67,7 +67,7 @@ impl Toolchain {
         }
     }
 
-    /// What setup chose last.
+    /// Returns the compiler that setup chose last.
     pub fn remembered() -> Option<Self> {
         // A file that is missing or spoilt only costs another setup.
         let text = fs::read_to_string(memory()).ok()?;

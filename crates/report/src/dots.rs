@@ -37,13 +37,13 @@ pub struct DotSeries {
 /// A value and how far it spreads. A mean that is not finite is left out of the drawing.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
-    /// Where the dot is.
+    /// Value of the dot.
     #[serde(with = "super::number")]
     pub mean: f64,
-    /// Where the bar begins; not above the mean.
+    /// Beginning of the bar; not above the mean.
     #[serde(with = "super::number")]
     pub low: f64,
-    /// Where the bar ends; not below the mean.
+    /// End of the bar; not below the mean.
     #[serde(with = "super::number")]
     pub high: f64,
 }
@@ -102,7 +102,7 @@ impl Dots {
         Ok(())
     }
 
-    /// Where the dot of a series lies below the top category's middle, in categories.
+    /// Returns the distance of a series' dot below the top category's middle, in categories.
     fn place(&self, category: usize, series: usize) -> f64 {
         let count = self.series.len() as f64;
         category as f64 + ((series as f64 + 0.5) / count - 0.5) * DODGE

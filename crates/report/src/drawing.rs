@@ -37,7 +37,7 @@ pub(super) struct Axis {
     pub(super) zero: bool,
 }
 
-/// What one entry of the legend stands for.
+/// Curve of one entry of the legend.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(super) struct Curve {
     pub(super) name: String,

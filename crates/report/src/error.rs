@@ -1,4 +1,4 @@
-//! What can be wrong with a report's data.
+//! Errors in a report's data.
 
 use std::path::PathBuf;
 
@@ -61,17 +61,17 @@ pub enum ReportError {
         series: String,
         /// The category's name.
         category: String,
-        /// Where the bar begins.
+        /// Beginning of the bar.
         low: f64,
-        /// Where the dot is.
+        /// Value of the dot.
         mean: f64,
-        /// Where the bar ends.
+        /// End of the bar.
         high: f64,
     },
     /// A text that is no page in JSON.
     #[error("no page in JSON: {source}; give a file that --format json wrote")]
     Json {
-        /// Why.
+        /// Cause.
         source: serde_json::Error,
     },
     /// A page in another format's version.
@@ -87,7 +87,7 @@ pub enum ReportError {
     /// An image that cannot be drawn.
     #[error("the image cannot be drawn: {reason}")]
     Image {
-        /// Why.
+        /// Reason.
         reason: String,
     },
     /// The file could not be written.
@@ -95,7 +95,7 @@ pub enum ReportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// Why.
+        /// Cause.
         source: std::io::Error,
     },
 }

@@ -13,7 +13,7 @@ use super::{Colour, ReportError};
 pub struct Figure {
     /// Unique on its page; also the name of the image a reader saves.
     pub id: String,
-    /// What the figure shows.
+    /// Caption: the subject of the figure.
     pub caption: String,
     /// The drawing.
     pub plot: Plot,
@@ -30,7 +30,7 @@ pub enum Plot {
     Dots(Dots),
 }
 
-/// How a curve is drawn.
+/// Style of a curve.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Style {
     /// Its colour.
@@ -102,7 +102,7 @@ impl Figure {
         }
     }
 
-    /// What follows the caption because the drawing cannot be read without it.
+    /// Returns the note that follows the caption because the drawing cannot be read without it.
     pub(super) fn note(&self) -> Option<String> {
         match &self.plot {
             Plot::Lines(_) => None,

@@ -40,7 +40,7 @@ pub struct Series {
     /// Ordinates, as many.
     #[serde(with = "super::number::list")]
     pub y: Vec<f64>,
-    /// How it is drawn.
+    /// Style of the curve.
     pub style: Style,
 }
 

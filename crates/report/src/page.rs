@@ -20,13 +20,13 @@ pub struct Page {
     pub title: String,
     /// One sentence under the title.
     pub subtitle: String,
-    /// How it came about.
+    /// Provenance of the page.
     pub provenance: Provenance,
     /// Its sections, in reading order.
     pub sections: Vec<Section>,
 }
 
-/// What a reader needs to make the same page again.
+/// Provenance: all that a reader needs to make the same page again.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Provenance {
     /// The command line.
@@ -48,7 +48,7 @@ pub struct Section {
     pub prose: Vec<String>,
     /// Its tables and figures, after the prose.
     pub blocks: Vec<Block>,
-    /// How it came about, where that is not how the page did.
+    /// Provenance, if it is not the page's.
     pub provenance: Option<Provenance>,
 }
 
@@ -61,7 +61,7 @@ pub enum Block {
     Figure(Figure),
     /// Either, under a label of its own ("Table 5.7") where the others are counted.
     Labelled {
-        /// What stands before the caption.
+        /// Text before the caption.
         label: String,
         /// The table or figure.
         block: Box<Self>,
@@ -100,7 +100,7 @@ impl Block {
         }
     }
 
-    /// What it holds, whatever it is labelled.
+    /// Returns the content, whatever its label.
     pub(super) fn content(&self) -> Content<'_> {
         match self {
             Self::Table(table) => Content::Table(table),
@@ -121,7 +121,7 @@ pub(super) enum Content<'a> {
 pub(super) struct Part<'a> {
     pub(super) section: &'a Section,
     pub(super) blocks: Vec<Numbered<'a>>,
-    /// How it came about: the section's own provenance, or else the page's.
+    /// Provenance: the section's own, or else the page's.
     pub(super) provenance: &'a Provenance,
 }
 

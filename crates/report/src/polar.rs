@@ -11,7 +11,7 @@ use std::f64::consts::TAU;
 const DEVIATION_SHARE: f64 = 0.3;
 /// Most division circles on either side of the nominal circle.
 const DIVISIONS: f64 = 3.0;
-/// Where divisions are labelled: on the diagonal, away from the axes, where the quadrant glitches are; rad.
+/// Angle at which divisions are labelled: on the diagonal, away from the axes, where the quadrant glitches are; rad.
 const LABEL_ANGLE: f64 = TAU / 8.0;
 
 /// Radial deviation from a circle, magnified.
@@ -38,11 +38,11 @@ pub struct DeviationTrace {
     /// Radius less the nominal one, um.
     #[serde(with = "super::number::list")]
     pub deviation_um: Vec<f64>,
-    /// How it is drawn.
+    /// Style of the trace.
     pub style: Style,
 }
 
-/// How far a polar figure magnifies, in round numbers.
+/// Magnification of a polar figure, in round numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Magnification {
     /// Drawn deviation over true deviation.
@@ -110,7 +110,7 @@ impl PolarDeviation {
         }
     }
 
-    /// What the reader must know to read the figure.
+    /// Returns the note on the scale that the reader needs.
     pub(super) fn scale_note(&self) -> String {
         let Magnification {
             factor,
@@ -185,13 +185,13 @@ impl PolarDeviation {
         }
     }
 
-    /// Where a sample is drawn, mm from the centre.
+    /// Returns the point at which a sample is drawn, mm from the centre.
     fn drawn(&self, scale: Magnification, angle_rad: f64, deviation_um: f64) -> (f64, f64) {
         let radius = self.radius_mm + scale.factor * deviation_um * 1e-3;
         (radius * angle_rad.cos(), radius * angle_rad.sin())
     }
 
-    /// What is drawn of the plane on either side of the centre, mm.
+    /// Returns the half width of the plane that is drawn, mm from the centre.
     fn reach_mm(&self, scale: Magnification) -> f64 {
         let reach_um = scale.divisions as f64 * scale.division_um;
         1.06 * (self.radius_mm + scale.factor * reach_um * 1e-3)
@@ -210,7 +210,7 @@ impl PolarDeviation {
 }
 
 impl Magnification {
-    /// What stands in the centre.
+    /// Returns the text in the centre.
     fn lines(&self) -> [String; 2] {
         [
             format!("× {}", self.factor),
@@ -219,7 +219,7 @@ impl Magnification {
     }
 }
 
-/// What a division circle is called.
+/// Returns the label of a division circle.
 fn division_label(um: f64) -> String {
     format!("{um:+} µm").replace('-', "\u{2212}")
 }

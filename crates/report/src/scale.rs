@@ -13,7 +13,7 @@ pub enum Scale {
 }
 
 impl Scale {
-    /// Where a value lies on the axis, in any even unit; not finite where it has no place.
+    /// Returns a value's place on the axis, in any even unit; not finite if it has none.
     pub(super) fn place(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
@@ -30,7 +30,7 @@ impl Scale {
         }
     }
 
-    /// Where all values lie.
+    /// Returns the places of all values.
     pub(super) fn places(self, values: &[f64]) -> Vec<f64> {
         values.iter().map(|&value| self.place(value)).collect()
     }
@@ -46,7 +46,7 @@ impl Scale {
             })
     }
 
-    /// What values span.
+    /// Returns the span of the values.
     pub(super) fn span(self, values: impl Iterator<Item = f64>) -> f64 {
         self.reach(values).map_or(0.0, |(low, high)| high - low)
     }

@@ -20,7 +20,7 @@ const HEAD_WIDTH: usize = 12;
 pub struct Table {
     /// Unique on its page; also the name of its CSV file.
     pub id: String,
-    /// What the table shows.
+    /// Caption: the subject of the table.
     pub caption: String,
     /// One per column, left to right.
     pub columns: Vec<Column>,
@@ -31,7 +31,7 @@ pub struct Table {
 /// The head of a column.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Column {
-    /// What is in it.
+    /// Heading of the column.
     pub heading: String,
     /// Unit of its numbers, if they have one.
     pub unit: Option<String>,

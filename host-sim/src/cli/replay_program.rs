@@ -19,7 +19,7 @@ pub(super) struct ProgramOptions {
     /// G90.1/G91.1, I, J, K or R, F in mm/min, M2/M30.
     #[arg(long, value_name = "FILE")]
     pub(super) gcode: Option<PathBuf>,
-    /// How far the path may leave a corner between straight lines, mm, 0 to 10; 0 stops at it exactly.
+    /// Largest deviation of the path at a corner, mm, 0 to 10; 0 stops at it exactly.
     #[arg(long, requires = "gcode", default_value_t = 0.0, value_name = "MM")]
     corner_deviation_mm: f64,
     /// Largest acceleration along the path, mm/s^2; without it 500.

@@ -30,7 +30,7 @@ const BACKLOG: usize = 1_000;
 /// Requests to start afresh of which one is sent: each start takes memory for good.
 const RESTARTS: u64 = 1_000;
 
-/// What whole frames may ask for.
+/// Requests that whole frames may make.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Allowed {
     /// Neither to enable nor to move.
@@ -185,7 +185,7 @@ impl Bench {
         self.send(&whole(Body::Hello));
     }
 
-    /// Whether the line and what it has asked for are quiet, as far as they have to be.
+    /// Returns true if the line and the effects of its requests are as quiet as they have to be.
     fn is_clean(&self, allowed: Allowed) -> bool {
         match allowed {
             Allowed::Looking => !self.asked_to_enable && !self.asked_to_move,

@@ -33,7 +33,8 @@ fn slope(error_mm: f64) -> f64 {
     x.cosh() + x * x.sinh()
 }
 
-/// How far the axis still moves to and fro, mm, 1.3 s after a load that the law holds at `error_mm` was put on slowly.
+/// Returns the swing that is left of the axis, mm, 1.3 s after a load that the law holds at `error_mm` was put on
+/// slowly.
 fn unrest_mm(error_mm: f64) -> f64 {
     let load_v = GAINS.kp_v_per_mm * GAIN.at(error_mm) * error_mm;
     let pid = Pid::<f64>::build(&GAINS, LIMIT_V, PERIOD_S);

@@ -2,7 +2,7 @@
 //!
 //! An axis runs one law of [`feedback::LawKind`], chosen in its settings and exchanged without a jolt. All of them close
 //! in the same way (one integrator, held back by what the output limit leaves) and keep the same memory
-//! ([`feedback::FeedbackState`]), and at small errors each is a PID
+//! ([`terms::FeedbackState`]), and at small errors each is a PID
 //! ([`crate::settings::FeedbackSettings::linear_gains`]): that is what their stability is judged by.
 //!
 //! | law | module | acts on |
@@ -14,7 +14,7 @@
 //! | sliding mode | [`sliding_mode`] | the distance from a line in the phase plane, saturated |
 //! | NCTF | [`nctf`] | the distance from a measured trajectory in the phase plane |
 //!
-//! [`surface`] is the PI that the last three have in common, [`plant_model`] the linear model of the axis, and [`popov`] the
+//! [`terms`] are the input, the output and the memory of a law, [`surface`] is the PI that the last three have in common, [`plant_model`] the linear model of the axis, and [`popov`] the
 //! bound of the nonlinear gain on it.
 
 pub mod cascade;

@@ -197,7 +197,7 @@ fn the_reader_chooses_the_colours() {
     assert_eq!(opened.browser.problems(), Vec::<String>::new());
 }
 
-/// How the page is while it is being printed.
+/// Script that returns the state of the page while it is being printed.
 const PRINTED: &str = "(() => {
     const drawings = [...document.querySelectorAll('.drawing')];
     const style = (element) => getComputedStyle(element);

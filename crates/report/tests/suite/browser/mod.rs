@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 const PATIENCE: Duration = Duration::from_secs(120);
 /// Programs that speak the protocol.
 const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "chrome"];
-/// Where `cargo xtask test` says that a missing browser is a failure.
+/// Variable by which `cargo xtask test` makes a missing browser a failure.
 const REQUIRED: &str = "QUADRANT_BROWSER_TESTS";
 
 /// A browser with one tab.
@@ -172,7 +172,7 @@ impl Browser {
         message
     }
 
-    /// What the page has complained of since this was asked last: errors, exceptions, violations, requests.
+    /// Returns the page's complaints since the last call: errors, exceptions, violations, requests.
     pub(crate) fn problems(&mut self) -> Vec<String> {
         std::mem::take(&mut self.problems)
     }
