@@ -227,9 +227,9 @@ mod app {
             let _ = cx.local.requests_in.enqueue(request);
         }
         let elapsed = cx.local.tick.elapsed_cycles();
-        if let Some(snapshot) = cx.local.control.observe(elapsed) {
+        if cx.local.control.observe(elapsed) {
             // A supervising task that is late finds the oldest snapshots and misses the newest.
-            let _ = cx.local.snapshots_in.enqueue(snapshot);
+            let _ = cx.local.snapshots_in.enqueue(cx.local.control.snapshot());
             let _ = supervise::spawn();
             if let Some(readings) = cx.local.glitches_out.dequeue() {
                 cx.local.control.show_glitches(readings);

@@ -103,9 +103,12 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         )
     }
 
-    /// Samples telemetry and capture after the outputs are written. Returns the supervising task's snapshot when it is due.
+    /// Samples telemetry and capture after the outputs are written. Returns true if the supervising task's [`snapshot`] is
+    /// due.
+    ///
+    /// [`snapshot`]: Self::snapshot
     #[inline(always)]
-    pub fn observe(&mut self, elapsed_cycles: u32) -> Option<Snapshot<S>> {
+    pub fn observe(&mut self, elapsed_cycles: u32) -> bool {
         if let Some(sampler) = self.ends.samplers.dequeue() {
             self.sampler = sampler;
         }
@@ -129,10 +132,13 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         if full {
             self.give_capture_back();
         }
-        self.state
-            .tick()
-            .is_multiple_of(PERIOD_TICKS)
-            .then(|| Snapshot::of(&self.state))
+        self.state.tick().is_multiple_of(PERIOD_TICKS)
+    }
+
+    /// The supervising task's view of the last tick. By itself, as an `Option` of it would be copied once more.
+    #[inline(always)]
+    pub fn snapshot(&self) -> Snapshot<S> {
+        Snapshot::of(&self.state)
     }
 
     /// Replaces an axis; the old one goes back to the server as its back buffer.

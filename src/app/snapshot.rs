@@ -43,6 +43,7 @@ pub struct Snapshot<S> {
 
 impl<S: Scalar> Snapshot<S> {
     /// Takes a snapshot of the stage.
+    #[inline(always)]
     pub fn of(state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
         Self {
             tick: state.tick(),

@@ -113,16 +113,24 @@ pub(crate) fn is_leaf(path: &str) -> bool {
         .is_ok_and(|found| found.schema.is_leaf())
 }
 
-/// The leaf at a path below an axis. Without `dyn` the search of the path would be in the image once for each struct.
+/// The leaf of an axis by its keys. It is in the image once: without `dyn` the search would be there for every kind of keys,
+/// inlined for every call.
+#[inline(never)]
+fn axis_leaf_by<'a>(
+    axis: &'a AxisSettings,
+    keys: &mut dyn Keys,
+) -> Result<&'a dyn Any, ValueError> {
+    axis.ref_any_by_key(keys)
+}
+
+/// The leaf at a path below an axis.
 pub(crate) fn axis_leaf<'a>(axis: &'a AxisSettings, below: &str) -> Result<&'a dyn Any, TreeError> {
-    let keys: &mut dyn Keys = &mut below.into_keys();
-    Ok(axis.ref_any_by_key(keys)?)
+    Ok(axis_leaf_by(axis, &mut below.into_keys())?)
 }
 
 /// The number `field` (as the table names it) of an axis; `None` in a part that is left out.
 pub(crate) fn number_at(axis: &AxisSettings, field: &str) -> Option<f64> {
-    let keys: &mut dyn Keys = &mut ConstPathIter::<'.'>::new(Some(field));
-    number(axis.ref_any_by_key(keys).ok()?)
+    number(axis_leaf_by(axis, &mut ConstPathIter::<'.'>::new(Some(field))).ok()?)
 }
 
 impl StageSettings {

@@ -127,9 +127,10 @@ impl<S: Scalar> Running<S> {
         if self.requests.len() < REQUESTS {
             self.requests.extend(inputs.request);
         }
-        let Some(seen) = self.control.observe(0) else {
+        if !self.control.observe(0) {
             return (outputs, Poll::Continue);
-        };
+        }
+        let seen = self.control.snapshot();
         self.seen = seen;
         let supervised = self.supervision.run(
             &seen,
