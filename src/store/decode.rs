@@ -5,8 +5,8 @@ use core::fmt;
 use heapless::String;
 use serde::Deserialize;
 
-use super::Provenance;
 use super::format::{FORMAT, Head, RecordHead};
+use super::provenance::Provenance;
 use crate::settings::parts::{PARTS, part_below_axis, part_of};
 use crate::settings::path::{ANY_AXIS, Path, below_axis, of_any_axis, of_axis};
 use crate::settings::tree::{TreeError, is_leaf, leaves};

@@ -15,26 +15,21 @@ mod decode;
 mod encode;
 mod format;
 mod log;
+mod provenance;
 mod sector;
 
 pub use decode::{DecodeError, Finding, decode};
 pub use encode::{TooLong, encode};
 pub use format::FORMAT;
 pub use log::{LogError, Stored};
+pub use provenance::{PROVENANCE_BYTES, Provenance};
 
 use core::fmt;
 
 use embedded_storage::nor_flash::NorFlash;
-use heapless::String;
 
 use crate::settings::{SettingsError, StageSettings};
 use log::{Log, SEQUENCE_BYTES};
-
-/// The longest text on where settings come from, in bytes.
-pub const PROVENANCE_BYTES: usize = 200;
-
-/// Origin of settings: the command, its version, the record.
-pub type Provenance = String<PROVENANCE_BYTES>;
 
 /// Room for one set while it is written or read; a test fills it with the longest.
 pub const BUFFER_BYTES: usize = 7 * 1024;

@@ -7,10 +7,10 @@ use std::io::{BufRead, BufReader, Read};
 use anyhow::{Context, Result};
 use quadrant::command::Command;
 
-use crate::faults::case::moving;
+use crate::faults::approach::moving;
 use crate::faults::fixture::Fixture;
-use crate::saturation;
 use crate::trace::{self, Traced, Tracer, traced};
+use crate::traced_run;
 use xtask::image::Image;
 use xtask::listing::Listing;
 
@@ -39,7 +39,7 @@ pub(crate) fn longest(image: &Image) -> Result<BTreeMap<String, u32>> {
             format!("{:#x}..{:#x}", range.start, range.end - 1)
         })
         .collect();
-    saturation::traced(
+    traced_run::run(
         image,
         |memory| trace::start(image, memory, &ranges.join(",")),
         drive,

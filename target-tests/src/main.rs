@@ -14,6 +14,7 @@ mod reference_model;
 mod saturation;
 mod stages;
 mod trace;
+mod traced_run;
 
 use std::path::PathBuf;
 use std::process::ExitCode;

@@ -8,12 +8,11 @@ use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{AxisSignal, Channel, MAX_CHANNELS};
 use quadrant::link::message::{Body, Request, TelemetryRequest};
 
-use crate::faults::case::{configuration, moving};
+use crate::faults::approach::moving;
 use crate::faults::fixture::Fixture;
 use crate::interrupt_latency;
 use crate::trace::{Trace, Tracer};
-use quadrant_sim::machine::emulator::{Emulator, Memory};
-use std::process::ChildStderr;
+use crate::traced_run;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;
 
@@ -159,7 +158,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
 /// The instructions of each tick under a load.
 fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
     let trace = Trace::of(image)?;
-    let ticks = traced(
+    let ticks = traced_run::run(
         image,
         |memory| trace.start(image, memory),
         |fixture, tracer| drive(fixture, tracer, load),
@@ -169,31 +168,6 @@ fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
         .get(..TICKS as usize)
         .context("the trace ends too early")?;
     Ok(counted.iter().map(|tick| tick.values().sum()).collect())
-}
-
-/// Runs a fixture while its trace is read.
-pub(crate) fn traced<T: Send>(
-    image: &Image,
-    start: impl FnOnce(&Memory) -> Result<(Emulator, Tracer)>,
-    drive: impl FnOnce(Fixture, &mut Tracer) -> Result<()>,
-    read: impl FnOnce(ChildStderr) -> Result<T> + Send,
-) -> Result<T> {
-    std::thread::scope(|scope| {
-        let mut begun = None;
-        let fixture = Fixture::start_with(image, configuration(), |memory| {
-            let (mut emulator, mut tracer) = start(memory)?;
-            let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
-            tracer.run()?;
-            begun = Some((tracer, scope.spawn(move || read(lines))));
-            Ok(emulator)
-        })?;
-        let (mut tracer, reader) = begun.context("it was started")?;
-        drive(fixture, &mut tracer)?;
-        match reader.join() {
-            Ok(read) => read,
-            Err(_) => Err(anyhow!("the thread that reads the trace panicked")),
-        }
-    })
 }
 
 /// Runs the motion, and the load from [`LOADED`] on.

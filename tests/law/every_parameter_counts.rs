@@ -4,25 +4,14 @@
 use quadrant::control::feedback::LawKind;
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::SafetyState;
-use quadrant::scalar::{Quantity, Scalar};
-use quadrant::settings::{HomingSettings, PlanSettings, StageSettings, TravelSettings};
+use quadrant::scalar::Scalar;
+use quadrant::settings::{HomingSettings, StageSettings, TravelSettings};
 use serde_json::Value;
 
 use crate::common::{Noise, Rig};
+use crate::parameter_trace::{Trace, plan, tick_of};
 use crate::provocations::provoke;
-
-/// Outputs of every tick, in volts as bits and in codes, and the state at the end.
-pub(crate) type Trace = (Vec<([u64; 3], [i16; 3])>, SafetyState);
-
-/// The plan's peak acceleration is just within the default limit.
-pub(crate) fn plan() -> PlanSettings {
-    let sine = HarmonicSettings::with_velocity(0.5, 31.4, 2.0, 0.2);
-    PlanSettings {
-        motions: [MotionSettings::Harmonic(sine); 3],
-    }
-}
 
 /// A motion both ways with noise, an error beyond emax, a stretch that saturates, a change of settings, and in the end
 /// a jump of half a 32-bit counter's range and one beyond the plausible.
@@ -64,18 +53,6 @@ fn run<S: Scalar>(settings: &StageSettings, jumping: usize) -> Option<Trace> {
         trace.push(tick_of(&mut rig));
     }
     Some((trace, rig.state.safety()))
-}
-
-pub(crate) fn tick_of<S: Scalar>(rig: &mut Rig<S>) -> ([u64; 3], [i16; 3]) {
-    let outputs = rig.tick();
-    let volts = |index: usize| {
-        let volts = rig.state.axes()[index].telemetry().output;
-        volts.to_f64(Quantity::Voltage).to_bits()
-    };
-    (
-        core::array::from_fn(volts),
-        outputs.codes.map(|code| code.0).into_array(),
-    )
 }
 
 /// The paths of all leaves of a tree.

@@ -45,6 +45,7 @@ mod motion_modes;
 mod nonlinear_gain;
 mod not_commissioned;
 mod number_types;
+mod parameter_trace;
 mod pid;
 mod provocations;
 mod rate_limiter;

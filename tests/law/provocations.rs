@@ -6,7 +6,7 @@ use quadrant::safety::{AxisSwitches, SafetyState, StreamLoss, Switches};
 use quadrant::settings::StageSettings;
 
 use crate::common::Rig;
-use crate::every_parameter_counts::{Trace, plan, tick_of};
+use crate::parameter_trace::{Trace, plan, tick_of};
 
 /// The longest of the runs, ticks.
 const LONGEST: usize = 4000;

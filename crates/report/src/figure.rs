@@ -2,11 +2,11 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::ReportError;
 use super::dots::Dots;
 use super::drawing::Drawing;
 use super::lines::Lines;
 use super::polar::PolarDeviation;
-use super::{Colour, ReportError};
 
 /// A drawing with its caption.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -28,68 +28,6 @@ pub enum Plot {
     PolarDeviation(PolarDeviation),
     /// Values by category, with their spread.
     Dots(Dots),
-}
-
-/// Style of a curve.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Style {
-    /// Its colour.
-    pub colour: Colour,
-    /// Its dashes.
-    pub dash: Dash,
-}
-
-/// The dashes of a line. Colour alone does not carry meaning in print.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-pub enum Dash {
-    /// Unbroken.
-    Solid,
-    /// Dashed.
-    Dashed,
-    /// Dotted.
-    Dotted,
-    /// Marks that are not joined: measured points.
-    Points,
-}
-
-impl Style {
-    /// An unbroken line.
-    #[must_use]
-    pub const fn solid(colour: Colour) -> Self {
-        Self {
-            colour,
-            dash: Dash::Solid,
-        }
-    }
-
-    /// A dashed line.
-    #[must_use]
-    pub const fn dashed(colour: Colour) -> Self {
-        Self {
-            colour,
-            dash: Dash::Dashed,
-        }
-    }
-
-    /// Marks that are not joined: measured points.
-    #[must_use]
-    pub const fn points(colour: Colour) -> Self {
-        Self {
-            colour,
-            dash: Dash::Points,
-        }
-    }
-
-    /// The style of the `index`th of several equal curves: all colours unbroken first, then dashed, then dotted.
-    #[must_use]
-    pub fn nth(index: usize) -> Self {
-        let colours = Colour::CYCLE.len();
-        let dash = [Dash::Solid, Dash::Dashed, Dash::Dotted][index / colours % 3];
-        Self {
-            colour: Colour::CYCLE[index % colours],
-            dash,
-        }
-    }
 }
 
 impl Figure {
@@ -145,33 +83,10 @@ impl Figure {
     }
 }
 
-/// The samples at `kept`.
-pub(super) fn pick(values: &[f64], kept: &[usize]) -> Vec<f64> {
-    kept.iter().map(|&index| values[index]).collect()
-}
-
-/// Refuses a series whose two coordinates differ in length.
-pub(super) fn same_length(
-    figure: &str,
-    series: &str,
-    x: usize,
-    y: usize,
-) -> Result<(), ReportError> {
-    if x == y {
-        return Ok(());
-    }
-    Err(ReportError::SeriesLength {
-        figure: figure.to_owned(),
-        series: series.to_owned(),
-        x,
-        y,
-    })
-}
-
 #[cfg(test)]
 mod tests {
-    use super::{Dash, Figure, Plot, Style};
-    use crate::{Colour, Lines, ReportError, Series};
+    use super::{Figure, Plot};
+    use crate::{Lines, ReportError, Series, Style};
 
     fn figure(x: Vec<f64>, y: Vec<f64>) -> Figure {
         let series = vec![Series {
@@ -210,20 +125,5 @@ mod tests {
         let json = serde_json::to_string(&figure.drawing()).unwrap();
         assert!(json.contains("\"x\":[0.0,0.3,1.0]"), "{json}");
         assert!(json.contains("\"y\":[0.123457,null,1.0]"), "{json}");
-    }
-
-    #[test]
-    fn styles_do_not_repeat_before_eighteen_curves() {
-        let styles: Vec<Style> = (0..18).map(Style::nth).collect();
-        for (i, style) in styles.iter().enumerate() {
-            assert!(!styles[..i].contains(style), "{i}");
-        }
-        assert_eq!(
-            styles[0],
-            Style {
-                colour: Colour::Blue,
-                dash: Dash::Solid
-            }
-        );
     }
 }

@@ -1,8 +1,8 @@
 //! Curves over a common axis, and paths in a plane.
 
 use super::drawing::{Axis, Curve, Drawing, Shape};
-use super::figure::{pick, same_length};
 use super::mark::Mark;
+use super::samples::{pick, same_length};
 use super::{Colour, Dash, ReportError, Scale, Style, decimate};
 use serde::{Deserialize, Serialize};
 

@@ -1,9 +1,9 @@
 //! The circle test, drawn as a ball-bar instrument draws it.
 
 use super::drawing::{Axis, Circle, Curve, Drawing, Shape, Text};
-use super::figure::{Style, pick, same_length};
+use super::samples::{pick, same_length};
 use super::scale::rounded;
-use super::{ReportError, Scale, decimate};
+use super::{ReportError, Scale, Style, decimate};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 

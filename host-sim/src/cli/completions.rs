@@ -1,6 +1,6 @@
 //! `quadrant completions`.
 
-use clap::{Args, CommandFactory};
+use clap::{Args, Command};
 use clap_complete::Shell;
 
 /// Options of `quadrant completions`.
@@ -10,9 +10,8 @@ pub(super) struct Arguments {
     shell: Shell,
 }
 
-/// Prints the completions.
-pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let mut command = super::Arguments::command();
+/// Prints the completions of a command line.
+pub(super) fn run(arguments: &Arguments, mut command: Command) -> anyhow::Result<()> {
     clap_complete::generate(
         arguments.shell,
         &mut command,

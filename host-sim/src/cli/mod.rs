@@ -13,7 +13,7 @@ mod replay_program;
 mod settings;
 mod subject;
 
-use clap::{Parser, Subcommand};
+use clap::{CommandFactory, Parser, Subcommand};
 
 /// Servo control that removes friction's quadrant glitches: identify, design, commission, test and talk to a machine.
 ///
@@ -58,7 +58,7 @@ pub(crate) fn run() -> anyhow::Result<()> {
         Some(Command::Circle(arguments)) => circle::run(&arguments),
         Some(Command::Commission(arguments)) => commission::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
-        Some(Command::Completions(arguments)) => completions::run(&arguments),
+        Some(Command::Completions(arguments)) => completions::run(&arguments, Arguments::command()),
         Some(Command::Connect(arguments)) => connect::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
         Some(Command::Identify(command)) => identify::run(&command),

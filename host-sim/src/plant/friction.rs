@@ -2,26 +2,13 @@
 
 use quadrant::friction::Direction;
 use quadrant::friction::bristle::Bristle;
-use quadrant::friction::dahl::{Dahl, DahlParameters};
+use quadrant::friction::dahl::Dahl;
 use quadrant::friction::gms::{Gms, GmsState};
-use quadrant::friction::lugre::{Lugre, LugreParameters};
-use quadrant::friction::smoothed_gms::{SmoothedGms, SmoothedGmsParameters};
+use quadrant::friction::lugre::Lugre;
+use quadrant::friction::smoothed_gms::SmoothedGms;
 use quadrant::friction::stribeck::SlidingTable;
 
-use super::{AxisTruth, TRUTH_ELEMENTS};
-
-/// Friction model of a simulated axis. The levels are those of its static friction, the elements those of its GMS
-/// parameters.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum FrictionTruth {
-    #[default]
-    Gms,
-    Smoothed(SmoothedGmsParameters),
-    /// LuGre; its viscous friction is the static model's.
-    Lugre(LugreParameters),
-    /// Dahl's model, at the Coulomb level.
-    Dahl(DahlParameters),
-}
+use super::{AxisTruth, FrictionTruth, TRUTH_ELEMENTS};
 
 /// Pre-sliding friction of an axis: its model, and the model's state.
 #[derive(Clone, Debug)]

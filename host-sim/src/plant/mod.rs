@@ -16,9 +16,11 @@ mod variation;
 
 pub use axis::SimulatedAxis;
 pub use drive::{Backlash, Cogging, Drive, EncoderSide};
-pub use friction::{FrictionTruth, Presliding};
+pub use friction::Presliding;
 pub use marks::{MarkTruth, Marks};
 pub use stage::SimulatedStage;
 pub use transmission::{Body, Forcing};
-pub use truth::{AxisTruth, Imperfections, StageTruth, TRUTH_ELEMENTS, virgin_curve_elements};
+pub use truth::{
+    AxisTruth, FrictionTruth, Imperfections, StageTruth, TRUTH_ELEMENTS, virgin_curve_elements,
+};
 pub use variation::NEWTONS_PER_VOLT;

@@ -5,15 +5,30 @@ use std::f64::consts::TAU;
 use heapless::Vec;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::friction::PerDirection;
+use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
+use quadrant::friction::lugre::LugreParameters;
+use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 
 use super::Drive;
-use super::FrictionTruth;
 
 /// GMS elements of the simulated axes' friction.
 pub const TRUTH_ELEMENTS: usize = 10;
+
+/// Friction model of a simulated axis. The levels are those of its static friction, the elements those of its GMS
+/// parameters.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum FrictionTruth {
+    #[default]
+    Gms,
+    Smoothed(SmoothedGmsParameters),
+    /// LuGre; its viscous friction is the static model's.
+    Lugre(LugreParameters),
+    /// Dahl's model, at the Coulomb level.
+    Dahl(DahlParameters),
+}
 
 /// One simulated axis: `x'' = A (u(t - Td) - F) - B x' - C x`, friction `F` explicit.
 #[derive(Clone, Debug, PartialEq)]

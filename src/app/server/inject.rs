@@ -2,11 +2,12 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
+use super::opened::OpenInjection;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::app::supervisor::PERIOD_TICKS;
 use crate::law::command::Command;
-use crate::law::injection::{BLOCK_VALUES, InjectionProgress, VoltageBlock};
+use crate::law::injection::{BLOCK_VALUES, VoltageBlock};
 use crate::law::scalar::Scalar;
 use crate::settings::InjectionSettings;
 use quadrant_link::message::{InjectRequest, InjectStatus, LinkError, Reply, Voltages};
@@ -15,21 +16,6 @@ use quadrant_link::message::{InjectRequest, InjectStatus, LinkError, Reply, Volt
 const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;
 /// Ticks after which a command that was sent shows in the snapshot.
 const ARRIVAL_TICKS: u32 = 3 * PERIOD_TICKS;
-
-/// An injection that a host has opened.
-#[derive(Debug)]
-pub(super) struct OpenInjection {
-    /// The largest magnitude of a value.
-    most: u16,
-    /// The host's number of the value that is expected next.
-    next: u32,
-    /// The last value has come.
-    complete: bool,
-    /// The tick at which the control law was told to begin.
-    started: Option<u32>,
-    progress: Option<InjectionProgress>,
-    ended: bool,
-}
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     pub(super) fn serve_inject(&mut self, request: InjectRequest) -> Result<Reply, LinkError> {

@@ -7,6 +7,8 @@
 mod inject;
 mod motion;
 mod observe;
+mod opened;
+mod recorder;
 mod settings;
 mod statistics;
 mod status;
@@ -16,9 +18,8 @@ mod transmit_buffer;
 use embedded_storage::nor_flash::NorFlash;
 use heapless::String;
 
-use self::inject::OpenInjection;
-use self::observe::Recorder;
-use self::stream::OpenStream;
+use self::opened::{OpenInjection, OpenStream};
+use self::recorder::Recorder;
 use self::transmit_buffer::TransmitBuffer;
 use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};

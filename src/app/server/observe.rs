@@ -16,48 +16,6 @@ use quadrant_link::message::{
 /// Pre-trigger share of the capture that waits for faults, %.
 const FAULT_PRE_TRIGGER_PERCENT: u8 = 75;
 
-/// The capture's book-keeping on this side.
-#[derive(Debug)]
-pub(super) struct Recorder<'a> {
-    /// The capture, unless the control interrupt holds it.
-    capture: Option<Capture<'a>>,
-    /// The selection that it was armed with.
-    selection: Option<Selection>,
-    /// Number of complete captures.
-    number: u16,
-}
-
-impl<'a> Recorder<'a> {
-    pub(super) fn new(words: &'a mut [u32]) -> Self {
-        Self {
-            capture: Some(Capture::new(words)),
-            selection: None,
-            number: 0,
-        }
-    }
-
-    pub(super) fn phase(&self) -> CapturePhase {
-        self.capture
-            .as_ref()
-            .map_or(CapturePhase::Armed, Capture::phase)
-    }
-
-    /// Number of complete captures.
-    pub(super) const fn number(&self) -> u16 {
-        self.number
-    }
-
-    /// True if the frozen capture holds a tick.
-    pub(super) fn holds_trace_of(&self, tick: u32) -> bool {
-        let record = self.capture.as_ref().and_then(Capture::record);
-        record.is_some_and(|record| {
-            let decimation = self.selection.as_ref().map_or(1, Selection::decimation);
-            let span = record.samples.saturating_mul(decimation.into());
-            tick.wrapping_sub(record.first_tick) < span
-        })
-    }
-}
-
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_telemetry(

@@ -2,6 +2,7 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
+use super::opened::OpenStream;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::law::command::Command;
@@ -15,18 +16,6 @@ use quadrant_link::message::{self, LinkError, Reply, StreamRequest, StreamStatus
 
 /// Segments that must wait before the axes start: the host is that far ahead.
 const START_SEGMENTS: usize = STREAM_ITEM_ROOM / 2;
-
-/// A stream that a host has opened.
-#[derive(Debug)]
-pub(super) struct OpenStream {
-    planner: StreamPlanner,
-    /// The host's number of the set point that is expected next.
-    next: u32,
-    /// The axes have been told to start.
-    started: bool,
-    /// The last set point has come.
-    complete: bool,
-}
 
 impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     #[inline(never)]

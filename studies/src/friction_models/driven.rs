@@ -4,7 +4,10 @@ use quadrant::friction::Direction;
 use quadrant::friction::stribeck::SlidingTable;
 use quadrant_sim::plant::{AxisTruth, Presliding};
 
-use crate::friction_models::{Curve, Parameters};
+use crate::friction_models::Parameters;
+
+/// A curve: displacement in mm or velocity in mm/s, and the force in V.
+pub type Curve = (Vec<f64>, Vec<f64>);
 
 /// A model, where it stands and how it is moved.
 pub(super) struct Driven {

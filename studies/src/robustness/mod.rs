@@ -8,6 +8,7 @@
 pub mod command;
 pub mod compliance;
 pub mod drives;
+mod error;
 mod figures;
 pub mod page;
 pub mod scenario;
@@ -17,13 +18,14 @@ mod trial;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::safety::Fault;
-use quadrant::settings::{AxisSettings, SettingsError, StageSettings};
+use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run::AxisTrace;
 use quadrant_sim::experiment::statistic::Statistic;
 use rayon::prelude::*;
 
+pub use error::RobustnessError;
 pub use scenario::{Scenario, scenarios};
 pub use trial::Task;
 use trial::{Ended, Trial};
@@ -73,28 +75,6 @@ impl RobustnessOutcome {
             .filter_map(|run| run.as_ref().err().copied())
             .collect()
     }
-}
-
-/// Reasons for which a competitor cannot run.
-#[derive(Clone, Debug, thiserror::Error)]
-pub enum RobustnessError {
-    /// Its settings are refused.
-    #[error("{competitor} in the scenario {scenario}: settings refused: {source}")]
-    Settings {
-        competitor: String,
-        scenario: String,
-        source: SettingsError,
-    },
-    /// A motion did not end.
-    #[error(
-        "{competitor} in the scenario {scenario}: the motion has not ended after {ticks} ticks"
-    )]
-    Endless {
-        competitor: String,
-        scenario: String,
-        /// Ticks waited.
-        ticks: usize,
-    },
 }
 
 /// The usual competitors: PID and N-PID, each without feedforward and with the combined one.

@@ -9,7 +9,8 @@ use quadrant::stage::Outputs;
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 
-use super::case::{configuration, moving};
+use super::approach::moving;
+use super::case::configuration;
 use super::finding::{Finding, latched, log_contains};
 use super::fixture::Fixture;
 use crate::reference_model;

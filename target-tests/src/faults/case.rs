@@ -1,9 +1,9 @@
 //! What goes wrong, for each fault that is found while the machine runs.
 
-use anyhow::{Result, bail, ensure};
+use anyhow::Result;
 use quadrant::axes::AxisName;
 use quadrant::encoder::EncoderReading;
-use quadrant::link::message::{AxisSet, Body};
+use quadrant::link::message::Body;
 use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{AxisSwitches, FaultCode, Switches};
@@ -11,13 +11,10 @@ use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::MarkTruth;
 
+use super::approach::{SPEED_MM_S, enabled, homed, homing, moving, start_homing};
 use super::fixture::{Configuration, Fixture, InputFault};
 use super::streams;
 
-/// Largest speed of the motions, mm/s.
-const SPEED_MM_S: f64 = 30.0;
-/// Ticks within which anything is found here.
-pub(crate) const LONGEST: u32 = 40_000;
 /// Counts from one index pulse to the next: 1 mm, so that homing is short.
 const COUNTS_PER_INDEX: u32 = 2_000;
 /// Counts that a damaged encoder loses.
@@ -279,20 +276,6 @@ fn drifting(by: fn(u32) -> u32) -> InputFault {
     })
 }
 
-pub(crate) fn enabled(fixture: &mut Fixture) -> Result<()> {
-    fixture.done(Body::Enable)?;
-    fixture.run(super::fixture::A_WHILE)
-}
-
-/// All axes along their sines, x at full speed.
-pub(crate) fn moving(fixture: &mut Fixture, direction: f64) -> Result<()> {
-    enabled(fixture)?;
-    fixture.done(Body::Run)?;
-    fixture.run_until(LONGEST, "full speed", |fixture| {
-        direction * fixture.plant().axes()[0].velocity_mm_s() > 0.97 * SPEED_MM_S
-    })
-}
-
 /// Something is pressed at full speed.
 fn pressed(fixture: &mut Fixture, direction: f64, switches: Switches) -> Result<u32> {
     moving(fixture, direction)?;
@@ -300,31 +283,4 @@ fn pressed(fixture: &mut Fixture, direction: f64, switches: Switches) -> Result<
         fixture,
         Box::new(move |input, _, _| input.switches = input.switches.with(switches)),
     ))
-}
-
-/// All axes homed, and at rest where they park.
-fn homed(fixture: &mut Fixture) -> Result<()> {
-    enabled(fixture)?;
-    fixture.done(Body::Home(AxisSet::ALL))?;
-    for _ in 0..LONGEST / 1_000 {
-        fixture.run(1_000)?;
-        let status = fixture.status()?;
-        ensure!(status.fault.is_none(), "homing failed: {status:?}");
-        if status.homed == AxisSet::ALL && !status.running {
-            return Ok(());
-        }
-    }
-    bail!("homing never ends")
-}
-
-fn homing(fixture: &mut Fixture) -> Result<u32> {
-    enabled(fixture)?;
-    start_homing(fixture)
-}
-
-/// Lets x home.
-fn start_homing(fixture: &mut Fixture) -> Result<u32> {
-    let from = fixture.tick();
-    fixture.done(Body::Home(AxisSet::NONE.with(AxisName::X.into())))?;
-    Ok(from)
 }

@@ -1,6 +1,7 @@
 //! `cargo xtask faults`: every fault injected from outside in the emulated firmware, with the reference model in this process beside
 //! it, and what was found held against the committed table.
 
+pub(crate) mod approach;
 mod at_start;
 pub(crate) mod case;
 mod finding;

@@ -7,7 +7,7 @@ use quadrant::link::message::{
 };
 use quadrant::units::DacCode;
 
-use super::case::{LONGEST, enabled};
+use super::approach::{LONGEST, enabled};
 use super::fixture::Fixture;
 
 /// Ticks from a set point of a stream to the next.

@@ -17,7 +17,7 @@ use super::process::Model;
 
 /// Options of `quadrant design npid`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     model: Model,
     /// Largest gain as a share of the Popov bound, 0 to 1.
@@ -39,7 +39,7 @@ pub(in crate::cli) struct Arguments {
 /// Heights of the steps shown, mm: within the encoder's noise, across emax, and far beyond.
 const STEPS_MM: [f64; 2] = [0.01, 0.1];
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { model, output, .. } = arguments;
     if !(arguments.sector_share > 0.0 && arguments.sector_share <= 1.0) {
         bail!(

@@ -16,7 +16,7 @@ use super::process::Model;
 
 /// Options of `quadrant design pid`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     model: Model,
     /// Design on a measured response, as `quadrant identify frf` saves it, and not on a model.
@@ -117,7 +117,7 @@ impl Arguments {
     }
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { model, output, .. } = arguments;
     let mut file = model.file()?;
     let sampled = model.sampled(&file)?;

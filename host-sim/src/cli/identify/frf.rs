@@ -13,7 +13,8 @@ use quadrant_sim::identify::pages::linear::response_section;
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 
-use super::{page, recorded};
+use super::page::page;
+use super::recorded;
 use crate::cli::subject::{Measured, Subject};
 use quadrant_sim::command::output::{Output, command_line, share};
 
@@ -22,7 +23,7 @@ const SETTLING_S: f64 = 0.7;
 
 /// Options of `quadrant identify frf`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// Saved recordings instead, made alike: CSV files with t_s, position_mm (or position_m), voltage_v, injection_v and,
@@ -40,7 +41,7 @@ pub(in crate::cli) struct Arguments {
 
 /// Options of a measured response.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Measurement {
+pub(crate) struct Measurement {
     /// Waveform of the injected voltage.
     #[arg(long, value_enum, default_value_t = Waveform::Multisine)]
     waveform: Waveform,
@@ -128,7 +129,7 @@ impl Measurement {
 }
 
 /// Measures the response of an axis under the PID of `base` alone.
-pub(in crate::cli) fn excite(
+pub(crate) fn excite(
     test_axis: &mut dyn TestAxis,
     base: &AxisSettings,
     settings: &FrfSettings,
@@ -165,7 +166,7 @@ fn response_of_saved(arguments: &Arguments) -> anyhow::Result<FrfMeasurement> {
     Ok(found)
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
         record,

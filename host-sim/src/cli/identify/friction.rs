@@ -14,13 +14,14 @@ use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Recording;
 
-use super::{page, recorded};
+use super::page::page;
+use super::recorded;
 use crate::cli::subject::{Destination, Subject};
 use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A recorded friction map instead, as this command saves it: velocity_mm_s, voltage_v, deviation_v, stick_slip.
@@ -48,10 +49,10 @@ pub(in crate::cli) struct Arguments {
 }
 
 /// Travel of an axis of which none is known, mm.
-pub(in crate::cli) const TRAVEL_MM: f64 = 200.0;
+pub(crate) const TRAVEL_MM: f64 = 200.0;
 
 /// Moves an axis at constant velocities under the PID of `base` alone.
-pub(in crate::cli) fn run_at_velocities(
+pub(crate) fn run_at_velocities(
     test_axis: &mut dyn TestAxis,
     base: &AxisSettings,
     settings: &StaticFrictionSettings,
@@ -65,7 +66,7 @@ pub(in crate::cli) fn run_at_velocities(
     Ok(found)
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
         destination,

@@ -5,14 +5,13 @@ pub(super) mod friction;
 pub(super) mod motion;
 pub(super) mod motor_constant;
 mod nctf;
+mod page;
 mod plant;
 mod recorded;
 mod revise;
 pub(super) mod virgin_curve;
-// The old name, until the studies have their own command.
 
 use clap::Subcommand;
-use quadrant_sim::report::{Page, Provenance, Section};
 
 /// The steps from measurements to parameters.
 #[derive(Debug, Subcommand)]
@@ -45,15 +44,5 @@ pub(super) fn run(command: &Command) -> anyhow::Result<()> {
         Command::Revise(arguments) => revise::run(arguments),
         Command::StaticFriction(arguments) => friction::run(arguments),
         Command::VirginCurve(arguments) => virgin_curve::run(arguments),
-    }
-}
-
-/// A page of one step.
-fn page(title: &str, axis: &str, sections: Vec<Section>, provenance: Provenance) -> Page {
-    Page {
-        title: title.to_owned(),
-        subtitle: axis.to_owned(),
-        provenance,
-        sections,
     }
 }

@@ -20,7 +20,7 @@ use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A recorded motion: a CSV file with t_s, position_mm (or position_m), voltage_v and, for a closed loop, reference_mm (or
@@ -69,7 +69,7 @@ pub(in crate::cli) struct Arguments {
 /// The amplifier's range in a simulated cascade, V.
 const LIMIT_V: f64 = 10.0;
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     if let Some(force) = arguments.force_per_volt
         && !(force > 0.0 && force.is_finite())
@@ -148,10 +148,10 @@ fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {
 }
 
 /// Travel of an axis of which none is known, mm.
-pub(in crate::cli) const TRAVEL_MM: f64 = 200.0;
+pub(crate) const TRAVEL_MM: f64 = 200.0;
 
 /// Moves an axis to and fro, under the settings in force.
-pub(in crate::cli) fn move_to_and_fro(
+pub(crate) fn move_to_and_fro(
     test_axis: &mut dyn TestAxis,
     rounds: usize,
 ) -> anyhow::Result<Recording> {

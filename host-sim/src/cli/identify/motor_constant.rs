@@ -13,13 +13,14 @@ use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 
-use super::{page, recorded};
+use super::page::page;
+use super::recorded;
 use crate::cli::subject::{Destination, Subject};
 use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A saved test instead, of voltage steps between two levels of one sign, passes both ways: a CSV file with t_s,
@@ -58,7 +59,7 @@ fn dwell(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "it must be 0.001 to 1 s, several times the axis' dead time".to_owned())
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
         destination,
@@ -108,12 +109,12 @@ pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 }
 
 /// Travel of an axis of which none is known, mm.
-pub(in crate::cli) const TRAVEL_MM: f64 = 20.0;
+pub(crate) const TRAVEL_MM: f64 = 20.0;
 /// Control rate of a saved test's axis, Hz.
 const DEFAULT_RATE_HZ: f64 = 1e4;
 
 /// Steps the voltage of an axis in open loop, under a law that does nothing.
-pub(in crate::cli) fn step_voltage(
+pub(crate) fn step_voltage(
     test_axis: &mut dyn TestAxis,
     base: &AxisSettings,
     settings: &MotorConstantSettings,

@@ -14,14 +14,15 @@ use quadrant_sim::identify::pages::characteristic::{characteristic_section, char
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 
-use super::{page, recorded};
+use super::page::page;
+use super::recorded;
 use crate::cli::subject::{Destination, Subject};
 use quadrant_sim::command::axis::Axis;
 use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify nctf`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A saved test instead, in which the axis is driven and then left alone, both ways: a CSV file with t_s, position_mm
@@ -51,7 +52,7 @@ fn speed(text: &str) -> Result<f64, String> {
         .ok_or_else(|| "it must be above zero, to 1000 mm/s".to_owned())
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
         destination,

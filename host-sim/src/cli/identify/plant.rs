@@ -13,12 +13,13 @@ use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Block;
 
 use super::frf::Measurement;
-use super::{page, recorded};
+use super::page::page;
+use super::recorded;
 use crate::cli::subject::{Destination, Subject};
 
 /// Options of `quadrant identify plant`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A measured response instead, as `quadrant identify frf` saves it.
@@ -38,7 +39,7 @@ pub(in crate::cli) struct Arguments {
     output: Output,
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     let settings = PlantFitSettings {
         least_coherence: arguments.least_coherence,

@@ -22,7 +22,7 @@ use quadrant_sim::command::axis::Axis;
 
 /// Options of `quadrant identify revise`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A recording of the axis at rest under its own PID instead, excited by an injected voltage: a CSV file with t_s,
@@ -51,7 +51,7 @@ pub(in crate::cli) struct Arguments {
     output: Output,
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject, output, ..
     } = arguments;

@@ -13,13 +13,14 @@ use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Recording;
 
-use super::{page, recorded};
+use super::page::page;
+use super::recorded;
 use crate::cli::subject::{Destination, Subject};
 use quadrant_sim::command::output::{Output, command_line, share};
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]
-pub(in crate::cli) struct Arguments {
+pub(crate) struct Arguments {
     #[command(flatten)]
     subject: Subject,
     /// A recorded slow sine instead: a CSV file with t_s, position_mm (or position_m), voltage_v.
@@ -48,19 +49,19 @@ pub(in crate::cli) struct Arguments {
 }
 
 /// Travel of an axis of which none is known, mm.
-pub(in crate::cli) const TRAVEL_MM: f64 = 200.0;
+pub(crate) const TRAVEL_MM: f64 = 200.0;
 
 /// Sine, as far as it is asked for; the rest follows from the axis' settings.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::cli) struct Sine {
-    pub(in crate::cli) amplitude_mm: Option<f64>,
-    pub(in crate::cli) frequency_hz: Option<f64>,
-    pub(in crate::cli) cycles: Option<f64>,
+pub(crate) struct Sine {
+    pub(crate) amplitude_mm: Option<f64>,
+    pub(crate) frequency_hz: Option<f64>,
+    pub(crate) cycles: Option<f64>,
 }
 
 impl Sine {
     /// Moves an axis in the sine under a controller of low bandwidth; returns the recording and the sine.
-    pub(in crate::cli) fn measure(
+    pub(crate) fn measure(
         self,
         test_axis: &mut dyn TestAxis,
         base: &AxisSettings,
@@ -89,7 +90,7 @@ impl Sine {
     }
 }
 
-pub(in crate::cli) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject,
         destination,
