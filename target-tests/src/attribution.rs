@@ -1,4 +1,4 @@
-//! Which stage an instruction belongs to, from the image's debug information.
+//! Attribution of an instruction to a stage, from the image's debug information.
 
 use std::collections::HashMap;
 

@@ -26,7 +26,7 @@ const LOOKS: usize = 40;
 /// Control ticks to run, and how often the supervising task and the server run in them at least.
 const TICKS: u32 = 100;
 const POLLS: u32 = 9;
-/// How long the first tick may wait, in the host's time: settings are built before it, with interrupts masked.
+/// Timeout of the first tick, in the host's time: settings are built before it, with interrupts masked.
 const TIMEOUT: Duration = Duration::from_secs(30);
 /// NVIC_ISPR1, and TIM7 in it.
 const SET_PENDING: u32 = 0xE000_E204;
@@ -34,8 +34,8 @@ const TIM7: u32 = 1 << (55 - 32);
 /// `str r0, [r1]` and a branch to itself, at the bottom of the stack, where nobody is.
 const PEND: [u8; 4] = [0x08, 0x60, 0xFE, 0xE7];
 const SCRATCH: u32 = 0x2000_0000;
-/// What the log must say: SPI was asked and answered zero, the flash was found empty and the board not commissioned,
-/// initialisation came to its end; and that a full stack ended it.
+/// Lines that the log must have: SPI was asked and answered zero, the flash was found empty and the board not
+/// commissioned, initialisation came to its end; and that a full stack ended it.
 const EXPECTED: [&str; 6] = [
     "the converter answers 0x0000 instead of 0x0004",
     "quadrant ",
@@ -44,7 +44,7 @@ const EXPECTED: [&str; 6] = [
     "10000 control ticks per second, outputs off",
     "hard fault, outputs are off: the stack is full",
 ];
-/// What it must not say: the button reads as pressed here, but was never seen up.
+/// Lines that it must not have: the button reads as pressed here, but was never seen up.
 const FORBIDDEN: [&str; 2] = ["outputs enabled", "request refused"];
 
 /// QEMU, ended when dropped.

@@ -16,7 +16,7 @@ use xtask::golden::Golden;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;
 
-/// How much more than expected is accepted, in percent.
+/// Tolerance above the expected count, %.
 const TOLERANCE_PERCENT: f64 = 5.0;
 
 /// Instructions per tick of one stage or of all.
@@ -27,7 +27,7 @@ struct Figure {
     max: u32,
 }
 
-/// What was counted.
+/// Counts of a run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 struct Count {
     ticks: u32,
@@ -37,7 +37,7 @@ struct Count {
     stages: BTreeMap<String, Figure>,
 }
 
-/// What is expected.
+/// File of the expected counts.
 const GOLDEN: Golden = Golden {
     path: "target-tests/golden/instructions.toml",
     head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",

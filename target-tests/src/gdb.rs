@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Context, Result, bail, ensure};
 
-/// How long QEMU may take to open its port, and to answer.
+/// Timeout of QEMU's port and answers.
 const TIMEOUT: Duration = Duration::from_secs(20);
 
 /// The number of the program counter among the registers r0 to r15.

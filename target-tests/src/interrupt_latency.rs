@@ -16,10 +16,10 @@ use xtask::listing::Listing;
 
 /// Ticks that are traced.
 const TICKS: u32 = 200;
-/// What is not traced: initialisation and the idle loop, which masks nothing once ticks are due.
+/// Function that is not traced: initialisation and the idle loop, which masks nothing once ticks are due.
 const IDLE: &str = "main";
 
-/// What an instruction does to the mask.
+/// Effect of an instruction on the interrupt mask.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Effect {
     Mask,

@@ -15,16 +15,16 @@ use xtask::toolchain::Toolchain;
 
 /// Control ticks per second of the firmware's time.
 const RATE_HZ: f64 = 10_000.0;
-/// How late, in us of firmware time, the last tick may look at the clock: the interrupt's latency.
+/// Latest look of the last tick at the clock, us of firmware time: the interrupt's latency.
 const LATENCY_US: u64 = 10;
 /// Ticks between two steps of the progress bar.
 const PROGRESS_TICKS: u32 = 10_000;
 
-/// What came of a run.
+/// Result of a run.
 pub(crate) struct Run {
-    /// How the words compare.
+    /// Comparison of the words.
     pub(crate) tally: Tally,
-    /// How long the ticks took.
+    /// Duration of the ticks.
     elapsed: Duration,
 }
 

@@ -29,7 +29,7 @@ use xtask::toolchain::{Choice, Toolchain};
 #[derive(Parser)]
 #[command(name = "target-tests")]
 struct Cli {
-    /// How the firmware is compiled [default: what `cargo xtask setup` chose last]
+    /// Compiler of the firmware [default: the one that `cargo xtask setup` chose last]
     #[arg(long, global = true, value_enum)]
     toolchain: Option<Choice>,
 
@@ -58,13 +58,13 @@ enum Verb {
     },
 }
 
-/// How to emulate.
+/// Options of an emulation.
 #[derive(Args)]
 struct EmulateArgs {
     /// The firmware's number type
     #[arg(long, value_enum, default_value_t = Scalar::F32)]
     scalar: Scalar,
-    /// How long, in seconds of the firmware's time
+    /// Duration, in seconds of the firmware's time
     #[arg(long, default_value_t = 10.0)]
     seconds: f64,
     /// Let the hardware timer fire the control interrupt, on recorded inputs
@@ -75,7 +75,7 @@ struct EmulateArgs {
     settings: Option<PathBuf>,
 }
 
-/// Which faults.
+/// Options that choose faults.
 #[derive(Args)]
 struct FaultArgs {
     /// The firmware's number type
@@ -89,7 +89,7 @@ struct FaultArgs {
     overwrite_expected: bool,
 }
 
-/// What to count.
+/// Options of a count.
 #[derive(Args)]
 struct CountArgs {
     /// The firmware's number type
@@ -103,7 +103,7 @@ struct CountArgs {
     overwrite_expected: bool,
 }
 
-/// Which combinations.
+/// Options that choose combinations.
 #[derive(Args)]
 struct CombinationArgs {
     /// The firmware's number type

@@ -64,7 +64,7 @@ impl<S: Scalar> Law for LawMachine<S, FIRMWARE_ELEMENTS> {
     }
 }
 
-/// How the firmware's words compare with the reference model's.
+/// Comparison of the firmware's words with the reference model's.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Tally {
     /// Converter words compared.
@@ -110,12 +110,12 @@ impl ReferenceModel {
         })
     }
 
-    /// What it runs.
+    /// Returns the job that it runs.
     pub(crate) fn job(&self) -> &Job {
         &self.job
     }
 
-    /// What firmware and reference model read in the next tick.
+    /// Returns the inputs of the next tick, for firmware and reference model.
     pub(crate) fn input(&mut self) -> InputRecord {
         let counts = self.plant.read_counters();
         InputRecord::of_counts(counts, self.operator.request(self.tick))
@@ -138,7 +138,7 @@ impl ReferenceModel {
         self.tally.add(self.tick, self.expected, firmware);
     }
 
-    /// How the comparison stands.
+    /// Returns the comparison so far.
     pub(crate) fn tally(&self) -> &Tally {
         &self.tally
     }

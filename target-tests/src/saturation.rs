@@ -22,11 +22,11 @@ const FROM: u32 = 1_600;
 const LOADED: u32 = 1_500;
 /// Ticks counted.
 const TICKS: u32 = 200;
-/// What it costs a tick to take a request of the operator to its queue: the emulated board's own way in, which is counted
-/// here because a real one would cost as much.
+/// Cost of taking a request of the operator to its queue, instructions: the emulated board's own way in, which is
+/// counted here because a real one would cost as much.
 const REQUEST: i64 = 25;
 
-/// What is done to the firmware.
+/// Load on the firmware.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Load {
     /// Telemetry of as many channels as there may be, at every tick.
@@ -40,7 +40,7 @@ struct Load {
 }
 
 impl Load {
-    /// By how much a tick may exceed the same tick with what it was asked to do, but without load.
+    /// Returns the instructions by which a tick may exceed the same tick with the same requests but without load.
     fn tolerance(self) -> i64 {
         if self.requests { REQUEST } else { 0 }
     }

@@ -1,4 +1,4 @@
-//! Which function belongs to which stage of the control tick.
+//! Stages of the control tick, and the functions that belong to each.
 
 /// The stages, each by the beginning of the path of its functions. Of an instruction's inlined frames, the outermost
 /// one found here decides: friction evaluated for the feedforward is feedforward.
@@ -17,7 +17,7 @@ const STAGES: [(&str, &str); 12] = [
     ("quadrant_firmware::app::__rtic_internal_", "spawning"),
 ];
 
-/// What holds the stages together, innermost first; it counts only where no stage does.
+/// Functions that hold the stages together, innermost first; they count only where no stage does.
 const FRAMES: [(&str, &str); 4] = [
     ("quadrant::law::axis::", "axis"),
     ("quadrant::law::stage::", "stage"),
@@ -25,7 +25,7 @@ const FRAMES: [(&str, &str); 4] = [
     ("rtic::", "interrupt"),
 ];
 
-/// What no table knows.
+/// Stage of functions that no table has.
 pub(crate) const OTHER: &str = "other";
 
 /// The stage of an instruction, from the functions it was inlined into, outermost first.

@@ -16,7 +16,7 @@ use xtask::image::Image;
 use xtask::listing::Listing;
 use xtask::prove::ROOT;
 
-/// What is to be seen of an image.
+/// Trace of an image.
 pub(crate) struct Trace {
     root: u32,
     listing: Listing,
@@ -126,7 +126,7 @@ impl Tracer {
     }
 }
 
-/// What follows a control tick: seeing its first instruction ends the tick.
+/// Functions that follow a control tick: seeing the first instruction of one ends the tick.
 const FOLLOWERS: [&str; 4] = ["DISPATCHER_0", "DISPATCHER_1", "DISPATCHER_2", "main"];
 
 /// Instructions of one tick, by stage.

@@ -17,7 +17,7 @@ use crate::reference_model;
 use quadrant_sim::machine::emulator::{Clock, Emulator, Memory};
 use xtask::image::Image;
 
-/// What ends a firmware, what the next one finds, and what it says of it.
+/// Ends of a firmware, the fault that the next one finds, and its words for it.
 const RESETS: [(&str, InjectedFault, FaultCode, &str); 5] = [
     (
         "a panic of the idle loop, 30 mm/s",
@@ -127,7 +127,7 @@ pub(super) fn refused_settings(image: &Image) -> Result<Finding> {
     })
 }
 
-/// What a firmware that starts with a fault says and does.
+/// Returns the log and the outputs of a firmware that starts with a fault.
 fn at_start(
     mut fixture: Fixture,
     how: &str,

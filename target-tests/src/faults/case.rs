@@ -1,4 +1,4 @@
-//! What goes wrong, for each fault that is found while the machine runs.
+//! Cases: the cause of each fault that is found while the machine runs.
 
 use anyhow::Result;
 use quadrant::axes::AxisName;
@@ -24,7 +24,7 @@ const LOST_COUNTS: u32 = 100;
 pub(crate) struct Case {
     /// In words.
     pub(crate) how: &'static str,
-    /// What is otherwise than in the common configuration.
+    /// Changes to the common configuration.
     pub(crate) adjust: fn(&mut Configuration),
     /// Brings the machine there, and breaks something; gives the first tick whose inputs show it.
     pub(crate) bring: fn(&mut Fixture) -> Result<u32>,
@@ -62,7 +62,7 @@ pub(crate) fn configuration() -> Configuration {
     }
 }
 
-/// How a fault is brought about while the machine runs; nothing for those that are found elsewhere.
+/// Returns the case of a fault that is caused while the machine runs; `None` for those that are found elsewhere.
 pub(crate) fn of(code: FaultCode) -> Option<Case> {
     let case = |how, bring| Case {
         how,

@@ -14,12 +14,12 @@ const LONGEST: u32 = 40_000;
 /// Ticks until a capture is full: it holds fewer after its trigger.
 const CAPTURE_TICKS: u32 = 300;
 
-/// How a fault was found.
+/// Finding of a fault.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) struct Finding {
     /// The fault.
     pub(crate) fault: String,
-    /// What was done.
+    /// Cause, in words.
     pub(crate) how: String,
     /// The axis that the firmware named, or the stage.
     pub(crate) axis: String,
@@ -28,11 +28,11 @@ pub(crate) struct Finding {
     pub(crate) ticks: Option<u32>,
     /// The converters' words in that tick.
     pub(crate) codes: [i16; 3],
-    /// Whether the amplifiers were enabled in it.
+    /// True if the amplifiers were enabled in it.
     pub(crate) enabled: bool,
     /// Ticks from there to the first with the amplifiers disabled.
     pub(crate) ticks_until_off: u32,
-    /// Whether its trace was captured.
+    /// True if its trace was captured.
     pub(crate) captured: bool,
     /// Converter words and bytes of the link that were compared with the reference model's.
     pub(crate) compared: (u64, u64),
@@ -143,7 +143,7 @@ pub(crate) fn latched(fixture: &mut Fixture, code: FaultCode) -> Result<FaultRep
     Ok(report)
 }
 
-/// Whether the log has a line with these words.
+/// Checks that the log has a line with these words.
 pub(crate) fn log_contains(log: &[String], words: &str) -> Result<()> {
     ensure!(
         log.iter().any(|line| line.contains(words)),

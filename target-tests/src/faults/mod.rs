@@ -20,7 +20,7 @@ use xtask::golden::Golden;
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;
 
-/// What was found, in order of the faults' numbers.
+/// Findings, in order of the faults' numbers.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 struct Table {
     #[serde(default)]

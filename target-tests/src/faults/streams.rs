@@ -1,4 +1,4 @@
-//! What a host sends at the rate of the machine's time, and what becomes of the machine when it stops.
+//! Streams of a host at the rate of the machine's time, and the machine's reaction when they stop.
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::message::AxisName;
