@@ -163,7 +163,7 @@ impl Destination {
         let axis = subject.axis()?;
         let mut file = match subject.start(Some(path))? {
             Some(file) => file,
-            None => SettingsFile::new(machine.unwrap_or_default()),
+            None => SettingsFile::new(machine.unwrap_or_else(StageSettings::simulated)),
         };
         change(&mut file.stage.axes[axis.index()]);
         file.provenance.push(Provenance {

@@ -109,7 +109,7 @@ pub fn largest_integral_gain(
 ///         && (with.phase_margin_deg - without.phase_margin_deg).abs() <= 0.05
 /// });
 /// assert_eq!(ki, Some(8.0));
-/// # Ok::<(), crate::design::MarginError>(())
+/// # Ok::<(), quadrant_sim::design::MarginError>(())
 /// ```
 pub fn largest_integral_gain_where(
     process: &Process,

@@ -69,7 +69,10 @@ pub(super) struct Model {
 
 impl Model {
     pub(super) fn new() -> (Self, Rc<RefCell<Bench>>) {
-        let bench = Rc::new(RefCell::new(Bench::default()));
+        let bench = Rc::new(RefCell::new(Bench {
+            in_force: StageSettings::simulated(),
+            ..Bench::default()
+        }));
         let model = Self {
             bench: Rc::clone(&bench),
             port: LinkServer::new(),
