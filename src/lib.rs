@@ -27,7 +27,7 @@
 //! 5. The converter's word, and [`telemetry`] with every term of the law.
 //!
 //! [`safety`] decides whether any of this reaches the amplifiers: the stage starts disabled, and a fault switches it off
-//! in the tick that finds it, or brakes it under control where that is safer. [`supervisor`] stands between a person's requests and the tick.
+//! in the tick that finds it, or brakes it under control where that is safer. [`app::supervisor`] stands between a person's requests and the tick.
 //!
 //! # One law, three number types
 //!

@@ -13,7 +13,7 @@ use crate::command;
 /// Releases whose warnings are errors: those that the tree was last checked with. Newer ones warn of more.
 const LINTED_WITH: [&str; 2] = ["1.95.0", "1.96.0"];
 
-/// True if the warnings of a compiler are errors, by what [`compiler`] says.
+/// True if the warnings of a compiler are errors, by what `compiler` says.
 pub fn denies_warnings(compiler: &str) -> bool {
     let release = compiler.split(' ').next();
     release.is_some_and(|release| LINTED_WITH.contains(&release))

@@ -144,7 +144,7 @@ impl<'a> Capture<'a> {
     }
 
     /// After a tick: watches for the trigger and records, if a sample is due. Says whether this tick froze the ring. At
-    /// most [`MAX_CHANNELS`](crate::law::telemetry::MAX_CHANNELS) + 1 reads; a capture that is not armed costs a comparison.
+    /// most [`MAX_CHANNELS`](quadrant_link::message::MAX_CHANNELS) + 1 reads; a capture that is not armed costs a comparison.
     #[inline(always)]
     pub fn step<S: Scalar, const N: usize>(&mut self, seen: &Observation<'_, S, N>) -> bool {
         match self.phase {

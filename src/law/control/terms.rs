@@ -7,7 +7,7 @@ use crate::law::scalar::Scalar;
 pub struct FeedbackInput<S> {
     /// Tracking error e, mm.
     pub error: S,
-    /// Velocity of the reference, mm/s; only the laws that [`Feedback::needs_velocity`] names read it.
+    /// Velocity of the reference, mm/s; only the laws that `Feedback::needs_velocity` names read it.
     pub velocity: S,
 }
 

@@ -3,7 +3,7 @@
 //! [`StageSettings::validate`](crate::settings::StageSettings::validate) walks its ranges, the
 //! [default settings](crate::settings::StageSettings::default) and those of files that lack a field take its defaults,
 //! `quadrant settings` and `docs/settings.md` are made from it. The firmware carries fields and ranges alone
-//! ([`rules`]); words and units stay on the host. Defaults of flags, names and lists stand in `settings::defaults`, where
+//! (`rules`); words and units stay on the host. Defaults of flags, names and lists stand in `settings::defaults`, where
 //! they are typed.
 //!
 //! A row comes after those that its range refers to, so that the first refused value is the one to mend.

@@ -61,7 +61,7 @@ pub enum AxisSignal {
 #[strum(serialize_all = "kebab-case")]
 #[repr(u8)]
 pub enum StageSignal {
-    /// The number of its [`MachineState`].
+    /// The number of its [`MachineState`](super::MachineState).
     State = 0,
     /// The number of the fault that is latched, or for which the axes brake; 0 without one.
     Fault = 1,
