@@ -16,7 +16,7 @@
 //! [`Axis`](crate::law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
 //!
 //! The firmware puts each piece into an RTIC task; a host runs them one after the other in one thread
-//! (`quadrant_sim::console`), in the order in which the target would.
+//! (`quadrant_sim::machine`), in the order in which the target would.
 
 pub mod capture;
 mod change_detector;

@@ -1,6 +1,6 @@
 //! `cargo xtask test`: every check there is.
 //!
-//! What is built for a microcontroller is checked by a process of its own beside the host's tests: linking an image keeps one
+//! The firmware and its images are checked by a process of its own beside the host's tests: linking an image keeps one
 //! core busy. What is emulated comes last and alone, as lockstep needs both.
 
 use std::fs::{self, File};

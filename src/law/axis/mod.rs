@@ -105,7 +105,7 @@ pub struct Axis<S: Scalar, const N: usize> {
 
 /// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
 ///
-/// What is not given is not there: no feedforward, no homing, no limits but the amplifier's, and a 32-bit encoder.
+/// Parts that are not given are absent: no feedforward, no homing, no limits but the amplifier's, and a 32-bit encoder.
 #[derive(Debug)]
 pub struct AxisBuilder<'a, S: Scalar, const N: usize> {
     axis: &'a mut Axis<S, N>,
