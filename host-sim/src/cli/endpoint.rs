@@ -93,17 +93,20 @@ impl LinkEndpoint {
     }
 }
 
-#[cfg(unix)]
+#[cfg(all(unix, feature = "emulated"))]
 fn emulated(image: &Path, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
     let link = quadrant_sim::machine::EmulatedLink::start(image, seed, flash)?;
     Ok(Client::open(link)?)
 }
 
-#[cfg(not(unix))]
+#[cfg(not(all(unix, feature = "emulated")))]
 fn emulated(_: &Path, _: u64, _: Option<&Path>) -> anyhow::Result<Client> {
-    anyhow::bail!(
+    anyhow::bail!(if cfg!(unix) {
+        "emulated: this program was built without QEMU's side; build it with `--features emulated`, as in `cargo run \
+         --release --features emulated -- connect --emulated`"
+    } else {
         "emulated: QEMU shares memory through a file on Unix systems alone; the simulated machine works here"
-    )
+    })
 }
 
 #[cfg(test)]

@@ -16,7 +16,7 @@
 //! - [`Machine`], [`TestAxis`]: a machine and an axis that are measured, whatever they are made of;
 //! - [`law`]: the control law and the supervisor alone;
 //! - [`simulated`], [`application`], [`memory_flash`]: the firmware's application in this process;
-//! - [`emulated`], [`emulator`]: the firmware's image in QEMU; [`benchmark_job`]: the motion that it is counted with;
+//! - [`emulated`], [`emulator`] (feature `emulated`): the firmware's image in QEMU; [`benchmark_job`]: the motion that it is counted with;
 //! - [`Transport`], [`SerialTransport`], [`TcpTransport`], [`Loopback`]: bytes to a machine and back;
 //! - [`simulated_io`]: fault injection at machines that are not real: inputs, supply, log.
 //!
@@ -25,11 +25,11 @@
 pub mod application;
 mod approach;
 pub mod benchmark_job;
-#[cfg(unix)]
+#[cfg(all(unix, feature = "emulated"))]
 pub mod emulated;
-#[cfg(unix)]
+#[cfg(all(unix, feature = "emulated"))]
 mod emulated_link;
-#[cfg(unix)]
+#[cfg(all(unix, feature = "emulated"))]
 pub mod emulator;
 mod flash_file;
 mod interface;
@@ -47,7 +47,7 @@ mod timing;
 mod transport;
 
 pub use approach::approach;
-#[cfg(unix)]
+#[cfg(all(unix, feature = "emulated"))]
 pub use emulated_link::EmulatedLink;
 pub use interface::{Machine, MachineError};
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
