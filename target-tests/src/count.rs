@@ -1,6 +1,6 @@
 //! `cargo xtask count`: the instructions of a control tick, from the interrupt's entry to its return, by stage.
 //!
-//! QEMU logs every instruction executed. These are instructions, not cycles.
+//! QEMU logs every run of instructions executed. These are instructions, not cycles.
 
 use std::collections::BTreeMap;
 

@@ -2,14 +2,14 @@
 //! seen while every tick brings a line for the log.
 
 use std::collections::{BTreeMap, HashMap};
-use std::io::{BufRead, BufReader, Read};
+use std::io::Read;
 
-use anyhow::{Context, Result};
+use anyhow::Result;
 use quadrant::command::Command;
 
 use crate::faults::approach::moving;
 use crate::faults::fixture::Fixture;
-use crate::trace::{self, Traced, Tracer, traced};
+use crate::trace::{self, Tracer, for_each_instruction};
 use crate::traced_run;
 use xtask::image::Image;
 use xtask::listing::Listing;
@@ -95,18 +95,10 @@ impl<'a> Stretches<'a> {
     }
 
     fn read(mut self, trace: impl Read) -> Result<BTreeMap<String, u32>> {
-        let mut lines = BufReader::with_capacity(1 << 20, trace);
-        let mut line = Vec::new();
-        while lines
-            .read_until(b'\n', &mut line)
-            .context("cannot read QEMU's trace")?
-            > 0
-        {
-            if let Some(Traced::Begun(address)) = traced(&line) {
-                self.executed(address);
-            }
-            line.clear();
-        }
+        for_each_instruction(trace, |address| {
+            self.executed(address);
+            Ok(())
+        })?;
         Ok(self.longest)
     }
 

@@ -1,10 +1,13 @@
-//! The instructions that QEMU executes, one line each, followed through the control interrupt.
+//! The instructions that QEMU executes, followed through the control interrupt.
+//!
+//! QEMU translates straight runs of instructions. It lists each once, when it is translated, and then writes a line whenever it
+//! is about to be executed.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashMap};
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, anyhow};
 use quadrant_sim::machine::emulator::{self, Clock, Emulator, Memory};
 
 use crate::attribution::Attribution;
@@ -93,8 +96,8 @@ pub(crate) fn start(image: &Image, memory: &Memory, filter: &str) -> Result<(Emu
     Ok((emulator, Tracer { debugger }))
 }
 
-/// The switch of a trace. Single instructions take hundreds of times as long as translated code: what comes before those
-/// that count, such as the building of tables, runs without.
+/// The switch of a trace. Traced code takes tens of times as long as other: what comes before the ticks that count, such as the
+/// building of tables, runs without.
 pub(crate) struct Tracer {
     debugger: Debugger,
 }
@@ -118,10 +121,8 @@ impl Tracer {
     }
 
     fn switch_on(&mut self) -> Result<()> {
-        // Its name until QEMU 8.0, and since.
-        self.debugger.monitor("singlestep on")?;
-        self.debugger.monitor("one-insn-per-tb on")?;
-        self.debugger.monitor("log exec,nochain")?;
+        // Unchained code is translated anew, and so listed.
+        self.debugger.monitor("log exec,nochain,in_asm")?;
         self.debugger.resume()
     }
 }
@@ -153,33 +154,7 @@ struct OpenTick {
 impl Tally<'_> {
     /// Reads a trace to its end.
     fn read(mut self, trace: impl Read) -> Result<Vec<Tick>> {
-        let mut lines = BufReader::with_capacity(1 << 20, trace);
-        let mut line = Vec::new();
-        let mut previous = None;
-        loop {
-            line.clear();
-            if lines
-                .read_until(b'\n', &mut line)
-                .context("cannot read QEMU's trace")?
-                == 0
-            {
-                break;
-            }
-            match traced(&line) {
-                // A line comes before its instruction is executed: it counts when the next one comes.
-                Some(Traced::Begun(address)) => {
-                    if let Some(address) = previous.replace(address) {
-                        self.executed(address)?;
-                    }
-                }
-                // An interrupt came first: the instruction announced last was not executed.
-                Some(Traced::Stopped) => previous = None,
-                None => eprint!("{}", String::from_utf8_lossy(&line)),
-            }
-        }
-        if let Some(address) = previous {
-            self.executed(address)?;
-        }
+        for_each_instruction(trace, |address| self.executed(address))?;
         self.closed.extend(self.open.take().map(|open| open.tick));
         Ok(self.closed)
     }
@@ -222,33 +197,85 @@ impl Tally<'_> {
     }
 }
 
+/// Calls back with the address of each instruction that a trace shows executed, in order.
+pub(crate) fn for_each_instruction(
+    trace: impl Read,
+    mut executed: impl FnMut(u32) -> Result<()>,
+) -> Result<()> {
+    let mut lines = BufReader::with_capacity(1 << 20, trace);
+    let mut line = Vec::new();
+    // Straight runs of instructions, by the first address.
+    let mut runs: HashMap<u32, Vec<u32>> = HashMap::new();
+    let mut listed = None;
+    let mut announced = None;
+    let mut execute = |run: Option<u32>, runs: &HashMap<u32, Vec<u32>>| -> Result<()> {
+        let Some(first) = run else { return Ok(()) };
+        let run = runs.get(&first).ok_or_else(|| {
+            anyhow!("QEMU has not listed the instructions at {first:#x}; was it built without a disassembler?")
+        })?;
+        run.iter().try_for_each(|address| executed(*address))
+    };
+    loop {
+        line.clear();
+        if lines
+            .read_until(b'\n', &mut line)
+            .context("cannot read QEMU's trace")?
+            == 0
+        {
+            break;
+        }
+        match traced(&line) {
+            Some(Traced::Listing) => listed = None,
+            Some(Traced::Listed(address)) => {
+                let first = *listed.get_or_insert(address);
+                let run = runs.entry(first).or_default();
+                if address == first {
+                    run.clear();
+                }
+                run.push(address);
+            }
+            // It counts when the next one comes.
+            Some(Traced::Begun(first)) => execute(announced.replace(first), &runs)?,
+            // An interrupt came first: what was announced last was not executed.
+            Some(Traced::Stopped) => announced = None,
+            None => eprint!("{}", String::from_utf8_lossy(&line)),
+        }
+    }
+    execute(announced, &runs)
+}
+
 /// A line of the trace.
 #[derive(Debug, PartialEq)]
-pub(crate) enum Traced {
-    /// The instruction at an address is about to be executed.
+enum Traced {
+    /// Instructions that have been translated follow.
+    Listing,
+    /// One of them, at an address.
+    Listed(u32),
+    /// Those from an address on are about to be executed.
     Begun(u32),
-    /// It is not, after all.
+    /// They are not, after all.
     Stopped,
 }
 
-/// `Trace 0: 0x7f41c4000100 [00000000/000000d8/00000110/00000201] CONTROL_TICK`
-pub(crate) fn traced(line: &[u8]) -> Option<Traced> {
+/// `Trace 0: 0x7f41c4000100 [00000000/000000d8/00000110/00000201] CONTROL_TICK`, or a line of a listing:
+/// `0x000000d8:  b5f0       push     {r4, r5, r6, r7, lr}`
+fn traced(line: &[u8]) -> Option<Traced> {
     if line.starts_with(b"Stopped execution") {
         return Some(Traced::Stopped);
     }
+    if line.starts_with(b"--------") || line.starts_with(b"IN:") || line == b"\n" {
+        return Some(Traced::Listing);
+    }
+    let hexadecimal =
+        |digits: &[u8]| u32::from_str_radix(std::str::from_utf8(digits).ok()?, 16).ok();
+    if let Some(listed) = line.strip_prefix(b"0x") {
+        let colon = listed.iter().position(|byte| *byte == b':')?;
+        return hexadecimal(&listed[..colon]).map(Traced::Listed);
+    }
     let line = line.strip_prefix(b"Trace ")?;
     let open = line.iter().position(|byte| *byte == b'[')?;
-    let fields = std::str::from_utf8(&line[open + 1..]).ok()?;
-    let address = fields.split('/').nth(1)?;
-    u32::from_str_radix(
-        address
-            .trim_start_matches("00000000")
-            .trim_start_matches("0x"),
-        16,
-    )
-    .or_else(|_| u32::from_str_radix(address, 16))
-    .ok()
-    .map(Traced::Begun)
+    let address = line[open + 1..].split(|byte| *byte == b'/').nth(1)?;
+    hexadecimal(address).map(Traced::Begun)
 }
 
 #[cfg(test)]
@@ -261,6 +288,25 @@ mod tests {
         assert_eq!(traced(line), Some(Traced::Begun(0xd8)));
         let line = b"Stopped execution of TB chain before 0x7f41c4000100 [000000d8] CONTROL_TICK\n";
         assert_eq!(traced(line), Some(Traced::Stopped));
+        let line = b"0x000000d8:  b5f0       push     {r4, r5, r6, r7, lr}\n";
+        assert_eq!(traced(line), Some(Traced::Listed(0xd8)));
+        assert_eq!(traced(b"IN: CONTROL_TICK\n"), Some(Traced::Listing));
         assert_eq!(traced(b"qemu-system-arm: terminating\n"), None);
+    }
+
+    #[test]
+    fn runs_of_instructions_are_executed_unless_an_interrupt_comes_first() {
+        let trace = b"----------------\nIN: a\n0x00000010:  bf00 nop\n0x00000012:  bf00 nop\n\n\
+            Trace 0: 0x1 [0/00000010/0/0] a\nTrace 0: 0x1 [0/00000010/0/0] a\n\
+            Stopped execution of TB chain before 0x1 [00000010] a\nTrace 0: 0x1 [0/00000010/0/0] a\n";
+        let mut executed = Vec::new();
+        for_each_instruction(trace.as_slice(), |address| {
+            executed.push(address);
+            Ok(())
+        })
+        .unwrap();
+        assert_eq!(executed, [0x10, 0x12, 0x10, 0x12]);
+        let unlisted = b"Trace 0: 0x1 [0/00000020/0/0] a\n";
+        assert!(for_each_instruction(unlisted.as_slice(), |_| Ok(())).is_err());
     }
 }
