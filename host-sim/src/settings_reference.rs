@@ -132,8 +132,9 @@ fn parts() -> BTreeSet<String> {
 }
 
 /// Heading of the settings whose paths begin so.
-const SECTIONS: [(&str, &str); 8] = [
+const SECTIONS: [(&str, &str); 9] = [
     ("/rate_hz", "The stage"),
+    ("/axes/*/commissioned", "Commissioning"),
     ("/axes/*/encoder/", "Encoder"),
     ("/axes/*/amplifier/", "Amplifier"),
     ("/axes/*/limits/", "Limits"),

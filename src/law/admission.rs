@@ -28,8 +28,14 @@ pub struct StageView {
     pub injection_ready: bool,
     /// A voltage is being injected.
     pub injecting: bool,
-    /// The settings are those of a commissioning, or of a host. The law cannot tell: the application says so.
+    /// An axis is commissioned, and every axis that its law could drive is: [`StageRef::is_commissioned`].
+    ///
+    /// [`StageRef::is_commissioned`]: crate::law::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// The outputs are kept off while flash is written, or until a restart.
+    pub locked: bool,
+    /// The stored settings are damaged or were refused, and nobody has stored others since.
+    pub settings_invalid: bool,
 }
 
 /// Reason why a command is not acted on.
@@ -57,8 +63,12 @@ pub enum Refusal {
     NoInjection,
     /// A voltage is being injected.
     Injecting,
-    /// The settings are the default ones, which hold no law.
+    /// No axis is commissioned, or one that has a law is not.
     NotCommissioned,
+    /// The outputs are kept off while flash is written, or until a restart.
+    Locked,
+    /// The stored settings are damaged or were refused.
+    SettingsInvalid,
 }
 
 impl Refusal {
@@ -79,7 +89,11 @@ impl Refusal {
             }
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
-                "not commissioned: no axis has a law; run `quadrant commission`, or load a settings file"
+                "not commissioned: no axis is, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
+            }
+            Self::Locked => "flash is being written, or a restart is due; ask again",
+            Self::SettingsInvalid => {
+                "the stored settings are damaged or were refused; check the draft, store it, then reset"
             }
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(interlock) => match interlock.code {
@@ -127,6 +141,7 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::Disable | Command::Stop => None,
         Command::ResetFault if stopping => Some(Refusal::Stopping),
         Command::ResetFault if !faulted => Some(Refusal::NoFault),
+        Command::ResetFault if view.settings_invalid => Some(Refusal::SettingsInvalid),
         Command::ResetFault => None,
         _ if faulted => Some(Refusal::FaultLatched),
         _ if stopping => Some(Refusal::Stopping),
@@ -134,7 +149,9 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
             view.interlock.map(Refusal::BadInput)
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
+        Command::Enable if view.settings_invalid => Some(Refusal::SettingsInvalid),
         Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
+        Command::Enable if view.locked => Some(Refusal::Locked),
         Command::Enable => None,
         _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
         Command::Run | Command::StartStream | Command::StartInjection if view.running => {

@@ -17,7 +17,7 @@
 
 use crate::law::admission::{self, StageView};
 use crate::law::axes::{AxisName, PerAxis};
-use crate::law::axis::{Axis, AxisState};
+use crate::law::axis::{Axis, AxisState, Commissioning};
 use crate::law::command::Command;
 use crate::law::encoder::EncoderReading;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
@@ -108,6 +108,10 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
     injection: InjectionState<S>,
+    /// The outputs are kept off: [`StageState::lock`].
+    locked: bool,
+    /// The stored settings are damaged or were refused.
+    settings_invalid: bool,
 }
 
 /// The fault that each axis found in a tick, if any.
@@ -123,6 +127,8 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             held: None,
             settled: 0,
             injection: InjectionState::default(),
+            locked: false,
+            settings_invalid: false,
         }
     }
 }
@@ -135,13 +141,36 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         state
     }
 
-    /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet.
+    /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet. [`FaultCode::SettingsInvalid`] stays until
+    /// [`accept_settings`](Self::accept_settings), whatever other fault is latched first.
     pub fn start_faulted(&mut self, code: FaultCode) {
+        self.settings_invalid |= code == FaultCode::SettingsInvalid;
+        if matches!(self.safety, SafetyState::Faulted(_)) {
+            return;
+        }
         self.safety = SafetyState::Faulted(Fault {
             code,
             axis: None,
             tick: 0,
         });
+    }
+
+    /// Keeps the outputs off until [`unlock`](Self::unlock), if they are off now: for what may not happen while they are
+    /// on, such as the erasure of flash. Returns true if they are kept off.
+    pub fn lock(&mut self) -> bool {
+        self.locked |= !self.safety.drives();
+        self.locked
+    }
+
+    /// Ends [`lock`](Self::lock).
+    pub fn unlock(&mut self) {
+        self.locked = false;
+    }
+
+    /// Takes note that valid settings were stored, or the stored ones erased: a reset clears
+    /// [`FaultCode::SettingsInvalid`] from now on.
+    pub fn accept_settings(&mut self) {
+        self.settings_invalid = false;
     }
 
     /// The memories of x, y and z.
@@ -221,16 +250,22 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         self.injection.is_running()
     }
 
+    /// The relation of the injection that waits or is under way to the loop and to the plan.
+    pub(crate) fn injection_coupling(&self) -> Option<Coupling> {
+        self.injection.injection().map(Injection::coupling)
+    }
+
     /// Progress of the injection under way, or else of the last one.
     pub fn injection_progress(&self) -> InjectionProgress {
         self.injection.progress()
     }
 }
 
-impl StageView {
-    /// The view of a stage as its last tick left it.
-    pub fn of<S: Scalar, const N: usize>(state: &StageState<S, N>) -> Self {
-        Self {
+impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
+    /// The view of the stage as its last tick left it.
+    #[inline(always)]
+    pub fn view(&self, state: &StageState<S, N>) -> StageView {
+        StageView {
             safety: state.safety(),
             running: state.is_running(),
             interlock: state.interlock(),
@@ -238,10 +273,31 @@ impl StageView {
             modes: state.axes.by_ref().map(AxisState::mode),
             homed: state.axes.by_ref().map(AxisState::is_homed),
             stream_ready: state.axes.iter().all(AxisState::is_stream_ready),
-            injection_ready: state.is_injection_ready(),
+            injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
-            commissioned: true,
+            commissioned: self.is_commissioned(),
+            locked: state.locked,
+            settings_invalid: state.settings_invalid,
         }
+    }
+
+    /// True if the axis of the injection that waits, should there be one, was commissioned.
+    fn may_inject(&self, state: &StageState<S, N>) -> bool {
+        let injection = state.injection.injection();
+        injection.is_none_or(|injection| {
+            self.axes[injection.axis()].commissioning() == Commissioning::Done
+        })
+    }
+
+    /// True if an axis was commissioned, and no other has a law that could drive it.
+    #[inline(always)]
+    pub fn is_commissioned(&self) -> bool {
+        let has = |standing| {
+            self.axes
+                .iter()
+                .any(|axis| axis.commissioning() == standing)
+        };
+        has(Commissioning::Done) && !has(Commissioning::Missing)
     }
 }
 
@@ -461,14 +517,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if driven && command == Command::ResetFault {
             return;
         }
-        if state.safety.apply(command, state.interlock.is_some()) {
+        // Whoever has let it through looked at an older state.
+        if admission::refusal(self.view(state), command).is_some() {
+            return;
+        }
+        if state.safety.apply(command) {
             state.held = None;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
                 axis.enable(memory);
             }
-        } else if state.safety.is_enabled()
-            && admission::refusal(StageView::of(state), command).is_none()
-        {
+        } else if state.safety.is_enabled() {
             self.start(state, command, tick);
         }
     }

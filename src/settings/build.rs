@@ -2,8 +2,10 @@
 
 use super::{AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings};
 use crate::law::axes::{AxisName, PerAxis};
-use crate::law::axis::{Axis, AxisBuilder};
+use crate::law::axis::{Axis, AxisBuilder, Commissioning};
+use crate::law::control::feedback::LawKind;
 use crate::law::encoder::Encoder;
+use crate::law::feedforward::FeedforwardKind;
 use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
@@ -64,6 +66,26 @@ impl StageSettings {
 }
 
 impl AxisSettings {
+    /// The standing of the axis.
+    pub(super) fn commissioning(&self) -> Commissioning {
+        let (pid, gains) = (&self.feedback.pid, &self.feedforward.gains);
+        let numbers = [
+            pid.kp_v_per_mm,
+            pid.ki_v_per_mm_s,
+            pid.kd_v_s_per_mm,
+            gains.inertia_v_s2_per_mm,
+            self.amplifier.offset_v,
+        ];
+        let is_inert = self.feedback.law == LawKind::Pid
+            && self.feedforward.kind == FeedforwardKind::None
+            && numbers == [0.0; 5];
+        match (self.commissioned, is_inert) {
+            (true, _) => Commissioning::Done,
+            (false, true) => Commissioning::Inert,
+            (false, false) => Commissioning::Missing,
+        }
+    }
+
     /// The preview in whole ticks.
     #[inline(never)]
     fn preview_ticks(&self, period_s: f64) -> usize {
@@ -129,6 +151,7 @@ impl AxisSettings {
                 (longest_preview_ticks - preview_ticks) as u32,
                 scale,
             ))
+            .commissioning(self.commissioning())
             .try_build();
         debug_assert_eq!(built, Ok(()), "validation accepted what an axis refuses");
     }

@@ -60,6 +60,15 @@ impl<'a> Draft<'a> {
         }
     }
 
+    /// A draft that holds other settings than those in force, edited already.
+    pub fn edited(in_force: &'a mut StageSettings, settings: &'a mut StageSettings) -> Self {
+        Self {
+            settings,
+            in_force,
+            touched: [true; 3],
+        }
+    }
+
     /// The settings in force.
     pub fn in_force(&self) -> &StageSettings {
         self.in_force

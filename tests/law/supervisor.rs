@@ -26,6 +26,8 @@ const DISABLED: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: true,
+    locked: false,
+    settings_invalid: false,
 };
 const ENABLED: StageView = StageView {
     safety: SafetyState::Enabled,

@@ -101,6 +101,20 @@ pub struct Axis<S: Scalar, const N: usize> {
     following: Following<S>,
     travel: Travel,
     generator: ReferenceGenerator<S>,
+    commissioning: Commissioning,
+}
+
+/// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
+/// [`Done`](Self::Done).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Commissioning {
+    /// Nobody has commissioned the axis, and its law puts out nothing, whatever is measured.
+    #[default]
+    Inert,
+    /// Nobody has commissioned the axis, but its law would drive it.
+    Missing,
+    /// The axis was commissioned.
+    Done,
 }
 
 /// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
@@ -175,6 +189,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
         axis.generator = ReferenceGenerator::default();
+        axis.commissioning = Commissioning::Done;
         let builder = Self {
             axis,
             period_s,
@@ -293,6 +308,13 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     #[must_use]
     pub fn generator(self, generator: ReferenceGenerator<S>) -> Self {
         self.axis.generator = generator;
+        self
+    }
+
+    /// The standing of the settings; [`Commissioning::Done`] unless given.
+    #[must_use]
+    pub fn commissioning(self, commissioning: Commissioning) -> Self {
+        self.axis.commissioning = commissioning;
         self
     }
 
@@ -490,7 +512,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             following: Following::default(),
             travel: Travel::UNLIMITED,
             generator: ReferenceGenerator::default(),
+            commissioning: Commissioning::Inert,
         }
+    }
+
+    /// The standing of the axis' settings.
+    pub const fn commissioning(&self) -> Commissioning {
+        self.commissioning
     }
 
     /// One control period of an axis that is driven by itself, without a stage: reads the encoder, advances the

@@ -214,8 +214,8 @@ impl FaultCode {
                 "read the registers that it left; check the supply; report it with the firmware's version",
             ],
             Self::SettingsInvalid => [
-                "the stored settings were refused; the defaults are in force",
-                "read which field was refused, correct it, apply and store; then reset",
+                "the stored settings are damaged or were refused; the defaults are in force",
+                "connect and check the draft, which may hold an older set, or load a settings file; apply, store, then reset",
             ],
             Self::HomeSwitchMissing => [
                 "homing went homing.travel_mm without meeting its switch",

@@ -13,8 +13,6 @@ pub(in crate::settings) struct Rule {
     pub(in crate::settings) least: Limit,
     /// Largest allowed value.
     pub(in crate::settings) most: Limit,
-    /// Default.
-    pub(in crate::settings) default: f64,
     /// Reads the number of a list's point; `None` for a leaf.
     pub(in crate::settings) point: Option<PointNumber>,
 }
@@ -46,7 +44,6 @@ const fn rules<const N: usize>(groups: &[&[LeafInfo]]) -> [Rule; N] {
         field: "",
         least: Limit::At(0.0),
         most: Limit::At(0.0),
-        default: 0.0,
         point: None,
     };
     let mut rules = [blank; N];
@@ -60,7 +57,6 @@ const fn rules<const N: usize>(groups: &[&[LeafInfo]]) -> [Rule; N] {
                     field: leaf.field,
                     least: least.limit(),
                     most: most.limit(),
-                    default: leaf.default,
                     point: match leaf.place {
                         Place::Points(read) => Some(read),
                         Place::Stage | Place::Axis => None,

@@ -50,6 +50,9 @@ pub(super) const OF_AXIS: &[LeafInfo] = &[
         "Voltage at which the motor gives no force; it is added to every output."),
     flag("amplifier.reversed",
         "True if a positive voltage moves the axis to smaller positions."),
+    flag("commissioned",
+        "True if the axis was commissioned, by the tool or by a person; outputs are enabled only if one was, and every other \
+         has no gains, feedforward or offset."),
     number("plant.gain_mm_per_v_s2", "mm/(V s²)", at(1e-3), at(1e9), UNSET,
         "A, acceleration per volt at the amplifier's input. With a plant the feedback law is held to stability."),
     number("plant.damping_per_s", "1/s", at(0.0), at(1e6), 0.0,
