@@ -16,6 +16,8 @@ pub struct StageView {
     pub running: bool,
     /// The bad input that keeps the outputs from being enabled.
     pub interlock: Option<EnableInterlock>,
+    /// An axis that moves though the outputs are off.
+    pub moving: Option<AxisName>,
     /// A fault that only held the axes.
     pub held: Option<Fault>,
     /// The motion mode of each axis.
@@ -59,6 +61,8 @@ pub enum Refusal {
     Injecting,
     /// The settings are the default ones, which hold no law.
     NotCommissioned,
+    /// The axis moves though the outputs are off.
+    NotAtStandstill(AxisName),
 }
 
 impl Refusal {
@@ -80,6 +84,9 @@ impl Refusal {
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
                 "not commissioned: no axis has a law; run `quadrant commission`, or load a settings file"
+            }
+            Self::NotAtStandstill(_) => {
+                "the axis moves though the outputs are off; wait until it stands, or find out what moves it"
             }
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(interlock) => match interlock.code {
@@ -103,7 +110,7 @@ impl Refusal {
     pub const fn axis(&self) -> Option<AxisName> {
         match self {
             Self::BadInput(interlock) => interlock.axis,
-            Self::AxisBusy(axis) => Some(*axis),
+            Self::AxisBusy(axis) | Self::NotAtStandstill(axis) => Some(*axis),
             _ => None,
         }
     }
@@ -135,6 +142,9 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
         Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
+        Command::Enable if !view.safety.is_enabled() && view.moving.is_some() => {
+            view.moving.map(Refusal::NotAtStandstill)
+        }
         Command::Enable => None,
         _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
         Command::Run | Command::StartStream | Command::StartInjection if view.running => {

@@ -39,6 +39,8 @@ pub struct ReferenceGenerator<S: Scalar> {
     homing: Option<Homing<S>>,
     stream: Stream<S>,
     wait_ticks: u32,
+    /// Ticks that a controlled stop may take at most.
+    stop_limit: Option<u32>,
 }
 
 impl<S: Scalar> ReferenceGenerator<S> {
@@ -58,6 +60,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
             homing: None,
             stream: Stream::new(scale),
             wait_ticks: 0,
+            stop_limit: None,
         }
     }
 
@@ -83,6 +86,13 @@ impl<S: Scalar> ReferenceGenerator<S> {
         self
     }
 
+    /// Ends a controlled stop that takes longer than this many ticks with a fault (SS1-t of IEC 61800-5-2).
+    #[must_use]
+    pub fn with_stop_limit(mut self, ticks: u32) -> Self {
+        self.stop_limit = Some(ticks);
+        self
+    }
+
     /// The ramp of a controlled stop.
     #[inline(always)]
     pub fn stop_ramp(&self) -> &Ramp<S> {
@@ -96,6 +106,8 @@ pub(crate) struct GeneratorState<S: Scalar> {
     mode: MotionMode,
     /// Ticks until the motion begins.
     waiting: u32,
+    /// Ticks of the controlled stop under way.
+    stopping: u32,
     motion: MotionState,
     ramp: RampState,
     jog: JogState,
@@ -108,6 +120,7 @@ impl<S: Scalar> Default for GeneratorState<S> {
         Self {
             mode: MotionMode::Hold,
             waiting: 0,
+            stopping: 0,
             motion: MotionState::default(),
             ramp: RampState::default(),
             jog: JogState::default(),
@@ -205,6 +218,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
         state.ramp = self
             .stop_ramp
             .take_over(from.position, from.displacement, from.before);
+        state.stopping = 0;
         state.mode = MotionMode::Stopping;
     }
 }
@@ -271,10 +285,8 @@ impl<S: Scalar> ReferenceGenerator<S> {
                 }
                 StreamStep::Underrun => {
                     self.stop(state, from);
-                    (
-                        self.advance_stop(state),
-                        GeneratorEvent::Fault(FaultCode::StreamUnderrun),
-                    )
+                    let (sample, _) = self.advance_stop(state);
+                    (sample, GeneratorEvent::Fault(FaultCode::StreamUnderrun))
                 }
             },
             (MotionMode::OpenLoop, _) => {
@@ -287,18 +299,24 @@ impl<S: Scalar> ReferenceGenerator<S> {
             // Homing whose settings have gone ends in a stop as well.
             (MotionMode::Home, None) => {
                 self.stop(state, from);
-                (self.advance_stop(state), GeneratorEvent::None)
+                self.advance_stop(state)
             }
-            _ => (self.advance_stop(state), GeneratorEvent::None),
+            _ => self.advance_stop(state),
         }
     }
 
-    fn advance_stop(&self, state: &mut GeneratorState<S>) -> ReferenceSample<S> {
+    fn advance_stop(&self, state: &mut GeneratorState<S>) -> (ReferenceSample<S>, GeneratorEvent) {
         let sample = self.stop_ramp.step(&mut state.ramp, Velocity::ZERO);
         if state.ramp.is_at_rest() {
             state.mode = MotionMode::Hold;
         }
-        sample
+        state.stopping = state.stopping.saturating_add(1);
+        let event = if self.stop_limit.is_some_and(|most| state.stopping > most) {
+            GeneratorEvent::Fault(FaultCode::StopOverrun)
+        } else {
+            GeneratorEvent::None
+        };
+        (sample, event)
     }
 
     fn advance_home(
@@ -326,13 +344,12 @@ impl<S: Scalar> ReferenceGenerator<S> {
         (sample, event)
     }
 
-    /// True if a pressed limit switch is one that the axis is meant to move onto.
+    /// The switch that the axis is meant to move onto, if there is one.
     #[inline(always)]
-    pub(crate) fn expects(&self, state: &GeneratorState<S>, switches: AxisSwitches) -> bool {
-        state.mode == MotionMode::Home
-            && self
-                .homing
-                .as_ref()
-                .is_some_and(|homing| homing.expects(switches))
+    pub(crate) fn expected(&self, state: &GeneratorState<S>) -> AxisSwitches {
+        match &self.homing {
+            Some(homing) if state.mode == MotionMode::Home => homing.switch(),
+            _ => AxisSwitches::default(),
+        }
     }
 }

@@ -104,6 +104,8 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     safety: SafetyState,
     tick: u32,
     interlock: Option<EnableInterlock>,
+    /// An axis that moves though the outputs are off.
+    moving: Option<AxisName>,
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
@@ -120,6 +122,7 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             safety: SafetyState::default(),
             tick: 0,
             interlock: None,
+            moving: None,
             held: None,
             settled: 0,
             injection: InjectionState::default(),
@@ -162,6 +165,11 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     /// The bad input that keeps the outputs from being enabled at present, if there is one.
     pub fn interlock(&self) -> Option<EnableInterlock> {
         self.interlock
+    }
+
+    /// An axis that moves while the outputs are off: they are not enabled until it stands.
+    pub fn moving(&self) -> Option<AxisName> {
+        self.moving
     }
 
     /// The last fault that only held the axes ([`Reaction::Hold`]), until the next motion.
@@ -234,6 +242,7 @@ impl StageView {
             safety: state.safety(),
             running: state.is_running(),
             interlock: state.interlock(),
+            moving: state.moving(),
             held: state.held(),
             modes: state.axes.by_ref().map(AxisState::mode),
             homed: state.axes.by_ref().map(AxisState::is_homed),
@@ -312,6 +321,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if state.safety == SafetyState::Start && state.interlock.is_none() {
             state.safety = SafetyState::Disabled;
         }
+        state.moving = if driven { None } else { self.moving(state) };
         if let Some(command) = inputs.command {
             self.handle_command(state, command, driven, tick);
         }
@@ -342,6 +352,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             *code = axis.drive(memory, changed);
         }
         outputs
+    }
+
+    /// The first axis that does not stand.
+    fn moving(&self, state: &StageState<S, N>) -> Option<AxisName> {
+        self.axes
+            .into_iter()
+            .zip(&state.axes)
+            .zip(AxisName::ALL)
+            .find(|((axis, memory), _)| !axis.stands(memory))
+            .map(|(_, name)| name)
     }
 
     /// Advances the references of driven axes.
@@ -461,7 +481,9 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if driven && command == Command::ResetFault {
             return;
         }
-        if state.safety.apply(command, state.interlock.is_some()) {
+        let obstructed = state.interlock.is_some() || state.moving.is_some();
+        if state.safety.apply(command, obstructed) {
+            state.moving = None;
             state.held = None;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
                 axis.enable(memory);

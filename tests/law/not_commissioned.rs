@@ -17,6 +17,7 @@ const READY: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
     interlock: None,
+    moving: None,
     held: None,
     modes: PerAxis::splat(quadrant::motion::MotionMode::Hold),
     homed: PerAxis::splat(false),

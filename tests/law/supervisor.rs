@@ -19,6 +19,7 @@ const DISABLED: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
     interlock: None,
+    moving: None,
     held: None,
     modes: PerAxis::splat(MotionMode::Hold),
     homed: PerAxis::splat(false),

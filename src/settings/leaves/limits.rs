@@ -30,6 +30,20 @@ fn most_acceleration_mm_s2(axis: &AxisSettings, period_s: f64) -> f64 {
     MOST_COUNTS_PER_TICK_SQUARED * axis.encoder.resolution_mm / (period_s * period_s)
 }
 
+/// The longest that braking from the largest velocity, or building it up, may take, s.
+const LONGEST_BRAKING_S: f64 = 1.0;
+
+fn least_braking_mm_s2(axis: &AxisSettings, _: f64) -> f64 {
+    let limits = &axis.limits;
+    limits
+        .max_acceleration_mm_s2
+        .max(limits.max_velocity_mm_s / LONGEST_BRAKING_S)
+}
+
+fn least_braking_jerk_mm_s3(axis: &AxisSettings, _: f64) -> f64 {
+    (axis.limits.braking_mm_s2 / LONGEST_BRAKING_S).max(1.0)
+}
+
 fn most_error_mm(axis: &AxisSettings, _: f64) -> f64 {
     MOST_ERROR_COUNTS * axis.encoder.resolution_mm
 }
@@ -65,9 +79,11 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("limits.overspeed_ratio", "", at(1.05), at(2.0), 1.2,
         "Measured speed that is a fault, as a multiple of the largest velocity."),
     number("limits.braking_mm_s2", "mm/s²",
-        at(1e-3), at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
-        "Deceleration of a stop after a fault; above the largest acceleration."),
-    number("limits.braking_jerk_mm_s3", "mm/s³", at(1.0), at(1e9), 1e6,
+        times(1.0, "the largest acceleration, and what ends the largest velocity in a second", least_braking_mm_s2),
+        at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
+        "Deceleration of a stop after a fault."),
+    number("limits.braking_jerk_mm_s3", "mm/s³",
+        times(1.0, "what builds the braking up in a second", least_braking_jerk_mm_s3), at(1e9), 1e6,
         "Jerk of that stop."),
     number("limits.silent_s", "s", times(1.0, "the control period", period_s), at(10.0), 0.1,
         "Longest time without encoder motion while the output is above the share below; then the encoder counts as faulty."),
