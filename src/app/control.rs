@@ -7,6 +7,7 @@ use crate::app::capture::Capture;
 use crate::app::supervisor::PERIOD_TICKS;
 use crate::app::telemetry::{Observation, Sampler, SamplerState};
 use crate::law::axes::{AxisName, PerAxis};
+use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::reference::Motion;
 use crate::law::safety::{FaultCode, StreamLoss};
@@ -24,6 +25,8 @@ pub struct Control<'q, 'a, S: Scalar> {
     capture: Option<Capture<'a>>,
     glitches: GlitchReadings,
     commanded: bool,
+    /// Some axes have new settings that others have not yet.
+    exchanging: bool,
     /// Values of the first waiting block that were taken.
     place: usize,
     ends: ControlEnds<'q, 'a, S>,
@@ -49,6 +52,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             capture: None,
             glitches: GlitchReadings::default(),
             commanded: false,
+            exchanging: false,
             place: 0,
             ends,
         }
@@ -73,8 +77,8 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// tell, and a command of the server's acts when the inputs have none.
     #[inline(always)]
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
-        let settings_changed = match self.ends.swaps.dequeue() {
-            Some(swap) => self.swap(swap),
+        let settings_changed = match self.ends.swaps.peek() {
+            Some(_) => self.take_swap(),
             None => PerAxis::splat(false),
         };
         if let Some((name, motion)) = self.ends.motions.dequeue() {
@@ -85,7 +89,10 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             Some(StreamItem::Segments(_)) => self.take_segments(),
             Some(StreamItem::Injection(_) | StreamItem::Voltages(_)) => self.take_voltage(),
         }
-        let command = inputs.command.or_else(|| self.ends.commands.dequeue());
+        let command = inputs
+            .command
+            .or_else(|| self.ends.commands.dequeue())
+            .filter(|command| *command != Command::Enable || !self.exchanging);
         self.commanded = command.is_some();
         let axes = self.axes.each_ref().map(|axis| &**axis);
         StageRef {
@@ -141,15 +148,30 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         Snapshot::of(&self.state)
     }
 
-    /// Replaces an axis; the old one goes back to the server as its back buffer.
+    /// Replaces an axis, if it may be replaced now.
     #[cold]
     #[inline(never)]
+    fn take_swap(&mut self) -> PerAxis<bool> {
+        let driven = self.state.safety().drives();
+        match self.ends.swaps.peek() {
+            Some(swap) if swap.needs_disabled && driven => PerAxis::splat(false),
+            _ => match self.ends.swaps.dequeue() {
+                Some(swap) => self.swap(swap),
+                None => PerAxis::splat(false),
+            },
+        }
+    }
+
+    /// Replaces an axis; the old one goes back to the server as its back buffer.
     fn swap(&mut self, swap: AxisSwap<'a, S>) -> PerAxis<bool> {
         let AxisSwap {
             name,
             axis,
             streaming,
+            needs_disabled,
+            more,
         } = swap;
+        self.exchanging = needs_disabled && more;
         // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);
         let _ = self.ends.back_buffers.enqueue(replaced);

@@ -24,6 +24,8 @@ pub struct StageView {
     pub modes: PerAxis<MotionMode>,
     /// The axes that know where they are.
     pub homed: PerAxis<bool>,
+    /// The axes that start no more than jogs and homing until they are homed.
+    pub awaiting_homing: PerAxis<bool>,
     /// The first segments of a stream are there, and start where the axes rest.
     pub stream_ready: bool,
     /// The first value of an injected voltage is there.
@@ -63,6 +65,8 @@ pub enum Refusal {
     NotCommissioned,
     /// The axis moves though the outputs are off.
     NotAtStandstill(AxisName),
+    /// The axis is not homed, and its settings ask for it.
+    NotHomed(AxisName),
 }
 
 impl Refusal {
@@ -88,6 +92,9 @@ impl Refusal {
             Self::NotAtStandstill(_) => {
                 "the axis moves though the outputs are off; wait until it stands, or find out what moves it"
             }
+            Self::NotHomed(_) => {
+                "the axis is not homed: until then it jogs and homes at limits.unhomed_mm_s, and nothing else"
+            }
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(interlock) => match interlock.code {
                 FaultCode::EmergencyStop => "the emergency stop is pressed; release it",
@@ -110,7 +117,9 @@ impl Refusal {
     pub const fn axis(&self) -> Option<AxisName> {
         match self {
             Self::BadInput(interlock) => interlock.axis,
-            Self::AxisBusy(axis) | Self::NotAtStandstill(axis) => Some(*axis),
+            Self::AxisBusy(axis) | Self::NotAtStandstill(axis) | Self::NotHomed(axis) => {
+                Some(*axis)
+            }
             _ => None,
         }
     }
@@ -150,6 +159,14 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::Run | Command::StartStream | Command::StartInjection if view.running => {
             Some(Refusal::AlreadyRunning)
         }
+        Command::Run | Command::StartStream | Command::StartInjection
+            if view.awaiting_homing.contains(&true) =>
+        {
+            let awaiting = view.awaiting_homing;
+            let first = awaiting.named().find(|(_, awaiting)| **awaiting);
+            first.map(|(axis, _)| Refusal::NotHomed(axis))
+        }
+        Command::StartMove(axis) if view.awaiting_homing[axis] => Some(Refusal::NotHomed(axis)),
         Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),
         Command::StartInjection if !view.injection_ready => Some(Refusal::NoInjection),
         Command::Run | Command::StartStream | Command::StartInjection => None,

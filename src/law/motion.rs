@@ -41,6 +41,8 @@ pub struct ReferenceGenerator<S: Scalar> {
     wait_ticks: u32,
     /// Ticks that a controlled stop may take at most.
     stop_limit: Option<u32>,
+    /// Largest velocity of a jog of an axis that is not homed.
+    reduced_velocity: Option<Velocity>,
 }
 
 impl<S: Scalar> ReferenceGenerator<S> {
@@ -61,6 +63,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
             stream: Stream::new(scale),
             wait_ticks: 0,
             stop_limit: None,
+            reduced_velocity: None,
         }
     }
 
@@ -90,6 +93,13 @@ impl<S: Scalar> ReferenceGenerator<S> {
     #[must_use]
     pub fn with_stop_limit(mut self, ticks: u32) -> Self {
         self.stop_limit = Some(ticks);
+        self
+    }
+
+    /// Jogs an axis that is not homed at no more than this.
+    #[must_use]
+    pub fn with_reduced_velocity(mut self, velocity: Option<Velocity>) -> Self {
+        self.reduced_velocity = velocity;
         self
     }
 
@@ -179,11 +189,14 @@ impl<S: Scalar> ReferenceGenerator<S> {
         state: &mut GeneratorState<S>,
         position: Position,
         velocity: Velocity,
+        homed: bool,
     ) {
+        let reduced = self.reduced_velocity.filter(|_| !homed);
+        let most = reduced.unwrap_or(self.max_velocity);
         if state.mode != MotionMode::Jog {
             state.ramp = RampState::at_rest(position);
         }
-        state.jog = JogState::new(velocity.max(-self.max_velocity).min(self.max_velocity));
+        state.jog = JogState::new(velocity.max(-most).min(most));
         state.mode = MotionMode::Jog;
     }
 

@@ -106,6 +106,8 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     interlock: Option<EnableInterlock>,
     /// An axis that moves though the outputs are off.
     moving: Option<AxisName>,
+    /// The axes that start no more than jogs and homing until they are homed.
+    awaiting_homing: PerAxis<bool>,
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
@@ -123,6 +125,7 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             tick: 0,
             interlock: None,
             moving: None,
+            awaiting_homing: PerAxis::splat(false),
             held: None,
             settled: 0,
             injection: InjectionState::default(),
@@ -243,6 +246,7 @@ impl StageView {
             running: state.is_running(),
             interlock: state.interlock(),
             moving: state.moving(),
+            awaiting_homing: state.awaiting_homing,
             held: state.held(),
             modes: state.axes.by_ref().map(AxisState::mode),
             homed: state.axes.by_ref().map(AxisState::is_homed),
@@ -320,6 +324,14 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         }
         if state.safety == SafetyState::Start && state.interlock.is_none() {
             state.safety = SafetyState::Disabled;
+        }
+        for ((axis, memory), awaiting) in self
+            .axes
+            .into_iter()
+            .zip(&state.axes)
+            .zip(&mut state.awaiting_homing)
+        {
+            *awaiting = axis.awaits_homing(memory);
         }
         state.moving = if driven { None } else { self.moving(state) };
         if let Some(command) = inputs.command {

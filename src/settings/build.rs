@@ -154,6 +154,9 @@ impl AxisSettings {
             ))
             .travel(limits.build_travel(scale, &stop_ramp))
             .standstill(STANDSTILL_MM_S * period_s / encoder.resolution_mm)
+            .reduced_speed(limits.unhomed_mm_s.map(|reduced_mm_s| {
+                limits.overspeed_ratio * reduced_mm_s * period_s / encoder.resolution_mm
+            }))
             .generator(self.build_generator(
                 stop_ramp,
                 (longest_preview_ticks - preview_ticks) as u32,
@@ -219,6 +222,11 @@ impl AxisSettings {
         )
         .with_homing(self.build_homing(scale))
         .with_stop_limit(limits.stop_ticks(scale.rate_hz))
+        .with_reduced_velocity(
+            limits
+                .unhomed_mm_s
+                .map(|reduced_mm_s| Velocity::from_mm_s(reduced_mm_s, scale)),
+        )
         .with_wait(wait_ticks)
     }
 }

@@ -18,6 +18,7 @@ const READY: StageView = StageView {
     running: false,
     interlock: None,
     moving: None,
+    awaiting_homing: PerAxis::splat(false),
     held: None,
     modes: PerAxis::splat(quadrant::motion::MotionMode::Hold),
     homed: PerAxis::splat(false),

@@ -296,3 +296,67 @@ fn a_fault_that_switches_off_goes_before_one_that_stops_in_the_same_tick() {
     assert_eq!((both, code), (tick, FaultCode::FollowingError));
     assert!(matches!(state, SafetyState::Faulted(_)), "{state:?}");
 }
+
+#[test]
+fn until_it_is_homed_an_axis_is_slow_and_starts_nothing_but_jogs_and_homing() {
+    let settings = with_x(|x| x.limits.unhomed_mm_s = Some(5.0));
+    let mut rig = Rig::<f32>::new(&settings, &crate::common::sine_on_x(1.0, 10.0));
+    rig.tick();
+    rig.command(Command::Enable);
+    let said = |rig: &Rig<f32>, command| refusal(StageView::of(&rig.state), command);
+    let not_homed = Some(Refusal::NotHomed(AxisName::X));
+    for command in [
+        Command::Run,
+        Command::StartStream,
+        Command::StartInjection,
+        Command::StartMove(AxisName::X),
+    ] {
+        assert_eq!(said(&rig, command), not_homed, "{command:?}");
+        rig.command(command);
+        assert!(!rig.state.is_running(), "{command:?}");
+    }
+    assert_eq!(said(&rig, Command::StartMove(AxisName::Y)), None);
+    // A jog and homing are held to it.
+    let fastest = |rig: &mut Rig<f32>, command| {
+        rig.command(command);
+        let mut most_mm_s = 0.0f64;
+        for _ in 0..3000 {
+            let before = rig.state.axes()[0].reference();
+            follow(rig);
+            assert!(rig.tick().enabled);
+            let moved = rig.state.axes()[0].reference() - before;
+            most_mm_s = most_mm_s.max(moved.to_mm(SCALE.resolution_mm).abs() * SCALE.rate_hz);
+        }
+        rig.command(Command::Stop);
+        for _ in 0..500 {
+            follow(rig);
+            rig.tick();
+        }
+        most_mm_s
+    };
+    let jog = Command::Jog(AxisName::X, Velocity::from_mm_s(50.0, SCALE));
+    let home = Command::Home(AxisName::X);
+    let seen = [fastest(&mut rig, jog), fastest(&mut rig, home)];
+    assert!(
+        seen.iter().all(|most| (4.9..5.1).contains(most)),
+        "{seen:?}"
+    );
+    // What is measured is watched too: 20 mm/s.
+    let (state, count) = (rig.state.clone(), rig.inputs.readings[0].count);
+    for homed in [false, true] {
+        rig.state = state.clone();
+        rig.state.set_homed(AxisName::X, homed);
+        rig.inputs.readings[0].count = count;
+        for _ in 0..40 {
+            rig.inputs.readings[0].count += 4;
+            rig.tick();
+        }
+        let fault = rig.state.safety().fault().map(|fault| fault.code);
+        assert_eq!(fault, (!homed).then_some(FaultCode::Overspeed));
+    }
+    // Homed, it moves as it may.
+    let mut rig = Rig::<f32>::new(&settings, &crate::common::sine_on_x(1.0, 10.0));
+    rig.state.set_homed(AxisName::X, true);
+    rig.start();
+    assert!(rig.state.is_running());
+}

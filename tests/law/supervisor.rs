@@ -20,6 +20,7 @@ const DISABLED: StageView = StageView {
     running: false,
     interlock: None,
     moving: None,
+    awaiting_homing: PerAxis::splat(false),
     held: None,
     modes: PerAxis::splat(MotionMode::Hold),
     homed: PerAxis::splat(false),

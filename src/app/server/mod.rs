@@ -95,6 +95,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     timing: TimingStatistics,
     /// Axes whose new settings are not built yet.
     pending: AxisSet,
+    /// Safety depends on a setting in which they differ.
+    needs_disabled: bool,
     back_buffer: Option<&'a mut Axis<S>>,
     draft: Draft<'a>,
     /// Somebody has given the settings in force.
@@ -133,6 +135,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             seen: Snapshot::default(),
             timing: TimingStatistics::default(),
             pending: AxisSet::NONE,
+            needs_disabled: false,
             back_buffer: Some(parts.back_buffer),
             commissioned: parts.settings.is_commissioned(),
             draft: Draft::new(parts.settings, parts.draft),

@@ -78,6 +78,12 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 "the settings applied last are still being built; ask again"
             )));
         }
+        let safety = self.draft.safety_change();
+        if let Some(leaf) = safety
+            && self.seen.view.safety.drives()
+        {
+            return Err(refused(format_args!("{leaf}")));
+        }
         let changed = match self.draft.apply(FIRMWARE_ELEMENTS) {
             Ok(changed) => changed,
             Err(ApplyError::Refused(error)) => return Err(invalid(format_args!("{error}"))),
@@ -96,6 +102,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .collect();
         self.commissioned = self.draft.in_force().is_commissioned();
         self.pending = changed;
+        self.needs_disabled = safety.is_some();
         Ok(Reply::Applied(Applied {
             changed,
             restart_needed: false,
@@ -120,6 +127,8 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             name,
             axis,
             streaming: settings.streaming.build(),
+            needs_disabled: self.needs_disabled,
+            more: self.pending.iter().nth(1).is_some(),
         };
         match self.ends.swaps.enqueue(swap) {
             Ok(()) => {

@@ -104,6 +104,8 @@ pub struct Axis<S: Scalar, const N: usize> {
     travel: Travel,
     /// Measured speed above which the axis does not stand, 2^-8 counts per tick.
     standstill: u32,
+    /// Limit of the measured speed until the axis is homed, 2^-8 counts per tick.
+    reduced_speed: Option<u32>,
     generator: ReferenceGenerator<S>,
 }
 
@@ -180,6 +182,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
         axis.standstill = u32::MAX;
+        axis.reduced_speed = None;
         axis.generator = ReferenceGenerator::default();
         let builder = Self {
             axis,
@@ -306,6 +309,14 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     #[must_use]
     pub fn standstill(self, counts_per_tick: f64) -> Self {
         self.axis.standstill = speed_limit(counts_per_tick);
+        self
+    }
+
+    /// The limit of the measured speed until the axis is homed, counts per tick; half a count is added for the
+    /// quantisation. With it, the axis starts no motion but jogs and homing until then.
+    #[must_use]
+    pub fn reduced_speed(self, counts_per_tick: Option<f64>) -> Self {
+        self.axis.reduced_speed = counts_per_tick.map(speed_limit);
         self
     }
 
@@ -513,6 +524,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             following: Following::default(),
             travel: Travel::UNLIMITED,
             standstill: u32::MAX,
+            reduced_speed: None,
             generator: ReferenceGenerator::default(),
         }
     }
@@ -544,6 +556,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let step = self.encoder.update(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
         let slow = self.overspeed.step(&mut state.overspeed, step.counts);
+        let slow = slow
+            & match self.reduced_speed {
+                Some(most) if !state.homed => state.speed().unsigned_abs() <= most,
+                _ => true,
+            };
         let alive = self
             .signal_loss
             .step(&mut state.signal_loss, step.counts, state.last_output);
@@ -587,6 +604,12 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         })
     }
 
+    /// True if the axis has to be homed before it may start more than jogs and homing.
+    #[inline(always)]
+    pub(crate) fn awaits_homing(&self, state: &AxisState<S, N>) -> bool {
+        self.reduced_speed.is_some() & !state.homed
+    }
+
     /// True if the measured speed is that of an axis that stands.
     #[inline(always)]
     pub(crate) fn stands(&self, state: &AxisState<S, N>) -> bool {
@@ -614,7 +637,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let (generator, here) = (&mut state.generator, state.look_ahead);
         match command {
             Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
-            Command::Jog(_, velocity) => self.generator.start_jog(generator, here, velocity),
+            Command::Jog(_, velocity) => {
+                self.generator
+                    .start_jog(generator, here, velocity, state.homed);
+            }
             Command::StartStream => self.generator.start_stream(generator),
             Command::Stop => self.stop(state),
             Command::Home(_) => {

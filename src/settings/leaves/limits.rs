@@ -2,7 +2,9 @@
 
 use strum::VariantNames;
 
-use super::row::{LeafInfo, UNSET, at, at_most, flag, name, number, period_s, times};
+use super::row::{
+    Exchange, LeafInfo, UNSET, at, at_most, exchanged, flag, name, number, period_s, times,
+};
 use crate::law::friction::Direction;
 use crate::settings::axis::AxisSettings;
 use crate::settings::homing::HomeSwitch;
@@ -59,7 +61,7 @@ fn search_mm_s(axis: &AxisSettings, _: f64) -> f64 {
 }
 
 #[rustfmt::skip]
-pub(super) const LEAVES: &[LeafInfo] = &[
+pub(super) const LEAVES: &[LeafInfo] = &exchanged(Exchange::Disabled, [
     number("limits.max_velocity_mm_s", "mm/s",
         at(1e-3), at_most(1e3, "what the encoder's counter can follow", fastest_mm_s), 50.0,
         "Largest velocity of any reference; at twice this the encoder counts as faulty."),
@@ -94,6 +96,9 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("limits.travel_mm.positive", "mm",
         times(1.0, "the smallest and one count", least_positive_mm), at(LONGEST_TRAVEL_MM), UNSET,
         "The largest position of a homed axis."),
+    number("limits.unhomed_mm_s", "mm/s",
+        at(1e-3), times(1.0, "the largest velocity", |axis, _| axis.limits.max_velocity_mm_s), 10.0,
+        "Largest velocity until the axis is homed; nothing but jogs and homing starts until then. Left out: it moves as a homed one."),
     name("homing.direction", Direction::VARIANTS,
         "End of the travel towards which the switch is searched."),
     name("homing.switch", HomeSwitch::VARIANTS,
@@ -112,4 +117,4 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "Position to which the axis moves in the end; held to the travel."),
     number("homing.travel_mm", "mm", times(1.0, "one count", resolution_mm), at(2.0 * LONGEST_TRAVEL_MM), UNSET,
         "Longest way to the switch, and off it, before homing fails."),
-];
+]);
