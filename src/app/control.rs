@@ -25,6 +25,8 @@ pub struct Control<'q, 'a, S: Scalar> {
     capture: Option<Capture<'a>>,
     glitches: GlitchReadings,
     commanded: bool,
+    /// Some axes have new settings that others have not yet.
+    exchanging: bool,
     /// Values of the first waiting block that were taken.
     place: usize,
     /// Orders taken so far; wraps.
@@ -55,6 +57,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             capture: None,
             glitches: GlitchReadings::default(),
             commanded: false,
+            exchanging: false,
             place: 0,
             orders: 0,
             plan_taken: false,
@@ -88,9 +91,9 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// tell, and an order of the server's acts when the inputs have no command.
     #[inline(always)]
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
-        let (settings_changed, unfit) = match self.ends.swaps.dequeue() {
+        let (settings_changed, unfit) = match self.ends.swaps.peek() {
             // Settings that are not those of a commissioned stage do not drive it on.
-            Some(swap) => (self.swap(swap), !self.stage().is_commissioned()),
+            Some(_) => (self.take_swap(), !self.stage().is_commissioned()),
             None => (PerAxis::splat(false), false),
         };
         match self.ends.stream_items.peek() {
@@ -109,6 +112,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 None => None,
             },
         };
+        let command = command.filter(|command| *command != Command::Enable || !self.exchanging);
         self.commanded = command.is_some();
         let axes = self.axes.each_ref().map(|axis| &**axis);
         let stage = StageRef {
@@ -249,15 +253,30 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
     }
 
-    /// Replaces an axis; the old one goes back to the server as its back buffer.
+    /// Replaces an axis, if it may be replaced now.
     #[cold]
     #[inline(never)]
+    fn take_swap(&mut self) -> PerAxis<bool> {
+        let driven = self.state.safety().drives();
+        match self.ends.swaps.peek() {
+            Some(swap) if swap.needs_disabled && driven => PerAxis::splat(false),
+            _ => match self.ends.swaps.dequeue() {
+                Some(swap) => self.swap(swap),
+                None => PerAxis::splat(false),
+            },
+        }
+    }
+
+    /// Replaces an axis; the old one goes back to the server as its back buffer.
     fn swap(&mut self, swap: AxisSwap<'a, S>) -> PerAxis<bool> {
         let AxisSwap {
             name,
             axis,
             streaming,
+            needs_disabled,
+            more,
         } = swap;
+        self.exchanging = needs_disabled && more;
         // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);
         let _ = self.ends.back_buffers.enqueue(replaced);

@@ -39,6 +39,10 @@ pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) name: AxisName,
     pub(super) axis: &'a mut Axis<S>,
     pub(super) streaming: StreamLoss,
+    /// It waits until the outputs are off.
+    pub(super) needs_disabled: bool,
+    /// Another axis of the same settings follows: the outputs stay off until then.
+    pub(super) more: bool,
 }
 
 /// An item that waits for the control law: of a stream or of an injection, never of both.

@@ -16,12 +16,16 @@ pub struct StageView {
     pub running: bool,
     /// The bad input that keeps the outputs from being enabled.
     pub interlock: Option<EnableInterlock>,
+    /// An axis that moves though the outputs are off.
+    pub moving: Option<AxisName>,
     /// A fault that only held the axes.
     pub held: Option<Fault>,
     /// The motion mode of each axis.
     pub modes: PerAxis<MotionMode>,
     /// The axes that know where they are.
     pub homed: PerAxis<bool>,
+    /// The axes that start no more than jogs and homing until they are homed.
+    pub awaiting_homing: PerAxis<bool>,
     /// The first segments of a stream are there, and start where the axes rest.
     pub stream_ready: bool,
     /// The first value of an injected voltage is there.
@@ -69,6 +73,10 @@ pub enum Refusal {
     Locked,
     /// The stored settings are damaged or were refused.
     SettingsInvalid,
+    /// The axis moves though the outputs are off.
+    NotAtStandstill(AxisName),
+    /// The axis is not homed, and its settings ask for it.
+    NotHomed(AxisName),
 }
 
 impl Refusal {
@@ -95,6 +103,12 @@ impl Refusal {
             Self::SettingsInvalid => {
                 "the stored settings are damaged or were refused; check the draft, store it, then reset"
             }
+            Self::NotAtStandstill(_) => {
+                "the axis moves though the outputs are off; wait until it stands, or find out what moves it"
+            }
+            Self::NotHomed(_) => {
+                "the axis is not homed: until then it jogs and homes at limits.unhomed_mm_s, and nothing else"
+            }
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(interlock) => match interlock.code {
                 FaultCode::EmergencyStop => "the emergency stop is pressed; release it",
@@ -117,7 +131,9 @@ impl Refusal {
     pub const fn axis(&self) -> Option<AxisName> {
         match self {
             Self::BadInput(interlock) => interlock.axis,
-            Self::AxisBusy(axis) => Some(*axis),
+            Self::AxisBusy(axis) | Self::NotAtStandstill(axis) | Self::NotHomed(axis) => {
+                Some(*axis)
+            }
             _ => None,
         }
     }
@@ -152,11 +168,22 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::Enable if view.settings_invalid => Some(Refusal::SettingsInvalid),
         Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
         Command::Enable if view.locked => Some(Refusal::Locked),
+        Command::Enable if !view.safety.is_enabled() && view.moving.is_some() => {
+            view.moving.map(Refusal::NotAtStandstill)
+        }
         Command::Enable => None,
         _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
         Command::Run | Command::StartStream | Command::StartInjection if view.running => {
             Some(Refusal::AlreadyRunning)
         }
+        Command::Run | Command::StartStream | Command::StartInjection
+            if view.awaiting_homing.contains(&true) =>
+        {
+            let awaiting = view.awaiting_homing;
+            let first = awaiting.named().find(|(_, awaiting)| **awaiting);
+            first.map(|(axis, _)| Refusal::NotHomed(axis))
+        }
+        Command::StartMove(axis) if view.awaiting_homing[axis] => Some(Refusal::NotHomed(axis)),
         Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),
         Command::StartInjection if !view.injection_ready => Some(Refusal::NoInjection),
         Command::Run | Command::StartStream | Command::StartInjection => None,

@@ -104,6 +104,10 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     safety: SafetyState,
     tick: u32,
     interlock: Option<EnableInterlock>,
+    /// An axis that moves though the outputs are off.
+    moving: Option<AxisName>,
+    /// The axes that start no more than jogs and homing until they are homed.
+    awaiting_homing: PerAxis<bool>,
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
@@ -124,6 +128,8 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             safety: SafetyState::default(),
             tick: 0,
             interlock: None,
+            moving: None,
+            awaiting_homing: PerAxis::splat(false),
             held: None,
             settled: 0,
             injection: InjectionState::default(),
@@ -191,6 +197,11 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     /// The bad input that keeps the outputs from being enabled at present, if there is one.
     pub fn interlock(&self) -> Option<EnableInterlock> {
         self.interlock
+    }
+
+    /// An axis that moves while the outputs are off: they are not enabled until it stands.
+    pub fn moving(&self) -> Option<AxisName> {
+        self.moving
     }
 
     /// The last fault that only held the axes ([`Reaction::Hold`]), until the next motion.
@@ -269,6 +280,8 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             safety: state.safety(),
             running: state.is_running(),
             interlock: state.interlock(),
+            moving: state.moving(),
+            awaiting_homing: state.awaiting_homing,
             held: state.held(),
             modes: state.axes.by_ref().map(AxisState::mode),
             homed: state.axes.by_ref().map(AxisState::is_homed),
@@ -368,6 +381,15 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if state.safety == SafetyState::Start && state.interlock.is_none() {
             state.safety = SafetyState::Disabled;
         }
+        for ((axis, memory), awaiting) in self
+            .axes
+            .into_iter()
+            .zip(&state.axes)
+            .zip(&mut state.awaiting_homing)
+        {
+            *awaiting = axis.awaits_homing(memory);
+        }
+        state.moving = if driven { None } else { self.moving(state) };
         if let Some(command) = inputs.command {
             self.handle_command(state, command, driven, tick);
         }
@@ -398,6 +420,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             *code = axis.drive(memory, changed);
         }
         outputs
+    }
+
+    /// The first axis that does not stand.
+    fn moving(&self, state: &StageState<S, N>) -> Option<AxisName> {
+        self.axes
+            .into_iter()
+            .zip(&state.axes)
+            .zip(AxisName::ALL)
+            .find(|((axis, memory), _)| !axis.stands(memory))
+            .map(|(_, name)| name)
     }
 
     /// Advances the references of driven axes.
@@ -522,6 +554,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             return;
         }
         if state.safety.apply(command) {
+            state.moving = None;
             state.held = None;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
                 axis.enable(memory);

@@ -220,6 +220,7 @@ impl Default for LimitSettings {
             silent_s: default!("limits.silent_s"),
             silent_share: default!("limits.silent_share"),
             travel_mm: None,
+            unhomed_mm_s: None,
         }
     }
 }

@@ -17,6 +17,8 @@ const READY: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
     interlock: None,
+    moving: None,
+    awaiting_homing: PerAxis::splat(false),
     held: None,
     modes: PerAxis::splat(quadrant::motion::MotionMode::Hold),
     homed: PerAxis::splat(false),

@@ -19,6 +19,8 @@ const DISABLED: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
     interlock: None,
+    moving: None,
+    awaiting_homing: PerAxis::splat(false),
     held: None,
     modes: PerAxis::splat(MotionMode::Hold),
     homed: PerAxis::splat(false),

@@ -101,6 +101,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     timing: TimingStatistics,
     /// Axes whose new settings are not built yet.
     pending: AxisSet,
+    /// Safety depends on a setting in which they differ.
+    needs_disabled: bool,
     back_buffer: Option<&'a mut Axis<S>>,
     draft: Draft<'a>,
     provenance: Provenance,
@@ -146,6 +148,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             seen: Snapshot::default(),
             timing: TimingStatistics::default(),
             pending: AxisSet::NONE,
+            needs_disabled: false,
             back_buffer: Some(parts.back_buffer),
             draft: if parts.keep_draft {
                 Draft::edited(parts.settings, parts.draft)

@@ -17,6 +17,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
+            Body::Enable if self.needs_disabled && !self.pending.is_empty() => {
+                return Err(busy(format_args!(
+                    "the settings applied last are still being built; ask again"
+                )));
+            }
             Body::Enable => {
                 self.command(Command::Enable)?;
                 self.arm_for_faults();

@@ -1,7 +1,7 @@
 //! Requests about settings: a draft is edited leaf by leaf, and takes effect as a whole.
 
 use super::deferred::Work;
-use super::{Server, busy, index, invalid};
+use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::AxisSwap;
 use crate::hal::SettingsFlash;
 use crate::law::axes::AxisName;
@@ -80,6 +80,12 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             )));
         }
         self.check_rate()?;
+        let safety = self.draft.safety_change();
+        if let Some(leaf) = safety
+            && self.seen.view.safety.drives()
+        {
+            return Err(refused(format_args!("{leaf}")));
+        }
         let changed = match self.draft.apply(FIRMWARE_ELEMENTS) {
             Ok(changed) => changed,
             Err(ApplyError::Refused(error)) => return Err(invalid(format_args!("{error}"))),
@@ -97,6 +103,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             .map(Into::into)
             .collect();
         self.pending = changed;
+        self.needs_disabled = safety.is_some();
         Ok(Reply::Applied(Applied {
             changed,
             restart_needed: false,
@@ -136,6 +143,8 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             name,
             axis,
             streaming: settings.streaming.build(),
+            needs_disabled: self.needs_disabled,
+            more: self.pending.iter().nth(1).is_some(),
         };
         match self.ends.swaps.enqueue(swap) {
             Ok(()) => {

@@ -143,6 +143,20 @@ impl<'a> ConnectedAxis<'a> {
         shape.recording(&samples).ok_or(Stop::Short)
     }
 
+    /// Waits for rest and switches the outputs off, if settings are to change on which safety depends.
+    fn disabled_for(&mut self, stage: &StageSettings) -> Result<(), settings::ExchangeError> {
+        if stage.safety_change(&self.stage).is_none() {
+            return Ok(());
+        }
+        let status = settle::rest(self.client, BEFORE)?;
+        if status.state == MachineState::Enabled {
+            self.client.order(Body::Disable)?;
+            let due = self.client.now() + ENABLING;
+            while self.client.status()?.state == MachineState::Enabled && self.client.now() < due {}
+        }
+        Ok(())
+    }
+
     /// Waits for rest, with the outputs on; says where the axis is.
     fn enabled(&mut self) -> Result<f64, ClientError> {
         let mut status = settle::rest(self.client, BEFORE)?;
@@ -179,7 +193,8 @@ impl TestAxis for ConnectedAxis<'_> {
         let mut stage = self.stage.clone();
         stage.axes[self.axis as usize] = settings.clone();
         stage.validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)?;
-        settings::load(self.client, &stage)
+        self.disabled_for(&stage)
+            .and_then(|()| settings::load(self.client, &stage))
             .map_err(|error| MachineError::Connection(Box::new(error)))?;
         self.stage = stage;
         Ok(())
