@@ -210,12 +210,14 @@ fn a_setting_on_which_safety_depends_is_named() {
 
 /// A row that is added to the table must not forget its column.
 #[test]
-fn every_leaf_of_encoder_amplifier_limits_homing_and_plant_needs_the_outputs_off() {
+fn every_leaf_of_amplifier_limits_homing_plant_and_commissioning_needs_the_outputs_off() {
     for leaf in all() {
         let group = leaf.field.split('.').next().expect("a name");
         let expected = match group {
             "rate_hz" | "encoder" => Exchange::Restart,
-            "streaming" | "amplifier" | "limits" | "homing" | "plant" => Exchange::Disabled,
+            "streaming" | "amplifier" | "limits" | "homing" | "plant" | "commissioned" => {
+                Exchange::Disabled
+            }
             "feedback" | "friction" | "feedforward" => Exchange::Driven,
             other => panic!("{other} is no group"),
         };
