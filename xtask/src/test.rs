@@ -76,7 +76,7 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     let firmware = Beside::start(toolchain)?;
     host(&mut report)?;
     firmware.finish(&mut report)?;
-    emulated(&mut report, toolchain);
+    emulated(&mut report, toolchain)?;
     println!("\n{:.1} min", started.elapsed().as_secs_f64() / 60.0);
     Ok(report.finish())
 }
@@ -143,7 +143,7 @@ fn host(report: &mut Report) -> Result<()> {
         // Setup has installed the browser: the tests that open pages in it must not skip.
         command::run(
             cargo()
-                .args(["test", "--workspace"])
+                .args(["test", "--workspace", "--no-fail-fast"])
                 .env("QUADRANT_BROWSER_TESTS", "required"),
         )
     });
@@ -254,16 +254,29 @@ pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
 }
 
 /// Checks that run in the emulator.
-fn emulated(report: &mut Report, toolchain: Toolchain) {
+fn emulated(report: &mut Report, toolchain: Toolchain) -> Result<()> {
+    // `cargo run` would build the libraries once more: without the features that other packages of the workspace ask for.
+    report.step("the target's tests are built", || {
+        command::run(command::command("cargo").args([
+            "build",
+            "--workspace",
+            "--bin",
+            "target-tests",
+        ]))
+    });
+    let chores = std::env::current_exe()?;
+    let profiles = chores
+        .ancestors()
+        .nth(2)
+        .context("xtask lies in a profile's folder")?;
+    let program = profiles.join("debug/target-tests");
     let mut step = |name: &str, verb: &[&str]| {
         report.step(name, || {
-            let mut cargo = command::command("cargo");
-            cargo
-                .args(["run", "--quiet", "--package", "quadrant-target-tests", "--"])
-                .args(["--toolchain", toolchain.name()])
+            let mut test = command::command(&program);
+            test.args(["--toolchain", toolchain.name()])
                 .args(verb)
                 .env(image::BUILT, "1");
-            command::run(&mut cargo)
+            command::run(&mut test)
         });
     };
     step(
@@ -291,6 +304,7 @@ fn emulated(report: &mut Report, toolchain: Toolchain) {
     report.step("a session through the console, end to end", || {
         transcript::run(toolchain, false)
     });
+    Ok(())
 }
 
 #[cfg(test)]
