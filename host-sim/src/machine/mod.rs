@@ -16,7 +16,8 @@
 //! - [`Machine`], [`TestAxis`]: a machine and an axis that are measured, whatever they are made of;
 //! - [`law`]: the control law and the supervisor alone;
 //! - [`simulated`], [`application`], [`memory_flash`]: the firmware's application in this process;
-//! - [`emulated`], [`emulator`] (feature `emulated`): the firmware's image in QEMU; [`benchmark_job`]: the motion that it is counted with;
+//! - [`emulated`], [`emulator`] (feature `emulated`): the firmware's image in QEMU; [`benchmark_job`]: the motion that it is
+//!   counted with;
 //! - [`Transport`], [`SerialTransport`], [`TcpTransport`], [`Loopback`]: bytes to a machine and back;
 //! - [`simulated_io`]: fault injection at machines that are not real: inputs, supply, log.
 //!
