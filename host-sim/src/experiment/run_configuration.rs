@@ -29,7 +29,8 @@ pub fn identified_settings() -> Result<SettingsFile, SettingsFileError> {
 }
 
 /// The law's knowledge of the plant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum ModelKnowledge {
     /// The plant's own friction, on a plant without imperfections.
     Exact,

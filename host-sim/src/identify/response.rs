@@ -73,8 +73,7 @@ impl FrequencyResponse {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), ResponseError> {
-        let path = path.as_ref();
+    pub fn write_csv(&self, path: &Path) -> Result<(), ResponseError> {
         let refuse = |source| ResponseError::Csv {
             path: path.to_owned(),
             source,
@@ -100,8 +99,7 @@ impl FrequencyResponse {
     ///
     /// # Errors
     /// A file that cannot be read or is not a frequency response; names the row and the column.
-    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, ResponseError> {
-        let path = path.as_ref();
+    pub fn read_csv(path: &Path) -> Result<Self, ResponseError> {
         let refuse = |source| ResponseError::Csv {
             path: path.to_owned(),
             source,

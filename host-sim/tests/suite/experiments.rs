@@ -1,6 +1,5 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
-use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
 use quadrant::command::Command;
 use quadrant::lockstep::Job;
@@ -44,7 +43,7 @@ fn the_same_seed_gives_the_same_outcome() {
 #[test]
 fn combined_feedforward_makes_the_circle_rounder() {
     let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
-    let circles = run_circles::<f32>(&Configuration::EXTREMES, &setup, 1).unwrap();
+    let circles = run_circles(&Configuration::EXTREMES, &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
 }
@@ -105,13 +104,13 @@ fn our_controllers_follow_the_recorded_emps_reference() {
         return;
     }
     let axis = RecordedAxis::Emps;
-    let record = Record::read(file, &axis.limits()).unwrap();
-    let outcomes = replay::<f32>(
+    let record = Record::read(file.as_ref(), &axis.limits()).unwrap();
+    let outcomes = replay(
         &record,
         axis,
         &RunConfiguration::exact(StageSettings::simulated()),
         1,
-        &ProgressBar::hidden(),
+        &|| {},
     )
     .unwrap();
     let rms = |configuration| {

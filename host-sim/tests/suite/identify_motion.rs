@@ -24,7 +24,7 @@ fn emps() -> Option<Recording> {
     let path: PathBuf =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/emps/emps.csv");
     if path.exists() {
-        return Some(Recording::read_csv(path).unwrap());
+        return Some(Recording::read_csv(&path).unwrap());
     }
     println!(
         "SKIPPED: the EMPS recording is not at ../shared/data/emps/emps.csv beside the project"

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::{Output, command_line, share};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, Page};

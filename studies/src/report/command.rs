@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use quadrant_sim::command::output::{Output, share};
+use quadrant_cli::output::{Output, share};
 use quadrant_sim::report::{Block, Page, Table};
 
 use crate::report::{Context, Done, PARTS, Part, Request, compute};
@@ -87,7 +87,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             if shown {
                 output.table(table)?;
             } else {
-                table.write_csv(output.file(&format!("{}.csv", table.id))?)?;
+                table.write_csv(&output.file(&format!("{}.csv", table.id))?)?;
             }
         }
     }

@@ -60,7 +60,7 @@ impl Context {
         }
         let setups = self.setups();
         let configurations = Configuration::all();
-        let comparison = self.request(&setups, &configurations).run::<f32>(advance)?;
+        let comparison = self.request(&setups, &configurations).run(advance)?;
         Ok(self.comparison.get_or_init(|| comparison))
     }
 

@@ -4,8 +4,8 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, progress};
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::plant::cutting::{Component, Milling};
@@ -85,7 +85,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output.table(&table)?;
     }
     let all = robustness_full_table(&report);
-    all.write_csv(output.file(&format!("{}.csv", all.id))?)?;
+    all.write_csv(&output.file(&format!("{}.csv", all.id))?)?;
     write_cutting_force(output)?;
     let page = Page {
         title: "Robustness on the simulated stage".to_owned(),
@@ -131,7 +131,7 @@ fn write_cutting_force(output: &Output) -> anyhow::Result<()> {
     };
     let (feed, normal) = (force(Component::Feed), force(Component::Normal));
     write_trace(
-        output.file("synthetic-cutting-force.csv")?,
+        &output.file("synthetic-cutting-force.csv")?,
         &[("t_s", &time), ("force_x_n", &normal), ("force_y_n", &feed)],
     )?;
     Ok(())

@@ -185,7 +185,7 @@ fn the_committed_force_is_the_generated_one() {
         env!("CARGO_MANIFEST_DIR"),
         "/../host-sim/data/synthetic-cutting-force.csv"
     );
-    let [across, along, none] = ForceRecord::read_csv(path).unwrap().axes;
+    let [across, along, none] = ForceRecord::read_csv(path.as_ref()).unwrap().axes;
     assert_eq!(none, None);
     let cut = Milling::slot();
     for (force, component) in [(across, Component::Normal), (along, Component::Feed)] {

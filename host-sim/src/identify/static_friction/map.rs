@@ -56,8 +56,7 @@ impl FrictionMap {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), MapError> {
-        let path = path.as_ref();
+    pub fn write_csv(&self, path: &Path) -> Result<(), MapError> {
         let refuse = |source| MapError::Csv {
             path: path.to_owned(),
             source,
@@ -84,8 +83,7 @@ impl FrictionMap {
     ///
     /// # Errors
     /// A file that cannot be read or is not a friction map; names the row and the column.
-    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, MapError> {
-        let path = path.as_ref();
+    pub fn read_csv(path: &Path) -> Result<Self, MapError> {
         let refuse = |source| MapError::Csv {
             path: path.to_owned(),
             source,
