@@ -95,7 +95,7 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
         let time_s = 2e-3 * f64::from(index);
         writeln!(reference, "{time_s},{}", 5.0 * (2.0 * time_s).sin().powi(2)).unwrap();
     }
-    std::fs::write(&at.join("reference.csv"), reference).unwrap();
+    std::fs::write(at.join("reference.csv"), reference).unwrap();
     let shown = succeed(
         at,
         &[

@@ -92,7 +92,7 @@ fn the_same_session_is_the_same_to_the_last_byte() {
     let [one, other] = [0, 1].map(|_| {
         let folder = tempfile::tempdir().unwrap();
         let said = succeeds(folder.path(), &["--seed", "3"], script);
-        (said, std::fs::read(&folder.path().join("a.csv")).unwrap())
+        (said, std::fs::read(folder.path().join("a.csv")).unwrap())
     });
     assert_eq!(one, other);
     // What happened before and while it was recorded is told all the same.
@@ -169,7 +169,7 @@ fn a_gain_is_changed_while_the_axis_moves() {
 fn a_part_program_is_followed_and_ends_where_it_says() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::write(
-        &folder.path().join("part.ngc"),
+        folder.path().join("part.ngc"),
         "G21 G90 G17 G94\nF900\nG1 X10\nG3 X10 Y8 J4\nG1 X2 Y8 Z1.5\nM2\n",
     )
     .unwrap();
@@ -374,7 +374,7 @@ fn a_flash_file_keeps_what_was_stored_from_one_command_to_the_next() {
     let kept = succeeds(folder.path(), &flash, &format!("provenance\n{get}"));
     assert_eq!(kept, "a test\n0.8\n");
     assert_ne!(succeeds(folder.path(), &[], get), "0.8\n");
-    std::fs::write(&folder.path().join("short"), "no flash").unwrap();
+    std::fs::write(folder.path().join("short"), "no flash").unwrap();
     let refused = session(folder.path(), &["--flash", "short"], get);
     let errors = String::from_utf8(refused.stderr).unwrap();
     assert!(errors.contains("short has 8 bytes"), "{errors}");

@@ -77,7 +77,7 @@ fn what_cannot_be_measured_or_fitted_is_refused_with_a_remedy() {
     assert!(fail(at, &["frf"]).contains("--axis"));
     let missing = fail(at, &["frf", "--record", "none.csv"]);
     assert!(missing.contains("none.csv"), "{missing}");
-    std::fs::write(&at.join("short.csv"), "t_s,position_mm\n0,0\n").unwrap();
+    std::fs::write(at.join("short.csv"), "t_s,position_mm\n0,0\n").unwrap();
     let column = fail(at, &["frf", "--record", "short.csv"]);
     assert!(column.contains("no column voltage_v"), "{column}");
 }

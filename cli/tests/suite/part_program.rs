@@ -32,7 +32,7 @@ fn the_sample_programs_run_on_the_stage_and_what_is_written_can_be_replayed() {
             "x",
         ],
     );
-    std::fs::write(&at.join("bad.ngc"), "G21\nG1 X10\n").unwrap();
+    std::fs::write(at.join("bad.ngc"), "G21\nG1 X10\n").unwrap();
     let refused = command::fail(at, &["replay", "--gcode", "bad.ngc"]);
     assert!(refused.contains("line 2: G1 has no feed"), "{refused}");
     let refused = command::fail(at, &["replay", "--gcode", "bad.ngc", "--axis", "x"]);

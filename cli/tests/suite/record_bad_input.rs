@@ -60,7 +60,7 @@ fn spoilt(header: &str, edit: impl Fn(usize, &mut Vec<String>)) -> String {
 /// Returns the error of `identify frf --record` for a text that it must refuse.
 fn refusal(text: &str, options: &[&str]) -> String {
     let folder = TempDir::new().unwrap();
-    std::fs::write(&folder.path().join("bad.csv"), text).unwrap();
+    std::fs::write(folder.path().join("bad.csv"), text).unwrap();
     let mut arguments = vec!["frf", "--record", "bad.csv"];
     arguments.extend(options);
     let (done, message) = identify(folder.path(), &arguments);
@@ -183,7 +183,7 @@ fn a_wrong_sample_rate_is_refused() {
     // Each is good by itself, and together they are not.
     let folder = TempDir::new().unwrap();
     for (name, step_s) in [("fast.csv", 1e-4), ("slow.csv", 1e-3)] {
-        std::fs::write(&folder.path().join(name), timed(step_s)).unwrap();
+        std::fs::write(folder.path().join(name), timed(step_s)).unwrap();
     }
     let (done, message) = identify(folder.path(), &["frf", "--record", "fast.csv", "slow.csv"]);
     assert!(
@@ -278,7 +278,7 @@ fn a_position_that_does_not_follow_the_voltage_is_pointed_out() {
         cells[2] = other.split(',').nth(2).unwrap().to_owned();
     });
     let folder = TempDir::new().unwrap();
-    std::fs::write(&folder.path().join("shuffled.csv"), shuffled).unwrap();
+    std::fs::write(folder.path().join("shuffled.csv"), shuffled).unwrap();
     let (done, message) = identify(folder.path(), &["frf", "--record", "shuffled.csv"]);
     assert!(
         done && message.contains("hardly a line is coherent"),
@@ -335,13 +335,13 @@ fn options_that_cannot_be_are_refused() {
 fn the_other_steps_refuse_spoilt_recordings_too() {
     let folder = TempDir::new().unwrap();
     let dead = spoilt(HEADER, |_, cells| cells[3] = "0".to_owned());
-    std::fs::write(&folder.path().join("dead.csv"), dead).unwrap();
+    std::fs::write(folder.path().join("dead.csv"), dead).unwrap();
     std::fs::write(
-        &folder.path().join("map.csv"),
+        folder.path().join("map.csv"),
         "velocity_mm_s,voltage_v\n1,0.1\n",
     )
     .unwrap();
-    std::fs::write(&folder.path().join("frf.csv"), "frequency_hz\n1\n").unwrap();
+    std::fs::write(folder.path().join("frf.csv"), "frequency_hz\n1\n").unwrap();
     for (arguments, words) in [
         (
             ["motor-constant", "--record", "dead.csv"],

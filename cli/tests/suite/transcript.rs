@@ -20,7 +20,7 @@ struct Told {
 /// Plays a script at one of the console's places.
 fn play(place: &[&str], script: &str) -> Told {
     let folder = tempfile::tempdir().unwrap();
-    fs::write(&folder.path().join("stage.toml"), SETTINGS).unwrap();
+    fs::write(folder.path().join("stage.toml"), SETTINGS).unwrap();
     let mut child = Command::new(env!("CARGO_BIN_EXE_quadrant"))
         .args(["connect", "--echo"])
         .args(place)

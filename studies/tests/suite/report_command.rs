@@ -35,7 +35,7 @@ fn a_part_is_the_same_to_the_byte_from_its_file_and_computed_again_on_another_nu
         "{}",
         shown(&first)
     );
-    let page = || std::fs::read(&at.join("a/report.html")).unwrap();
+    let page = || std::fs::read(at.join("a/report.html")).unwrap();
     let computed = page();
 
     let kept = report(at, "2", &["--only", "chapter-4", "--out", "a"]);

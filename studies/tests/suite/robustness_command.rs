@@ -50,14 +50,14 @@ fn what_cannot_be_is_refused_with_what_could() {
         let said = fail(folder.path(), arguments);
         assert!(said.contains(words), "{said}");
     }
-    std::fs::write(&folder.path().join("f.csv"), "t_s,force_n\n0,1\n").unwrap();
+    std::fs::write(folder.path().join("f.csv"), "t_s,force_n\n0,1\n").unwrap();
     let said = fail(folder.path(), &["robustness", "--force", "f.csv"]);
     assert!(said.contains("force_x_n"), "{said}");
     let rows: String = (0..20)
         .map(|k| format!("{},{}\n", f64::from(k) * 1e-3, 2e5))
         .collect();
     std::fs::write(
-        &folder.path().join("g.csv"),
+        folder.path().join("g.csv"),
         format!("t_s,force_x_n\n{rows}"),
     )
     .unwrap();
