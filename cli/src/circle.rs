@@ -1,38 +1,15 @@
 //! `quadrant circle`.
 
-use std::path::PathBuf;
-
+use crate::plane::PlaneName;
 use anyhow::{Context, ensure};
-use clap::{Args, ValueEnum};
-use quadrant::reference::Plane;
+use clap::Args;
+use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_sim::circle::page::{circle_page, circle_tables};
 use quadrant_sim::circle::{CircleRequest, run_circle_tests};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::settings_file::SettingsFile;
-
-/// A plane, as G17 to G19 select it.
-#[derive(Clone, Copy, Debug, ValueEnum)]
-enum PlaneName {
-    /// x and y, G17.
-    Xy,
-    /// y and z, G19.
-    Yz,
-    /// z and x, G18.
-    Zx,
-}
-
-impl PlaneName {
-    const fn plane(self) -> Plane {
-        match self {
-            Self::Xy => Plane::Xy,
-            Self::Yz => Plane::Yz,
-            Self::Zx => Plane::Zx,
-        }
-    }
-}
 
 /// Options of `quadrant circle`.
 #[derive(Clone, Debug, Args)]
@@ -52,10 +29,8 @@ pub(super) struct Arguments {
     /// Number of noise seeds, from --seed on, 1 to 100; with several, tables give means and spreads over them.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
-    /// Settings of the control law, as `quadrant commission` leaves them; without them, those that commissioning the
-    /// simulated stage gave.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     #[command(flatten)]
     output: Output,
 }
@@ -73,10 +48,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             );
         }
     }
-    let stage = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?.stage,
-        None => identified_settings()?.stage,
-    };
+    let stage = arguments.settings.read()?.stage;
     let setup = RunConfiguration::identified(stage);
     let last_seed = output.seed.checked_add(arguments.seeds - 1);
     let last_seed =

@@ -1,28 +1,22 @@
 //! `quadrant compare`.
 
-use std::path::PathBuf;
-
 use clap::Args;
+use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, share};
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::comparison::{Comparison, Request};
 use quadrant_sim::compare::page::{comparison_page, comparison_tables};
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{
-    ModelKnowledge, RunConfiguration, identified_settings,
-};
+use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::write_trace;
-use quadrant_sim::settings_file::SettingsFile;
 
 /// Options of `quadrant compare`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
-    /// Settings of the control law, as `quadrant commission` leaves them; without them, those that commissioning the
-    /// simulated stage gave.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     /// Noise seeds of the runs with the identified model, from --seed on, 1 to 100; tables give means over them.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
@@ -33,7 +27,7 @@ pub(super) struct Arguments {
 impl Default for Arguments {
     fn default() -> Self {
         Self {
-            settings: None,
+            settings: LawSettings::default(),
             seeds: 1,
             output: Output::default(),
         }
@@ -49,10 +43,7 @@ const STEPS: u64 = 1_000_000;
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, seeds, .. } = arguments;
-    let settings = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?,
-        None => identified_settings()?,
-    };
+    let settings = arguments.settings.read()?;
     let setups = RunConfiguration::both(&settings.stage);
     let configurations = Configuration::all();
     let bar = share("comparing on the simulated stage");
@@ -80,10 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             write_errors(output, &comparison, knowledge, velocity)?;
         }
     }
-    let settings = arguments.settings.as_ref();
-    let settings = settings.map_or_else(String::new, |path| {
-        format!(" --settings {}", path.display())
-    });
+    let settings = arguments.settings.option();
     let mut command = format!("quadrant compare{settings} --seed {}", output.seed);
     if *seeds > 1 {
         command += &format!(" --seeds {seeds}");

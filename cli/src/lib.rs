@@ -4,6 +4,7 @@
 #![allow(missing_docs)]
 
 pub mod axis;
+pub mod law_settings;
 pub mod output;
 
 /// Returns an error with its causes; most messages contain their cause's already.

@@ -92,17 +92,29 @@ impl Output {
         for table in &tables {
             self.table(table)?;
         }
+        let section = Section {
+            id: "results".to_owned(),
+            heading: "Results".to_owned(),
+            provenance: None,
+            prose: vec![],
+            blocks: tables.into_iter().map(Block::Table).collect(),
+        };
+        self.section(title, subtitle, section, name)
+    }
+
+    /// Writes a page of one section.
+    pub fn section(
+        &self,
+        title: &str,
+        subtitle: &str,
+        section: Section,
+        name: &str,
+    ) -> anyhow::Result<()> {
         let page = Page {
             title: title.to_owned(),
             subtitle: subtitle.to_owned(),
             provenance: provenance(&command_line(), self.seed),
-            sections: vec![Section {
-                id: "results".to_owned(),
-                heading: "Results".to_owned(),
-                provenance: None,
-                prose: vec![],
-                blocks: tables.into_iter().map(Block::Table).collect(),
-            }],
+            sections: vec![section],
         };
         self.page(&page, name)
     }
@@ -113,6 +125,14 @@ pub fn share(what: &'static str) -> ProgressBar {
     let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(1000).with_style(style).with_message(what)
+}
+
+/// Runs `work` under a progress bar; what it is given takes the share that is done, 0 to 1.
+pub fn with_bar<T>(message: &'static str, work: impl FnOnce(&mut dyn FnMut(f64)) -> T) -> T {
+    let bar = share(message);
+    let done = work(&mut |done| bar.set_position((1000.0 * done) as u64));
+    bar.finish_and_clear();
+    done
 }
 
 /// A progress bar over `runs`; hidden where nobody watches.

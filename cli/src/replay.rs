@@ -4,16 +4,14 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use clap::Args;
+use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, progress};
-use quadrant_sim::experiment::run_configuration::{
-    ModelKnowledge, RunConfiguration, identified_settings,
-};
+use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Record;
 use quadrant_sim::replay::recorded;
 use quadrant_sim::replay::recorded::RecordedAxis;
 use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
-use quadrant_sim::settings_file::SettingsFile;
 
 use super::replay_program::{self, ProgramOptions};
 
@@ -39,10 +37,8 @@ pub(super) struct Arguments {
     /// one without. The controllers are the same.
     #[arg(long, value_enum, default_value = "identified")]
     model: ModelKnowledge,
-    /// Settings of the simulated stage's control law, as `quadrant commission` leaves them; without them, those that
-    /// commissioning the simulated stage gave.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     #[command(flatten)]
     output: Output,
 }
@@ -57,13 +53,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
     } = arguments;
     ensure!(
-        settings.is_none() || *axis != Some(RecordedAxis::Emps),
+        settings.path.is_none() || *axis != Some(RecordedAxis::Emps),
         "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
     );
-    let stage = match settings {
-        Some(path) => SettingsFile::read(path)?.stage,
-        None => identified_settings()?.stage,
-    };
+    let stage = settings.read()?.stage;
     let setup = RunConfiguration::new(*model, stage);
     if let Some(path) = &program.gcode {
         return replay_program::run(path, program, &setup, output);
@@ -80,10 +73,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let outcomes = recorded::replay(&record, *axis, &setup, output.seed, &|| bar.inc(1))?;
     bar.finish_and_clear();
     output.table(&recorded_table(&outcomes, *axis))?;
-    let settings = settings.as_ref();
-    let settings = settings.map_or_else(String::new, |path| {
-        format!(" --settings {}", path.display())
-    });
+    let settings = settings.option();
     let model = match model {
         ModelKnowledge::Identified => "",
         ModelKnowledge::Exact => " --model exact",

@@ -7,7 +7,7 @@ use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::{Machine, TestAxis};
-use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use quadrant_sim::settings_file::SettingsFile;
 
 use super::endpoint::Endpoint;
 use quadrant_cli::axis::Axis;
@@ -166,16 +166,11 @@ impl Destination {
             None => SettingsFile::new(machine.unwrap_or_else(StageSettings::simulated)),
         };
         change(&mut file.stage.axes[axis.index()]);
-        file.provenance.push(Provenance {
-            command: command_line(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            axis: axis.name().to_owned(),
-            records: records
-                .iter()
-                .map(|path| path.display().to_string())
-                .collect(),
-            sets: sets.iter().map(|&part| part.to_owned()).collect(),
-        });
+        let records = records
+            .iter()
+            .map(|path| path.display().to_string())
+            .collect();
+        file.add_provenance(&command_line(), axis.name(), records, sets);
         file.write(path)?;
         println!(
             "{}: the settings with this {} of {}",

@@ -96,6 +96,23 @@ impl SettingsFile {
         }
     }
 
+    /// Adds a command that has set `sets` on an axis from `records`.
+    pub fn add_provenance(
+        &mut self,
+        command: &str,
+        axis: &str,
+        records: Vec<String>,
+        sets: &[&str],
+    ) {
+        self.provenance.push(Provenance {
+            command: command.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            axis: axis.to_owned(),
+            records,
+            sets: sets.iter().map(|&part| part.to_owned()).collect(),
+        });
+    }
+
     /// Reads and checks a file.
     ///
     /// # Errors

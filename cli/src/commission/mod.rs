@@ -19,7 +19,7 @@ use quadrant_sim::identify::pages::revise::revise_table;
 use quadrant_sim::machine::{Machine, TestAxis};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
-use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
 use super::endpoint::Endpoint;
@@ -330,15 +330,12 @@ impl Found {
         let command = command_line();
         let records = saved::write(output, found, checked)?;
         file.stage.axes[axis as usize] = found.settings.clone();
-        file.provenance.push(Provenance {
-            command: command.clone(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            axis: axis.as_str().to_owned(),
+        file.add_provenance(
+            &command,
+            axis.as_str(),
             records,
-            sets: ["feedback", "friction", "feedforward", "plant"]
-                .map(str::to_owned)
-                .into(),
-        });
+            &["feedback", "friction", "feedforward", "plant"],
+        );
         file.write(path)?;
         let page = commission_page(who, found, checked, provenance(&command, output.seed));
         let mut lines = vec![format!("{}: the settings of the stage", path.display())];

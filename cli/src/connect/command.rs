@@ -8,6 +8,7 @@ use quadrant::link::message::Channel;
 use quadrant_sim::machine::simulated_io;
 
 use crate::commission::Request;
+use crate::plane::PlaneName;
 use crate::subject::travel;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
@@ -303,17 +304,6 @@ pub(super) struct ScopeOptions {
     /// Write what was sampled as CSV.
     #[arg(long, value_name = "FILE")]
     pub(super) csv: Option<PathBuf>,
-}
-
-/// Plane of a circle.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-pub(super) enum PlaneName {
-    /// Horizontal; G17 in a part program.
-    Xy,
-    /// Of the second and third axis; G19.
-    Yz,
-    /// Of the third and first axis; G18.
-    Zx,
 }
 
 /// Event that a capture waits for.

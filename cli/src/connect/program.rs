@@ -7,7 +7,7 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use quadrant::link::message::Body;
-use quadrant::reference::{Plane, Sense, circle};
+use quadrant::reference::{Sense, circle};
 use quadrant::settings::PlanSettings;
 use quadrant_sim::client::set_points::{references_mm, set_points, stream};
 use quadrant_sim::client::{Client, settings, settle};
@@ -15,7 +15,7 @@ use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use serde_json::json;
 
 use super::answer::Answer;
-use super::command::{CircleOptions, PlaneName, StreamOptions};
+use super::command::{CircleOptions, StreamOptions};
 
 pub(super) fn plan(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let text =
@@ -37,11 +37,6 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
             bail!("{name} {value}: it must be above 0 and at most {most}");
         }
     }
-    let (plane, plane_name) = match options.plane {
-        PlaneName::Xy => (Plane::Xy, "xy"),
-        PlaneName::Yz => (Plane::Yz, "yz"),
-        PlaneName::Zx => (Plane::Zx, "zx"),
-    };
     let sense = if options.clockwise {
         Sense::Clockwise
     } else {
@@ -49,7 +44,7 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
     };
     let feed_mm_s = options.feed_mm_min / 60.0;
     let motions = circle(
-        plane,
+        options.plane.plane(),
         sense,
         options.radius_mm,
         feed_mm_s,
@@ -61,8 +56,9 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
     let turn_s = TAU * options.radius_mm / feed_mm_s;
     let duration_s = options.turns * turn_s + 2.0 * options.lead_s;
     let text = format!(
-        "a circle of {} mm in {plane_name} at {feed_mm_s:.3} mm/s: {duration_s:.3} s; `run` starts it",
-        options.radius_mm
+        "a circle of {} mm in {} at {feed_mm_s:.3} mm/s: {duration_s:.3} s; `run` starts it",
+        options.radius_mm,
+        options.plane.name()
     );
     Ok(Answer::new(text, json!({ "duration_s": duration_s })))
 }

@@ -8,7 +8,7 @@ use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_cli::output::Output;
 use quadrant_sim::design::Form;
-use quadrant_sim::settings_file::{Provenance, SettingsFile};
+use quadrant_sim::settings_file::SettingsFile;
 
 use quadrant_cli::axis::Axis;
 
@@ -126,13 +126,7 @@ impl Model {
         records: Vec<String>,
         sets: &str,
     ) -> anyhow::Result<()> {
-        file.provenance.push(Provenance {
-            command: command.to_owned(),
-            version: env!("CARGO_PKG_VERSION").to_owned(),
-            axis: self.axis.name().to_owned(),
-            records,
-            sets: vec![sets.to_owned()],
-        });
+        file.add_provenance(command, self.axis.name(), records, &[sets]);
         let path = output.file("settings.toml")?;
         file.write(&path)?;
         println!(

@@ -11,12 +11,10 @@ use quadrant_sim::identify::frf::{
 };
 use quadrant_sim::identify::pages::linear::response_section;
 use quadrant_sim::machine::TestAxis;
-use quadrant_sim::pages::provenance;
 
-use super::page::page;
 use super::recorded;
 use crate::subject::{Measured, Subject};
-use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::output::{Output, with_bar};
 
 /// The settling time of a fresh measurement, s.
 const SETTLING_S: f64 = 0.7;
@@ -138,11 +136,9 @@ pub(crate) fn excite(
     settings: &FrfSettings,
 ) -> anyhow::Result<FrfMeasurement> {
     test_axis.apply(&measuring_settings(base))?;
-    let bar = share("exciting the axis");
-    let found = measure(test_axis, settings, &mut |done| {
-        bar.set_position((1000.0 * done) as u64);
+    let found = with_bar("exciting the axis", |progress| {
+        measure(test_axis, settings, progress)
     })?;
-    bar.finish_and_clear();
     Ok(found)
 }
 
@@ -203,11 +199,10 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
              excitation lost in noise or friction?"
         );
     }
-    let page = page(
+    output.section(
         "Frequency response",
         &title,
-        vec![response_section(&found, None)],
-        provenance(&command_line(), output.seed),
-    );
-    output.page(&page, "frf.html")
+        response_section(&found, None),
+        "frf.html",
+    )
 }

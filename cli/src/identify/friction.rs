@@ -11,13 +11,11 @@ use quadrant_sim::identify::static_friction::{
     Exponent, FrictionMap, StaticFrictionSettings, fit_map, measure,
 };
 use quadrant_sim::machine::TestAxis;
-use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Recording;
 
-use super::page::page;
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify static-friction`.
 #[derive(Clone, Debug, Args)]
@@ -58,11 +56,9 @@ pub(crate) fn run_at_velocities(
     settings: &StaticFrictionSettings,
 ) -> anyhow::Result<(FrictionMap, Vec<Recording>)> {
     test_axis.apply(&measuring_settings(base))?;
-    let bar = share("moving at constant velocity");
-    let found = measure(test_axis, settings, &mut |done| {
-        bar.set_position((1000.0 * done) as u64);
+    let found = with_bar("moving at constant velocity", |progress| {
+        measure(test_axis, settings, progress)
     })?;
-    bar.finish_and_clear();
     Ok(found)
 }
 
@@ -105,13 +101,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     map.write_csv(&output.file("friction-map.csv")?)?;
     let found = fit_map(&map, exponent)?;
     output.table(&friction_table(&found))?;
-    let page = page(
+    output.section(
         "Static friction",
         &title,
-        vec![friction_section(&map, &found)],
-        provenance(&command_line(), output.seed),
-    );
-    output.page(&page, "static-friction.html")?;
+        friction_section(&map, &found),
+        "static-friction.html",
+    )?;
     let records = arguments.record.as_slice();
     destination.write(subject, stage, records, &["friction"], |settings| {
         let gms = settings.friction.gms.clone();

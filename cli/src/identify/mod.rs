@@ -5,7 +5,6 @@ pub(super) mod friction;
 pub(super) mod motion;
 pub(super) mod motor_constant;
 mod nctf;
-mod page;
 mod plant;
 mod recorded;
 mod revise;

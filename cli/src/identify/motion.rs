@@ -16,7 +16,7 @@ use quadrant_sim::record::Recording;
 
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::output::{Output, command_line, share, with_bar};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]
@@ -155,12 +155,10 @@ pub(crate) fn move_to_and_fro(
     test_axis: &mut dyn TestAxis,
     rounds: usize,
 ) -> anyhow::Result<Recording> {
-    let bar = share("moving to and fro");
-    let recording = shuttle(test_axis, rounds, &mut |done| {
-        bar.set_position((1000.0 * done) as u64);
+    let found = with_bar("moving to and fro", |progress| {
+        shuttle(test_axis, rounds, progress)
     })?;
-    bar.finish_and_clear();
-    Ok(recording)
+    Ok(found)
 }
 
 /// The record, its title on a page, and the settings of the machine, if one was measured.

@@ -11,12 +11,10 @@ use quadrant_sim::identify::motor_constant::{
 use quadrant_sim::identify::pages::linear::motor_constant_table;
 use quadrant_sim::identify::pages::motor_constant::motor_constant_section;
 use quadrant_sim::machine::TestAxis;
-use quadrant_sim::pages::provenance;
 
-use super::page::page;
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify motor-constant`.
 #[derive(Clone, Debug, Args)]
@@ -91,13 +89,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let mass = arguments.moving_mass_kg;
     output.table(&motor_constant_table(&motor, mass))?;
-    let page = page(
+    output.section(
         "Motor constant",
         &title,
-        vec![motor_constant_section(&motor, mass)],
-        provenance(&command_line(), output.seed),
-    );
-    output.page(&page, "motor-constant.html")?;
+        motor_constant_section(&motor, mass),
+        "motor-constant.html",
+    )?;
     let records = arguments.record.as_slice();
     let rate_hz = stage
         .as_ref()
@@ -120,10 +117,8 @@ pub(crate) fn step_voltage(
     settings: &MotorConstantSettings,
 ) -> anyhow::Result<MotorConstant> {
     test_axis.apply(&zero_gain_settings(base))?;
-    let bar = share("voltage steps in open loop");
-    let motor = measure(test_axis, settings, &mut |done| {
-        bar.set_position((1000.0 * done) as u64);
+    let found = with_bar("voltage steps in open loop", |progress| {
+        measure(test_axis, settings, progress)
     })?;
-    bar.finish_and_clear();
-    Ok(motor)
+    Ok(found)
 }

@@ -12,13 +12,11 @@ use quadrant_sim::identify::characteristic::{
 };
 use quadrant_sim::identify::pages::characteristic::{characteristic_section, characteristic_table};
 use quadrant_sim::machine::TestAxis;
-use quadrant_sim::pages::provenance;
 
-use super::page::page;
 use super::recorded;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::axis::Axis;
-use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify nctf`.
 #[derive(Clone, Debug, Args)]
@@ -94,13 +92,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .unwrap_or(settings.limits.max_velocity_mm_s);
     let points = found.points(surface.slope_per_s, most_mm_s);
     output.table(&characteristic_table(&points))?;
-    let page = page(
+    output.section(
         "Nominal characteristic trajectory",
         &title,
-        vec![characteristic_section(&found, surface.slope_per_s, &points)],
-        provenance(&command_line(), output.seed),
-    );
-    output.page(&page, "nctf.html")?;
+        characteristic_section(&found, surface.slope_per_s, &points),
+        "nctf.html",
+    )?;
     let records = arguments.record.as_slice();
     destination.write(subject, machine, records, &["feedback.nctf"], |settings| {
         settings.feedback.nctf = Some(NctfGains {
@@ -118,10 +115,8 @@ fn coast(
     settings: &CharacteristicSettings,
 ) -> anyhow::Result<Characteristic> {
     test_axis.apply(&zero_gain_settings(base))?;
-    let bar = share("coasting in open loop");
-    let found = measure(test_axis, settings, &mut |done| {
-        bar.set_position((1000.0 * done) as u64);
+    let found = with_bar("coasting in open loop", |progress| {
+        measure(test_axis, settings, progress)
     })?;
-    bar.finish_and_clear();
     Ok(found)
 }

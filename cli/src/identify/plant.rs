@@ -3,17 +3,15 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant_cli::output::{Output, command_line};
+use quadrant_cli::output::Output;
 use quadrant_sim::identify::pages::linear::{
     fitted_response_section, plant_tables, response_section,
 };
 use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Block;
 
 use super::frf::Measurement;
-use super::page::page;
 use super::recorded;
 use crate::subject::{Destination, Subject};
 
@@ -69,13 +67,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output.table(table)?;
     }
     section.blocks.splice(0..0, tables.map(Block::Table));
-    let page = page(
-        "Linear model",
-        &title,
-        vec![section],
-        provenance(&command_line(), output.seed),
-    );
-    output.page(&page, "plant.html")?;
+    output.section("Linear model", &title, section, "plant.html")?;
     let records = arguments.record.as_slice();
     let destination = &arguments.destination;
     destination.write(subject, stage, records, &["plant"], |settings| {

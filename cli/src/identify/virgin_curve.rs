@@ -10,13 +10,11 @@ use quadrant_sim::identify::pages::friction::{gms_table, presliding_section};
 use quadrant_sim::identify::single_state::with_all_models;
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveSettings, identify, measure};
 use quadrant_sim::machine::TestAxis;
-use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Recording;
 
-use super::page::page;
 use super::recorded;
 use crate::subject::{Destination, Subject};
-use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::output::{Output, with_bar};
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]
@@ -81,11 +79,9 @@ impl Sine {
             frequency_hz: self.frequency_hz.unwrap_or(usual.frequency_hz),
             cycles: self.cycles.unwrap_or(usual.cycles),
         };
-        let bar = share("moving slowly to and fro");
-        let recording = measure(test_axis, &sine, &mut |done| {
-            bar.set_position((1000.0 * done) as u64);
+        let recording = with_bar("moving slowly to and fro", |progress| {
+            measure(test_axis, &sine, progress)
         })?;
-        bar.finish_and_clear();
         Ok((recording, sine))
     }
 }
@@ -140,13 +136,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .zip(&found.knots_mm)
         .map(|(element, knot)| element.stiffness_v_per_mm * knot)
         .sum();
-    let page = page(
+    output.section(
         "Pre-sliding friction",
         &title,
-        vec![presliding_section(&found, breakaway_v)],
-        provenance(&command_line(), output.seed),
-    );
-    output.page(&page, "virgin-curve.html")?;
+        presliding_section(&found, breakaway_v),
+        "virgin-curve.html",
+    )?;
     let records = arguments.record.as_slice();
     destination.write(subject, stage, records, &["friction"], |settings| {
         let sliding = settings.friction.sliding;
