@@ -10,7 +10,7 @@ use anyhow::Context;
 use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant_sim::commission::page::{commission_page, gains_table, verdict_table};
+use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
 use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
@@ -221,9 +221,9 @@ impl Job<'_> {
         }
         let verdict: Vec<_> = found
             .found
-            .verdicts
+            .results
             .iter()
-            .map(|verdict| json!({ "law": verdict.law, "rms_um": 1e3 * verdict.score.rms_mm }))
+            .map(|result| json!({ "law": result.law, "rms_um": 1e3 * result.score.rms_mm }))
             .collect();
         let data = json!({
             "settings": path,
@@ -286,8 +286,8 @@ impl Found {
             gms_table(&found.presliding.0),
             gains_table(found),
         ];
-        if !found.verdicts.is_empty() {
-            tables.push(verdict_table(&found.verdicts));
+        if !found.results.is_empty() {
+            tables.push(results_table(&found.results));
         }
         if let Some(checked) = &self.checked {
             tables.push(revise_table(&found.plant.plant, &checked.revisions));

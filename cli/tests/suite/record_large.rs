@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::machine::{Drive, Experiment, SimulatedTestAxis, TestAxis};
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::RecordError;
 use quadrant_sim::record::Recording;
 
@@ -21,7 +21,7 @@ const RATE_HZ: f64 = 1e4;
 
 /// An axis shaken in open loop.
 fn shaken() -> Recording {
-    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let excitation = Excitation {
         waveform: Waveform::Random,
         rms_v: 0.3,

@@ -21,7 +21,9 @@ use crate::experiment::run::{RunError, run};
 use crate::experiment::run_configuration::RunConfiguration;
 use crate::identify::single_state::with_all_models;
 use crate::machine::LawMachine;
-use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
+use crate::plant::{
+    AxisParameters, Drive, FrictionParameters, Imperfections, SimulatedStage, StageParameters,
+};
 use crate::record::{AxisLimits, Record};
 
 /// An axis that can follow a record.
@@ -82,7 +84,7 @@ const INTEGRAL_RATIO_PER_S: f64 = 0.66;
 /// Axis under test: law and plant.
 struct Axis {
     settings: AxisSettings,
-    truth: AxisTruth,
+    truth: AxisParameters,
 }
 
 impl RecordedAxis {
@@ -164,7 +166,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
     settings.amplifier.offset_v = emps::OFFSET_N * per_newton;
     settings.plant = Some(plant);
     settings.limits.max_acceleration_mm_s2 = 5000.0;
-    let truth = AxisTruth {
+    let truth = AxisParameters {
         gain_mm_per_v_s2: gain,
         // All viscous friction is in the friction model, as published.
         damping_per_s: 0.0,
@@ -172,7 +174,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
         delay_s: emps::DELAY_S,
         friction,
         gms,
-        model: FrictionTruth::Gms,
+        model: FrictionParameters::Gms,
         resolution_mm: emps::RESOLUTION_MM,
         full_scale_v: 10.0,
         imperfections: Imperfections {
@@ -306,7 +308,7 @@ fn run_record(
     let mut settings = StageSettings::simulated();
     settings.axes[0] = axis.settings.clone();
     configuration.apply(&mut settings);
-    let mut truth = StageTruth::ideal();
+    let mut truth = StageParameters::ideal();
     truth.axes[0] = axis.truth.clone();
     let table = RecordedTable::new(positions, ticks_per_sample, settings.motion_scale(0));
     let mut machine = LawMachine::<f32, ELEMENTS>::with_plan(

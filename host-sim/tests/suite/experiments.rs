@@ -11,7 +11,7 @@ use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::record::Record;
 use quadrant_sim::replay::recorded::{RecordedAxis, replay};
 
@@ -58,7 +58,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         },
     };
     let mut machine = LawMachine::<f32, 4>::new(&job).unwrap();
-    let mut plant = SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1);
+    let mut plant = SimulatedStage::new(&StageParameters::real(), job.stage.rate_hz, 1);
     let mut operator = Operator::runs_the_plan();
     for tick in 0..20_000 {
         // The encoder of x stands still, as if the axis were clamped.

@@ -15,12 +15,12 @@ use quadrant::settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 use super::Drive;
 
 /// GMS elements of the simulated axes' friction.
-pub const TRUTH_ELEMENTS: usize = 10;
+pub const PLANT_ELEMENTS: usize = 10;
 
 /// Friction model of a simulated axis. The levels are those of its static friction, the elements those of its GMS
 /// parameters.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub enum FrictionTruth {
+pub enum FrictionParameters {
     #[default]
     Gms,
     Smoothed(SmoothedGmsParameters),
@@ -32,7 +32,7 @@ pub enum FrictionTruth {
 
 /// One simulated axis: `x'' = A (u(t - Td) - F) - B x' - C x`, friction `F` explicit.
 #[derive(Clone, Debug, PartialEq)]
-pub struct AxisTruth {
+pub struct AxisParameters {
     /// A, mm/(V s^2).
     pub gain_mm_per_v_s2: f64,
     /// B without the viscous friction that `friction` carries, 1/s.
@@ -46,7 +46,7 @@ pub struct AxisTruth {
     /// Pre-sliding friction, and the rate at which sliding friction follows the Stribeck curve.
     pub gms: GmsParameters,
     /// The model that it follows.
-    pub model: FrictionTruth,
+    pub model: FrictionParameters,
     /// Length of an encoder count, mm.
     pub resolution_mm: f64,
     /// Voltage of the converter's largest code, V; the amplifier saturates there.
@@ -102,9 +102,9 @@ impl Imperfections {
 
 /// The three axes of the simulated stage.
 #[derive(Clone, Debug, PartialEq)]
-pub struct StageTruth {
+pub struct StageParameters {
     /// x, y, z.
-    pub axes: [AxisTruth; 3],
+    pub axes: [AxisParameters; 3],
 }
 
 /// The elements whose virgin curve is `Fs (1 - exp(-4 x / range))`, scaled to reach Fs at the end of the pre-sliding
@@ -157,9 +157,9 @@ struct Character {
     imperfections: Imperfections,
 }
 
-fn axis(character: &Character) -> AxisTruth {
+fn axis(character: &Character) -> AxisParameters {
     let Character { mean, .. } = character;
-    AxisTruth {
+    AxisParameters {
         gain_mm_per_v_s2: character.linear.gain_mm_per_v_s2,
         // The viscous part of the linear model's damping is carried by friction.
         damping_per_s: character.linear.damping_per_s
@@ -174,11 +174,11 @@ fn axis(character: &Character) -> AxisTruth {
             elements: virgin_curve_elements(
                 mean.curve.breakaway_v,
                 character.presliding_mm,
-                TRUTH_ELEMENTS,
+                PLANT_ELEMENTS,
             ),
             attraction_v_s: 5.0,
         },
-        model: FrictionTruth::Gms,
+        model: FrictionParameters::Gms,
         resolution_mm: 5e-4,
         full_scale_v: 10.0,
         imperfections: character.imperfections,
@@ -186,7 +186,7 @@ fn axis(character: &Character) -> AxisTruth {
     }
 }
 
-impl StageTruth {
+impl StageParameters {
     /// The simulated stage with everything a real one has. x is the axis of `thesis.md`'s chosen parameters; y and z
     /// are plausible companions, chosen too.
     pub fn real() -> Self {
