@@ -40,7 +40,7 @@ const EXPECTED: [&str; 6] = [
     "the converter answers 0x0000 instead of 0x0004",
     "quadrant ",
     "no settings are stored",
-    "not commissioned: no axis has a law",
+    "not commissioned: no axis is, or one with a law is not",
     "10000 control ticks per second, outputs off",
     "hard fault, outputs are off: the stack is full",
 ];

@@ -334,13 +334,17 @@ fn every_fault_is_found_in_its_tick_with_the_outputs_of_its_reaction() {
     }
 }
 
-/// Those that the tick cannot find by itself.
-pub(crate) const OF_OTHERS: [FaultCode; 7] = [
+/// Those of other tests, and then those that the tick cannot find by itself.
+pub(crate) const OF_OTHERS: [FaultCode; 9] = [
     // Of a stream: see the tests of streaming.
     FaultCode::StreamUnderrun,
     // Of an injected voltage: see its tests.
     FaultCode::InjectionUnderrun,
     FaultCode::InjectionBounds,
+    // Of an axis that moves as its output makes it: see `encoder_dead`.
+    FaultCode::EncoderImplausible,
+    // Of a stop without an end: see `stops`.
+    FaultCode::StopOverrun,
     FaultCode::WatchdogReset,
     FaultCode::Panic,
     FaultCode::HardFault,

@@ -23,8 +23,9 @@ pub(super) enum Idempotency {
     Query,
     /// The same as of one: it says what should be, or has a number.
     Idempotent,
-    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and a second
-    /// motion is refused while the first is under way.
+    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and whatever
+    /// enables the outputs or starts a motion is asked for by a person, each time: somebody at the machine may have switched
+    /// off in between.
     NotIdempotent,
 }
 
@@ -40,17 +41,18 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Capture(CaptureRequest::State | CaptureRequest::Read { .. }) => Idempotency::Query,
         // A later selection outdates an earlier one, whose blocks have another generation.
         Body::Telemetry(_)
-        | Body::Enable
         | Body::Disable
         | Body::Stop
-        | Body::Jog { .. }
         | Body::SetPlan(_)
         | Body::Stream(StreamRequest::Points { .. } | StreamRequest::Close)
         | Body::Inject(InjectRequest::Values { .. } | InjectRequest::Close)
         | Body::Settings(
             SettingsRequest::Set { .. } | SettingsRequest::Revert | SettingsRequest::Defaults,
         ) => Idempotency::Idempotent,
-        Body::ResetFault
+        Body::Jog { velocity_mm_s, .. } if *velocity_mm_s == 0.0 => Idempotency::Idempotent,
+        Body::Enable
+        | Body::Jog { .. }
+        | Body::ResetFault
         | Body::Run
         | Body::Home(_)
         | Body::Move { .. }

@@ -6,7 +6,7 @@ use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::bootstrap::measuring_settings;
 use crate::experiment::metrics::{Score, score};
-use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::machine::{Drive, Experiment, ExperimentError, MachineError, TestAxis};
 use crate::record::Recording;
 
 /// The sine on which settings are judged.
@@ -52,6 +52,9 @@ pub enum VerifyError {
     /// The settings are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// The machine refused settings, or the connection failed.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
     /// The run was stopped.
     #[error(transparent)]
     TestAxis(#[from] ExperimentError),
