@@ -25,6 +25,7 @@ use crate::law::injection::{
     Coupling, InjectedValue, Injection, InjectionProgress, InjectionState, InjectionStep,
 };
 use crate::law::reference::{Motion, Segment};
+use crate::law::safety::plausibility::is_due;
 use crate::law::safety::{
     EnableInterlock, Fault, FaultCode, Reaction, SafetyState, StreamLoss, Switches,
 };
@@ -358,14 +359,15 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         let driven = state.safety.drives();
         let mut good = inputs.switches.are_good();
         let mut findings = Findings::splat(Ok(()));
-        for (((axis, memory), reading), finding) in self
+        for ((((axis, memory), reading), finding), index) in self
             .axes
             .into_iter()
             .zip(&mut state.axes)
             .zip(&inputs.readings)
             .zip(&mut findings)
+            .zip(0..)
         {
-            *finding = axis.read_encoder(memory, reading);
+            *finding = axis.read_encoder(memory, reading, is_due(tick, index));
             good &= finding.is_ok();
         }
         state.interlock = None;

@@ -10,11 +10,11 @@ use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
-use crate::law::safety::plausibility::{Plausibility, PlausibilityModel};
+use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
-use crate::law::units::Position;
+use crate::law::units::{DacCode, Position};
 
 /// Counts that an axis shows for certain: those of one dead line, and noise.
 const HELD_COUNTS: f64 = 5.0;
@@ -33,7 +33,7 @@ const MODEL_COUNTS: f64 = 20.0;
 /// What is added to that distance for the error of the dead time, over the way that the largest output brings within it.
 const DELAY_ERROR: f64 = 0.1;
 /// Speed that no load explains, mm/s, and in counts per tick.
-const MODEL_VELOCITY_MM_S: f64 = 100.0;
+const MODEL_VELOCITY_MM_S: f64 = 80.0;
 const MODEL_STEP_COUNTS: f64 = 8.0;
 /// Measured speed below which an axis stands, beyond what quantisation adds, mm/s.
 const STANDSTILL_MM_S: f64 = 1.0;
@@ -190,10 +190,21 @@ impl AxisSettings {
     }
 
     #[inline(never)]
-    fn build_plausibility<S: Scalar>(&self, period_s: f64) -> Plausibility<S> {
+    fn build_plausibility(&self, period_s: f64) -> Plausibility {
         let (limit_v, resolution_mm) = (self.amplifier.output_limit_v, self.encoder.resolution_mm);
+        let amplifier = &self.amplifier;
+        let per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
+        let words = Words {
+            per_volt: if amplifier.reversed {
+                -per_volt
+            } else {
+                per_volt
+            },
+            offset: rounding::round(amplifier.offset_v * per_volt) as i32,
+        };
         let Some(plant) = self.plant else {
-            return Plausibility::without_model(OPEN_BUDGET_V_S, OPEN_SHARE * limit_v, period_s);
+            let breakaway_v = OPEN_SHARE * limit_v;
+            return Plausibility::without_model(OPEN_BUDGET_V_S, breakaway_v, words, period_s);
         };
         let sliding = &self.friction.sliding;
         let breakaway_v = sliding
@@ -209,6 +220,9 @@ impl AxisSettings {
             gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
             damping_per_s: plant.damping_per_s,
             delay_s,
+            limit_v,
+            // Beyond it, a step of the encoder is a jump.
+            largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
             held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v),
             breakaway_v: (FRICTION_ERROR * breakaway_v).max(HELD_SHARE * limit_v),
             load_v: LOAD_SHARE * limit_v,
@@ -219,7 +233,7 @@ impl AxisSettings {
                 .max(MODEL_COUNTS * resolution_mm),
             velocity_mm_s: MODEL_VELOCITY_MM_S.max(MODEL_STEP_COUNTS * resolution_mm / period_s),
         };
-        Plausibility::new(&model, resolution_mm, period_s)
+        Plausibility::new(&model, words, resolution_mm, period_s)
     }
 
     #[inline(never)]

@@ -48,6 +48,7 @@ mod not_commissioned;
 mod number_types;
 mod parameter_trace;
 mod pid;
+mod plant;
 mod preemption;
 mod provocations;
 mod rate_limiter;

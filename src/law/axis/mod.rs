@@ -50,7 +50,7 @@ use crate::law::safety::monitor::{
     Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
     SignalLossState, speed_limit,
 };
-use crate::law::safety::plausibility::{Plausibility, PlausibilityState};
+use crate::law::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
 use crate::law::safety::travel::{Travel, TravelState};
 use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::{Quantity, Scalar};
@@ -98,7 +98,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     bumpless_decay: S,
     overspeed: Overspeed,
     signal_loss: SignalLoss<S>,
-    plausibility: Plausibility<S>,
+    plausibility: Plausibility,
     index_spacing: IndexSpacing,
     following: Following<S>,
     travel: Travel,
@@ -294,7 +294,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
 
     /// The comparison of the encoder with the plant.
     #[must_use]
-    pub fn plausibility(self, plausibility: Plausibility<S>) -> Self {
+    pub fn plausibility(self, plausibility: Plausibility) -> Self {
         self.axis.plausibility = plausibility;
         self
     }
@@ -377,7 +377,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     homed: bool,
     overspeed: OverspeedState,
     signal_loss: SignalLossState,
-    plausibility: PlausibilityState<S>,
+    plausibility: PlausibilityState,
     index: IndexState,
     following: FollowingState<S>,
     travel: TravelState,
@@ -461,6 +461,17 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     #[inline(always)]
     pub(crate) fn speed(&self) -> i32 {
         self.overspeed.speed()
+    }
+
+    /// What the axis shows of its motion and output.
+    #[inline(always)]
+    fn shown(&self) -> Shown {
+        Shown {
+            count: self.encoder.count().0 as i32,
+            speed: self.speed(),
+            words: self.telemetry.code_sum,
+            open: self.mode() == MotionMode::OpenLoop,
+        }
     }
 
     /// Sets what is added to the output from this tick on, V.
@@ -569,17 +580,18 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         reading: &EncoderReading,
         tick: u32,
     ) -> Result<DacCode, FaultCode> {
-        self.read_encoder(state, reading)?;
+        self.read_encoder(state, reading, is_due(tick, 0))?;
         self.update_reference(state, motion, AxisSwitches::default(), tick)?;
         Ok(self.drive(state, false))
     }
 
-    /// Takes the encoder's reading and checks it.
+    /// Takes the encoder's reading and checks it. `due`: it is compared with the plant in this tick.
     #[inline(always)]
     pub(crate) fn read_encoder(
         &self,
         state: &mut AxisState<S, N>,
         reading: &EncoderReading,
+        due: bool,
     ) -> Result<(), FaultCode> {
         let step = self.encoder.update(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
@@ -592,13 +604,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let alive = self
             .signal_loss
             .step(&mut state.signal_loss, step.counts, state.last_output);
-        let open = state.mode() == MotionMode::OpenLoop;
-        let plausible = self.plausibility.step(
-            &mut state.plausibility,
-            step.counts,
-            state.last_output,
-            open,
-        );
+        let plausible = !due || {
+            let shown = state.shown();
+            self.plausibility.step(&mut state.plausibility, shown)
+        };
         let indexed = match reading.index {
             Some(raw) => {
                 let at = self.encoder.count_at(&state.encoder, raw);
@@ -647,8 +656,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Prepares to hold the measured position.
     pub fn enable(&self, state: &mut AxisState<S, N>) {
         let here = state.encoder.position();
+        let shown = Shown {
+            speed: 0,
+            ..state.shown()
+        };
         *state = AxisState {
             encoder: state.encoder.clone(),
+            plausibility: self.plausibility.start(shown),
             homed: state.homed,
             index: state.index,
             following: self.following.start(),
@@ -694,6 +708,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     fn shift(state: &mut AxisState<S, N>, offset: Position) {
         state.encoder.shift(offset);
         state.telemetry.measured = state.encoder.count();
+        state.plausibility.recount(state.encoder.count().0 as i32);
         state.look_ahead = state.look_ahead + offset;
         for position in &mut state.preview {
             *position = *position + offset;
@@ -946,6 +961,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.generator.hold();
         state.injected = S::ZERO;
         state.last_output = S::ZERO;
+        state.plausibility = self.plausibility.start(state.shown());
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),
             measured,

@@ -1,13 +1,14 @@
 //! The monitors of each axis, one small pure step a tick each, without a division.
 
-use super::plausibility::DITHER_COUNTS;
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
+/// Counts within which an encoder with one dead line dithers.
+pub(super) const DITHER_COUNTS: u32 = 2;
 /// Fraction bits of a filtered speed.
-const SPEED_FRACTION_BITS: u32 = 8;
+pub(super) const SPEED_FRACTION_BITS: u32 = 8;
 /// The speed is filtered over 2^3 ticks: at one count a tick, a single reading says little.
-const SPEED_FILTER_BITS: u32 = 3;
+pub(super) const SPEED_FILTER_BITS: u32 = 3;
 /// No axis moves further in a tick, counts; an encoder that does so is faulty, and its filter shall not wrap.
 const LARGEST_STEP: i32 = 1 << 16;
 /// Addition of quantisation and noise to a filtered speed, counts per tick.
