@@ -96,6 +96,44 @@ fn enable_and_store_in_one_burst_write_nothing_while_the_outputs_are_on() {
     assert_eq!((upper.driven_while_busy, upper.guarded), (0, 0));
 }
 
+/// A leaf that safety depends on, as a request sets it.
+fn slower() -> Body {
+    let mut settings = settings();
+    settings.axes[0].limits.max_velocity_mm_s = 100.0;
+    let path = "/axes/0/limits/max_velocity_mm_s";
+    let mut bytes = [0; quadrant::settings::MAX_VALUE_BYTES];
+    let (kind, length) = settings.get_bytes(path, &mut bytes).expect("a leaf");
+    Body::Settings(SettingsRequest::Set {
+        path: path.try_into().expect("fits"),
+        value: quadrant::link::message::Value {
+            kind,
+            bytes: heapless::Vec::from_slice(&bytes[..length]).expect("fits"),
+        },
+    })
+}
+
+#[test]
+fn enable_waits_for_the_settings_that_were_applied_before_it() {
+    let apply = || Body::Settings(SettingsRequest::Apply);
+    let mut tasks = Tasks::new(&settings(), 1);
+    let first = tasks.send(&[slower(), apply(), Body::Enable]);
+    tasks.run(300);
+    assert_eq!(tasks.answers.get(&(first + 2)), Some(&Ok(Reply::Done)));
+    assert!(tasks.upper.borrow().outputs.enabled);
+    let jog = Body::Jog {
+        axis: AxisName::X,
+        velocity_mm_s: 150.0,
+    };
+    assert!(tasks.ask(jog).is_err(), "the new limit is in force");
+
+    // Who asks to disable while it waits is heard.
+    let mut tasks = Tasks::new(&settings(), 1);
+    let first = tasks.send(&[slower(), apply(), Body::Enable, Body::Disable]);
+    tasks.run(300);
+    assert!(refused(tasks.answers.get(&(first + 2))));
+    assert!(!tasks.upper.borrow().outputs.enabled);
+}
+
 #[test]
 fn enable_and_reboot_in_one_burst_do_not_restart_a_driven_machine() {
     let mut tasks = Tasks::new(&settings(), 1);

@@ -12,6 +12,10 @@ pub(super) const ANSWER: Duration = Duration::from_millis(150);
 /// Time for an answer after which flash has been written, a sector of it erased.
 const STORED: Duration = Duration::from_secs(6);
 
+/// Time for an answer after which settings that were applied before have been built, in software where the processor knows
+/// no double precision.
+const BUILT: Duration = Duration::from_secs(2);
+
 /// Time for which, and pause after which, a request is repeated that the machine is too busy for.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
 pub(super) const BUSY_PAUSE: Duration = Duration::from_millis(5);
@@ -68,6 +72,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
 pub(super) const fn answer_timeout(body: &Body) -> Duration {
     match body {
         Body::Settings(SettingsRequest::Store(_)) => STORED,
+        Body::Enable => BUILT,
         _ => ANSWER,
     }
 }

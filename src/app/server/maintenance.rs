@@ -19,6 +19,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 self.locked = true;
             }
             Work::Plan => self.order(Order::Plan)?,
+            Work::Enable => {}
         }
         self.deferred = Some(Deferred { id: 0, work });
         Ok(Reply::Done)
@@ -29,6 +30,10 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         if !self.is_settled() {
             return false;
         }
+        let waiting = &self.deferred;
+        if self.must_wait_to_enable() && waiting.as_ref().is_some_and(Deferred::enables) {
+            return false;
+        }
         let Some(Deferred { id, work }) = self.deferred.take() else {
             return false;
         };
@@ -37,6 +42,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             Work::Plan => Err(refused(format_args!(
                 "a motion is under way; stop it before the plan is exchanged"
             ))),
+            Work::Enable => self.check_not_stopped().and_then(|()| self.enable()),
             _ if !self.seen.view.locked => Err(outputs_on()),
             Work::Store(provenance) => self.save(provenance),
             Work::Restart => {

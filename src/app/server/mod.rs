@@ -302,10 +302,8 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
     fn serve(&mut self, body: Body) -> Result<Reply, LinkError> {
         if matches!(body, Body::Stop | Body::Disable) {
             self.urgent = self.urgent.wrapping_add(1);
-        } else if body.may_move() && self.urgent != self.ends.urgent() {
-            return Err(refused(format_args!(
-                "a later request to stop or to disable has been acted on; ask again"
-            )));
+        } else if body.may_move() {
+            self.check_not_stopped()?;
         }
         match body {
             Body::Hello => Ok(Reply::Identity(self.identity())),
@@ -325,6 +323,16 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             } => self.start_move(axis.into(), target_mm, velocity_mm_s),
             other => self.serve_command(other),
         }
+    }
+
+    /// Checks that nobody has asked to stop or to disable since the request that is being served.
+    fn check_not_stopped(&self) -> Result<(), LinkError> {
+        if self.urgent == self.ends.urgent() {
+            return Ok(());
+        }
+        Err(refused(format_args!(
+            "a later request to stop or to disable has been acted on; ask again"
+        )))
     }
 }
 

@@ -17,15 +17,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
-            Body::Enable if self.needs_disabled && !self.pending.is_empty() => {
-                return Err(busy(format_args!(
-                    "the settings applied last are still being built; ask again"
-                )));
+            Body::Enable if self.must_wait_to_enable() => {
+                self.check(Command::Enable)?;
+                return self.defer(Work::Enable);
             }
-            Body::Enable => {
-                self.command(Command::Enable)?;
-                self.arm_for_faults();
-            }
+            Body::Enable => return self.enable(),
             Body::Disable => self.command(Command::Disable)?,
             Body::ResetFault => self.command(Command::ResetFault)?,
             Body::Stop => {
@@ -63,6 +59,18 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 ))));
             }
         }
+        Ok(Reply::Done)
+    }
+
+    /// True while settings that safety depends on are being built: control does not enable before it has them all.
+    pub(super) fn must_wait_to_enable(&self) -> bool {
+        self.needs_disabled && !self.pending.is_empty()
+    }
+
+    /// Enables the outputs.
+    pub(super) fn enable(&mut self) -> Result<Reply, LinkError> {
+        self.command(Command::Enable)?;
+        self.arm_for_faults();
         Ok(Reply::Done)
     }
 
