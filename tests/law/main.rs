@@ -58,6 +58,7 @@ mod reference_ramp;
 mod reference_recorded;
 mod reference_stream;
 mod safety;
+mod safety_expected;
 mod safety_fault_numbers;
 mod safety_faults;
 mod safety_properties;
