@@ -4,6 +4,7 @@ mod anti_windup;
 mod axis_limits;
 mod board_wiring;
 mod bumpless;
+mod campaign;
 mod capture;
 mod change_detector;
 mod common;

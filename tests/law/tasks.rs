@@ -26,12 +26,23 @@ use quadrant::units::POSITION_FRACTION_BITS;
 
 use crate::common::Noise;
 use crate::flash::{Flash, FlashError};
+use crate::plant::{Encoder, Plant};
 
 /// Ticks that an erasure takes here; on the reference board it is 2500 to 5000.
 const ERASE_TICKS: u32 = 400;
 
+/// An x axis that moves as its output makes it, with an encoder that may die.
+pub(crate) struct Moved {
+    pub(crate) plant: Plant,
+    pub(crate) encoder: Encoder,
+    /// Ticks since the encoder died.
+    pub(crate) dead: Option<u32>,
+}
+
 /// Control interrupt and supervising task, and what they see.
 pub(crate) struct Upper {
+    /// In place of an x axis that follows its reference exactly.
+    pub(crate) x: Option<Moved>,
     control: Control<'static, 'static, f32>,
     intake: Intake<'static>,
     supervision: Supervision,
@@ -83,8 +94,15 @@ impl Upper {
             .by_ref()
             .map(|axis| axis.reference().0)
             .into_array();
-        let readings = references
+        let mut readings = references
             .map(|position| EncoderReading::of((position >> POSITION_FRACTION_BITS) as u32));
+        if let Some(x) = &mut self.x {
+            let volts = f64::from(self.outputs.codes[0].0) / 32767.0 * 10.0;
+            x.plant.step(if self.outputs.enabled { volts } else { 0.0 });
+            x.dead = x.dead.map(|age| age + 1);
+            let count = x.encoder.read(x.plant.position_mm, x.dead);
+            readings[0] = EncoderReading::of(count as u32);
+        }
         self.control.hear(self.intake.frames());
         self.outputs = self.control.tick(&Inputs {
             readings: readings.into(),
@@ -269,6 +287,7 @@ impl Tasks {
             control.start_faulted(FaultCode::SettingsInvalid);
         }
         let upper = Rc::new(RefCell::new(Upper {
+            x: None,
             control,
             intake: Intake::new(intake_ends),
             supervision: Supervision::new([5e-4; 3]),
@@ -359,6 +378,14 @@ impl Tasks {
             } else {
                 self.poll();
             }
+        }
+    }
+
+    /// One tick, and the server if the supervising task has run in it.
+    pub(crate) fn step(&mut self) {
+        self.upper.borrow_mut().tick();
+        if self.tick().is_multiple_of(10) {
+            self.poll();
         }
     }
 
