@@ -8,7 +8,7 @@ use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use crate::identify::single_state::with_all_models;
-use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
+use crate::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 
 /// Structure of a model: its terms beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -178,8 +178,8 @@ impl MotionModel {
     }
 
     /// The axis that the model describes, to be simulated: without encoder noise.
-    pub fn axis(&self, full_scale_v: f64) -> AxisTruth {
-        AxisTruth {
+    pub fn axis(&self, full_scale_v: f64) -> AxisParameters {
+        AxisParameters {
             gain_mm_per_v_s2: 1.0 / self.inertia_v_s2_per_mm,
             // All damping is in the friction.
             damping_per_s: 0.0,
@@ -187,7 +187,7 @@ impl MotionModel {
             delay_s: self.delay_s(),
             friction: self.friction,
             gms: self.gms(),
-            model: FrictionTruth::Gms,
+            model: FrictionParameters::Gms,
             resolution_mm: 1e-6,
             full_scale_v,
             imperfections: Imperfections {
