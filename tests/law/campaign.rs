@@ -27,10 +27,10 @@ const STOP_TICKS: u32 = 1050 + 200;
 /// beyond in 20 000 campaigns.
 const UNPLANNED_MM: f64 = 2.1;
 /// Speed below which an axis comes to rest, mm/s: if its encoder dies then, the voltage that it has may be that of a load.
-const COMING_TO_REST_MM_S: f64 = 20.0;
-/// What coasts at a speed, mm per mm/s: 1 / B of the plant; and what the dead time adds, mm.
+const COMING_TO_REST_MM_S: f64 = 30.0;
+/// What coasts at a speed, mm per mm/s: 1 / B of the plant; and what the largest output adds that is on its way, A V Td / B, mm.
 const COASTING_S: f64 = 1.0 / 144.8;
-const COASTING_MM: f64 = 3.5;
+const COASTING_MM: f64 = 69_390.0 * 10.0 * 1.2e-3 / 144.8;
 /// Ticks of a campaign, and the last one in which something happens.
 const TICKS: u32 = 10_000;
 const LAST_EVENT: u32 = 8_000;
@@ -266,7 +266,7 @@ fn run(campaign: &Campaign) -> Result<f64, String> {
         loaded: campaign.has_load(),
         ..Watch::default()
     };
-    let mut unseen = false;
+    let (mut unseen, mut speed_mm_s) = (false, 0.0);
     let mut noise = Noise::new(campaign.seed ^ 0x5A5A);
     let (mut silent, mut pressed) = (false, false);
     let mut words = 0;
@@ -281,7 +281,8 @@ fn run(campaign: &Campaign) -> Result<f64, String> {
                     let x = upper.x.as_mut().expect("given");
                     // It dies once.
                     if x.dead.is_none() {
-                        unseen = campaign.is_unseen(death, x.plant.velocity_mm_s);
+                        speed_mm_s = x.plant.velocity_mm_s;
+                        unseen = campaign.is_unseen(death, speed_mm_s);
                         (x.encoder.death, x.dead) = (death, Some(0));
                     }
                 }
@@ -345,7 +346,10 @@ fn run(campaign: &Campaign) -> Result<f64, String> {
         watch.look(&tasks, pressed)?;
     }
     if watch.unplanned_mm > UNPLANNED_MM && !unseen {
-        return Err(format!("{:.2} mm were not planned", watch.unplanned_mm));
+        return Err(format!(
+            "{:.2} mm were not planned, dead at {speed_mm_s:.0} mm/s",
+            watch.unplanned_mm
+        ));
     }
     Ok(watch.unplanned_mm)
 }
