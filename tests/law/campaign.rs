@@ -329,7 +329,7 @@ fn run(campaign: &Campaign) -> Result<f64, String> {
             tasks.send(&[Body::Status]);
         }
         let injects = matches!(campaign.activity, Activity::OpenLoop | Activity::ClosedLoop);
-        if injects && !silent && at > 150 && at % 20 == 0 {
+        if injects && !silent && at > 150 && at.is_multiple_of(20) {
             let values = Voltages::new((0..20).map(|place| {
                 let turn = core::f64::consts::TAU * 20.0 * 1e-4 * f64::from(words + place);
                 (0.8 * turn.sin() / 10.0 * 32767.0) as i16
