@@ -153,10 +153,9 @@ impl<S: Scalar> Homing<S> {
         }
     }
 
-    /// The switch that this homing moves onto.
-    #[inline(always)]
-    pub(crate) fn switch(&self) -> AxisSwitches {
-        self.parameters.switch
+    /// True if a pressed limit switch is one that this homing moves onto.
+    pub(crate) fn expects(&self, switches: AxisSwitches) -> bool {
+        switches.has(self.parameters.switch)
     }
 
     /// The reference of the next tick along `ramp`, whose state is `moving`; `parked` is the state of the last move.

@@ -3,14 +3,12 @@
 
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::settings::AxisSettings;
+use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::bootstrap::measuring_settings;
 use crate::experiment::metrics::{Score, score};
 use crate::experiment::sine_test::SineTest;
-use crate::machine::{
-    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, approach,
-};
+use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, approach};
 use crate::record::Recording;
 
 /// The sines on an axis with room: the middle velocity of the thesis first, then short, slow and fast.
@@ -133,9 +131,9 @@ impl Verification {
 /// Reason why the trials cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
-    /// The machine did not take the settings.
+    /// The settings are refused.
     #[error(transparent)]
-    Machine(#[from] MachineError),
+    Settings(#[from] SettingsError),
     /// The PID alone was stopped.
     #[error(transparent)]
     TestAxis(#[from] ExperimentError),
@@ -254,7 +252,7 @@ impl Bench<'_> {
         law: &str,
         settings: &AxisSettings,
         count: usize,
-    ) -> Result<(LawResult, Option<ExperimentError>), MachineError> {
+    ) -> Result<(LawResult, Option<ExperimentError>), SettingsError> {
         let mut settings = settings.clone();
         // Room for the error that a poor law makes, as for the PID.
         let measuring = measuring_settings(&settings);

@@ -1,9 +1,10 @@
 //! A machine whose axes can be measured.
 
-use quadrant::axes::AxisName;
-use quadrant::settings::StageSettings;
+use std::error::Error;
 
-use super::error::MachineError;
+use quadrant::axes::AxisName;
+use quadrant::settings::{SettingsError, StageSettings};
+
 use super::test_axis::TestAxis;
 
 /// A machine with three axes: the one start of identification and commissioning.
@@ -47,4 +48,18 @@ pub trait Machine {
     /// # Errors
     /// A machine without a flash, or a flash that failed.
     fn store(&mut self, provenance: &str) -> Result<(), MachineError>;
+}
+
+/// Reason why a machine cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum MachineError {
+    /// Settings that are refused.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The control law alone has no flash.
+    #[error("the control law alone has no flash to store settings in: take another --machine")]
+    NoFlash,
+    /// The connection failed, or the machine refused.
+    #[error(transparent)]
+    Connection(Box<dyn Error + Send + Sync>),
 }

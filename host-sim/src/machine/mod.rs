@@ -32,7 +32,6 @@ pub mod emulated;
 mod emulated_link;
 #[cfg(all(unix, feature = "emulated"))]
 pub mod emulator;
-mod error;
 mod flash_file;
 mod interface;
 pub mod law;
@@ -51,8 +50,7 @@ mod transport;
 pub use approach::approach;
 #[cfg(all(unix, feature = "emulated"))]
 pub use emulated_link::EmulatedLink;
-pub use error::MachineError;
-pub use interface::Machine;
+pub use interface::{Machine, MachineError};
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
 pub use loopback::{Loopback, SimulatedPeer};
 pub use serial::{BAUD, SerialTransport};

@@ -54,12 +54,11 @@ impl SafetyState {
         }
     }
 
-    /// Takes a command that [`admission`](crate::law::admission) has let through; returns true if the outputs have just
-    /// been enabled.
+    /// Takes a command; says whether the outputs have just been enabled. `obstructed`: an input is bad.
     #[inline(always)]
-    pub fn apply(&mut self, command: Command) -> bool {
+    pub fn apply(&mut self, command: Command, obstructed: bool) -> bool {
         match (command, *self) {
-            (Command::Enable, Self::Disabled) => {
+            (Command::Enable, Self::Disabled) if !obstructed => {
                 *self = Self::Enabled;
                 return true;
             }
