@@ -3,8 +3,8 @@
 use std::path::{Path, PathBuf};
 
 use quadrant_sim::identify::motion::{
-    Candidate, CascadeLoop, MotionFitError, MotionFitSettings, MotionModel, fit_motion,
-    recommended, replay_closed_loop, replay_open_loop, shuttle,
+    Candidate, CascadeLoop, MotionFitError, MotionFitSettings, MotionModel, Signals, fit_motion,
+    recommended, refined, replay_closed_loop, replay_open_loop, shuttle, validate,
 };
 use quadrant_sim::identify::setting::SettingError;
 use quadrant_sim::machine::SimulatedTestAxis;
@@ -70,31 +70,67 @@ fn our_friction_explains_more_of_emps_also_where_it_was_not_fitted() {
     let Some(record) = emps() else { return };
     let candidates = fitted(&record, &MotionFitSettings::default());
     let best = recommended(&candidates).unwrap();
-    assert!(best.model.relative_error < 0.028);
-    assert!(validation(best) < 0.028);
-    assert!(validation(best) < 1.02 * best.model.relative_error);
-    assert!(best.model.structure.presliding && best.model.is_stribeck());
+    assert!(best.model.relative_error < 0.018);
+    assert!(validation(best) < 0.021);
+    assert!(best.model.structure.presliding && best.model.structure.stribeck);
+}
+
+#[test]
+fn the_record_of_emps_repeats_itself_and_is_not_judged_by_its_repetitions() {
+    let Some(record) = emps() else { return };
+    // The same trajectory four times: whoever withholds one of them judges what was fitted.
+    for candidate in fitted(&record, &MotionFitSettings::default()) {
+        let ratio = validation(&candidate) / candidate.model.relative_error;
+        assert!((1.04..1.3).contains(&ratio), "{ratio}");
+    }
+}
+
+#[test]
+fn the_dead_time_of_emps_is_as_uncertain_as_its_models_disagree() {
+    let Some(record) = emps() else { return };
+    let candidates = fitted(&record, &MotionFitSettings::default());
+    let of = |candidate: &Candidate| {
+        let estimates = candidate.model.estimates.iter();
+        let found = estimates.filter(|estimate| estimate.name == "Td");
+        found.map(|td| (td.value, td.standard_error)).next()
+    };
+    let (best, deviation) = of(recommended(&candidates).unwrap()).unwrap();
+    // Another record of the same machine gave 0.670 ms, with a friction that does not rise.
+    for other in candidates
+        .iter()
+        .filter_map(of)
+        .map(|td| td.0)
+        .chain([0.67e-3])
+    {
+        assert!(
+            (other - best).abs() < 1.2 * deviation,
+            "{best} {deviation} {other}"
+        );
+    }
 }
 
 #[test]
 fn the_models_of_emps_move_as_the_machine_did() {
     let Some(record) = emps() else { return };
     let candidates = fitted(&record, &MotionFitSettings::default());
-    let (four, best) = (
-        &candidates[0].model,
-        &recommended(&candidates).unwrap().model,
-    );
+    let (four, best) = (&candidates[0].model, recommended(&candidates).unwrap());
     // The published model, simulated elsewhere: 1.75 um and 5.2 %.
-    let closed = replay_closed_loop(four, &record, &EMPS_LOOP);
-    assert!((1e3 * closed.position_rms_mm - 1.75).abs() < 0.05);
-    assert!((closed.voltage_error - 0.052).abs() < 1e-3);
-    let better = replay_closed_loop(best, &record, &EMPS_LOOP);
-    assert!(better.position_rms_mm < 0.9 * closed.position_rms_mm);
-    assert!(better.voltage_error < 0.95 * closed.voltage_error);
-    // Elsewhere 5.28 mm. An open loop drifts on the smallest difference at standstill.
-    let open = replay_open_loop(four, &record).position_rms_mm;
-    assert!((4.0..8.0).contains(&open), "{open}");
-    assert!(replay_open_loop(best, &record).position_rms_mm < 0.5 * open);
+    let settings = MotionFitSettings::default();
+    let signals = Signals::new(&record, &settings);
+    let closed = replay_closed_loop(four, &record, &signals, &EMPS_LOOP);
+    // They started at rest, where the record starts in motion.
+    assert!((1.5..1.8).contains(&(1e3 * closed.position_rms_mm)));
+    assert!((0.044..0.052).contains(&closed.voltage_error));
+    let better = replay_closed_loop(&best.model, &record, &signals, &EMPS_LOOP);
+    assert!(1e3 * better.position_rms_mm < 0.8);
+    assert!(better.voltage_error < 0.025);
+    // Elsewhere 5.28 mm.
+    let open =
+        |candidate: &MotionModel| replay_open_loop(candidate, &record, &signals).position_rms_mm;
+    assert!((5.0..5.4).contains(&open(four)), "{}", open(four));
+    let refined = refined(best, &record, &settings).unwrap();
+    assert!(open(&refined.model) < 0.5, "{}", open(&refined.model));
+    assert!(refined.model.relative_error < 1.01 * best.model.relative_error);
 }
 
 /// An ordinary motion of an axis of the simulated stage.
@@ -128,7 +164,8 @@ fn with_the_dead_time_known_the_simulated_axes_are_found() {
             * (truth.friction.positive.curve.coulomb_v + truth.friction.negative.curve.coulomb_v);
         let level = model.friction.positive.curve.coulomb_v / mean;
         assert!((level - 1.0).abs() < 0.03, "axis {index}: Fc {level}");
-        let most_mm = model.elements.last().unwrap().0;
+        let slipping = model.elements.iter().filter(|(_, level_v)| *level_v > 0.0);
+        let most_mm = slipping.last().unwrap().0;
         assert!((0.01..0.05).contains(&most_mm), "axis {index}: {most_mm}");
     }
 }
@@ -164,6 +201,53 @@ fn the_friction_of_a_record_makes_settings_that_the_firmware_takes() {
     stage
         .validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)
         .unwrap();
+}
+
+#[test]
+fn a_level_that_rises_with_the_speed_is_found_and_the_firmware_takes_it() {
+    let mut truth = StageTruth::real().axes[0].clone();
+    for way in [&mut truth.friction.positive, &mut truth.friction.negative] {
+        way.curve.breakaway_v = 0.6 * way.curve.coulomb_v;
+        way.curve.stribeck_velocity_mm_s = 15.0;
+    }
+    let settings = MotionFitSettings {
+        dead_time_s: Some(truth.delay_s + 0.5e-4),
+        ..MotionFitSettings::default()
+    };
+    let candidates = fitted(&simulated(0, &truth), &settings);
+    let model = &recommended(&candidates).unwrap().model;
+    let curve = &model.friction.positive.curve;
+    let rise = curve.breakaway_v / curve.coulomb_v;
+    assert!((0.5..0.7).contains(&rise), "{curve:?}");
+    let mut stage = quadrant::settings::StageSettings::simulated();
+    stage.axes[0].friction = model.friction_settings();
+    let room = quadrant::friction::gms::FIRMWARE_ELEMENTS;
+    stage.validate(room).unwrap();
+}
+
+#[test]
+fn another_record_judges_models_that_it_did_not_fit() {
+    let truth = &StageTruth::real().axes[0];
+    let settings = MotionFitSettings::default();
+    let candidates = fitted(&simulated(0, truth), &settings);
+    let best = recommended(&candidates).unwrap();
+    let on = |truth: &AxisTruth, seed: u64| {
+        let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), seed);
+        let record = shuttle(&mut test_axis, 1, &mut |_| {}).unwrap();
+        validate(best, &record, &settings).unwrap()
+    };
+    let same = on(truth, 2);
+    assert!(same < 1.2 * best.model.relative_error, "{same}");
+    let mut stiffer = truth.clone();
+    for way in [
+        &mut stiffer.friction.positive,
+        &mut stiffer.friction.negative,
+    ] {
+        way.curve.coulomb_v *= 1.3;
+        way.curve.breakaway_v *= 1.3;
+    }
+    let other = on(&stiffer, 2);
+    assert!(other > 2.0 * same, "{other} {same}");
 }
 
 #[test]

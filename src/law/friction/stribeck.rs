@@ -17,11 +17,11 @@ use crate::law::table::{OctaveTable, interpolation_error};
 pub struct StribeckCurve {
     /// Fc, the level at high velocity, V.
     pub coulomb_v: f64,
-    /// Fs, the level at breakaway, V; at least Fc.
+    /// Fs, the level at breakaway, V; below Fc where the level rises with the velocity.
     pub breakaway_v: f64,
-    /// Vs, the velocity scale of the drop from Fs to Fc, mm/s.
+    /// Vs, the velocity scale of the change from Fs to Fc, mm/s.
     pub stribeck_velocity_mm_s: f64,
-    /// delta, the shape of the drop; 1 is exponential, 2 Gaussian.
+    /// delta, the shape of the change; 1 is exponential, 2 Gaussian.
     pub exponent: f64,
 }
 

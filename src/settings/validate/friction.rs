@@ -56,11 +56,10 @@ impl AxisSettings {
         }
         self.validate_resolved(at, STIFFNESS, stiffness, period_s)?;
         let sliding = &self.friction.sliding;
-        let lowest = sliding
-            .positive
-            .curve
-            .coulomb_v
-            .min(sliding.negative.curve.coulomb_v);
+        let lowest = [&sliding.positive, &sliding.negative]
+            .map(|model| model.curve.coulomb_v.min(model.curve.breakaway_v))
+            .into_iter()
+            .fold(f64::MAX, f64::min);
         let most = lowest / period_s;
         if gms.attraction_v_s > most {
             let reason = Reason::TooFastForRate { most };

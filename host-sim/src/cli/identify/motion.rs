@@ -6,13 +6,16 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant::settings::StageSettings;
 use quadrant_sim::identify::motion::{
-    CascadeLoop, MotionFitSettings, fit_motion, recommended, replay_closed_loop, replay_open_loop,
-    shuttle,
+    Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, refined,
+    replay_closed_loop, replay_open_loop, shuttle, validate,
 };
-use quadrant_sim::identify::pages::motion::{Reruns, candidates_table, motion_page, motion_table};
+use quadrant_sim::identify::pages::motion::{
+    Reruns, candidates_table, motion_page, motion_table, validation_table,
+};
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Recording;
+use quadrant_sim::report::Table;
 
 use super::recorded;
 use crate::cli::subject::{Destination, Subject};
@@ -27,6 +30,9 @@ pub(crate) struct Arguments {
     /// reference_m).
     #[arg(long, value_name = "FILE")]
     record: Option<PathBuf>,
+    /// Another recorded motion of the same axis, taken later: every model is judged on it, and none is fitted to it.
+    #[arg(long, value_name = "FILE", requires = "record")]
+    validate: Option<PathBuf>,
     /// Force per volt at the amplifier's input, N/V: adds parameters in kg, N s/m and N.
     #[arg(long, value_name = "N_PER_V")]
     force_per_volt: Option<f64>,
@@ -86,32 +92,46 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         dead_time_s: arguments.dead_time_s,
     };
     let bar = share("fitting models");
-    let candidates = fit_motion(&recording, &settings, &|done| {
+    let mut candidates = fit_motion(&recording, &settings, &|done| {
         bar.set_position((1000.0 * done) as u64);
     })?;
+    bar.set_message("refining the best");
+    let best = recommended(&candidates).context("no model of the record is one of friction")?;
+    let refined = refined(best, &recording, &settings);
+    let validated = arguments
+        .validate
+        .as_ref()
+        .map(|path| validation(&candidates, path, &settings))
+        .transpose()?;
     bar.set_message("running the models");
-    let reruns: Vec<Reruns> = candidates
-        .iter()
-        .map(|candidate| Reruns {
-            open_loop: replay_open_loop(&candidate.model, &recording),
-            closed_loop: cascade
-                .as_ref()
-                .map(|cascade| replay_closed_loop(&candidate.model, &recording, cascade)),
-        })
-        .collect();
+    let signals = Signals::new(&recording, &settings);
+    let rerun = |candidate: &Candidate| Reruns {
+        open_loop: replay_open_loop(&candidate.model, &recording, &signals),
+        closed_loop: cascade
+            .as_ref()
+            .map(|cascade| replay_closed_loop(&candidate.model, &recording, &signals, cascade)),
+    };
+    let mut chosen = best.clone();
+    // A search that found no end, or nothing better, leaves the best as it is.
+    if let Ok(refined) = refined {
+        let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
+        if rms(&refined) < rms(best) {
+            chosen = refined.clone();
+        }
+        candidates.push(refined);
+    }
+    let reruns: Vec<Reruns> = candidates.iter().map(rerun).collect();
     bar.finish_and_clear();
-    let chosen = recommended(&candidates).context("no model of the record is one of friction")?;
-    let tables = vec![
-        candidates_table(&candidates, &reruns),
-        motion_table(&chosen.model, arguments.force_per_volt),
-    ];
+    let mut tables = vec![candidates_table(&candidates, &reruns)];
+    tables.extend(validated);
+    tables.push(motion_table(&chosen.model, arguments.force_per_volt));
     for table in &tables {
         output.table(table)?;
     }
     let page = motion_page(
         &title,
         tables,
-        chosen,
+        &chosen,
         provenance(&command_line(), output.seed),
     );
     output.page(&page, "motion.html")?;
@@ -120,17 +140,36 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         destination,
         ..
     } = arguments;
-    let records = arguments.record.as_slice();
+    let records: Vec<PathBuf> = arguments
+        .record
+        .iter()
+        .chain(&arguments.validate)
+        .cloned()
+        .collect();
     destination.write(
         subject,
         stage,
-        records,
+        &records,
         &["friction", "plant"],
         |settings| {
             settings.plant = Some(chosen.model.plant());
             settings.friction = chosen.model.friction_settings();
         },
     )
+}
+
+/// Every candidate on another record.
+fn validation(
+    candidates: &[Candidate],
+    path: &PathBuf,
+    settings: &MotionFitSettings,
+) -> anyhow::Result<Table> {
+    let other = recorded::read(path)?;
+    let errors = candidates
+        .iter()
+        .map(|candidate| Ok((candidate, validate(candidate, &other, settings)?)))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(validation_table(&errors, &path.display().to_string()))
 }
 
 fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {

@@ -3,11 +3,13 @@
 use rayon::prelude::*;
 
 use super::error::{LEAST_PERCENT, LEAST_ROWS, MotionFitError};
-use super::model::{MotionModel, Structure};
-use super::regressors::Regression;
+use super::model::{Estimate, MotionModel, Structure};
+use super::regressors::{Regression, Term};
 use super::signals::{MotionFitSettings, Signals};
+use super::simulate::open_loop_mm;
 use super::solution::{MOST_DEAD_TIME_S, Solution};
 use super::uncertainty::estimates;
+use crate::identify::fit::{Loss, Parameter, fit_with_step};
 use crate::identify::setting::SettingError;
 use crate::record::Recording;
 
@@ -16,9 +18,12 @@ use crate::record::Recording;
 pub struct Candidate {
     /// The model, fitted to the whole record.
     pub model: MotionModel,
-    /// Relative error of models fitted to every other pair of motion segments on the pairs between, both ways round;
-    /// nothing when there are too few segments.
+    /// Relative error on parts of the trajectory that were withheld from the fit, in all their repetitions, one part at a time;
+    /// nothing when there are too few motions, or for a model that was [refined].
     pub validation_error: Option<f64>,
+    /// True if its motion was fitted, too.
+    pub refined: bool,
+    solution: Solution,
     /// The rows of the regression.
     pub rows: Rows,
 }
@@ -38,9 +43,19 @@ pub struct Rows {
     pub friction_v: Vec<f64>,
 }
 
-/// Share of the largest velocity below which the axis does not count as moving.
-const MOVING: f64 = 0.01;
+/// Parts of the trajectory that are withheld, one at a time.
+const PARTS: usize = 8;
+/// Reversals below which nothing is withheld.
+const LEAST_REVERSALS: usize = 3;
+/// Validation errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
+const AS_GOOD: f64 = 1.02;
+/// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
+const ANOTHER_OPINION: f64 = 2.0;
+
 /// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done.
+///
+/// A parameter's standard error covers the record's noise, what the value becomes with parts of the trajectory withheld, and
+/// how far it lies from that of the other models which predict withheld parts at most twice as badly as the best.
 ///
 /// # Errors
 /// A record that is too short, moves one way only, or does not tell parameters apart.
@@ -51,18 +66,47 @@ pub fn fit_motion(
 ) -> Result<Vec<Candidate>, MotionFitError> {
     check(recording, settings)?;
     let signals = Signals::new(recording, settings);
-    let velocity = signals.decimated(&signals.velocity_mm_s, settings);
-    let segments = segments(&velocity)?;
+    let parts = parts(&signals, settings)?;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    Structure::ALL
+    let mut candidates: Vec<Candidate> = Structure::ALL
         .into_par_iter()
         .map(|structure| {
-            let candidate = candidate(&signals, settings, structure, &segments);
+            let candidate = candidate(&signals, settings, structure, &parts);
             let count = 1 + done.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
             progress(count as f64 / Structure::ALL.len() as f64);
             candidate
         })
-        .collect()
+        .collect::<Result<_, _>>()?;
+    heed_other_opinions(&mut candidates);
+    Ok(candidates)
+}
+
+/// Widens each standard error by the distance to the same parameter of the other good models.
+fn heed_other_opinions(candidates: &mut [Candidate]) {
+    let best = candidates
+        .iter()
+        .filter_map(|candidate| candidate.validation_error)
+        .fold(f64::INFINITY, f64::min);
+    let opinions: Vec<Vec<Estimate>> = candidates
+        .iter()
+        .filter(|candidate| {
+            candidate
+                .validation_error
+                .is_some_and(|error| error <= ANOTHER_OPINION * best)
+        })
+        .map(|candidate| candidate.model.estimates.clone())
+        .collect();
+    for candidate in candidates {
+        for estimate in &mut candidate.model.estimates {
+            let furthest = opinions
+                .iter()
+                .flatten()
+                .filter(|other| other.name == estimate.name)
+                .map(|other| (other.value - estimate.value).abs())
+                .fold(0.0, f64::max);
+            estimate.standard_error = estimate.standard_error.hypot(furthest);
+        }
+    }
 }
 
 fn check(recording: &Recording, settings: &MotionFitSettings) -> Result<(), MotionFitError> {
@@ -111,48 +155,96 @@ fn check(recording: &Recording, settings: &MotionFitSettings) -> Result<(), Moti
     Ok(())
 }
 
-/// The motion segment that each row belongs to: from reversal to reversal.
-fn segments(velocity_mm_s: &[f64]) -> Result<Vec<usize>, MotionFitError> {
-    let largest = velocity_mm_s
-        .iter()
-        .fold(0.0_f64, |most, v| most.max(v.abs()));
-    let moving = MOVING * largest;
+/// The part of the trajectory that each row belongs to; nothing of it where too few reversals leave too little to withhold.
+/// A trajectory that repeats itself is divided within one repetition, so that a part is withheld wherever it occurs.
+fn parts(
+    signals: &Signals,
+    settings: &MotionFitSettings,
+) -> Result<Option<Vec<usize>>, MotionFitError> {
+    let velocity = signals.decimated(&signals.velocity_mm_s, settings);
+    let moving = signals.moving_mm_s();
     let share = |sign: f64| {
-        let count = velocity_mm_s.iter().filter(|v| **v * sign > moving).count();
-        100.0 * count as f64 / velocity_mm_s.len() as f64
+        let count = velocity.iter().filter(|v| **v * sign > moving).count();
+        100.0 * count as f64 / velocity.len() as f64
     };
     let percent = share(1.0).min(share(-1.0));
     if percent < LEAST_PERCENT {
         return Err(MotionFitError::OneWay { percent });
     }
-    let (mut segment, mut way) = (0, 0.0);
-    Ok(velocity_mm_s
+    let ways: Vec<f64> = velocity
         .iter()
-        .map(|velocity| {
-            if velocity.abs() > moving {
-                if way * velocity < 0.0 {
-                    segment += 1;
-                }
-                way = velocity.signum();
-            }
-            segment
-        })
-        .collect())
+        .filter(|v| v.abs() > moving)
+        .map(|v| v.signum())
+        .collect();
+    let reversals = ways.windows(2).filter(|pair| pair[0] != pair[1]).count();
+    if reversals < LEAST_REVERSALS {
+        return Ok(None);
+    }
+    let position = signals.decimated(&signals.position_mm, settings);
+    let period = repetition(&position).unwrap_or(position.len());
+    let part = |row: usize| (row % period) * PARTS / period;
+    Ok(Some((0..position.len()).map(part).collect()))
 }
+
+/// Rows after which a trajectory repeats itself; nothing if it does not.
+fn repetition(position_mm: &[f64]) -> Option<usize> {
+    let count = position_mm.len();
+    let mean = position_mm.iter().sum::<f64>() / count as f64;
+    let variance = position_mm.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / count as f64;
+    let differs = |lag: usize| -> f64 {
+        let pairs = position_mm.iter().zip(&position_mm[lag..]);
+        let squares: f64 = pairs.map(|(a, b)| (a - b).powi(2)).sum();
+        (squares / (count - lag) as f64 / variance).sqrt()
+    };
+    // Neighbours are alike, too: a repetition is a likeness after a difference.
+    let longest = (LONGEST_REPETITION * count as f64) as usize;
+    let unlike = (1..longest).find(|&lag| differs(lag) > UNLIKE)?;
+    let alike = (unlike..longest).find(|&lag| differs(lag) < ALIKE)?;
+    let until = (alike..longest).find(|&lag| differs(lag) >= ALIKE);
+    (alike..until.unwrap_or(longest)).min_by(|a, b| differs(*a).total_cmp(&differs(*b)))
+}
+
+/// A repetition takes at most this share of the record: more is not seen twice.
+const LONGEST_REPETITION: f64 = 0.6;
+/// RMS differences of a trajectory and itself, later, over its standard deviation: it is another place, or the same.
+const UNLIKE: f64 = 0.2;
+const ALIKE: f64 = 0.02;
 
 fn candidate(
     signals: &Signals,
     settings: &MotionFitSettings,
     structure: Structure,
-    segments: &[usize],
+    parts: &Option<Vec<usize>>,
 ) -> Result<Candidate, MotionFitError> {
-    let regression = Regression::new(signals, settings, structure);
+    let regression = Regression::new(signals, settings, structure, signals.span());
     let all: Vec<usize> = (0..regression.rows()).collect();
     let whole = Solution::find(&regression, structure, &all)?;
-    let residual = whole.residual(&regression, &all);
+    let withheld = match parts {
+        Some(parts) => withheld(&regression, structure, parts)?,
+        None => None,
+    };
+    let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
+    Ok(Candidate {
+        validation_error: withheld.as_ref().map(|found| found.error),
+        refined: false,
+        ..described(signals, settings, structure, &regression, whole, others)?
+    })
+}
+
+/// A candidate for a solution, with its estimates and rows; `withheld` are the solutions without parts of the trajectory.
+fn described(
+    signals: &Signals,
+    settings: &MotionFitSettings,
+    structure: Structure,
+    regression: &Regression<'_>,
+    whole: Solution,
+    withheld: &[Solution],
+) -> Result<Candidate, MotionFitError> {
+    let all: Vec<usize> = (0..regression.rows()).collect();
+    let residual = whole.residual(regression, &all);
     let row_s = signals.sample_time_s * settings.decimation(signals.sample_time_s) as f64;
-    let estimates = estimates(&whole, &regression, structure, settings, &residual);
-    let model = whole.model(&regression, structure, settings, &residual, estimates)?;
+    let estimates = estimates(&whole, regression, structure, settings, &residual, withheld);
+    let model = whole.model(regression, structure, settings, &residual, estimates)?;
     let acceleration = signals.decimated(&signals.acceleration_mm_s2, settings);
     let voltage = regression.voltage_at(whole.dead_time_s);
     let friction = voltage
@@ -160,7 +252,8 @@ fn candidate(
         .zip(&acceleration)
         .map(|(volts, a)| volts - model.inertia_v_s2_per_mm * a - model.offset_v);
     Ok(Candidate {
-        validation_error: validation(&regression, structure, segments)?,
+        validation_error: None,
+        refined: true,
         rows: Rows {
             time_s: all
                 .iter()
@@ -172,49 +265,163 @@ fn candidate(
             residual_v: residual.iter().copied().collect(),
         },
         model,
+        solution: whole,
     })
 }
 
-/// The model to use: that with the smallest error where it was not fitted (or, without validation, where it was), among
-/// those whose level does not rise with the velocity.
+/// The model to use: the simplest of those whose error where they were not fitted (or, without validation, where they were)
+/// is within two per cent of the smallest.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
     let error = |candidate: &Candidate| {
         candidate
             .validation_error
             .unwrap_or(candidate.model.relative_error)
     };
+    let smallest = candidates.iter().map(error).fold(f64::INFINITY, f64::min);
     candidates
         .iter()
-        .filter(|candidate| candidate.model.is_stribeck())
-        .min_by(|a, b| error(a).total_cmp(&error(b)))
+        .find(|candidate| error(candidate) <= AS_GOOD * smallest)
 }
 
-/// Fits one half of the pairs of segments and judges the other, both ways round.
-fn validation(
+/// Fits with one part of the trajectory withheld at a time, and what they missed there.
+struct Withheld {
+    solutions: Vec<Solution>,
+    error: f64,
+}
+
+/// Withholds each part in turn; nothing if what is left tells too little.
+fn withheld(
     regression: &Regression<'_>,
     structure: Structure,
-    segments: &[usize],
-) -> Result<Option<f64>, MotionFitError> {
-    // A pair holds both senses of motion, so that either half can be fitted by itself.
-    let half = |parity: usize| -> Vec<usize> {
-        (0..segments.len())
-            .filter(|&row| segments[row] / 2 % 2 == parity)
-            .collect()
-    };
-    if segments.last().is_none_or(|last| *last < 3) {
-        return Ok(None);
-    }
+    parts: &[usize],
+) -> Result<Option<Withheld>, MotionFitError> {
     let (mut missed, mut total) = (0.0, 0.0);
-    for parity in [0, 1] {
-        let found = match Solution::find(regression, structure, &half(parity)) {
-            // Half of a record may tell too little.
+    let mut solutions = Vec::new();
+    for part in 0..PARTS {
+        let (judged, fitted): (Vec<usize>, Vec<usize>) =
+            (0..parts.len()).partition(|&row| parts[row] == part);
+        let found = match Solution::find(regression, structure, &fitted) {
             Err(MotionFitError::Dependent { .. }) => return Ok(None),
             found => found?,
         };
-        let others = half(1 - parity);
-        missed += found.residual(regression, &others).norm_squared();
+        missed += found.residual(regression, &judged).norm_squared();
         let voltage = regression.voltage_at(found.dead_time_s);
-        total += voltage.select_rows(&others).norm_squared();
+        total += voltage.select_rows(&judged).norm_squared();
+        solutions.push(found);
     }
-    Ok(Some((missed / total).sqrt()))
+    Ok(Some(Withheld {
+        solutions,
+        error: (missed / total).sqrt(),
+    }))
+}
+
+/// Relative error of a model on another record, taken after its own, on which nothing is fitted.
+///
+/// # Errors
+/// As [`fit_motion`].
+pub fn validate(
+    candidate: &Candidate,
+    other: &Recording,
+    settings: &MotionFitSettings,
+) -> Result<f64, MotionFitError> {
+    check(other, settings)?;
+    let signals = Signals::new(other, settings);
+    let Candidate {
+        model, solution, ..
+    } = candidate;
+    let span = model.span.afterwards();
+    let regression = Regression::new(&signals, settings, model.structure, span);
+    let all: Vec<usize> = (0..regression.rows()).collect();
+    let voltage = regression.voltage_at(solution.dead_time_s);
+    Ok(solution.residual(&regression, &all).norm() / voltage.norm())
+}
+
+/// Ranges of the coefficients in a refinement, over their values; of those that may be of either sign, over the Coulomb level.
+const REFINED_WITHIN: f64 = 0.3;
+/// Time between the positions that a refinement compares, s.
+const REFINED_EVERY_S: f64 = 0.025;
+/// Step of its difference quotients, of a coefficient's range: friction's corners make the simulation rough.
+const REFINED_STEP: f64 = 1e-4;
+
+/// The same structure with coefficients that also make it move as the axis did: a position that is off by a thousandth of
+/// the travel, in open loop, weighs as much as a voltage that is off by a thousandth. An open loop adds up errors of the
+/// force that a fit of the force alone does not see.
+///
+/// # Errors
+/// As [`fit_motion`], and a search that does not come to an end.
+pub fn refined(
+    candidate: &Candidate,
+    recording: &Recording,
+    settings: &MotionFitSettings,
+) -> Result<Candidate, MotionFitError> {
+    let signals = Signals::new(recording, settings);
+    let Candidate {
+        model, solution, ..
+    } = candidate;
+    let (structure, span) = (model.structure, model.span);
+    let regression = Regression::new(&signals, settings, structure, span);
+    let all: Vec<usize> = (0..regression.rows()).collect();
+    let coulomb_v = model.friction.positive.curve.coulomb_v;
+    let ranges: Vec<f64> = regression
+        .terms
+        .iter()
+        .zip(solution.coefficients.iter())
+        .map(|(term, value)| match term {
+            Term::Inertia | Term::Viscous(_) | Term::Coulomb | Term::Element(_) => {
+                REFINED_WITHIN * value.abs()
+            }
+            Term::Drop | Term::Offset | Term::Drift(_) | Term::AlongTravel(_) => {
+                REFINED_WITHIN * coulomb_v
+            }
+        })
+        .collect();
+    let free: Vec<usize> = (0..ranges.len()).filter(|&i| ranges[i] > 0.0).collect();
+    let shifted = |shares: &[f64]| {
+        let mut found = solution.clone();
+        for (&index, share) in free.iter().zip(shares) {
+            found.coefficients[index] += share * ranges[index];
+        }
+        found
+    };
+    let voltage = regression.voltage_at(solution.dead_time_s).norm();
+    let every = (REFINED_EVERY_S / signals.sample_time_s).ceil() as usize;
+    let compared = signals.position_mm.len().div_ceil(every);
+    let travel_mm = 2.0 * span.position_mm.1;
+    let position_weight = 1.0 / (travel_mm * (compared as f64).sqrt());
+    let parameters = vec![
+        Parameter {
+            name: "coefficient",
+            start: 0.0,
+            bounds: (-1.0, 1.0),
+        };
+        free.len()
+    ];
+    let residuals = |shares: &[f64]| {
+        let found = shifted(shares);
+        let force = found.residual(&regression, &all);
+        let Ok(model) = found.model(&regression, structure, settings, &force, Vec::new()) else {
+            return vec![f64::NAN; all.len() + compared];
+        };
+        let position_mm = open_loop_mm(&model, &signals);
+        let off = position_mm.iter().zip(&signals.position_mm);
+        force
+            .iter()
+            .map(|volts| volts / voltage)
+            .chain(off.step_by(every).map(|(a, b)| (a - b) * position_weight))
+            .collect()
+    };
+    let found = fit_with_step(&parameters, Loss::Squares, REFINED_STEP, residuals)?;
+    let mut found = described(
+        &signals,
+        settings,
+        structure,
+        &regression,
+        shifted(&found.values),
+        &[],
+    )?;
+    // What the data tell of a parameter is what the force told.
+    for (estimate, before) in found.model.estimates.iter_mut().zip(&model.estimates) {
+        estimate.standard_error = before.standard_error;
+    }
+    Ok(found)
 }

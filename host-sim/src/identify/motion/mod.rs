@@ -6,6 +6,8 @@
 //! u(t - Td) = M' a + sigma v + s(v) h + offset,   M' = 1/A
 //! ```
 //!
+//! (level and offset may also change with time, and along the travel)
+//!
 //! `h` is the sign of the velocity, or, with pre-sliding friction, a bank of Maxwell-slip elements driven by the measured
 //! position. Velocity and acceleration come from the position alone, by zero-phase filtering and central differences; what
 //! the filter does to the edges is cut, and all signals, the regressors among them, pass the same decimation filter.
@@ -28,8 +30,8 @@ mod uncertainty;
 mod zero_phase;
 
 pub use error::MotionFitError;
-pub use fit::{Candidate, Rows, fit_motion, recommended};
-pub use model::{Estimate, MotionModel, Structure};
+pub use fit::{Candidate, Rows, fit_motion, recommended, refined, validate};
+pub use model::{Change, Estimate, MotionModel, Span, Structure};
 pub use shuttle::shuttle;
 pub use signals::{MotionFitSettings, Signals};
 pub use simulate::{CascadeLoop, Replayed, replay_closed_loop, replay_open_loop};

@@ -8,7 +8,6 @@ use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use crate::identify::single_state::with_all_models;
-use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
 
 /// Structure of a model: its terms beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,20 +18,25 @@ pub struct Structure {
     pub dead_time: bool,
     /// Friction that turns over a displacement and not at once.
     pub presliding: bool,
-    /// A level that changes with the velocity, from Fs at rest to Fc. It may rise, too: that is no Stribeck effect, but
-    /// what some records hold.
+    /// A level that changes with the velocity, from Fs at rest to Fc. It may rise, too.
     pub stribeck: bool,
+    /// Level and offset that change with time, in proportion.
+    pub drift: bool,
+    /// Level and offset that change along the travel, in proportion.
+    pub along_travel: bool,
 }
 
 impl Structure {
     /// The models that are compared, each with one more part than the one before; the first has the four parameters
     /// that are usual (and published for EMPS).
-    pub const ALL: [Self; 5] = {
+    pub const ALL: [Self; 7] = {
         let four = Self {
             directed_viscous: false,
             dead_time: false,
-            stribeck: false,
             presliding: false,
+            stribeck: false,
+            drift: false,
+            along_travel: false,
         };
         let directed = Self {
             directed_viscous: true,
@@ -50,7 +54,23 @@ impl Structure {
             stribeck: true,
             ..presliding
         };
-        [four, directed, delayed, presliding, stribeck]
+        let drifting = Self {
+            drift: true,
+            ..stribeck
+        };
+        let along_travel = Self {
+            along_travel: true,
+            ..drifting
+        };
+        [
+            four,
+            directed,
+            delayed,
+            presliding,
+            stribeck,
+            drifting,
+            along_travel,
+        ]
     };
 
     /// Returns the terms added to those of the model before it in [`ALL`](Self::ALL), for a table.
@@ -68,6 +88,8 @@ impl Structure {
             (self.dead_time, "dead time"),
             (self.presliding, "pre-sliding"),
             (self.stribeck, "level by velocity"),
+            (self.drift, "drift"),
+            (self.along_travel, "along the travel"),
         ] {
             if holds {
                 name = format!("{name} + {part}");
@@ -83,7 +105,7 @@ pub struct Estimate {
     pub name: String,
     pub unit: &'static str,
     pub value: f64,
-    /// One standard deviation, over blocks of the record.
+    /// One standard deviation: see [`fit_motion`](super::fit_motion).
     pub standard_error: f64,
     /// Factor that turns the value into newtons, metres and seconds, but for the force per volt; and the unit it then
     /// has.
@@ -96,7 +118,8 @@ pub struct MotionModel {
     pub structure: Structure,
     /// M' = 1/A, V s²/mm.
     pub inertia_v_s2_per_mm: f64,
-    /// Static friction each way, viscous friction included; Fs = Fc without a Stribeck part.
+    /// Static friction each way, viscous friction included; Fs = Fc where the level does not change with the velocity. Where
+    /// friction drifts, in the middle of the record; where it changes along the travel, in its middle.
     pub friction: PerDirection<StaticFriction>,
     /// Offset, V: the amplifier's, gravity, and half the difference of the two Coulomb levels.
     pub offset_v: f64,
@@ -104,21 +127,66 @@ pub struct MotionModel {
     pub dead_time_s: f64,
     /// The part of it that is the voltage's hold, s: half the record's sampling time.
     pub hold_s: f64,
-    /// Level of each element, V, at its knot, mm; empty where friction turns at once.
+    /// Knot, mm, and level, V, of each element, zero for what is left out; empty where friction turns at once.
     pub elements: Vec<(f64, f64)>,
+    /// Fs - Fc, V; below zero where the level rises with the velocity.
+    pub drop_v: f64,
+    /// Change of level and offset from the middle of the record to its end.
+    pub drift: Change,
+    /// Change of level and offset from the middle of the travel to its upper end.
+    pub along_travel: Change,
+    /// Middle of the record and of its travel, and half of each.
+    pub span: Span,
     /// All of that, with standard errors.
     pub estimates: Vec<Estimate>,
     /// Norm of the residual over that of the voltage, over the rows of the fit.
     pub relative_error: f64,
 }
 
+/// A linear change of friction's level and of the offset, V.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Change {
+    pub level_v: f64,
+    pub offset_v: f64,
+}
+
+/// The record that changes are counted over: their middles, and half of their extents.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Span {
+    /// Middle of the record, from its first sample, and half its duration, s.
+    pub time_s: (f64, f64),
+    /// Middle and half of the travel, mm.
+    pub position_mm: (f64, f64),
+}
+
+impl Span {
+    /// A time as -1 at the start of the record to 1 at its end; later times count as its end.
+    pub(super) fn time_share(&self, time_s: f64) -> f64 {
+        ((time_s - self.time_s.0) / self.time_s.1).clamp(-1.0, 1.0)
+    }
+
+    /// The same travel, at the end of the record and ever after.
+    pub(super) fn afterwards(self) -> Self {
+        Self {
+            time_s: (f64::MIN, 1.0),
+            ..self
+        }
+    }
+
+    /// A position as -1 at the lower end of the travel to 1 at the upper; beyond them, as at the end.
+    pub(super) fn travel_share(&self, position_mm: f64) -> f64 {
+        ((position_mm - self.position_mm.0) / self.position_mm.1).clamp(-1.0, 1.0)
+    }
+}
+
 /// Displacement over which a friction without pre-sliding turns, mm, for a simulation.
-const AT_ONCE_MM: f64 = 1e-4;
-/// Time in which sliding friction follows the Stribeck curve, s: a motion record does not show it.
-const LAG_S: f64 = 0.03;
+pub(super) const AT_ONCE_MM: f64 = 1e-4;
+/// Time in which sliding friction follows its curve, s: a motion record shows none, so the shortest that any control rate of
+/// the firmware resolves.
+const LAG_S: f64 = 1e-3;
 
 impl MotionModel {
-    /// Its friction as GMS parameters. The rate of attraction is not in the record: it is taken as Fs in 30 ms.
+    /// Its friction as GMS parameters.
     pub fn gms(&self) -> GmsParameters {
         let breakaway_v = self.friction.positive.curve.breakaway_v;
         let total: f64 = self.elements.iter().map(|(_, level)| level).sum();
@@ -130,6 +198,7 @@ impl MotionModel {
         } else {
             self.elements
                 .iter()
+                .filter(|(_, level_v)| *level_v > 0.0)
                 .map(|&(knot_mm, level_v)| GmsElement {
                     stiffness_v_per_mm: level_v / total * breakaway_v / knot_mm,
                     weight: level_v / total,
@@ -142,22 +211,9 @@ impl MotionModel {
         }
     }
 
-    /// True if the friction does not rise with the velocity but for its viscous part, as the firmware's model requires.
-    pub fn is_stribeck(&self) -> bool {
-        let curve = &self.friction.positive.curve;
-        curve.breakaway_v >= curve.coulomb_v
-    }
-
-    /// Its friction as settings hold it; a level that rises with the velocity is taken at its largest.
+    /// Its friction as settings hold it: that of the middle of the record and of the travel.
     pub fn friction_settings(&self) -> FrictionSettings {
-        let sliding = self.friction.map(|model| StaticFriction {
-            curve: StribeckCurve {
-                breakaway_v: model.curve.breakaway_v.max(model.curve.coulomb_v),
-                ..model.curve
-            },
-            ..*model
-        });
-        with_all_models(sliding, self.gms())
+        with_all_models(self.friction, self.gms())
     }
 
     /// The axis' own delay, s: without the hold, and never below zero.
@@ -174,27 +230,6 @@ impl MotionModel {
             damping_per_s: 0.5 * viscous / self.inertia_v_s2_per_mm,
             stiffness_per_s2: 0.0,
             delay_s: self.delay_s(),
-        }
-    }
-
-    /// The axis that the model describes, to be simulated: without encoder noise.
-    pub fn axis(&self, full_scale_v: f64) -> AxisTruth {
-        AxisTruth {
-            gain_mm_per_v_s2: 1.0 / self.inertia_v_s2_per_mm,
-            // All damping is in the friction.
-            damping_per_s: 0.0,
-            stiffness_per_s2: 0.0,
-            delay_s: self.delay_s(),
-            friction: self.friction,
-            gms: self.gms(),
-            model: FrictionTruth::Gms,
-            resolution_mm: 1e-6,
-            full_scale_v,
-            imperfections: Imperfections {
-                offset_v: -self.offset_v,
-                ..Imperfections::default()
-            },
-            drive: Drive::BallScrew,
         }
     }
 }

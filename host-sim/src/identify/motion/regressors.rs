@@ -2,7 +2,7 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::model::Structure;
+use super::model::{Span, Structure};
 use super::signals::{MotionFitSettings, Signals};
 
 /// The parts of a model that are linear, each the coefficient of a column.
@@ -20,6 +20,26 @@ pub(super) enum Term {
     Drop,
     /// Offset, V.
     Offset,
+    /// Change of the offset, or of friction's level, over half of the record, V.
+    Drift(Part),
+    /// The same over half of the travel, V.
+    AlongTravel(Part),
+}
+
+/// The part of the force that changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Part {
+    Offset,
+    Level,
+}
+
+impl Part {
+    pub(super) const fn name(self) -> &'static str {
+        match self {
+            Self::Offset => "offset",
+            Self::Level => "level",
+        }
+    }
 }
 
 /// A sense of motion.
@@ -51,13 +71,17 @@ pub(super) struct Regression<'a> {
     voltage_v: Vec<f64>,
     /// Velocity at the decimated samples, mm/s.
     pub(super) velocity_mm_s: Vec<f64>,
+    /// What changes are counted over.
+    pub(super) span: Span,
 }
 
 impl<'a> Regression<'a> {
+    /// Columns of a record; changes are counted over `span`, the record's own or that of the record that a model comes from.
     pub(super) fn new(
         signals: &'a Signals,
         settings: &'a MotionFitSettings,
         structure: Structure,
+        span: Span,
     ) -> Self {
         let velocity = &signals.velocity_mm_s;
         let one_way = |sign: f64| -> Vec<f64> {
@@ -103,6 +127,22 @@ impl<'a> Regression<'a> {
             terms.push(Term::Drop);
             columns.push(vec![0.0; velocity.len()]);
         }
+        let mut change = |term: fn(Part) -> Term, share: Vec<f64>| {
+            let level = share.iter().zip(&hysteresis).map(|(a, h)| a * h).collect();
+            terms.extend([term(Part::Offset), term(Part::Level)]);
+            columns.extend([share, level]);
+        };
+        if structure.drift {
+            let times = (0..velocity.len()).map(|k| k as f64 * signals.sample_time_s);
+            change(Term::Drift, times.map(|t| span.time_share(t)).collect());
+        }
+        if structure.along_travel {
+            let positions = signals.position_mm.iter();
+            change(
+                Term::AlongTravel,
+                positions.map(|&x| span.travel_share(x)).collect(),
+            );
+        }
         let columns: Vec<DVector<f64>> = columns
             .iter()
             .map(|column| DVector::from_vec(signals.decimated(column, settings)))
@@ -115,6 +155,7 @@ impl<'a> Regression<'a> {
             hysteresis,
             voltage_v: signals.smoothed(&signals.voltage_v, settings),
             velocity_mm_s: signals.decimated(velocity, settings),
+            span,
         }
     }
 
@@ -197,12 +238,17 @@ pub(super) fn solve(
         for (mut column, size) in scaled.column_iter_mut().zip(&sizes) {
             column /= *size;
         }
-        let decomposition = scaled.svd(true, true);
+        // The triangle of a QR decomposition has the columns' singular values, and is small.
+        let orthogonal = scaled.qr();
+        let mut rotated = targets.clone();
+        orthogonal.q_tr_mul(&mut rotated);
+        let rotated = rotated.rows(0, kept.len()).into_owned();
+        let decomposition = orthogonal.r().svd(true, true);
         let smallest = decomposition.singular_values.min();
         if smallest < DEPENDENT * decomposition.singular_values.max() {
             return None;
         }
-        let solution = decomposition.solve(&targets, 0.0).ok()?;
+        let solution = decomposition.solve(&rotated, 0.0).ok()?;
         let worst = kept
             .iter()
             .enumerate()

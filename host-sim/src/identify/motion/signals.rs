@@ -1,5 +1,6 @@
 //! From position and voltage to what a regression needs.
 
+use super::model::Span;
 use super::zero_phase::low_pass;
 use crate::record::Recording;
 
@@ -61,6 +62,8 @@ pub struct Signals {
     pub voltage_v: Vec<f64>,
 }
 
+/// Share of the largest velocity below which the axis does not count as moving.
+const MOVING: f64 = 0.01;
 /// Samples a second that are always enough, Hz.
 const ENOUGH_HZ: f64 = 1000.0;
 /// Order of the position's filter.
@@ -104,6 +107,25 @@ impl Signals {
             velocity_mm_s,
             acceleration_mm_s2,
             voltage_v,
+        }
+    }
+
+    /// Speed from which on the axis counts as moving, mm/s.
+    pub(super) fn moving_mm_s(&self) -> f64 {
+        let speeds = self.velocity_mm_s.iter().map(|v| v.abs());
+        MOVING * speeds.fold(0.0, f64::max)
+    }
+
+    /// Duration and travel of the record.
+    pub(super) fn span(&self) -> Span {
+        let positions = self.position_mm.iter();
+        let (low, high) = positions.fold((f64::MAX, f64::MIN), |(low, high), &x| {
+            (low.min(x), high.max(x))
+        });
+        let half_s = 0.5 * self.sample_time_s * self.position_mm.len() as f64;
+        Span {
+            time_s: (half_s, half_s),
+            position_mm: (0.5 * (low + high), 0.5 * (high - low)),
         }
     }
 

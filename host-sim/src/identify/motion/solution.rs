@@ -4,8 +4,8 @@ use nalgebra::DVector;
 use quadrant::friction::PerDirection;
 
 use super::error::MotionFitError;
-use super::model::{Estimate, MotionModel, Structure, sliding};
-use super::regressors::{Regression, Term, Way, solve};
+use super::model::{Change, Estimate, MotionModel, Structure, sliding};
+use super::regressors::{Part, Regression, Term, Way, solve};
 use super::signals::MotionFitSettings;
 use crate::identify::fit::{Loss, Parameter, fit};
 
@@ -15,6 +15,7 @@ pub(super) const MOST_DEAD_TIME_S: f64 = 0.02;
 const STRIBECK: (f64, f64, f64) = (0.1, 2e-3, 0.7);
 
 /// The parameters of one fit.
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Solution {
     pub(super) coefficients: DVector<f64>,
     pub(super) dead_time_s: f64,
@@ -122,6 +123,10 @@ impl Solution {
                 viscous(way).max(0.0),
             )
         };
+        let change = |term: &dyn Fn(Part) -> Term| Change {
+            level_v: sum(&|other| other == term(Part::Level)),
+            offset_v: sum(&|other| other == term(Part::Offset)),
+        };
         for (name, value, unit) in [("M'", inertia, "V s²/mm"), ("Fc", coulomb, "V")] {
             if value <= 0.0 {
                 return Err(MotionFitError::Unphysical {
@@ -134,7 +139,7 @@ impl Solution {
         }
         let elements = regression.terms.iter().zip(self.coefficients.iter());
         let elements = elements.filter_map(|(term, level_v)| match term {
-            Term::Element(knot) if *level_v > 0.0 => Some((settings.knots_mm[*knot], *level_v)),
+            Term::Element(knot) => Some((settings.knots_mm[*knot], *level_v)),
             _ => None,
         });
         let voltage = regression.voltage_at(self.dead_time_s);
@@ -146,6 +151,10 @@ impl Solution {
                 negative: way(Way::Negative),
             },
             offset_v: sum(&|term| term == Term::Offset),
+            drop_v: drop,
+            drift: change(&Term::Drift),
+            along_travel: change(&Term::AlongTravel),
+            span: regression.span,
             dead_time_s: self.dead_time_s,
             hold_s: regression.hold_s(),
             elements: elements.collect(),

@@ -7,6 +7,9 @@ use super::regressors::{Regression, Term, Way};
 use super::signals::MotionFitSettings;
 use super::solution::Solution;
 
+/// Names of what is not linear.
+const DEAD_TIME: &str = "Td";
+const STRIBECK_VELOCITY: &str = "Vs";
 /// Blocks that standard errors are taken over.
 const BLOCKS: usize = 40;
 /// Share by which a parameter is shifted for a difference quotient.
@@ -14,14 +17,17 @@ const SHIFT: f64 = 1e-3;
 /// Time by which the dead time is shifted for one, s.
 const DEAD_TIME_SHIFT_S: f64 = 1e-4;
 
-/// Every parameter with its standard error: the residuals of neighbouring rows are correlated, so that scores are summed
-/// over blocks before they are taken for independent (the sandwich of Huber, 1967, and White, 1980).
+/// Every parameter with its standard error, the larger of two. One is for noise: the residuals of neighbouring rows are
+/// correlated, so that scores are summed over blocks before they are taken for independent (the sandwich of Huber, 1967, and
+/// White, 1980). The other is for what the model leaves out: the jackknife over `withheld`, the same fit with one part of the
+/// trajectory withheld at a time.
 pub(super) fn estimates(
     solution: &Solution,
     regression: &Regression<'_>,
     structure: Structure,
     settings: &MotionFitSettings,
     residual: &DVector<f64>,
+    withheld: &[Solution],
 ) -> Vec<Estimate> {
     let columns = regression.columns_at(solution.stribeck_velocity_mm_s);
     let mut estimates: Vec<Estimate> = regression
@@ -47,7 +53,7 @@ pub(super) fn estimates(
         let sooner = regression.voltage_at((solution.dead_time_s - shift).max(0.0));
         let step = shift + shift.min(solution.dead_time_s);
         jacobian.push((sooner - later) / step);
-        estimates.push(searched("Td", "s", solution.dead_time_s, (1.0, "s")));
+        estimates.push(searched(DEAD_TIME, "s", solution.dead_time_s, (1.0, "s")));
     }
     if structure.stribeck {
         let shift = SHIFT * solution.stribeck_velocity_mm_s;
@@ -55,7 +61,7 @@ pub(super) fn estimates(
         let below = regression.columns_at(solution.stribeck_velocity_mm_s - shift);
         jacobian.push((above - below) * &solution.coefficients / (2.0 * shift));
         let velocity = solution.stribeck_velocity_mm_s;
-        estimates.push(searched("Vs", "mm/s", velocity, (1e-3, "m/s")));
+        estimates.push(searched(STRIBECK_VELOCITY, "mm/s", velocity, (1e-3, "m/s")));
     }
     // A level that is left out is no parameter.
     let free: Vec<usize> = (0..estimates.len())
@@ -63,10 +69,30 @@ pub(super) fn estimates(
         .collect();
     let kept: Vec<DVector<f64>> = free.iter().map(|&i| jacobian[i].clone()).collect();
     for (place, error) in sandwich(&DMatrix::from_columns(&kept), residual) {
-        estimates[free[place]].standard_error = error;
+        let index = free[place];
+        let values: Vec<f64> = withheld
+            .iter()
+            .map(|other| match estimates[index].name.as_str() {
+                DEAD_TIME => other.dead_time_s,
+                STRIBECK_VELOCITY => other.stribeck_velocity_mm_s,
+                _ => other.coefficients[index],
+            })
+            .collect();
+        estimates[index].standard_error = error.max(jackknife(&values));
     }
     estimates.retain(|estimate| estimate.value != 0.0);
     estimates
+}
+
+/// Standard error of a value from what it becomes when one part of the data is withheld at a time; zero without such values.
+fn jackknife(values: &[f64]) -> f64 {
+    if values.is_empty() {
+        return 0.0;
+    }
+    let count = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / count;
+    let squares: f64 = values.iter().map(|value| (value - mean).powi(2)).sum();
+    (squares * (count - 1.0) / count).sqrt()
 }
 
 /// Standard errors from sums over blocks, place by place; none where the columns depend on each other.
@@ -107,6 +133,12 @@ fn described(term: Term, settings: &MotionFitSettings, value: f64) -> Estimate {
         }
         Term::Drop => ("Fs - Fc".to_owned(), "V", (1.0, "N")),
         Term::Offset => ("offset".to_owned(), "V", (1.0, "N")),
+        Term::Drift(part) => (format!("drift of the {}", part.name()), "V", (1.0, "N")),
+        Term::AlongTravel(part) => (
+            format!("{} along half of the travel", part.name()),
+            "V",
+            (1.0, "N"),
+        ),
     };
     Estimate {
         name,

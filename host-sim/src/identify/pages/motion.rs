@@ -20,7 +20,11 @@ pub fn candidates_table(candidates: &[Candidate], reruns: &[Reruns]) -> Table {
     let rows = candidates.iter().zip(reruns).map(|(candidate, rerun)| {
         let closed = rerun.closed_loop.as_ref();
         vec![
-            Cell::text(candidate.model.structure.addition()),
+            Cell::text(if candidate.refined {
+                "the recommended, refined in motion".to_owned()
+            } else {
+                candidate.model.structure.addition()
+            }),
             percent(Some(candidate.model.relative_error)),
             percent(candidate.validation_error),
             Cell::number(rerun.open_loop.position_rms_mm, 2),
@@ -32,9 +36,9 @@ pub fn candidates_table(candidates: &[Candidate], reruns: &[Reruns]) -> Table {
     });
     Table {
         id: "motion-models".to_owned(),
-        caption: "Models of the record, each with one part more than the one above. Relative error: norm of the unexplained voltage over that of the voltage. Validation: fitted to \
-                  alternating pairs of motion segments, judged on the others. Open loop: simulated from the recorded voltage alone; closed \
-                  loop: simulated on the recorded reference"
+        caption: "Models of the record, each with one part more than the one above. Relative error: norm of the unexplained voltage over that of the voltage. Validation: the same on \
+                  parts of the trajectory that were withheld, in all their repetitions. Open loop: simulated from the recorded voltage alone; \
+                  closed loop: simulated on the recorded reference. Refined: fitted to the motion in open loop, too"
             .to_owned(),
         columns: columns(&[
             ("Model", ""),
@@ -45,6 +49,32 @@ pub fn candidates_table(candidates: &[Candidate], reruns: &[Reruns]) -> Table {
             ("Closed loop, voltage", "%"),
         ]),
         rows: rows.collect(),
+    }
+}
+
+/// How well models that were fitted to one record predict another.
+pub fn validation_table(errors: &[(&Candidate, f64)], record: &str) -> Table {
+    Table {
+        id: "motion-validation".to_owned(),
+        caption: format!(
+            "Relative error on {record}, on which nothing was fitted, beside that on the record of the fit; drift is taken as it stood at \
+             the end of that"
+        ),
+        columns: columns(&[
+            ("Model", ""),
+            ("Relative error", "%"),
+            ("On the other record", "%"),
+        ]),
+        rows: errors
+            .iter()
+            .map(|(candidate, error)| {
+                vec![
+                    Cell::text(candidate.model.structure.addition()),
+                    Cell::number(100.0 * candidate.model.relative_error, 3),
+                    Cell::number(100.0 * error, 3),
+                ]
+            })
+            .collect(),
     }
 }
 
@@ -77,7 +107,8 @@ pub fn motion_table(model: &MotionModel, force_n_per_v: Option<f64>) -> Table {
     Table {
         id: "motion-parameters".to_owned(),
         caption: format!(
-            "Parameters of \"{}\"; ± is one standard deviation over blocks of the record. The offset holds gravity, the amplifier's offset \
+            "Parameters of \"{}\"; ± is one standard deviation: noise, parts of the trajectory withheld, and the distance to other models \
+             that predict nearly as well. The offset holds gravity, the amplifier's offset \
              and half the difference of the Coulomb levels; the viscous friction holds B / A; Td holds half a period of the voltage's hold",
             model.structure.name()
         ),
@@ -142,8 +173,8 @@ pub fn motion_page(
                 id: "models".to_owned(),
                 heading: "Models and parameters".to_owned(),
                 prose: vec![
-                    "Each model has one part more than the one before. The one whose error is smallest where it was not fitted is \
-                     shown below, among those whose friction does not rise with the velocity but for its viscous part."
+                    "Each model has one part more than the one before. The simplest of those whose error is smallest where they were \
+                     not fitted is shown below, refined by its own motion where that made it move better."
                         .to_owned(),
                 ],
                 blocks: tables.into_iter().map(Block::Table).collect(),
