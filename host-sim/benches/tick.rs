@@ -11,7 +11,7 @@ use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::plant::{SimulatedStage, StageParameters};
 
 /// A machine on its stage, moving.
 struct Rig<S: Scalar> {
@@ -26,7 +26,7 @@ impl<S: Scalar> Rig<S> {
         let job = circle_and_sine(0.5);
         let mut rig = Self {
             machine: LawMachine::new(&job).expect("the default settings are valid"),
-            plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1),
+            plant: SimulatedStage::new(&StageParameters::real(), job.stage.rate_hz, 1),
             operator: Operator::runs_the_plan(),
             tick: 0,
         };

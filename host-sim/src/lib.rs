@@ -14,15 +14,13 @@
 //! - [`gcode`]: part programs, and their motion;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
 //! - [`settings_reference`]: the meaning of every setting, as a page;
-//! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have;
-//! - [`command`]: options that the commands of this package and of the studies share.
+//! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have.
 #![forbid(unsafe_code)]
 // A tool, not a library for others: a comment that only repeats a name is left out.
 #![allow(missing_docs)]
 
 pub mod circle;
 pub mod client;
-pub mod command;
 pub mod commission;
 pub mod compare;
 pub mod design;

@@ -96,12 +96,28 @@ impl SettingsFile {
         }
     }
 
+    /// Adds a command that has set `sets` on an axis from `records`.
+    pub fn add_provenance(
+        &mut self,
+        command: &str,
+        axis: &str,
+        records: Vec<String>,
+        sets: &[&str],
+    ) {
+        self.provenance.push(Provenance {
+            command: command.to_owned(),
+            version: env!("CARGO_PKG_VERSION").to_owned(),
+            axis: axis.to_owned(),
+            records,
+            sets: sets.iter().map(|&part| part.to_owned()).collect(),
+        });
+    }
+
     /// Reads and checks a file.
     ///
     /// # Errors
     /// A file that cannot be read or understood, or the first value that the firmware would refuse.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, SettingsFileError> {
-        let path = path.as_ref();
+    pub fn read(path: &Path) -> Result<Self, SettingsFileError> {
         let text = std::fs::read_to_string(path).map_err(|source| SettingsFileError::Io {
             path: path.to_owned(),
             source,
@@ -132,8 +148,7 @@ impl SettingsFile {
     ///
     /// # Errors
     /// A value that the firmware would refuse, in which case nothing is written; or a file that cannot be written.
-    pub fn write(&self, path: impl AsRef<Path>) -> Result<(), SettingsFileError> {
-        let path = path.as_ref();
+    pub fn write(&self, path: &Path) -> Result<(), SettingsFileError> {
         self.check(path)?;
         let text = toml::to_string_pretty(self).map_err(|source| SettingsFileError::Serialise {
             path: path.to_owned(),

@@ -4,7 +4,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use quadrant_sim::command::explained;
+use quadrant_cli::explained;
 use quadrant_studies::{
     friction_models, identification, laws, numerics, outputs, report, robustness,
 };

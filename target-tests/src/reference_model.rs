@@ -11,7 +11,7 @@ use quadrant::stage::Outputs;
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::emulator::Program;
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::settings_file::SettingsFile;
 
 use xtask::image::{self, Image};
@@ -101,7 +101,7 @@ impl ReferenceModel {
                 image::Scalar::F32 => law(&job, PhantomData::<f32>)?,
                 image::Scalar::Fixed => law(&job, PhantomData::<Fixed>)?,
             },
-            plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, SEED),
+            plant: SimulatedStage::new(&StageParameters::real(), job.stage.rate_hz, SEED),
             operator: Operator::runs_the_plan(),
             tick: 0,
             expected: Outputs::default(),

@@ -81,16 +81,16 @@ impl Programs {
     }
 
     fn quadrant(&self) -> BTreeSet<String> {
-        let mut found = self.of(|file| file == "host-sim/src/cli/mod.rs");
+        let mut found = self.of(|file| file == "cli/src/main.rs");
         found.insert("help".to_owned());
         found
     }
 
     /// Subcommands of a command of `quadrant`; empty if it has none.
     fn below(&self, verb: &str) -> BTreeSet<String> {
-        let folder = format!("/cli/{verb}/");
-        let file = format!("/cli/{verb}.rs");
-        self.of(|path| path.contains(&folder) || path.ends_with(&file))
+        let folder = format!("cli/src/{verb}/");
+        let file = format!("cli/src/{verb}.rs");
+        self.of(|path| path.starts_with(&folder) || path == file)
     }
 
     fn studies(&self) -> BTreeSet<String> {
@@ -223,7 +223,7 @@ fn every_command_of_the_console_is_on_its_page() {
     let programs = Programs::read();
     let page = std::fs::read_to_string(root().join("docs/console.md")).expect("the page");
     let found: Vec<_> = programs
-        .of(|file| file.contains("/cli/connect/") && file.ends_with("command.rs"))
+        .of(|file| file.starts_with("cli/src/connect/") && file.ends_with("command.rs"))
         .into_iter()
         .filter(|verb| verb != "-" && !page.contains(verb.as_str()))
         .collect();

@@ -77,22 +77,36 @@ fn the_law_knows_neither_settings_nor_link_nor_application() {
 }
 
 #[test]
-fn the_host_command_does_not_know_the_studies() {
-    let mut found = offences("host-sim/", |_, path| path[0] == "quadrant_studies");
-    if dependencies(&manifest("host-sim/Cargo.toml"))
+fn the_host_library_knows_neither_studies_nor_command_line() {
+    let mut found = offences("host-sim/", |_, path| {
+        ["quadrant_studies", "quadrant_cli"].contains(&path[0])
+    });
+    let foreign = ["quadrant-studies", "quadrant-cli", "indicatif", "rustyline"];
+    for (_, name, line) in dependencies(&manifest("host-sim/Cargo.toml")) {
+        if foreign.contains(&name.as_str()) || name == "clap" && !line.contains("optional = true") {
+            found.push(format!("host-sim/Cargo.toml: {line}"));
+        }
+    }
+    assert_none("host-sim names what stands above it", &found);
+}
+
+#[test]
+fn the_command_does_not_know_the_studies() {
+    let mut found = offences("cli/", |_, path| path[0] == "quadrant_studies");
+    if dependencies(&manifest("cli/Cargo.toml"))
         .iter()
         .any(|(_, name, _)| name == "quadrant-studies")
     {
-        found.push("host-sim/Cargo.toml".to_owned());
+        found.push("cli/Cargo.toml".to_owned());
     }
-    assert_none("host-sim names the studies", &found);
+    assert_none("cli names the studies", &found);
 }
 
 #[test]
 fn the_chores_do_not_depend_on_the_host_command() {
     let named: Vec<_> = dependencies(&manifest("xtask/Cargo.toml"))
         .into_iter()
-        .filter(|(_, name, _)| name == "quadrant-sim")
+        .filter(|(_, name, _)| ["quadrant-sim", "quadrant-cli"].contains(&name.as_str()))
         .map(|(table, _, line)| format!("{table} {line}"))
         .collect();
     assert_none("xtask depends on the host command", &named);

@@ -9,8 +9,9 @@ use crate::pages::{Text, texts};
 use crate::tree::{files, kebab_case, root, sources};
 
 /// Folders at the root whose contents documentation names.
-const FOLDERS: [&str; 13] = [
+const FOLDERS: [&str; 14] = [
     "src",
+    "cli",
     "crates",
     "host-sim",
     "studies",

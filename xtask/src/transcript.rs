@@ -6,7 +6,7 @@ use xtask::command;
 use xtask::image::{self, Board, Scalar, Target};
 use xtask::toolchain::Toolchain;
 
-/// Builds the image and runs the tests that play the session on it (`host-sim/tests/suite/transcript.rs`).
+/// Builds the image and runs the tests that play the session on it (`cli/tests/suite/transcript.rs`).
 pub(crate) fn run(toolchain: Toolchain, overwrite_expected: bool) -> Result<()> {
     let target = Target {
         board: Board::Mps2,

@@ -77,8 +77,8 @@ impl Page {
     }
 
     /// Writes [`Self::to_html`] into a file.
-    pub fn write_html(&self, path: impl AsRef<Path>) -> Result<(), ReportError> {
-        super::write::file(path.as_ref(), &self.to_html()?)
+    pub fn write_html(&self, path: &Path) -> Result<(), ReportError> {
+        super::write::file(path, &self.to_html()?)
     }
 }
 

@@ -175,8 +175,7 @@ impl Table {
     }
 
     /// Writes [`Self::to_csv`] into a file.
-    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), ReportError> {
-        let path = path.as_ref();
+    pub fn write_csv(&self, path: &Path) -> Result<(), ReportError> {
         std::fs::write(path, self.to_csv()?).map_err(|source| ReportError::Write {
             path: path.to_owned(),
             source,

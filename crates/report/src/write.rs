@@ -1,7 +1,6 @@
 //! A page as files, in the formats its readers want.
 
 use super::{Dots, Figure, Lines, Page, Plot, PolarDeviation, ReportError};
-use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 
@@ -11,7 +10,8 @@ const SCHEMA: &str = "quadrant-report/1";
 const FIGURES: &str = "figures";
 
 /// A format of results.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, ValueEnum)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Format {
     /// One self-contained page with zoomable figures.
     Html,
@@ -39,12 +39,11 @@ impl Page {
     /// What [`Self::to_html`] refuses, whatever the formats; files that cannot be written.
     pub fn write(
         &self,
-        folder: impl AsRef<Path>,
+        folder: &Path,
         name: &str,
         formats: &[Format],
     ) -> Result<Vec<PathBuf>, ReportError> {
         self.check()?;
-        let folder = folder.as_ref();
         let figures = folder.join(FIGURES);
         let has = |format| formats.contains(&format);
         make_folder(folder)?;

@@ -1,6 +1,5 @@
 //! A whole circle test: every plane, radius, feed and configuration, both senses.
 
-use indicatif::ProgressBar;
 use quadrant::reference::{Plane, Sense};
 use rayon::prelude::*;
 
@@ -113,18 +112,18 @@ impl CircleRequest {
 
 /// Runs every circle of a request in both senses, in parallel, on the firmware's law in `f32`; the same request gives
 /// the same results. A circle that an axis' limits forbid, or that switches the stage off, says so in its result.
-/// `progress` advances by one a case.
+/// `advance` is called after each case.
 pub fn run_circle_tests(
     request: &CircleRequest,
     setup: &RunConfiguration,
-    progress: &ProgressBar,
+    advance: &(dyn Fn() + Sync),
 ) -> Vec<CircleResult> {
     request
         .cases()
         .into_par_iter()
         .map(|case| {
             let outcome = run_case(&case, setup);
-            progress.inc(1);
+            advance();
             CircleResult { case, outcome }
         })
         .collect()
@@ -137,7 +136,7 @@ fn run_case(case: &CircleCase, setup: &RunConfiguration) -> Result<CircleTest, C
         radius_mm: case.radius_mm,
         feed_mm_s: case.feed_mm_min / 60.0,
     };
-    let path = |sense| run_path::<f32>(nominal(sense), case.configuration, setup, case.seed);
+    let path = |sense| run_path(nominal(sense), case.configuration, setup, case.seed);
     let rate_hz = setup.stage.rate_hz;
     let clockwise = path(Sense::Clockwise)?;
     let counter = path(Sense::CounterClockwise)?;

@@ -1,7 +1,6 @@
 //! The one circle of the comparison: XY, counter-clockwise, every configuration.
 
 use quadrant::reference::{Plane, Sense};
-use quadrant::scalar::Scalar;
 use rayon::prelude::*;
 
 use crate::circle::turn::{CircleRefusal, NominalCircle, run_turn};
@@ -29,7 +28,7 @@ pub struct CircleOutcome {
 ///
 /// # Errors
 /// Refused settings or a fault.
-pub fn run_circles<S: Scalar>(
+pub fn run_circles(
     configurations: &[Configuration],
     setup: &RunConfiguration,
     seed: u64,
@@ -43,7 +42,7 @@ pub fn run_circles<S: Scalar>(
     configurations
         .par_iter()
         .map(|&configuration| {
-            let turn = run_turn::<S>(nominal, configuration, setup, seed)?;
+            let turn = run_turn(nominal, configuration, setup, seed)?;
             Ok(CircleOutcome {
                 configuration,
                 path: turn.path,

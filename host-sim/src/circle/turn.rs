@@ -4,7 +4,6 @@ use std::f64::consts::TAU;
 
 use quadrant::lockstep::Job;
 use quadrant::reference::{Plane, Sense, circle};
-use quadrant::scalar::Scalar;
 use quadrant::settings::PlanSettings;
 
 use crate::circle::path::Point;
@@ -77,7 +76,7 @@ pub struct Turn {
 ///
 /// # Errors
 /// A circle beyond the axes' limits, refused settings, or a fault.
-pub fn run_path<S: Scalar>(
+pub fn run_path(
     nominal: NominalCircle,
     configuration: Configuration,
     setup: &RunConfiguration,
@@ -114,7 +113,7 @@ pub fn run_path<S: Scalar>(
     let preview_s = axes
         .iter()
         .fold(0.0_f64, |most, axis| most.max(axis.feedforward.preview_s));
-    let mut machine = LawMachine::<S, ELEMENTS>::new(&job).map_err(RunError::from)?;
+    let mut machine = LawMachine::<f32, ELEMENTS>::new(&job).map_err(RunError::from)?;
     let mut plant = SimulatedStage::new(&setup.truth, rate_hz, seed);
     let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
     let most_ticks = samples(2.0 + 2.0 * LEAD_S + turns * turn_s);
@@ -163,12 +162,12 @@ impl Turn {
 ///
 /// # Errors
 /// Those of [`run_path`].
-pub fn run_turn<S: Scalar>(
+pub fn run_turn(
     nominal: NominalCircle,
     configuration: Configuration,
     setup: &RunConfiguration,
     seed: u64,
 ) -> Result<Turn, CircleRefusal> {
-    let path = run_path::<S>(nominal, configuration, setup, seed)?;
+    let path = run_path(nominal, configuration, setup, seed)?;
     Ok(Turn::evaluate(nominal, &path, setup.stage.rate_hz))
 }

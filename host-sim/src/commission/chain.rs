@@ -97,9 +97,12 @@ pub fn commission(
     let mut found = models.commissioned(measurements, base, request, rate_hz);
 
     step += 1;
-    found.verdicts = verify(test_axis, &found.settings, request.trial, &mut |share| {
-        report(step, share)
-    })?;
+    found.results = verify(
+        test_axis,
+        &found.settings,
+        request.sine_test,
+        &mut |share| report(step, share),
+    )?;
     Ok(found)
 }
 

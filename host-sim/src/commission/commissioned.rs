@@ -2,8 +2,9 @@
 
 use quadrant::settings::AxisSettings;
 
-use super::verify::{Trial, Verdict};
+use super::verify::{SINE, SineResult};
 use crate::design::{MarginError, Margins, Target};
+use crate::experiment::sine_test::SineTest;
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::PlantFit;
@@ -21,7 +22,7 @@ pub struct CommissionSettings {
     /// The runs that the friction is taken from.
     pub friction: StaticFrictionSettings,
     /// The sine on which the result is judged.
-    pub trial: Trial,
+    pub sine_test: SineTest,
 }
 
 impl Default for CommissionSettings {
@@ -38,7 +39,7 @@ impl Default for CommissionSettings {
                 velocities_mm_s: (0.1, 40.0),
                 ..StaticFrictionSettings::default()
             },
-            trial: Trial::default(),
+            sine_test: SINE,
         }
     }
 }
@@ -63,5 +64,5 @@ pub struct Commissioned {
     /// Settings of the axis, finished.
     pub settings: AxisSettings,
     /// Results of the sine on the axis; none of a commissioning from saved recordings.
-    pub verdicts: Vec<Verdict>,
+    pub results: Vec<SineResult>,
 }

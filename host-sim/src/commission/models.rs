@@ -183,7 +183,7 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
-            verdicts: Vec::new(),
+            results: Vec::new(),
         }
     }
 }

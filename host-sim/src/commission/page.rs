@@ -1,6 +1,6 @@
 //! The page of a commissioning.
 
-use crate::commission::verify::Verdict;
+use crate::commission::verify::SineResult;
 use crate::commission::{Commissioned, CrossCheck};
 use crate::identify::motion::recommended;
 use crate::identify::pages::friction::{friction_section, presliding_section};
@@ -60,11 +60,11 @@ pub fn gains_table(found: &Commissioned) -> Table {
 }
 
 /// Returns the table of each law's sine tests on the axis, by its own encoder.
-pub fn verdict_table(verdicts: &[Verdict]) -> Table {
-    let baseline = verdicts.first().map(|verdict| verdict.score);
+pub fn results_table(results: &[SineResult]) -> Table {
+    let baseline = results.first().map(|result| result.score);
     Table {
         id: "verdict".to_owned(),
-        caption: "Tracking error on the trial's sine, by the axis' own encoder, over two cycles; change against the PID"
+        caption: "Tracking error on the sine, by the axis' own encoder, over two cycles; change against the PID"
             .to_owned(),
         columns: vec![
             Column::new("Law"),
@@ -73,18 +73,18 @@ pub fn verdict_table(verdicts: &[Verdict]) -> Table {
             Column::with_unit("Change of largest", "%"),
             Column::with_unit("Change of RMS", "%"),
         ],
-        rows: verdicts
+        rows: results
             .iter()
-            .map(|verdict| {
+            .map(|result| {
                 let change = |from: Option<f64>, to: f64| {
                     from.map_or(Cell::Missing, |from| Cell::number(100.0 * (to / from - 1.0), 1))
                 };
                 vec![
-                    Cell::text(verdict.law),
-                    Cell::number(UM_PER_MM * verdict.score.largest_mm, 2),
-                    Cell::number(UM_PER_MM * verdict.score.rms_mm, 3),
-                    change(baseline.map(|score| score.largest_mm), verdict.score.largest_mm),
-                    change(baseline.map(|score| score.rms_mm), verdict.score.rms_mm),
+                    Cell::text(result.law),
+                    Cell::number(UM_PER_MM * result.score.largest_mm, 2),
+                    Cell::number(UM_PER_MM * result.score.rms_mm, 3),
+                    change(baseline.map(|score| score.largest_mm), result.score.largest_mm),
+                    change(baseline.map(|score| score.rms_mm), result.score.rms_mm),
                 ]
             })
             .collect(),
@@ -98,12 +98,12 @@ pub fn commission_page(
     checked: Option<&CrossCheck>,
     provenance: Provenance,
 ) -> Page {
-    let verdict_curves = found
-        .verdicts
+    let error_curves = found
+        .results
         .iter()
         .enumerate()
-        .map(|(index, verdict)| {
-            let recording = &verdict.recording;
+        .map(|(index, result)| {
+            let recording = &result.recording;
             let errors: Vec<f64> = recording
                 .reference_mm
                 .iter()
@@ -111,7 +111,7 @@ pub fn commission_page(
                 .map(|(reference, position)| reference - position)
                 .collect();
             error_curve(
-                verdict.law.to_owned(),
+                result.law.to_owned(),
                 &errors,
                 recording.sample_time_s,
                 Style::nth(index),
@@ -135,14 +135,14 @@ pub fn commission_page(
             heading: "What it achieves".to_owned(),
             prose: Vec::new(),
             blocks: vec![
-                Block::Table(verdict_table(&found.verdicts)),
+                Block::Table(results_table(&found.results)),
                 Block::Figure(Figure {
                     id: "verdict-errors".to_owned(),
                     caption: "Tracking error, by the axis' own encoder".to_owned(),
                     plot: Plot::Lines(Lines {
                         x_label: "time (s)".to_owned(),
                         y_label: "tracking error (um)".to_owned(),
-                        series: verdict_curves,
+                        series: error_curves,
                         ..Lines::default()
                     }),
                 }),
@@ -153,7 +153,7 @@ pub fn commission_page(
         friction_section(map, friction),
         presliding_section(gms, friction.mean_levels_v().1),
     ];
-    if found.verdicts.is_empty() {
+    if found.results.is_empty() {
         // From saved recordings: nothing ran on the settings.
         sections[0].heading = "Controller".to_owned();
         sections[0].blocks.drain(..2);

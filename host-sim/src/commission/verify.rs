@@ -6,31 +6,19 @@ use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::bootstrap::measuring_settings;
 use crate::experiment::metrics::{Score, score};
+use crate::experiment::sine_test::SineTest;
 use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;
 
-/// The sine on which settings are judged.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Trial {
-    /// Amplitude of the sine, mm.
-    pub amplitude_mm: f64,
-    /// Largest velocity of the sine, mm/s.
-    pub velocity_mm_s: f64,
-}
-
-impl Default for Trial {
-    /// 5 mm at 10 mm/s: the middle velocity of the thesis, on a travel that every axis has.
-    fn default() -> Self {
-        Self {
-            amplitude_mm: 5.0,
-            velocity_mm_s: 10.0,
-        }
-    }
-}
+/// The sine on which settings are judged: the middle velocity of the thesis, on a travel that every axis has.
+pub const SINE: SineTest = SineTest {
+    amplitude_mm: 5.0,
+    velocity_mm_s: 10.0,
+};
 
 /// Score of one law on the sine.
 #[derive(Clone, Debug)]
-pub struct Verdict {
+pub struct SineResult {
     /// Name of the law.
     pub law: &'static str,
     /// Its score, on the measured position.
@@ -57,16 +45,16 @@ pub enum VerifyError {
     TestAxis(#[from] ExperimentError),
 }
 
-/// Runs the PID alone, the N-PID alone, and `settings` as they are, on the trial's sine.
+/// Runs the PID alone, the N-PID alone, and `settings` as they are, on a sine.
 ///
 /// # Errors
 /// Refused settings, or a run that is stopped.
 pub fn verify(
     test_axis: &mut dyn TestAxis,
     settings: &AxisSettings,
-    trial: Trial,
+    sine_test: SineTest,
     progress: &mut dyn FnMut(f64),
-) -> Result<Vec<Verdict>, VerifyError> {
+) -> Result<Vec<SineResult>, VerifyError> {
     let pid = measuring_settings(settings);
     let npid = AxisSettings {
         feedback: settings.feedback.clone(),
@@ -79,28 +67,32 @@ pub fn verify(
         ("N-PID", npid),
         ("N-PID + static + GMS", full),
     ];
-    let mut verdicts = Vec::new();
+    let mut results = Vec::new();
     for (index, (law, settings)) in laws.into_iter().enumerate() {
         test_axis.apply(&settings)?;
         let share = |done: f64| (index as f64 + done) / 3.0;
-        verdicts.push(run(test_axis, law, trial, &mut |done| {
+        results.push(run(test_axis, law, sine_test, &mut |done| {
             progress(share(done))
         })?);
     }
-    Ok(verdicts)
+    Ok(results)
 }
 
 fn run(
     test_axis: &mut dyn TestAxis,
     law: &'static str,
-    trial: Trial,
+    sine_test: SineTest,
     progress: &mut dyn FnMut(f64),
-) -> Result<Verdict, VerifyError> {
-    let sine =
-        HarmonicSettings::with_velocity(trial.amplitude_mm, trial.velocity_mm_s, CYCLES, LEAD_S);
+) -> Result<SineResult, VerifyError> {
+    let sine = HarmonicSettings::with_velocity(
+        sine_test.amplitude_mm,
+        sine_test.velocity_mm_s,
+        CYCLES,
+        LEAD_S,
+    );
     let recording = test_axis.perform(
         &Experiment {
-            name: format!("{law} on a sine of {} mm", trial.amplitude_mm),
+            name: format!("{law} on a sine of {} mm", sine_test.amplitude_mm),
             drive: Drive::ClosedLoop(MotionSettings::Harmonic(sine)),
             injection_v: Vec::new(),
             decimation: 1,
@@ -119,7 +111,7 @@ fn run(
         .zip(&scored.position_mm)
         .map(|(reference, position)| reference - position)
         .collect();
-    Ok(Verdict {
+    Ok(SineResult {
         law,
         score: score(&scored.reference_mm, &errors, cycle),
         recording: scored,

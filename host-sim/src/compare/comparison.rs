@@ -4,7 +4,6 @@
 //! A run with the exact model has no noise and starts at rest at the origin: a second one would repeat the first to the
 //! bit. It is run once, and its scores have no spread. One with the identified model is run once for each seed.
 
-use quadrant::scalar::Scalar;
 use rayon::prelude::*;
 
 use crate::compare::sine::{Outcome, run_at_amplitude};
@@ -103,7 +102,7 @@ impl Request<'_> {
     ///
     /// # Errors
     /// The first refused setting or fault.
-    pub fn run<S: Scalar>(&self, advance: &(dyn Fn(f64) + Sync)) -> Result<Comparison, RunError> {
+    pub fn run(&self, advance: &(dyn Fn(f64) + Sync)) -> Result<Comparison, RunError> {
         let runs = self.runs();
         let whole_s = self.expected_s();
         let outcomes: Vec<[Outcome; 3]> = runs
@@ -115,7 +114,8 @@ impl Request<'_> {
                     configuration,
                     seed,
                 } = *run;
-                let mut outcomes = run_at_amplitude::<S>(configuration, setup, amplitude_mm, seed)?;
+                let mut outcomes =
+                    run_at_amplitude::<f32>(configuration, setup, amplitude_mm, seed)?;
                 if seed != self.seed {
                     // One trace is drawn; the others would only fill the memory.
                     outcomes
@@ -253,7 +253,7 @@ mod tests {
         };
         let told = std::sync::Mutex::new(0.0);
         let comparison = request
-            .run::<f32>(&|share| *told.lock().unwrap() += share)
+            .run(&|share| *told.lock().unwrap() += share)
             .unwrap();
         assert!((told.into_inner().unwrap() - 1.0_f64).abs() < 1e-9);
         assert_eq!(comparison.entries().len(), 2 * 2 * 2 * 3);

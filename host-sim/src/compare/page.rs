@@ -6,7 +6,7 @@ use crate::compare::comparison::Comparison;
 use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
 use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use crate::experiment::configuration::Configuration;
-use crate::experiment::metrics::{GLITCH_WINDOW, Score};
+use crate::experiment::metrics::{GLITCH_WINDOW, Metric};
 use crate::experiment::run_configuration::ModelKnowledge;
 use crate::pages::{UM_PER_MM, error_curve};
 use crate::report::{
@@ -16,41 +16,23 @@ use crate::report::{
 /// Control period of the outcomes' traces, s.
 const PERIOD_S: f64 = 1e-4;
 
-/// A score's name, what it is, and how it is read.
-struct Reading {
-    id: &'static str,
-    caption: &'static str,
-    read: fn(&Score) -> f64,
-}
-
-const READINGS: [Reading; 3] = [
-    Reading {
-        id: "tracking-error-largest",
-        caption: "Tracking error, largest magnitude over two cycles",
-        read: |score| score.largest_mm,
-    },
-    Reading {
-        id: "tracking-error-rms",
-        caption: "Tracking error, RMS over two cycles",
-        read: |score| score.rms_mm,
-    },
-    Reading {
-        id: "quadrant-glitch",
-        caption: "Quadrant glitch, mean over the reversals of two cycles",
-        read: |score| score.glitch_mm,
-    },
+/// Names of the tables of [`Metric::ALL`].
+const IDS: [&str; 3] = [
+    "tracking-error-largest",
+    "tracking-error-rms",
+    "quadrant-glitch",
 ];
 
 /// The comparison's tables: one for each score, the headlines, the circles.
 pub fn comparison_tables(comparison: &Comparison, circles: &[CircleOutcome]) -> Vec<Table> {
-    READINGS
-        .iter()
-        .map(|reading| score_table(reading, comparison))
+    IDS.into_iter()
+        .zip(Metric::ALL)
+        .map(|(id, metric)| score_table(id, metric, comparison))
         .chain([headline_table(comparison), circle_table(circles)])
         .collect()
 }
 
-fn score_table(reading: &Reading, comparison: &Comparison) -> Table {
+fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
     let mut columns = vec![Column::new("Configuration")];
     for knowledge in ModelKnowledge::ALL {
         for velocity in VELOCITIES_MM_S {
@@ -63,7 +45,7 @@ fn score_table(reading: &Reading, comparison: &Comparison) -> Table {
     let value = |configuration, knowledge, velocity| {
         comparison
             .find(configuration, knowledge, AMPLITUDE_MM, velocity)
-            .map(|entry| entry.statistic(reading.read).mean * UM_PER_MM)
+            .map(|entry| entry.statistic(metric.read).mean * UM_PER_MM)
     };
     let rows = Configuration::all()
         .into_iter()
@@ -92,8 +74,8 @@ fn score_table(reading: &Reading, comparison: &Comparison) -> Table {
         })
         .collect();
     Table {
-        id: reading.id.to_owned(),
-        caption: format!("{}; change against PID alone", reading.caption),
+        id: id.to_owned(),
+        caption: format!("{} over two cycles; change against PID alone", metric.title),
         columns,
         rows,
     }
@@ -113,7 +95,7 @@ pub fn comparison_page(
             .map(Block::Table)
             .collect::<Vec<_>>()
     };
-    let scores = next_tables(READINGS.len());
+    let scores = next_tables(IDS.len());
     let headlines = next_tables(1);
     let circle_tables = next_tables(1);
     let errors = |knowledge: ModelKnowledge| {

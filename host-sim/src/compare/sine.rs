@@ -10,7 +10,7 @@ use crate::experiment::metrics::{Score, score};
 use crate::experiment::run::{AxisTrace, RunError, run};
 use crate::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use crate::machine::{LawMachine, Operator};
-use crate::plant::{SimulatedStage, StageTruth};
+use crate::plant::{SimulatedStage, StageParameters};
 
 /// Amplitude of the sine, mm.
 pub const AMPLITUDE_MM: f64 = 30.0;
@@ -84,7 +84,7 @@ impl Bench {
     ) -> Self {
         let job = job(configuration, setup, amplitude_mm);
         let [x, ..] = &setup.truth.axes;
-        let truth = StageTruth {
+        let truth = StageParameters {
             axes: [x.clone(), x.clone(), x.clone()],
         };
         let rate_hz = job.stage.rate_hz;

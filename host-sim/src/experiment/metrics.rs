@@ -81,6 +81,8 @@ pub fn change_percent(before: f64, after: f64) -> f64 {
 pub struct Metric {
     /// Its name in tables.
     pub name: &'static str,
+    /// The same, as a caption begins.
+    pub title: &'static str,
     /// Reads it, mm.
     pub read: fn(&Score) -> f64,
 }
@@ -89,18 +91,23 @@ impl Metric {
     /// Largest magnitude of the tracking error.
     pub const LARGEST: Self = Self {
         name: "Largest",
+        title: "Largest tracking error",
         read: |score| score.largest_mm,
     };
     /// RMS of the tracking error.
     pub const RMS: Self = Self {
         name: "RMS",
+        title: "RMS tracking error",
         read: |score| score.rms_mm,
     };
     /// Quadrant glitch.
     pub const GLITCH: Self = Self {
         name: "Glitch",
+        title: "Quadrant glitch",
         read: |score| score.glitch_mm,
     };
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::LARGEST, Self::RMS, Self::GLITCH];
     /// The tracking error.
     pub const TRACKING: [Self; 2] = [Self::LARGEST, Self::RMS];
 }

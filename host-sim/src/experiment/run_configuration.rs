@@ -14,7 +14,7 @@ use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
 
 use crate::identify::single_state::with_all_models;
-use crate::plant::{AxisTruth, StageTruth};
+use crate::plant::{AxisParameters, StageParameters};
 use crate::settings_file::{SettingsFile, SettingsFileError};
 
 /// The stage as `quadrant commission` found it, on x, then y, then z; a test commissions it again and compares.
@@ -29,7 +29,8 @@ pub fn identified_settings() -> Result<SettingsFile, SettingsFileError> {
 }
 
 /// The law's knowledge of the plant.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum ModelKnowledge {
     /// The plant's own friction, on a plant without imperfections.
     Exact,
@@ -65,13 +66,13 @@ pub struct RunConfiguration {
     pub knowledge: ModelKnowledge,
     /// The settings.
     pub stage: StageSettings,
-    pub truth: StageTruth,
+    pub truth: StageParameters,
 }
 
 impl RunConfiguration {
     /// The stage without imperfections, and these settings with its own friction.
     pub fn exact(mut stage: StageSettings) -> Self {
-        let truth = StageTruth::ideal();
+        let truth = StageParameters::ideal();
         set_exact_friction(&mut stage, &truth);
         Self {
             knowledge: ModelKnowledge::Exact,
@@ -85,7 +86,7 @@ impl RunConfiguration {
         Self {
             knowledge: ModelKnowledge::Identified,
             stage,
-            truth: StageTruth::real(),
+            truth: StageParameters::real(),
         }
     }
 
@@ -108,7 +109,7 @@ impl RunConfiguration {
     }
 }
 
-fn set_exact_friction(stage: &mut StageSettings, truth: &StageTruth) {
+fn set_exact_friction(stage: &mut StageSettings, truth: &StageParameters) {
     for (axis, truth) in stage.axes.iter_mut().zip(&truth.axes) {
         axis.friction = with_all_models(
             truth.friction.map(|model| with_total_damping(model, truth)),
@@ -119,7 +120,7 @@ fn set_exact_friction(stage: &mut StageSettings, truth: &StageTruth) {
 
 /// Viscous friction as a run at constant velocity shows it: sigma, and the linear damping B / A, which no motion
 /// can tell from it.
-fn with_total_damping(model: &StaticFriction, truth: &AxisTruth) -> StaticFriction {
+fn with_total_damping(model: &StaticFriction, truth: &AxisParameters) -> StaticFriction {
     StaticFriction {
         viscous_v_s_per_mm: model.viscous_v_s_per_mm + truth.damping_per_s / truth.gain_mm_per_v_s2,
         ..*model

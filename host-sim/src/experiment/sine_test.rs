@@ -8,7 +8,7 @@ use crate::experiment::configuration::ELEMENTS;
 use crate::experiment::metrics::{Score, score};
 use crate::experiment::run::{RunError, run};
 use crate::machine::LawMachine;
-use crate::plant::{AxisTruth, SimulatedStage, StageTruth};
+use crate::plant::{AxisParameters, SimulatedStage, StageParameters};
 
 /// A sine for an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,7 +55,7 @@ impl SineTest {
 /// Refused settings or a fault.
 pub fn run_sine_tests(
     settings: [AxisSettings; 3],
-    truth: &AxisTruth,
+    truth: &AxisParameters,
     tests: [SineTest; 3],
     rate_hz: f64,
     seed: u64,
@@ -74,7 +74,7 @@ pub fn run_sine_tests(
     let slowest_s = tests.map(SineTest::cycle_s).into_iter().fold(0.0, f64::max);
     let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * slowest_s;
     let mut machine = LawMachine::<f32, ELEMENTS>::new(&job)?;
-    let truth = StageTruth {
+    let truth = StageParameters {
         axes: [truth.clone(), truth.clone(), truth.clone()],
     };
     let traces = run(

@@ -37,8 +37,7 @@ impl Program {
     ///
     /// # Errors
     /// A file that cannot be read, or a program that is refused.
-    pub fn read(path: impl AsRef<Path>) -> Result<Self, ProgramError> {
-        let path = path.as_ref();
+    pub fn read(path: &Path) -> Result<Self, ProgramError> {
         let unreadable = |source| ProgramError::Read {
             path: path.to_owned(),
             source,

@@ -11,7 +11,8 @@ use rand_xoshiro::Xoshiro256PlusPlus;
 use rustfft::FftPlanner;
 
 /// The kinds of excitation.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Waveform {
     /// Periodic, a sine at each line, with random phases: no leakage, and its scatter from period to period is the noise.
     #[default]

@@ -8,6 +8,7 @@
 //! - [`excitation`]: voltages that make an axis show its response;
 //! - [`frf`]: that response, measured;
 //! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which the steps share;
+//! - [`measured_table`]: frequency responses and friction maps as CSV;
 //! - [`motion`]: inertia and friction from an ordinary motion record;
 //! - [`motor_constant`]: acceleration per volt from a square wave;
 //! - [`pages`]: the steps' tables and figures;
@@ -24,6 +25,7 @@ pub mod characteristic;
 pub mod excitation;
 pub mod fit;
 pub mod frf;
+pub mod measured_table;
 pub mod motion;
 pub mod motor_constant;
 pub mod pages;

@@ -14,7 +14,8 @@ use super::fit::{Fit, FitError, Loss, Parameter, fit};
 use super::response::{FrequencyResponse, ResponsePoint};
 
 /// Spring to ground in the model.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Stiffness {
     /// C is fitted: a response at standstill shows pre-sliding friction as a small spring.
     Free,

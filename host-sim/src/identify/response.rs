@@ -1,8 +1,10 @@
 //! A measured frequency response: what `identify frf` leaves, and what fits and designs read.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use num_complex::Complex64;
+
+use super::measured_table::{Columns, TableError};
 
 /// One line of a measured frequency response.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -23,46 +25,23 @@ pub struct FrequencyResponse {
     pub points: Vec<ResponsePoint>,
 }
 
-/// Reasons for which a file holds no frequency response.
-#[derive(Debug, thiserror::Error)]
-pub enum ResponseError {
-    /// The file cannot be read or written, or is no CSV.
-    #[error("{}: {source}", path.display())]
-    Csv { path: PathBuf, source: csv::Error },
-    /// A column is missing.
-    #[error("{}: no column {name}; a frequency response has the columns {}", path.display(), COLUMNS.join(", "))]
-    Column { path: PathBuf, name: &'static str },
-    /// A value that cannot be.
-    #[error("{}, row {row}, column {name}: {value:?} is not {expected}", path.display())]
-    Value {
-        path: PathBuf,
-        /// Row of data, from 1.
-        row: usize,
-        name: &'static str,
-        value: String,
-        expected: &'static str,
-    },
-    /// Too few lines to be of use.
-    #[error("{}: {rows} rows; a frequency response takes at least {MIN_POINTS}", path.display())]
-    TooShort { path: PathBuf, rows: usize },
-}
-
-const COLUMNS: [&str; 5] = [
-    "frequency_hz",
-    "gain_mm_per_v",
-    "phase_deg",
-    "coherence",
-    "relative_deviation",
-];
-
-/// Values allowed in each column.
-const EXPECTED: [&str; 5] = [
-    "a frequency above that of the row before",
-    "a number above zero",
-    "a finite number",
-    "a number from 0 to 1",
-    "a number of zero or more",
-];
+const COLUMNS: Columns<5> = Columns {
+    what: "a frequency response",
+    names: &[
+        "frequency_hz",
+        "gain_mm_per_v",
+        "phase_deg",
+        "coherence",
+        "relative_deviation",
+    ],
+    expected: [
+        "a frequency above that of the row before",
+        "a number above zero",
+        "a finite number",
+        "a number from 0 to 1",
+        "a number of zero or more",
+    ],
+};
 
 /// Fewest lines of a response.
 const MIN_POINTS: usize = 8;
@@ -73,91 +52,51 @@ impl FrequencyResponse {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), ResponseError> {
-        let path = path.as_ref();
-        let refuse = |source| ResponseError::Csv {
-            path: path.to_owned(),
-            source,
-        };
-        let mut writer = csv::Writer::from_path(path).map_err(refuse)?;
-        writer.write_record(COLUMNS).map_err(refuse)?;
-        for (point, phase_deg) in self.points.iter().zip(self.phase_deg()) {
-            let row = [
+    pub fn write_csv(&self, path: &Path) -> Result<(), TableError> {
+        let points = self.points.iter().zip(self.phase_deg());
+        let row = |(point, phase_deg): (&ResponsePoint, f64)| {
+            [
                 point.frequency_hz,
                 point.response.norm(),
                 phase_deg,
                 point.coherence,
                 point.relative_deviation,
-            ];
-            writer
-                .write_record(row.map(|value| value.to_string()))
-                .map_err(refuse)?;
-        }
-        writer.flush().map_err(|source| refuse(source.into()))
+            ]
+        };
+        COLUMNS.write(path, points.map(row))
     }
 
     /// Reads what [`write_csv`](Self::write_csv) writes; the order of the columns is free, others are passed over.
     ///
     /// # Errors
     /// A file that cannot be read or is not a frequency response; names the row and the column.
-    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, ResponseError> {
-        let path = path.as_ref();
-        let refuse = |source| ResponseError::Csv {
-            path: path.to_owned(),
-            source,
-        };
-        let mut reader = csv::Reader::from_path(path).map_err(refuse)?;
-        let header = reader.headers().map_err(refuse)?.clone();
-        let mut places = [0; 5];
-        for (place, name) in places.iter_mut().zip(COLUMNS) {
-            *place = header
-                .iter()
-                .position(|heading| heading.trim() == name)
-                .ok_or_else(|| ResponseError::Column {
-                    path: path.to_owned(),
-                    name,
-                })?;
+    pub fn read_csv(path: &Path) -> Result<Self, TableError> {
+        let rows = COLUMNS.read(path, |column, value, before| match column {
+            0 => value > before.map_or(0.0, |row| row[0]),
+            1 => value > 0.0,
+            3 => (0.0..=1.0).contains(&value),
+            4 => value >= 0.0,
+            _ => true,
+        })?;
+        if rows.len() < MIN_POINTS {
+            return Err(TableError::TooShort {
+                path: path.to_owned(),
+                rows: rows.len(),
+                what: COLUMNS.what,
+                least: MIN_POINTS,
+            });
         }
-        let mut points: Vec<ResponsePoint> = Vec::new();
-        for (index, record) in reader.records().enumerate() {
-            let record = record.map_err(refuse)?;
-            let lowest_hz = points.last().map_or(0.0, |point| point.frequency_hz);
-            let allowed: [&dyn Fn(f64) -> bool; 5] = [
-                &|hz| hz > lowest_hz,
-                &|gain| gain > 0.0,
-                &|_| true,
-                &|coherence| (0.0..=1.0).contains(&coherence),
-                &|deviation| deviation >= 0.0,
-            ];
-            let mut row = [0.0; 5];
-            for (column, value) in row.iter_mut().enumerate() {
-                let text = record.get(places[column]).unwrap_or_default().trim();
-                let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-                *value = number
-                    .filter(|number| allowed[column](*number))
-                    .ok_or_else(|| ResponseError::Value {
-                        path: path.to_owned(),
-                        row: index + 1,
-                        name: COLUMNS[column],
-                        value: text.to_owned(),
-                        expected: EXPECTED[column],
-                    })?;
-            }
-            let [frequency_hz, gain, phase_deg, coherence, relative_deviation] = row;
-            points.push(ResponsePoint {
+        let point = |[frequency_hz, gain, phase_deg, coherence, relative_deviation]: [f64; 5]| {
+            ResponsePoint {
                 frequency_hz,
                 response: Complex64::from_polar(gain, phase_deg.to_radians()),
                 coherence,
                 relative_deviation,
-            });
-        }
-        if points.len() < MIN_POINTS {
-            return Err(ResponseError::TooShort {
-                path: path.to_owned(),
-                rows: points.len(),
-            });
-        }
-        Ok(Self { points })
+            }
+        };
+        Ok(Self {
+            points: rows.into_iter().map(point).collect(),
+        })
     }
 
     /// The phase of each line, deg, without jumps of a whole turn; the first within -360..=0.

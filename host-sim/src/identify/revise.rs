@@ -19,7 +19,7 @@ use rayon::prelude::*;
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};
 use super::response::FrequencyResponse;
 use crate::machine::{Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
-use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
+use crate::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 use crate::record::Recording;
 
 /// Friction models beside the linear model, as in the thesis.
@@ -128,7 +128,7 @@ pub fn candidate(
     friction: &FrictionSettings,
     kind: ExplicitFriction,
     settings: &AxisSettings,
-) -> AxisTruth {
+) -> AxisParameters {
     let single = |turn_mm: f64, level_v: f64| GmsParameters {
         elements: ShortVec::from_iter([GmsElement {
             stiffness_v_per_mm: level_v / turn_mm,
@@ -161,7 +161,7 @@ pub fn candidate(
         ),
         ExplicitFriction::Both => (friction.sliding, friction.gms.clone()),
     };
-    AxisTruth {
+    AxisParameters {
         gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
         damping_per_s: plant.damping_per_s,
         stiffness_per_s2: plant.stiffness_per_s2,
@@ -171,7 +171,7 @@ pub fn candidate(
             negative: sliding.negative,
         },
         gms,
-        model: FrictionTruth::Gms,
+        model: FrictionParameters::Gms,
         resolution_mm: settings.encoder.resolution_mm,
         full_scale_v: settings.amplifier.full_scale_v,
         imperfections: Imperfections::default(),
@@ -185,7 +185,7 @@ pub fn candidate(
 /// A run that is stopped, or a recording without a response.
 pub fn simulated_response(
     measurement: &Measurement<'_>,
-    truth: AxisTruth,
+    truth: AxisParameters,
 ) -> Result<FrequencyResponse, ReviseError> {
     // The candidate is without noise: the seed does not matter.
     let mut test_axis = SimulatedTestAxis::new(0, truth, 0);

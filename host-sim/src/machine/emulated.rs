@@ -17,7 +17,7 @@ use quadrant::stage::Outputs;
 
 use super::emulator::{EmulatorError, Lockstep, Memory, Program};
 use super::timing::{OFF_TICKS, PORT_BYTES};
-use crate::plant::{SimulatedStage, StageTruth};
+use crate::plant::{SimulatedStage, StageParameters};
 
 /// Settings of a machine whose flash is empty: the simulated stage's, without a motion.
 fn first_job() -> Vec<u8> {
@@ -49,7 +49,7 @@ impl EmulatedMachine {
     /// QEMU is not installed, or the flash is of another size.
     pub fn start(
         program: Program,
-        truth: &StageTruth,
+        truth: &StageParameters,
         seed: u64,
         flash: &[u8],
     ) -> Result<Self, EmulatorError> {

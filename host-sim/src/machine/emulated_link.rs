@@ -14,7 +14,7 @@ use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};
 use super::simulated_io::SimulatedIo;
 use super::timing::server_period;
-use crate::plant::StageTruth;
+use crate::plant::StageParameters;
 
 /// The firmware's image in QEMU on the simulated stage, and the bytes to and from it.
 pub struct EmulatedLink {
@@ -36,7 +36,7 @@ impl EmulatedLink {
             .transpose()?;
         let erased = vec![0xFF; FLASH_BYTES];
         let content = flash.as_ref().map_or(&erased[..], FlashFile::content);
-        let machine = EmulatedMachine::start(program, &StageTruth::real(), seed, content)
+        let machine = EmulatedMachine::start(program, &StageParameters::real(), seed, content)
             .map_err(io::Error::other)?;
         Ok(Loopback::new(Self {
             machine,

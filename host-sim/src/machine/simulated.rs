@@ -14,7 +14,7 @@ use quadrant::stage::Outputs;
 use super::application::{Running, Start};
 use super::memory_flash::MemoryFlash;
 use super::timing::{OFF_TICKS, PORT_BYTES};
-use crate::plant::{SimulatedStage, StageTruth};
+use crate::plant::{SimulatedStage, StageParameters};
 
 /// Name of the board in the greeting.
 const BOARD: &str = "simulated";
@@ -74,7 +74,7 @@ impl SimulatedMachine {
     /// The first of the settings that is refused.
     pub fn new(
         settings: &StageSettings,
-        truth: &StageTruth,
+        truth: &StageParameters,
         seed: u64,
     ) -> Result<Self, SettingsError> {
         Self::with_flash(settings, truth, seed, MemoryFlash::default())
@@ -86,7 +86,7 @@ impl SimulatedMachine {
     /// The first of the settings that is refused.
     pub fn with_flash(
         settings: &StageSettings,
-        truth: &StageTruth,
+        truth: &StageParameters,
         seed: u64,
         flash: MemoryFlash,
     ) -> Result<Self, SettingsError> {

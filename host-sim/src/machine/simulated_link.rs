@@ -15,7 +15,7 @@ use super::memory_flash::MemoryFlash;
 use super::simulated::SimulatedMachine;
 use super::simulated_io::SimulatedIo;
 use super::timing::server_period;
-use crate::plant::StageTruth;
+use crate::plant::StageParameters;
 
 /// The firmware's application on the simulated stage, with that stage's settings, and the bytes to and from it.
 pub struct SimulatedLink {
@@ -38,8 +38,9 @@ impl SimulatedLink {
             .as_ref()
             .and_then(|file| MemoryFlash::of(file.content().to_vec()))
             .unwrap_or_default();
-        let machine = SimulatedMachine::with_flash(&settings, &StageTruth::real(), seed, content)
-            .map_err(io::Error::other)?;
+        let machine =
+            SimulatedMachine::with_flash(&settings, &StageParameters::real(), seed, content)
+                .map_err(io::Error::other)?;
         Ok(Loopback::new(Self {
             machine,
             flash,

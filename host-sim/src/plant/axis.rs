@@ -9,7 +9,7 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
-use super::{AxisTruth, Backlash, Body, Drive, EncoderSide, Forcing, Presliding};
+use super::{AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, Presliding};
 
 /// Steps of the integration in a control period.
 const SUBSTEPS: usize = 4;
@@ -17,7 +17,7 @@ const SUBSTEPS: usize = 4;
 /// One simulated axis in motion.
 #[derive(Clone, Debug)]
 pub struct SimulatedAxis {
-    truth: AxisTruth,
+    truth: AxisParameters,
     step_s: f64,
     volts_per_code: f64,
     /// Amplifier voltages on their way, one a substep: the plant's delay.
@@ -36,7 +36,7 @@ pub struct SimulatedAxis {
 
 impl SimulatedAxis {
     /// An axis at rest at zero, sampled at `rate_hz`; `seed` decides its noise.
-    pub fn new(truth: AxisTruth, rate_hz: f64, seed: u64) -> Self {
+    pub fn new(truth: AxisParameters, rate_hz: f64, seed: u64) -> Self {
         let step_s = 1.0 / (rate_hz * SUBSTEPS as f64);
         let delay = (truth.delay_s / step_s).round() as usize;
         Self {

@@ -8,7 +8,7 @@ use quadrant::friction::lugre::Lugre;
 use quadrant::friction::smoothed_gms::SmoothedGms;
 use quadrant::friction::stribeck::SlidingTable;
 
-use super::{AxisTruth, FrictionTruth, TRUTH_ELEMENTS};
+use super::{AxisParameters, FrictionParameters, PLANT_ELEMENTS};
 
 /// Pre-sliding friction of an axis: its model, and the model's state.
 #[derive(Clone, Debug)]
@@ -21,14 +21,14 @@ pub struct Presliding(Model);
 #[derive(Clone, Debug)]
 enum Model {
     Gms(
-        Gms<f64, TRUTH_ELEMENTS>,
+        Gms<f64, PLANT_ELEMENTS>,
         SlidingTable<f64>,
-        GmsState<f64, TRUTH_ELEMENTS>,
+        GmsState<f64, PLANT_ELEMENTS>,
     ),
     Smoothed(
-        SmoothedGms<f64, TRUTH_ELEMENTS>,
+        SmoothedGms<f64, PLANT_ELEMENTS>,
         SlidingTable<f64>,
-        GmsState<f64, TRUTH_ELEMENTS>,
+        GmsState<f64, PLANT_ELEMENTS>,
     ),
     Lugre(Lugre<f64>, Bristle<f64>),
     Dahl(Dahl<f64>, Bristle<f64>),
@@ -36,25 +36,25 @@ enum Model {
 
 impl Presliding {
     /// The axis' model at rest, springs slack; `step_s` is the time between evaluations.
-    pub fn new(truth: &AxisTruth, step_s: f64) -> Self {
+    pub fn new(truth: &AxisParameters, step_s: f64) -> Self {
         let curves = truth.friction.map(|model| model.curve);
         let surface = || SlidingTable::build(&curves, truth.gms.attraction_v_s, step_s);
         Self(match &truth.model {
-            FrictionTruth::Gms => Model::Gms(
+            FrictionParameters::Gms => Model::Gms(
                 Gms::build(&truth.gms.elements),
                 surface(),
                 GmsState::default(),
             ),
-            FrictionTruth::Smoothed(parameters) => {
+            FrictionParameters::Smoothed(parameters) => {
                 let breakaway_v = 0.5 * (curves.positive.breakaway_v + curves.negative.breakaway_v);
                 let model = SmoothedGms::build(&truth.gms.elements, parameters, breakaway_v);
                 Model::Smoothed(model, surface(), GmsState::default())
             }
-            FrictionTruth::Lugre(parameters) => Model::Lugre(
+            FrictionParameters::Lugre(parameters) => Model::Lugre(
                 Lugre::build(parameters, &curves, step_s),
                 Bristle::default(),
             ),
-            FrictionTruth::Dahl(parameters) => Model::Dahl(
+            FrictionParameters::Dahl(parameters) => Model::Dahl(
                 Dahl::build(parameters, curves.map(|curve| curve.coulomb_v)),
                 Bristle::default(),
             ),

@@ -5,7 +5,7 @@ use quadrant::safety::AxisSwitches;
 
 /// True positions of an axis' switches and index pulses. Every number is chosen, none measured.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct MarkTruth {
+pub struct MarkParameters {
     /// The negative limit switch is pressed below this, mm.
     pub negative_limit_mm: f64,
     /// The positive limit switch is pressed above this, mm.
@@ -20,7 +20,7 @@ pub struct MarkTruth {
     pub counts_per_index: i64,
 }
 
-impl Default for MarkTruth {
+impl Default for MarkParameters {
     /// Limit switches 5 mm beyond the default travel, a home switch at -40 mm, and an index pulse in every turn of a screw
     /// with a lead of 10 mm, one of them at -36 mm.
     fn default() -> Self {
@@ -38,7 +38,7 @@ impl Default for MarkTruth {
 /// The marks of an axis in use.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Marks {
-    truth: MarkTruth,
+    truth: MarkParameters,
     pressed: AxisSwitches,
     /// The encoder's count when it was last read.
     count: i64,
@@ -46,7 +46,7 @@ pub struct Marks {
 
 impl Marks {
     /// Marks of an axis that stands at zero.
-    pub fn new(truth: MarkTruth) -> Self {
+    pub fn new(truth: MarkParameters) -> Self {
         Self {
             truth,
             ..Self::default()

@@ -9,18 +9,19 @@ mod drive;
 mod friction;
 pub mod load;
 mod marks;
+mod parameters;
 mod stage;
 mod transmission;
-mod truth;
 mod variation;
 
 pub use axis::SimulatedAxis;
 pub use drive::{Backlash, Cogging, Drive, EncoderSide};
 pub use friction::Presliding;
-pub use marks::{MarkTruth, Marks};
+pub use marks::{MarkParameters, Marks};
+pub use parameters::{
+    AxisParameters, FrictionParameters, Imperfections, PLANT_ELEMENTS, StageParameters,
+    virgin_curve_elements,
+};
 pub use stage::SimulatedStage;
 pub use transmission::{Body, Forcing};
-pub use truth::{
-    AxisTruth, FrictionTruth, Imperfections, StageTruth, TRUTH_ELEMENTS, virgin_curve_elements,
-};
 pub use variation::NEWTONS_PER_VOLT;

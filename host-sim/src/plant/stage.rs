@@ -8,7 +8,7 @@ use quadrant::safety::Switches;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 
-use super::{MarkTruth, Marks, SimulatedAxis, StageTruth};
+use super::{MarkParameters, Marks, SimulatedAxis, StageParameters};
 
 /// The simulated stage in motion.
 #[derive(Clone, Debug)]
@@ -21,7 +21,7 @@ pub struct SimulatedStage {
 
 impl SimulatedStage {
     /// A stage at rest at the origin, sampled at `rate_hz`; the same seed gives the same noise.
-    pub fn new(truth: &StageTruth, rate_hz: f64, seed: u64) -> Self {
+    pub fn new(truth: &StageParameters, rate_hz: f64, seed: u64) -> Self {
         let axis = |index: usize| {
             SimulatedAxis::new(
                 truth.axes[index].clone(),
@@ -31,7 +31,7 @@ impl SimulatedStage {
         };
         Self {
             axes: [axis(0), axis(1), axis(2)],
-            marks: [Marks::new(MarkTruth::default()); 3],
+            marks: [Marks::new(MarkParameters::default()); 3],
             converters: None,
         }
     }
@@ -58,7 +58,7 @@ impl SimulatedStage {
     }
 
     /// Puts switches and index pulses elsewhere. The axes must stand where they started.
-    pub fn set_marks(&mut self, truths: [MarkTruth; 3]) {
+    pub fn set_marks(&mut self, truths: [MarkParameters; 3]) {
         self.marks = truths.map(Marks::new);
     }
 

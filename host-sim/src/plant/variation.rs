@@ -3,14 +3,14 @@
 use quadrant::friction::stribeck::StaticFriction;
 
 use super::{
-    AxisTruth, Backlash, Cogging, Drive, EncoderSide, Imperfections, virgin_curve_elements,
+    AxisParameters, Backlash, Cogging, Drive, EncoderSide, Imperfections, virgin_curve_elements,
 };
 
 /// The force of a volt at the amplifier's input, N/V, on every axis of the simulated stage: with it the x axis, which a volt
 /// accelerates by 69.39 m/s^2, moves 10 kg. Chosen; nothing but a load given in newtons depends on it.
 pub const NEWTONS_PER_VOLT: f64 = 693.9;
 
-impl AxisTruth {
+impl AxisParameters {
     /// With `ratio` times the moving mass, above zero: A, B and C are forces over mass. Friction is left as it is.
     #[must_use]
     pub fn with_mass(mut self, ratio: f64) -> Self {

@@ -23,8 +23,7 @@ impl ForceRecord {
     /// # Errors
     /// A file that cannot be read, with gaps or uneven time, or with a force beyond 100 kN; names line or column, the value,
     /// and what is allowed.
-    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, RecordError> {
-        let path = path.as_ref();
+    pub fn read_csv(path: &Path) -> Result<Self, RecordError> {
         let (time, forces) = columns::read_forces(path)?;
         let sample_time_s = time::check(path, &time)?;
         let mut axes = [None, None, None];

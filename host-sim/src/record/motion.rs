@@ -26,8 +26,7 @@ pub struct Record {
 
 impl Record {
     /// Reads and checks a record for an axis with `limits`.
-    pub fn read(path: impl AsRef<Path>, limits: &AxisLimits) -> Result<Self, RecordError> {
-        let path = path.as_ref();
+    pub fn read(path: &Path, limits: &AxisLimits) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Motion, &mut |_| {})?;
         let sample_time_s = time::check(path, &columns.time)?;
         plausible::check(path, &columns, sample_time_s, limits)?;

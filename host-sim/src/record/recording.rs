@@ -60,7 +60,7 @@ impl Recording {
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), TraceError> {
+    pub fn write_csv(&self, path: &Path) -> Result<(), TraceError> {
         let time: Vec<f64> = (0..self.len())
             .map(|index| index as f64 * self.sample_time_s)
             .collect();
@@ -82,7 +82,7 @@ impl Recording {
     /// # Errors
     /// A file that cannot be read, with gaps or uneven time, or whose position or voltage cannot be identified from; names
     /// line or column, the value, and what is allowed.
-    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, RecordError> {
+    pub fn read_csv(path: &Path) -> Result<Self, RecordError> {
         Self::read_csv_with(path, &mut |_| {})
     }
 
@@ -90,11 +90,7 @@ impl Recording {
     ///
     /// # Errors
     /// As [`read_csv`](Self::read_csv).
-    pub fn read_csv_with(
-        path: impl AsRef<Path>,
-        progress: &mut dyn FnMut(f64),
-    ) -> Result<Self, RecordError> {
-        let path = path.as_ref();
+    pub fn read_csv_with(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Experiment, progress)?;
         let sample_time_s = time::check(path, &columns.time)?;
         check(path, &columns)?;

@@ -32,8 +32,7 @@ pub enum TraceError {
 }
 
 /// Writes named columns of one length, every number in full, so that reading them back gives the same bits.
-pub fn write_trace(path: impl AsRef<Path>, columns: &[(&str, &[f64])]) -> Result<(), TraceError> {
-    let path = path.as_ref();
+pub fn write_trace(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), TraceError> {
     if let Some((first, values)) = columns.first()
         && let Some((column, other)) = columns
             .iter()

@@ -1,9 +1,7 @@
 //! A part program on the simulated stage: the firmware's law follows it, and the true path is compared with the
 //! programmed one.
 
-use indicatif::ProgressBar;
 use quadrant::reference::{Motion, RecordedTable};
-use quadrant::scalar::Scalar;
 use quadrant::settings::StageSettings;
 use quadrant::units::Position;
 use rayon::prelude::*;
@@ -78,30 +76,30 @@ pub struct ProgramOutcome {
     pub deviation_mm: Vec<[f64; 3]>,
 }
 
-/// Runs configurations on a sampled program, in parallel; the same seed gives the same outcomes. `progress` advances by
-/// one a configuration.
+/// Runs configurations on a sampled program, in parallel; the same seed gives the same outcomes. `advance` is called after
+/// each configuration.
 ///
 /// # Errors
 /// Refused settings or a fault.
-pub fn run_program<S: Scalar>(
+pub fn run_program(
     trajectory: &Trajectory,
     tables: &ProgramTables,
     configurations: &[Configuration],
     setup: &RunConfiguration,
     seed: u64,
-    progress: &ProgressBar,
+    advance: &(dyn Fn() + Sync),
 ) -> Result<Vec<ProgramOutcome>, RunError> {
     configurations
         .par_iter()
         .map(|&configuration| {
-            let outcome = run_one::<S>(trajectory, tables, configuration, setup, seed);
-            progress.inc(1);
+            let outcome = run_one(trajectory, tables, configuration, setup, seed);
+            advance();
             outcome
         })
         .collect()
 }
 
-fn run_one<S: Scalar>(
+fn run_one(
     trajectory: &Trajectory,
     tables: &ProgramTables,
     configuration: Configuration,
@@ -118,7 +116,7 @@ fn run_one<S: Scalar>(
         ))
     });
     let resolution_mm = stage.axes.each_ref().map(|axis| axis.encoder.resolution_mm);
-    let mut machine = LawMachine::<S, ELEMENTS>::with_plan(stage.build()?, motions);
+    let mut machine = LawMachine::<f32, ELEMENTS>::with_plan(stage.build()?, motions);
     let mut plant = SimulatedStage::new(&setup.truth, stage.rate_hz, seed);
     let most_ticks = tables.places.len() + 10_000;
     let traces = run(&mut machine, &mut plant, resolution_mm, most_ticks)?;

@@ -3,7 +3,6 @@
 use std::fmt;
 
 use heapless::Vec as ShortVec;
-use indicatif::ProgressBar;
 use quadrant::control::feedback::LawKind;
 use quadrant::control::npid::NonlinearGain;
 use quadrant::control::plant_model::PlantModel;
@@ -11,7 +10,6 @@ use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::reference::{Motion, RecordedTable};
-use quadrant::scalar::Scalar;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant::units::Position;
 use rayon::prelude::*;
@@ -23,11 +21,14 @@ use crate::experiment::run::{RunError, run};
 use crate::experiment::run_configuration::RunConfiguration;
 use crate::identify::single_state::with_all_models;
 use crate::machine::LawMachine;
-use crate::plant::{AxisTruth, Drive, FrictionTruth, Imperfections, SimulatedStage, StageTruth};
+use crate::plant::{
+    AxisParameters, Drive, FrictionParameters, Imperfections, SimulatedStage, StageParameters,
+};
 use crate::record::{AxisLimits, Record};
 
 /// An axis that can follow a record.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum RecordedAxis {
     /// The Electro-Mechanical Positioning System, by its published model.
     Emps,
@@ -83,7 +84,7 @@ const INTEGRAL_RATIO_PER_S: f64 = 0.66;
 /// Axis under test: law and plant.
 struct Axis {
     settings: AxisSettings,
-    truth: AxisTruth,
+    truth: AxisParameters,
 }
 
 impl RecordedAxis {
@@ -165,7 +166,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
     settings.amplifier.offset_v = emps::OFFSET_N * per_newton;
     settings.plant = Some(plant);
     settings.limits.max_acceleration_mm_s2 = 5000.0;
-    let truth = AxisTruth {
+    let truth = AxisParameters {
         gain_mm_per_v_s2: gain,
         // All viscous friction is in the friction model, as published.
         damping_per_s: 0.0,
@@ -173,7 +174,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
         delay_s: emps::DELAY_S,
         friction,
         gms,
-        model: FrictionTruth::Gms,
+        model: FrictionParameters::Gms,
         resolution_mm: emps::RESOLUTION_MM,
         full_scale_v: 10.0,
         imperfections: Imperfections {
@@ -239,12 +240,12 @@ pub const RUNS: u64 = 8;
 ///
 /// # Errors
 /// A record that does not fit the control rate, refused settings, or a fault.
-pub fn replay<S: Scalar>(
+pub fn replay(
     record: &Record,
     axis: RecordedAxis,
     setup: &RunConfiguration,
     seed: u64,
-    progress: &ProgressBar,
+    advance: &(dyn Fn() + Sync),
 ) -> Result<Vec<RecordedOutcome>, ReplayError> {
     let axis = axis.build(setup)?;
     let rate_hz = StageSettings::simulated().rate_hz;
@@ -283,21 +284,21 @@ pub fn replay<S: Scalar>(
     let ours: Result<Vec<_>, ReplayError> = Configuration::all()
         .into_par_iter()
         .map(|configuration| {
-            let outcome = run_record::<S>(
+            let outcome = run_record(
                 configuration,
                 &axis,
                 positions,
                 ticks_per_sample as u32,
                 seed,
             );
-            progress.inc(1);
+            advance();
             outcome
         })
         .collect();
     Ok(machine_itself.into_iter().chain(ours?).collect())
 }
 
-fn run_record<S: Scalar>(
+fn run_record(
     configuration: Configuration,
     axis: &Axis,
     positions: &'static [Position],
@@ -307,10 +308,10 @@ fn run_record<S: Scalar>(
     let mut settings = StageSettings::simulated();
     settings.axes[0] = axis.settings.clone();
     configuration.apply(&mut settings);
-    let mut truth = StageTruth::ideal();
+    let mut truth = StageParameters::ideal();
     truth.axes[0] = axis.truth.clone();
     let table = RecordedTable::new(positions, ticks_per_sample, settings.motion_scale(0));
-    let mut machine = LawMachine::<S, ELEMENTS>::with_plan(
+    let mut machine = LawMachine::<f32, ELEMENTS>::with_plan(
         settings.build()?,
         [Motion::Recorded(table), Motion::Hold, Motion::Hold],
     );

@@ -1,13 +1,10 @@
-//! The circle test on the simulated stage, and the command `quadrant circle`.
+//! The circle test on the simulated stage.
 
-use indicatif::ProgressBar;
 use quadrant::reference::Plane;
 use quadrant_sim::circle::page::circle_tables;
 use quadrant_sim::circle::{CircleRefusal, CircleRequest, CircleResult, run_circle_tests};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
-
-use crate::command;
 
 fn request(configurations: &[Configuration]) -> CircleRequest {
     CircleRequest {
@@ -21,7 +18,7 @@ fn request(configurations: &[Configuration]) -> CircleRequest {
 
 fn results(request: &CircleRequest) -> Vec<CircleResult> {
     let setup = RunConfiguration::identified(identified_settings().unwrap().stage);
-    run_circle_tests(request, &setup, &ProgressBar::hidden())
+    run_circle_tests(request, &setup, &|| {})
 }
 
 #[test]
@@ -98,38 +95,4 @@ fn the_same_request_gives_the_same_results_and_seeds_differ() {
     let [one, other] = [0, 1].map(|_| deviations(results(&request)));
     assert_eq!(one, other);
     assert_ne!(one[0], one[1]);
-}
-
-#[test]
-fn the_command_writes_tables_and_a_page() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    let shown = command::succeed(
-        at,
-        &[
-            "circle",
-            "--plane",
-            "zx",
-            "--radius-mm",
-            "5",
-            "--feed-mm-min",
-            "3000",
-            "--seeds",
-            "2",
-            "--out",
-            "x",
-        ],
-    );
-    assert!(shown.contains("G(b)") && shown.contains("ZX"), "{shown}");
-    for file in [
-        "circle-summary.csv",
-        "circle-tests.csv",
-        "circle-reversals.csv",
-    ] {
-        assert!(at.join("x").join(file).exists(), "{file}");
-    }
-    let page = std::fs::read_to_string(at.join("x/circle.html")).unwrap();
-    assert!(page.contains("circle-polar-zx") && !page.contains("circle-polar-xy"));
-    let refused = command::fail(at, &["circle", "--radius-mm", "5,0"]);
-    assert!(refused.contains("--radius-mm 0 must be"), "{refused}");
 }

@@ -17,7 +17,7 @@ use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
 use quadrant_sim::machine::{
     Drive, Experiment, ExperimentError, SimulatedLink, SimulatedTestAxis, TestAxis,
 };
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 
 fn client() -> Client {
     Client::open(SimulatedLink::start(1, None).unwrap()).unwrap()
@@ -345,7 +345,7 @@ fn the_motor_constant_of_the_connected_axis_is_that_of_the_axis_itself() {
     test_axis.apply(&limp).unwrap();
     let settings = MotorConstantSettings::default();
     let connected = motor_constant::measure(&mut test_axis, &settings, &mut |_| {}).unwrap();
-    let [truth, ..] = StageTruth::real().axes;
+    let [truth, ..] = StageParameters::real().axes;
     let mut direct = SimulatedTestAxis::new(0, truth, 1);
     let direct = motor_constant::measure(&mut direct, &settings, &mut |_| {}).unwrap();
     let ratio = connected.gain_mm_per_v_s2 / direct.gain_mm_per_v_s2;

@@ -1,6 +1,5 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
-use indicatif::ProgressBar;
 use quadrant::app::supervisor::Event;
 use quadrant::command::Command;
 use quadrant::lockstep::Job;
@@ -12,7 +11,7 @@ use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::record::Record;
 use quadrant_sim::replay::recorded::{RecordedAxis, replay};
 
@@ -44,7 +43,7 @@ fn the_same_seed_gives_the_same_outcome() {
 #[test]
 fn combined_feedforward_makes_the_circle_rounder() {
     let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
-    let circles = run_circles::<f32>(&Configuration::EXTREMES, &setup, 1).unwrap();
+    let circles = run_circles(&Configuration::EXTREMES, &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
 }
@@ -59,7 +58,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         },
     };
     let mut machine = LawMachine::<f32, 4>::new(&job).unwrap();
-    let mut plant = SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 1);
+    let mut plant = SimulatedStage::new(&StageParameters::real(), job.stage.rate_hz, 1);
     let mut operator = Operator::runs_the_plan();
     for tick in 0..20_000 {
         // The encoder of x stands still, as if the axis were clamped.
@@ -105,13 +104,13 @@ fn our_controllers_follow_the_recorded_emps_reference() {
         return;
     }
     let axis = RecordedAxis::Emps;
-    let record = Record::read(file, &axis.limits()).unwrap();
-    let outcomes = replay::<f32>(
+    let record = Record::read(file.as_ref(), &axis.limits()).unwrap();
+    let outcomes = replay(
         &record,
         axis,
         &RunConfiguration::exact(StageSettings::simulated()),
         1,
-        &ProgressBar::hidden(),
+        &|| {},
     )
     .unwrap();
     let rms = |configuration| {

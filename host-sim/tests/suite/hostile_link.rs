@@ -20,7 +20,7 @@ use quadrant::stage::Outputs;
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::application::{Running, Start};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
-use quadrant_sim::plant::{SimulatedStage, StageTruth};
+use quadrant_sim::plant::{SimulatedStage, StageParameters};
 
 use crate::common::Noise;
 use crate::link_traffic::{arrival, framed};
@@ -121,7 +121,7 @@ impl Bench {
         }
         Self {
             running: start(&settings),
-            plant: SimulatedStage::new(&StageTruth::real(), settings.rate_hz, 1),
+            plant: SimulatedStage::new(&StageParameters::real(), settings.rate_hz, 1),
             settings,
             line: Line::default(),
             ear: LinkServer::new(),

@@ -11,7 +11,7 @@ use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::settings_file::SettingsFile;
 use rayon::prelude::*;
 
@@ -23,7 +23,7 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
         .stage
         .axes
         .par_iter_mut()
-        .zip(StageTruth::real().axes)
+        .zip(StageParameters::real().axes)
         .enumerate()
         .for_each(|(index, (axis, truth))| {
             let mut rig = SimulatedTestAxis::new(index, truth, 1);
@@ -61,7 +61,7 @@ fn performance(stage: &StageSettings) -> [f64; 3] {
 /// The committed settings, but the feedforward of x told the truth, on the given elements.
 fn truth_told(elements: &GmsParameters) -> StageSettings {
     let mut stage = identified_settings().unwrap().stage;
-    let [truth, _, _] = StageTruth::real().axes;
+    let [truth, _, _] = StageParameters::real().axes;
     let axis = &mut stage.axes[0];
     let damping_v = truth.damping_per_s / truth.gain_mm_per_v_s2;
     axis.friction.sliding = truth.friction.map(|model| StaticFriction {
@@ -80,7 +80,7 @@ fn truth_told(elements: &GmsParameters) -> StageSettings {
 
 /// The true virgin curve, cut at the knots of the committed elements.
 fn truth_on_the_same_knots() -> GmsParameters {
-    let [truth, _, _] = StageTruth::real().axes;
+    let [truth, _, _] = StageParameters::real().axes;
     let axis = &identified_settings().unwrap().stage.axes[0];
     let level_v = 0.15;
     let knots: Vec<f64> = axis
@@ -125,7 +125,7 @@ fn identified_settings_do_as_well_as_the_truth_on_as_many_elements() {
         assert!(*found < 1.1 * exact, "{identified:?} against {told:?}");
     }
     // Told the truth on its own ten elements, the axis does better where a single instant counts.
-    let [truth, _, _] = StageTruth::real().axes;
+    let [truth, _, _] = StageParameters::real().axes;
     let ten = performance(&truth_told(&truth.gms));
     let [largest, rms, glitch] = [0, 1, 2].map(|score| identified[score] / ten[score]);
     assert!(

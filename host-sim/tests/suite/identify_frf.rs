@@ -10,11 +10,11 @@ use quadrant_sim::identify::frf::{
 };
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::Recording;
 
 /// The sliding axis: the viscous friction is part of its damping, and there is no spring.
-fn sliding(truth: &AxisTruth) -> PlantModel {
+fn sliding(truth: &AxisParameters) -> PlantModel {
     let viscous = truth.friction.positive.viscous_v_s_per_mm;
     PlantModel {
         gain_mm_per_v_s2: truth.gain_mm_per_v_s2,
@@ -24,12 +24,12 @@ fn sliding(truth: &AxisTruth) -> PlantModel {
     }
 }
 
-fn x_truth() -> AxisTruth {
-    StageTruth::real().axes[0].clone()
+fn x_truth() -> AxisParameters {
+    StageParameters::real().axes[0].clone()
 }
 
 /// The x axis under the slow first controller.
-fn slow_rig(truth: &AxisTruth, seed: u64) -> SimulatedTestAxis {
+fn slow_rig(truth: &AxisParameters, seed: u64) -> SimulatedTestAxis {
     let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), seed);
     let settings = bootstrap_settings(test_axis.settings(), truth.gain_mm_per_v_s2, 1e4);
     test_axis.apply(&settings).unwrap();
@@ -95,7 +95,7 @@ fn every_waveform_shows_the_sliding_axis() {
 
 #[test]
 fn every_axis_shows_its_response() {
-    for (seed, truth) in (1..).zip(&StageTruth::real().axes) {
+    for (seed, truth) in (1..).zip(&StageParameters::real().axes) {
         let found = measured(&mut slow_rig(truth, seed), &gentle());
         let lines = found.estimate.response.points.len();
         assert_true(&found.estimate.response, &sliding(truth), lines - 4);

@@ -8,7 +8,7 @@ use quadrant_sim::identify::motion::{
 };
 use quadrant_sim::identify::setting::SettingError;
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::Recording;
 
 /// Of the EMPS drive (see the record's own description).
@@ -24,7 +24,7 @@ fn emps() -> Option<Recording> {
     let path: PathBuf =
         Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data/emps/emps.csv");
     if path.exists() {
-        return Some(Recording::read_csv(path).unwrap());
+        return Some(Recording::read_csv(&path).unwrap());
     }
     println!(
         "SKIPPED: the EMPS recording is not at ../shared/data/emps/emps.csv beside the project"
@@ -134,14 +134,14 @@ fn the_models_of_emps_move_as_the_machine_did() {
 }
 
 /// An ordinary motion of an axis of the simulated stage.
-fn simulated(index: usize, truth: &AxisTruth) -> Recording {
+fn simulated(index: usize, truth: &AxisParameters) -> Recording {
     let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), 1);
     shuttle(&mut test_axis, 2, &mut |_| {}).unwrap()
 }
 
 #[test]
 fn with_the_dead_time_known_the_simulated_axes_are_found() {
-    for (index, truth) in StageTruth::real().axes.iter().enumerate() {
+    for (index, truth) in StageParameters::real().axes.iter().enumerate() {
         let settings = MotionFitSettings {
             // The hold of 10 kHz included.
             dead_time_s: Some(truth.delay_s + 0.5e-4),
@@ -172,7 +172,7 @@ fn with_the_dead_time_known_the_simulated_axes_are_found() {
 
 #[test]
 fn without_it_inertia_and_dead_time_are_hardly_told_apart_but_their_sum_is() {
-    let truth = &StageTruth::real().axes[0];
+    let truth = &StageParameters::real().axes[0];
     let candidates = fitted(&simulated(0, truth), &MotionFitSettings::default());
     let model = &recommended(&candidates).unwrap().model;
     let sum = |inertia: f64, viscous: f64, dead_time_s: f64| inertia + viscous * dead_time_s;
@@ -193,7 +193,7 @@ fn without_it_inertia_and_dead_time_are_hardly_told_apart_but_their_sum_is() {
 
 #[test]
 fn the_friction_of_a_record_makes_settings_that_the_firmware_takes() {
-    let truth = &StageTruth::real().axes[0];
+    let truth = &StageParameters::real().axes[0];
     let candidates = fitted(&simulated(0, truth), &MotionFitSettings::default());
     let model = &recommended(&candidates).unwrap().model;
     let mut stage = quadrant::settings::StageSettings::simulated();
@@ -205,7 +205,7 @@ fn the_friction_of_a_record_makes_settings_that_the_firmware_takes() {
 
 #[test]
 fn a_level_that_rises_with_the_speed_is_found_and_the_firmware_takes_it() {
-    let mut truth = StageTruth::real().axes[0].clone();
+    let mut truth = StageParameters::real().axes[0].clone();
     for way in [&mut truth.friction.positive, &mut truth.friction.negative] {
         way.curve.breakaway_v = 0.6 * way.curve.coulomb_v;
         way.curve.stribeck_velocity_mm_s = 15.0;
@@ -227,11 +227,11 @@ fn a_level_that_rises_with_the_speed_is_found_and_the_firmware_takes_it() {
 
 #[test]
 fn another_record_judges_models_that_it_did_not_fit() {
-    let truth = &StageTruth::real().axes[0];
+    let truth = &StageParameters::real().axes[0];
     let settings = MotionFitSettings::default();
     let candidates = fitted(&simulated(0, truth), &settings);
     let best = recommended(&candidates).unwrap();
-    let on = |truth: &AxisTruth, seed: u64| {
+    let on = |truth: &AxisParameters, seed: u64| {
         let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), seed);
         let record = shuttle(&mut test_axis, 1, &mut |_| {}).unwrap();
         validate(best, &record, &settings).unwrap()
@@ -252,7 +252,7 @@ fn another_record_judges_models_that_it_did_not_fit() {
 
 #[test]
 fn records_that_tell_too_little_are_refused_with_what_they_lack() {
-    let truth = &StageTruth::real().axes[0];
+    let truth = &StageParameters::real().axes[0];
     let whole = simulated(0, truth);
     let settings = MotionFitSettings::default();
     let refusal = |record: &Recording, settings: &MotionFitSettings| {

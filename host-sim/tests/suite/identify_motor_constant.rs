@@ -4,12 +4,12 @@ use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantError, MotorConstantSettings, evaluate, measure,
 };
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::Recording;
 
 const RESOLUTION_MM: f64 = 5e-4;
 
-fn test_of(truth: &AxisTruth, index: usize, seed: u64) -> MotorConstant {
+fn test_of(truth: &AxisParameters, index: usize, seed: u64) -> MotorConstant {
     let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
     measure(
         &mut test_axis,
@@ -25,7 +25,7 @@ fn evaluated(recording: Recording) -> Result<MotorConstant, MotorConstantError> 
 
 #[test]
 fn every_axis_shows_its_acceleration_per_volt() {
-    for (index, truth) in StageTruth::real().axes.iter().enumerate() {
+    for (index, truth) in StageParameters::real().axes.iter().enumerate() {
         for seed in 1..=3 {
             let found = test_of(truth, index, seed);
             let error = found.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2 - 1.0;
@@ -37,7 +37,7 @@ fn every_axis_shows_its_acceleration_per_volt() {
 
 #[test]
 fn without_the_screw_s_ripple_the_gain_is_accurate() {
-    let mut truth = StageTruth::real().axes[0].clone();
+    let mut truth = StageParameters::real().axes[0].clone();
     truth.imperfections.ripple_v = 0.0;
     let found = test_of(&truth, 0, 1);
     let error = found.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2 - 1.0;
@@ -46,7 +46,7 @@ fn without_the_screw_s_ripple_the_gain_is_accurate() {
 
 #[test]
 fn a_saved_test_gives_what_the_fresh_one_gave() {
-    let fresh = test_of(&StageTruth::real().axes[0], 0, 1);
+    let fresh = test_of(&StageParameters::real().axes[0], 0, 1);
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("test.csv");
     fresh.recording.write_csv(&path).unwrap();
@@ -57,7 +57,7 @@ fn a_saved_test_gives_what_the_fresh_one_gave() {
 
 #[test]
 fn the_moving_mass_turns_it_into_newtons_per_volt() {
-    let found = test_of(&StageTruth::real().axes[0], 0, 1);
+    let found = test_of(&StageParameters::real().axes[0], 0, 1);
     // 12 kg at 1 mm/s² take 12 mN.
     let expected = 12e-3 * found.gain_mm_per_v_s2;
     assert!((found.force_n_per_v(12.0) / expected - 1.0).abs() < 1e-12);
@@ -65,7 +65,7 @@ fn the_moving_mass_turns_it_into_newtons_per_volt() {
 
 #[test]
 fn an_axis_that_moves_the_wrong_way_is_refused() {
-    let mut recording = test_of(&StageTruth::real().axes[0], 0, 1).recording;
+    let mut recording = test_of(&StageParameters::real().axes[0], 0, 1).recording;
     for position in &mut recording.position_mm {
         *position = -*position;
     }
@@ -75,7 +75,7 @@ fn an_axis_that_moves_the_wrong_way_is_refused() {
 
 #[test]
 fn an_axis_that_friction_holds_is_refused() {
-    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let settings = MotorConstantSettings {
         most_level_v: 0.04,
         ..MotorConstantSettings::default()
@@ -89,7 +89,7 @@ fn an_axis_that_friction_holds_is_refused() {
 
 #[test]
 fn a_recording_of_something_else_is_refused() {
-    let recording = test_of(&StageTruth::real().axes[0], 0, 1).recording;
+    let recording = test_of(&StageParameters::real().axes[0], 0, 1).recording;
     // A single pass has no scatter.
     let pass = recording.slice(0..2500);
     let error = evaluated(pass).unwrap_err();

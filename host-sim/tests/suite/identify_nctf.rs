@@ -4,10 +4,10 @@ use quadrant_sim::identify::characteristic::{
     Characteristic, CharacteristicError, CharacteristicSettings, evaluate, measure,
 };
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::Recording;
 
-fn coast(index: usize, truth: AxisTruth) -> Result<Characteristic, CharacteristicError> {
+fn coast(index: usize, truth: AxisParameters) -> Result<Characteristic, CharacteristicError> {
     let mut test_axis = SimulatedTestAxis::new(index, truth, 3);
     measure(
         &mut test_axis,
@@ -17,7 +17,7 @@ fn coast(index: usize, truth: AxisTruth) -> Result<Characteristic, Characteristi
 }
 
 /// Distance in which the axis stops from a speed, by small steps of the equation of motion, mm.
-fn stopping_distance(truth: &AxisTruth, speed: f64) -> f64 {
+fn stopping_distance(truth: &AxisParameters, speed: f64) -> f64 {
     let (a, b) = (truth.gain_mm_per_v_s2, truth.damping_per_s);
     let friction = &truth.friction;
     let step_s = 1e-6;
@@ -32,7 +32,7 @@ fn stopping_distance(truth: &AxisTruth, speed: f64) -> f64 {
 
 #[test]
 fn the_trajectory_is_how_the_axis_comes_to_rest() {
-    for (index, truth) in StageTruth::real().axes.into_iter().enumerate() {
+    for (index, truth) in StageParameters::real().axes.into_iter().enumerate() {
         let found = coast(index, truth.clone()).unwrap();
         // The last micrometres differ: friction is not the same both ways.
         assert!(found.scatter < 0.2, "{}", found.scatter);
@@ -49,7 +49,7 @@ fn the_trajectory_is_how_the_axis_comes_to_rest() {
 
 #[test]
 fn control_follows_the_line_of_its_slope_up_to_the_knee_and_the_trajectory_beyond() {
-    let mut light = StageTruth::real().axes[0].clone();
+    let mut light = StageParameters::real().axes[0].clone();
     // A tenth of the friction: the axis coasts far.
     for model in [&mut light.friction.positive, &mut light.friction.negative] {
         model.curve.coulomb_v *= 0.1;
@@ -74,14 +74,14 @@ fn control_follows_the_line_of_its_slope_up_to_the_knee_and_the_trajectory_beyon
         );
     }
     // With more friction than control may brake with, the line is all there is.
-    let heavy = coast(0, StageTruth::real().axes[0].clone()).unwrap();
+    let heavy = coast(0, StageParameters::real().axes[0].clone()).unwrap();
     assert_eq!(heavy.knee_mm(slope), None);
     assert_eq!(heavy.points(slope, 250.0).len(), 1);
 }
 
 #[test]
 fn an_axis_that_stays_slow_and_recordings_that_are_no_test_are_refused() {
-    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let weak = CharacteristicSettings {
         most_voltage_v: 0.15,
         ..CharacteristicSettings::default()
@@ -102,7 +102,7 @@ fn an_axis_that_stays_slow_and_recordings_that_are_no_test_are_refused() {
         "{error}"
     );
 
-    let found = coast(0, StageTruth::real().axes[0].clone()).unwrap();
+    let found = coast(0, StageParameters::real().axes[0].clone()).unwrap();
     // Cut while the axis still moves.
     let driven = found
         .recording

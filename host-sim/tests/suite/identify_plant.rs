@@ -4,7 +4,7 @@ use quadrant_sim::commission::bootstrap::bootstrap_settings;
 use quadrant_sim::identify::frf::{FrfMeasurement, FrfSettings, measure};
 use quadrant_sim::identify::plant::{PlantError, PlantFit, PlantFitSettings, Stiffness, fit_plant};
 use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 
 const SLIDING: PlantFitSettings = PlantFitSettings {
     least_coherence: 0.9,
@@ -12,14 +12,14 @@ const SLIDING: PlantFitSettings = PlantFitSettings {
     stiffness: Stiffness::Zero,
 };
 
-fn truth(axis: usize, noise: f64) -> AxisTruth {
-    let mut truth = StageTruth::real().axes[axis].clone();
+fn truth(axis: usize, noise: f64) -> AxisParameters {
+    let mut truth = StageParameters::real().axes[axis].clone();
     truth.imperfections.encoder_noise_mm *= noise;
     truth
 }
 
 /// A, B with the viscous friction, Td.
-fn true_values(truth: &AxisTruth) -> [f64; 3] {
+fn true_values(truth: &AxisParameters) -> [f64; 3] {
     let viscous = truth.friction.positive.viscous_v_s_per_mm;
     [
         truth.gain_mm_per_v_s2,
@@ -38,7 +38,12 @@ fn settings(seed: u64) -> FrfSettings {
 }
 
 /// Measures under the slow first controller, which knows A with an error of a third.
-fn measured(index: usize, truth: &AxisTruth, settings: &FrfSettings, seed: u64) -> FrfMeasurement {
+fn measured(
+    index: usize,
+    truth: &AxisParameters,
+    settings: &FrfSettings,
+    seed: u64,
+) -> FrfMeasurement {
     let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
     let first = bootstrap_settings(test_axis.settings(), 1.3 * truth.gain_mm_per_v_s2, 1e4);
     test_axis.apply(&first).unwrap();

@@ -7,12 +7,12 @@ use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::identify::revise::{ExplicitFriction, ReviseError};
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;
 
 fn excited(rms_v: f64) -> (AtRest, AxisSettings) {
     let settings = identified_settings().unwrap().stage.axes[0].clone();
-    let mut test_axis = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut test_axis = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let excitation = Excitation {
         waveform: Waveform::Multisine,
         rms_v,
@@ -48,7 +48,7 @@ fn with_both_frictions_the_revised_model_shows_the_measured_response() {
         [fixed, gms, both].map(|revision| revision.friction),
         ExplicitFriction::ALL
     );
-    let truth = &StageTruth::real().axes[0];
+    let truth = &StageParameters::real().axes[0];
     let gain = both.plant.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2;
     assert!((gain - 1.0).abs() < 0.01, "{gain}");
     // The friction carries the whole viscous damping.

@@ -7,10 +7,10 @@ use quadrant_sim::identify::static_friction::{
     measure,
 };
 use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 
 /// An axis under its own PID.
-fn test_axis(index: usize, truth: &AxisTruth, seed: u64) -> SimulatedTestAxis {
+fn test_axis(index: usize, truth: &AxisParameters, seed: u64) -> SimulatedTestAxis {
     let mut test_axis = SimulatedTestAxis::new(index, truth.clone(), seed);
     let settings = measuring_settings(test_axis.settings());
     test_axis.apply(&settings).unwrap();
@@ -39,8 +39,8 @@ fn mapped(test_axis: &mut SimulatedTestAxis, settings: &StaticFrictionSettings) 
 }
 
 /// Friction of the positive direction by `factor`, of the negative by its mirror image around 1; nothing pushes.
-fn leaning(factor: f64) -> AxisTruth {
-    let mut truth = StageTruth::real().axes[0].clone();
+fn leaning(factor: f64) -> AxisParameters {
+    let mut truth = StageParameters::real().axes[0].clone();
     truth.imperfections.offset_v = 0.0;
     let mut mean = truth.friction.positive;
     mean.curve.coulomb_v = 0.120;
@@ -60,7 +60,7 @@ fn leaning(factor: f64) -> AxisTruth {
 
 #[test]
 fn every_axis_shows_its_friction_in_both_directions() {
-    for (index, truth) in StageTruth::real().axes.iter().enumerate() {
+    for (index, truth) in StageParameters::real().axes.iter().enumerate() {
         let map = mapped(&mut test_axis(index, truth, 1), &runs());
         let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
         let offset_v = truth.imperfections.offset_v;
@@ -123,7 +123,10 @@ fn stick_slip_at_the_low_end_is_detected_and_does_not_count() {
         stretch_mm: 1.0,
         ..StaticFrictionSettings::default()
     };
-    let map = mapped(&mut test_axis(0, &StageTruth::real().axes[0], 1), &settings);
+    let map = mapped(
+        &mut test_axis(0, &StageParameters::real().axes[0], 1),
+        &settings,
+    );
     let slowest = map.runs.iter().filter(|run| run.velocity_mm_s.abs() < 0.04);
     assert!(slowest.clone().count() == 2 && slowest.clone().all(|run| run.stick_slip));
     let mut fast = map.runs.iter().filter(|run| run.velocity_mm_s.abs() > 1.0);
@@ -137,7 +140,7 @@ fn stick_slip_at_the_low_end_is_detected_and_does_not_count() {
 #[test]
 fn an_axis_under_its_own_controller_does_not_stick_and_slip() {
     let map = mapped(
-        &mut test_axis(0, &StageTruth::real().axes[0], 1),
+        &mut test_axis(0, &StageParameters::real().axes[0], 1),
         &few_runs(),
     );
     assert_eq!(map.runs.len(), 16);
@@ -147,7 +150,7 @@ fn an_axis_under_its_own_controller_does_not_stick_and_slip() {
 #[test]
 fn a_map_that_is_too_thin_or_has_wrong_signs_is_refused() {
     let mut map = mapped(
-        &mut test_axis(0, &StageTruth::real().axes[0], 1),
+        &mut test_axis(0, &StageParameters::real().axes[0], 1),
         &few_runs(),
     );
     let thin = FrictionMap {
@@ -173,7 +176,7 @@ fn a_map_that_is_too_thin_or_has_wrong_signs_is_refused() {
 
 #[test]
 fn runs_that_cannot_be_made_are_refused_before_the_axis_moves() {
-    let mut test_axis = test_axis(0, &StageTruth::real().axes[0], 1);
+    let mut test_axis = test_axis(0, &StageParameters::real().axes[0], 1);
     let far = StaticFrictionSettings {
         velocities_mm_s: (1.0, 90.0),
         ..StaticFrictionSettings::default()

@@ -10,12 +10,12 @@ use quadrant_sim::identify::virgin_curve::{
     Knots, VirginCurveError, VirginCurveSettings, identify, measure,
 };
 use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::Recording;
 
 /// An axis under the quiet controller, and the amplitude that a commissioning chooses, mm.
 fn quiet_rig(index: usize, seed: u64) -> (SimulatedTestAxis, f64) {
-    let truth = StageTruth::real().axes[index].clone();
+    let truth = StageParameters::real().axes[index].clone();
     let breakaway_v = truth.friction.positive.curve.breakaway_v;
     let mut test_axis = SimulatedTestAxis::new(index, truth, seed);
     let plant = test_axis.settings().plant.unwrap();
@@ -45,7 +45,7 @@ fn refusal(recording: &Recording, knots: &Knots) -> VirginCurveError {
 }
 
 /// The true friction as the amplifier's input sees it: each level without what the offset pushes.
-fn sliding(truth: &AxisTruth) -> PerDirection<StaticFriction> {
+fn sliding(truth: &AxisParameters) -> PerDirection<StaticFriction> {
     let offset_v = truth.imperfections.offset_v;
     let pushed = |model: StaticFriction, by: f64| {
         let mut model = model;
@@ -61,7 +61,7 @@ fn sliding(truth: &AxisTruth) -> PerDirection<StaticFriction> {
 
 #[test]
 fn every_axis_shows_its_presliding_friction() {
-    for (index, truth) in StageTruth::real().axes.iter().enumerate() {
+    for (index, truth) in StageParameters::real().axes.iter().enumerate() {
         let recording = recorded(index, 1);
         let found = identify(&recording, Some(&sliding(truth)), &Knots::Automatic(4)).unwrap();
         let error = found.prediction.relative_error;
@@ -142,7 +142,7 @@ fn knots_can_be_given() {
 
 /// Friction of one level, as the library's own model makes it along a sine of 50 um.
 fn ideal(truth: &GmsParameters, level_v: f64, step_s: f64) -> Recording {
-    let mut flat = StageTruth::real().axes[0].friction.positive.curve;
+    let mut flat = StageParameters::real().axes[0].friction.positive.curve;
     flat.coulomb_v = level_v;
     flat.breakaway_v = level_v;
     let curves = PerDirection {
@@ -178,7 +178,7 @@ fn ideal(truth: &GmsParameters, level_v: f64, step_s: f64) -> Recording {
 
 #[test]
 fn every_branch_seen_from_its_reversal_is_the_virgin_curve_doubled() {
-    let truth = &StageTruth::real().axes[0].gms;
+    let truth = &StageParameters::real().axes[0].gms;
     let level_v = 0.15;
     let record = ideal(truth, level_v, 1e-3);
     let found = identify(&record, None, &Knots::Automatic(4)).unwrap();
@@ -196,7 +196,7 @@ fn every_branch_seen_from_its_reversal_is_the_virgin_curve_doubled() {
 
 #[test]
 fn a_recording_at_another_rate_gives_the_same_model() {
-    let truth = &StageTruth::real().axes[0].gms;
+    let truth = &StageParameters::real().axes[0].gms;
     let [usual, fast, slow] = [1e-3, 1e-4, 2e-3].map(|step_s| {
         let record = ideal(truth, 0.15, step_s);
         identify(&record, None, &Knots::Automatic(3)).unwrap()

@@ -15,7 +15,7 @@ use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::units::Position;
 use quadrant_sim::machine::LawMachine;
-use quadrant_sim::plant::{MarkTruth, SimulatedStage, StageTruth};
+use quadrant_sim::plant::{MarkParameters, SimulatedStage, StageParameters};
 
 /// Length of a count, mm.
 const COUNT_MM: f64 = 5e-4;
@@ -35,7 +35,7 @@ impl Bench {
         };
         let mut bench = Self {
             machine: LawMachine::new(&job).expect("valid"),
-            plant: SimulatedStage::new(&StageTruth::real(), job.stage.rate_hz, 7),
+            plant: SimulatedStage::new(&StageParameters::real(), job.stage.rate_hz, 7),
             settings: job.stage,
         };
         bench.run(20);
@@ -189,9 +189,9 @@ fn a_switch_elsewhere_gives_the_same_origin_to_the_count() {
     let mut origins = vec![];
     for home_mm in [-40.0, -39.2, -41.3, -38.1] {
         let mut bench = Bench::new(StageSettings::simulated());
-        let marks = MarkTruth {
+        let marks = MarkParameters {
             home_mm,
-            ..MarkTruth::default()
+            ..MarkParameters::default()
         };
         bench.plant.set_marks([marks; 3]);
         bench.ask(Command::Home(AxisName::X));

@@ -1,21 +1,15 @@
-//! The host command and its library, tested against the simulated stage.
+//! The host library, tested against the simulated stage.
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
 mod circle;
-mod command;
-mod commission;
-mod connect;
-mod connect_commission;
 mod connected_axis;
 mod default_gains;
-mod design_commands;
 mod design_npid;
 mod design_pid;
 mod experiments;
 mod hostile_link;
 mod identified_stage;
-mod identify_commands;
 mod identify_frf;
 mod identify_motion;
 mod identify_motor_constant;
@@ -31,16 +25,12 @@ mod plant;
 mod plant_disturbances;
 mod plant_drives;
 mod plant_unchanged;
-mod record_bad_input;
 mod record_emps;
 mod record_experiment;
-#[cfg(target_os = "linux")]
-mod record_large;
 mod record_refusals;
 mod record_trace;
 mod simulated_machine;
 mod test_axis;
-mod transcript;
 
 #[allow(dead_code, reason = "the law's tests use the rest")]
 #[path = "../../../tests/law/common.rs"]

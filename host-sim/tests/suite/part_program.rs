@@ -7,8 +7,6 @@ use proptest::test_runner::RngSeed;
 use quadrant::settings::StageSettings;
 use quadrant_sim::gcode::{Limits, Program, ProgramError, Trajectory, Vector};
 
-use crate::command;
-
 fn limits() -> Limits {
     Limits::of(&StageSettings::simulated())
 }
@@ -299,39 +297,4 @@ proptest! {
             prop_assert!(place.speed_mm_s <= feed * (1.0 + 1e-9) && place.speed_mm_s >= -1e-9);
         }
     }
-}
-
-#[test]
-fn the_sample_programs_run_on_the_stage_and_what_is_written_can_be_replayed() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    for name in ["circle", "rounded-square", "pocket"] {
-        std::fs::write(at.join(format!("{name}.ngc")), sample(name)).unwrap();
-        let file = format!("{name}.ngc");
-        let shown = command::succeed(at, &["replay", "--gcode", &file, "--out", name]);
-        assert!(shown.contains("Contour RMS"), "{shown}");
-        let mut reader = csv::Reader::from_path(at.join(name).join("part-program.csv")).unwrap();
-        let rms: Vec<f64> = reader
-            .records()
-            .map(|row| row.unwrap()[2].parse().unwrap())
-            .collect();
-        assert!(rms[1] < 0.5 * rms[0], "{name}: {rms:?}");
-        let page = std::fs::read_to_string(at.join(name).join("part-program.html")).unwrap();
-        assert!(page.contains(&file) && page.contains("part-program-feed"));
-    }
-    command::succeed(
-        at,
-        &[
-            "replay",
-            "--reference",
-            "rounded-square/part-program-x.csv",
-            "--axis",
-            "x",
-        ],
-    );
-    std::fs::write(at.join("bad.ngc"), "G21\nG1 X10\n").unwrap();
-    let refused = command::fail(at, &["replay", "--gcode", "bad.ngc"]);
-    assert!(refused.contains("line 2: G1 has no feed"), "{refused}");
-    let refused = command::fail(at, &["replay", "--gcode", "bad.ngc", "--axis", "x"]);
-    assert!(refused.contains("cannot be used with"), "{refused}");
 }

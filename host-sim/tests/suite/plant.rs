@@ -1,7 +1,7 @@
 //! The simulated axis behaves as the equations it is made from.
 
 use quadrant::units::DacCode;
-use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageTruth};
+use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 
 const RATE_HZ: f64 = 10e3;
 
@@ -10,7 +10,7 @@ fn code(volts: f64) -> DacCode {
 }
 
 fn x_axis() -> SimulatedAxis {
-    let [x, ..] = StageTruth::ideal().axes;
+    let [x, ..] = StageParameters::ideal().axes;
     SimulatedAxis::new(x, RATE_HZ, 1)
 }
 
@@ -39,7 +39,7 @@ fn pre_sliding_displacement_springs_back_in_part_when_the_voltage_goes() {
 
 #[test]
 fn a_constant_voltage_drives_the_axis_at_the_velocity_that_friction_and_damping_leave() {
-    let truth = StageTruth::ideal().axes[0].clone();
+    let truth = StageParameters::ideal().axes[0].clone();
     let mut axis = x_axis();
     run(&mut axis, 0.5, 3.0);
     let friction = truth.friction.positive;
@@ -90,7 +90,7 @@ fn the_counter_shows_negative_positions_as_a_wrapped_32_bit_counter_does() {
 #[test]
 fn the_same_seed_gives_the_same_noise_and_another_seed_another() {
     let readings = |seed| {
-        let mut stage = SimulatedStage::new(&StageTruth::real(), RATE_HZ, seed);
+        let mut stage = SimulatedStage::new(&StageParameters::real(), RATE_HZ, seed);
         (0..1000).map(|_| stage.read_counters()).collect::<Vec<_>>()
     };
     assert_eq!(readings(1), readings(1));
@@ -99,7 +99,7 @@ fn the_same_seed_gives_the_same_noise_and_another_seed_another() {
 
 #[test]
 fn a_held_voltage_moves_the_axis_as_it_would_in_continuous_time() {
-    let mut truth = StageTruth::ideal().axes[0].clone();
+    let mut truth = StageParameters::ideal().axes[0].clone();
     for model in [&mut truth.friction.positive, &mut truth.friction.negative] {
         model.curve.coulomb_v = 1e-9;
         model.curve.breakaway_v = 1e-9;

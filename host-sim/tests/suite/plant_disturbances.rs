@@ -3,7 +3,7 @@
 use quadrant::units::DacCode;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{ENTRY_S, Force, Load};
-use quadrant_sim::plant::{AxisTruth, SimulatedAxis, StageTruth};
+use quadrant_sim::plant::{AxisParameters, SimulatedAxis, StageParameters};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 use std::sync::Arc;
 
@@ -14,8 +14,8 @@ fn code(volts: f64) -> DacCode {
     DacCode((volts / 10.0 * DacCode::FULL_SCALE).round() as i16)
 }
 
-fn ideal() -> AxisTruth {
-    StageTruth::ideal().axes[0].clone()
+fn ideal() -> AxisParameters {
+    StageParameters::ideal().axes[0].clone()
 }
 
 /// The force over one turn of the spindle, at `count` times in the middle of equal intervals.
@@ -145,7 +145,7 @@ fn a_heavier_axis_accelerates_less_in_proportion() {
 
 #[test]
 fn a_heavier_axis_slides_no_slower_at_a_constant_voltage() {
-    let settled = |truth: AxisTruth| {
+    let settled = |truth: AxisParameters| {
         let mut axis = SimulatedAxis::new(truth, RATE_HZ, 1);
         for _ in 0..20_000 {
             axis.step(code(0.5), true);
@@ -177,7 +177,7 @@ fn grown_friction_holds_against_as_much_more_load() {
 
 #[test]
 fn more_delay_holds_the_first_motion_back_by_as_much() {
-    let first = |truth: AxisTruth| {
+    let first = |truth: AxisParameters| {
         let mut axis = SimulatedAxis::new(truth, RATE_HZ, 1);
         (0..100).find(|_| {
             axis.step(code(5.0), true);
@@ -199,7 +199,7 @@ fn the_interpolation_error_repeats_with_the_grating_and_never_exceeds_its_amplit
     assert!((error(0.005) - error(0.025)).abs() < 1e-12);
     assert_eq!(error(0.0), 0.0);
     // The counter shows it.
-    let fine = AxisTruth {
+    let fine = AxisParameters {
         resolution_mm: 1e-6,
         ..truth.clone()
     };

@@ -2,7 +2,7 @@
 
 use quadrant::units::DacCode;
 use quadrant_sim::plant::{
-    AxisTruth, Backlash, Body, Drive, EncoderSide, Forcing, SimulatedAxis, StageTruth,
+    AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, SimulatedAxis, StageParameters,
 };
 
 const RATE_HZ: f64 = 10e3;
@@ -11,8 +11,8 @@ fn code(volts: f64) -> DacCode {
     DacCode((volts / 10.0 * DacCode::FULL_SCALE).round() as i16)
 }
 
-fn ideal() -> AxisTruth {
-    StageTruth::ideal().axes[0].clone()
+fn ideal() -> AxisParameters {
+    StageParameters::ideal().axes[0].clone()
 }
 
 #[test]
@@ -160,7 +160,7 @@ fn an_encoder_on_the_motor_does_not_see_the_table() {
 
 #[test]
 fn without_a_gap_a_geared_axis_slides_as_a_rigid_one() {
-    let run = |truth: AxisTruth| {
+    let run = |truth: AxisParameters| {
         let mut axis = SimulatedAxis::new(truth, RATE_HZ, 1);
         for _ in 0..10_000 {
             axis.step(code(0.5), true);

@@ -4,7 +4,7 @@ use quadrant::friction::Direction;
 use quadrant::friction::gms::{Gms, GmsState};
 use quadrant::friction::stribeck::SlidingTable;
 use quadrant::units::DacCode;
-use quadrant_sim::plant::{SimulatedAxis, StageTruth, TRUTH_ELEMENTS};
+use quadrant_sim::plant::{PLANT_ELEMENTS, SimulatedAxis, StageParameters};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
@@ -21,12 +21,12 @@ fn along(velocity: f64) -> Direction {
 
 #[test]
 fn a_plain_axis_moves_by_the_equations_of_old() {
-    for (index, truth) in StageTruth::real().axes.into_iter().enumerate() {
+    for (index, truth) in StageParameters::real().axes.into_iter().enumerate() {
         let mut axis = SimulatedAxis::new(truth.clone(), RATE_HZ, 7);
         let step_s = 1.0 / (RATE_HZ * SUBSTEPS as f64);
         let delay = (truth.delay_s / step_s).round() as usize;
         let mut pipeline = VecDeque::from(vec![0.0; delay]);
-        let gms: Gms<f64, TRUTH_ELEMENTS> = Gms::build(&truth.gms.elements);
+        let gms: Gms<f64, PLANT_ELEMENTS> = Gms::build(&truth.gms.elements);
         let surface = SlidingTable::<f64>::build(
             &truth.friction.map(|model| model.curve),
             truth.gms.attraction_v_s,

@@ -25,7 +25,7 @@ fn recording() -> Option<PathBuf> {
 #[test]
 fn the_emps_recording_is_read_whole() {
     let Some(path) = recording() else { return };
-    let record = Record::read(path, &LIMITS).unwrap();
+    let record = Record::read(&path, &LIMITS).unwrap();
     assert_eq!(record.reference_mm.len(), 24_841);
     assert!((record.sample_time_s - 1e-3).abs() < 1e-9);
     assert!((record.reference_mm[0] - 0.107_822_08).abs() < 1e-12);

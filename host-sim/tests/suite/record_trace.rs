@@ -32,7 +32,7 @@ fn columns_of_unequal_length_are_refused_before_a_file_is_made() {
 
 #[test]
 fn a_trace_that_cannot_be_written_is_named() {
-    let error = write_trace("no/such/folder/run.csv", &[("t_s", &[0.0])]).unwrap_err();
+    let error = write_trace("no/such/folder/run.csv".as_ref(), &[("t_s", &[0.0])]).unwrap_err();
     assert!(
         error.to_string().contains("no/such/folder/run.csv"),
         "{error}"

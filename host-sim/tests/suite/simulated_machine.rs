@@ -11,7 +11,7 @@ use quadrant::safety::Switches;
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::simulated::SimulatedMachine;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 
 struct Session {
     machine: SimulatedMachine,
@@ -32,7 +32,7 @@ impl Session {
             axis.homing = default.homing;
             axis.limits.travel_mm = default.limits.travel_mm;
         }
-        let machine = SimulatedMachine::new(&settings, &StageTruth::real(), 1).unwrap();
+        let machine = SimulatedMachine::new(&settings, &StageParameters::real(), 1).unwrap();
         let mut session = Self {
             machine,
             receiver: Receiver::new(),

@@ -3,11 +3,11 @@
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::settings::presets::x_axis;
 use quadrant_sim::machine::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;
 
 fn test_axis(seed: u64) -> SimulatedTestAxis {
-    SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), seed)
+    SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), seed)
 }
 
 fn experiment(drive: Drive, injection_v: Vec<f64>) -> Experiment {

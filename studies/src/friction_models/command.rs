@@ -1,13 +1,10 @@
 //! `quadrant-studies friction`.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, progress};
-use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::law_settings::LawSettings;
+use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_sim::pages::provenance;
-use quadrant_sim::settings_file::SettingsFile;
 
 use crate::friction_models::page::{
     friction_models_page, friction_models_table, friction_parameters_table, tracking_table,
@@ -20,10 +17,8 @@ pub struct Arguments {
     /// The axis of the settings and of the simulated stage.
     #[arg(long, value_enum, default_value = "x")]
     axis: Axis,
-    /// Settings with the friction of the axis, as `quadrant commission` leaves them; without them, what commissioning the
-    /// simulated stage found.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     /// Width of the smoothed GMS' transition over each element's breakaway level, 0.001 to 1, instead of the settings'.
     #[arg(long, value_name = "SHARE", value_parser = width)]
     width: Option<f64>,
@@ -50,10 +45,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         width,
         output,
     } = arguments;
-    let stage = match settings {
-        Some(path) => SettingsFile::read(path)?.stage,
-        None => identified_settings()?.stage,
-    };
+    let stage = settings.read()?.stage;
     let mut axis_settings = stage.axes[axis.index()].clone();
     if let Some(width) = width {
         axis_settings.friction.smoothed_gms.width = *width;

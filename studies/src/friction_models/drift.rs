@@ -4,7 +4,7 @@
 use std::f64::consts::TAU;
 
 use quadrant::units::DacCode;
-use quadrant_sim::plant::{AxisTruth, SimulatedAxis};
+use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
 
 use crate::friction_models::Parameters;
 
@@ -30,7 +30,7 @@ pub struct Drift {
     pub velocity_um_s: f64,
 }
 
-pub(super) fn drift(truth: &AxisTruth, parameters: &Parameters) -> Drift {
+pub(super) fn drift(truth: &AxisParameters, parameters: &Parameters) -> Drift {
     let sliding = &parameters.friction.sliding;
     let level_v = sliding
         .positive

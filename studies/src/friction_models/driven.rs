@@ -2,7 +2,7 @@
 
 use quadrant::friction::Direction;
 use quadrant::friction::stribeck::SlidingTable;
-use quadrant_sim::plant::{AxisTruth, Presliding};
+use quadrant_sim::plant::{AxisParameters, Presliding};
 
 use crate::friction_models::Parameters;
 
@@ -28,7 +28,11 @@ enum Moved {
 
 impl Driven {
     /// A model at rest, springs slack; without a truth, the static model.
-    pub(super) fn new(parameters: &Parameters, truth: Option<&AxisTruth>, step_s: f64) -> Self {
+    pub(super) fn new(
+        parameters: &Parameters,
+        truth: Option<&AxisParameters>,
+        step_s: f64,
+    ) -> Self {
         let friction = &parameters.friction;
         let model = match truth {
             Some(truth) => Moved::Presliding(Presliding::new(truth, step_s)),

@@ -5,7 +5,7 @@ use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
 use quadrant::settings::AxisSettings;
 use quadrant_sim::identify::single_state::{presliding_range_mm, with_all_models};
-use quadrant_sim::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
+use quadrant_sim::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Model {
@@ -94,8 +94,8 @@ impl Parameters {
     }
 
     /// A free mass with a model's friction and nothing else: no delay, no noise, all damping in the friction.
-    fn axis(&self, model: FrictionTruth) -> AxisTruth {
-        AxisTruth {
+    fn axis(&self, model: FrictionParameters) -> AxisParameters {
+        AxisParameters {
             gain_mm_per_v_s2: self.gain_mm_per_v_s2,
             damping_per_s: 0.0,
             stiffness_per_s2: 0.0,
@@ -111,13 +111,13 @@ impl Parameters {
     }
 
     /// The model as a simulated axis' truth; the static model, which has no state, cannot be one.
-    pub(super) fn truth(&self, model: Model) -> Option<AxisTruth> {
+    pub(super) fn truth(&self, model: Model) -> Option<AxisParameters> {
         let model = match model {
             Model::Static => return None,
-            Model::Dahl => FrictionTruth::Dahl(self.dahl),
-            Model::Lugre => FrictionTruth::Lugre(self.lugre),
-            Model::Gms => FrictionTruth::Gms,
-            Model::SmoothedGms => FrictionTruth::Smoothed(self.friction.smoothed_gms),
+            Model::Dahl => FrictionParameters::Dahl(self.dahl),
+            Model::Lugre => FrictionParameters::Lugre(self.lugre),
+            Model::Gms => FrictionParameters::Gms,
+            Model::SmoothedGms => FrictionParameters::Smoothed(self.friction.smoothed_gms),
         };
         Some(self.axis(model))
     }

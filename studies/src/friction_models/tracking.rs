@@ -11,7 +11,7 @@ use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::identify::single_state::with_all_models;
-use quadrant_sim::plant::{AxisTruth, FrictionTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, FrictionParameters, StageParameters};
 use quadrant_sim::settings_file::SettingsFileError;
 use rayon::prelude::*;
 
@@ -51,16 +51,16 @@ pub enum TrackingError {
 }
 
 /// The simulated axis with another friction model, its parameters fitted to the axis' own.
-fn with_model(axis: &AxisTruth, model: Model) -> Option<AxisTruth> {
+fn with_model(axis: &AxisParameters, model: Model) -> Option<AxisParameters> {
     let fitted = with_all_models(axis.friction, axis.gms.clone());
     let model = match model {
         Model::Static => return None,
-        Model::Dahl => FrictionTruth::Dahl(fitted.dahl?),
-        Model::Lugre => FrictionTruth::Lugre(fitted.lugre?),
-        Model::Gms => FrictionTruth::Gms,
-        Model::SmoothedGms => FrictionTruth::Smoothed(fitted.smoothed_gms),
+        Model::Dahl => FrictionParameters::Dahl(fitted.dahl?),
+        Model::Lugre => FrictionParameters::Lugre(fitted.lugre?),
+        Model::Gms => FrictionParameters::Gms,
+        Model::SmoothedGms => FrictionParameters::Smoothed(fitted.smoothed_gms),
     };
-    Some(AxisTruth {
+    Some(AxisParameters {
         model,
         ..axis.clone()
     })
@@ -80,7 +80,7 @@ pub fn track(
     let mut stage = identified_settings()?.stage;
     // The comparison runs on the first axis.
     stage.axes[0] = settings.clone();
-    let axis = &StageTruth::real().axes[index];
+    let axis = &StageParameters::real().axes[index];
     let runs: Vec<(Model, FeedforwardKind)> = TRUTHS
         .into_iter()
         .flat_map(|truth| FeedforwardKind::ALL.map(|kind| (truth, kind)))

@@ -1,7 +1,7 @@
 //! `quadrant-studies identification`.
 
 use clap::Args;
-use quadrant_sim::command::output::{Output, progress};
+use quadrant_cli::output::{Output, progress};
 
 use crate::identification::page::validation_table;
 use crate::identification::{NOISE_LEVELS, validate};

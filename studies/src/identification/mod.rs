@@ -10,7 +10,7 @@ use indicatif::ProgressBar;
 use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::{AxisTruth, StageTruth};
+use quadrant_sim::plant::{AxisParameters, StageParameters};
 use rayon::prelude::*;
 
 /// Encoder noise of the runs, over that of the simulated stage.
@@ -127,7 +127,7 @@ pub fn validate(seeds: u64, progress: &ProgressBar) -> Result<Vec<Judgement>, Co
 /// # Errors
 /// A commissioning that fails.
 pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, CommissionError> {
-    let mut truth = StageTruth::real().axes[axis].clone();
+    let mut truth = StageParameters::real().axes[axis].clone();
     truth.imperfections.encoder_noise_mm *= noise;
     let base = StageSettings::simulated().axes[axis].clone();
     let mut rig = SimulatedTestAxis::new(axis, truth.clone(), seed);
@@ -146,7 +146,7 @@ pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, Commission
     })
 }
 
-fn estimates(found: &Commissioned, truth: &AxisTruth) -> Vec<Estimate> {
+fn estimates(found: &Commissioned, truth: &AxisParameters) -> Vec<Estimate> {
     let fit = &found.plant.fit;
     let viscous = truth.friction.positive.viscous_v_s_per_mm;
     let linear = [

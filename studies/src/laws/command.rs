@@ -1,14 +1,11 @@
 //! `quadrant-studies laws`.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, share};
-use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::law_settings::LawSettings;
+use quadrant_cli::output::{Output, command_line, share};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, Page};
-use quadrant_sim::settings_file::SettingsFile;
 
 use crate::laws::page::laws_section;
 use crate::laws::study::run_study;
@@ -20,9 +17,8 @@ pub struct Arguments {
     /// The axis of the simulated stage.
     #[arg(long, value_enum, default_value_t = Axis::X)]
     axis: Axis,
-    /// Settings of the axis, as `quadrant commission` leaves them [default: the simulated stage's own commissioning].
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     /// Noise seeds of the comparison, from --seed on.
     #[arg(long, default_value_t = 5, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
@@ -39,10 +35,7 @@ const STEPS: u64 = 1_000_000;
 /// Refused arguments, a run that fails, or a file that cannot be written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, axis, .. } = arguments;
-    let stage = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?.stage,
-        None => identified_settings()?.stage,
-    };
+    let stage = arguments.settings.read()?.stage;
     let bar = share("tuning and running the laws");
     bar.set_length(STEPS);
     let study = run_study(

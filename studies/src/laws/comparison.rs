@@ -6,7 +6,7 @@ use quadrant::settings::AxisSettings;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
 use quadrant_sim::experiment::statistic::Statistic;
-use quadrant_sim::plant::AxisTruth;
+use quadrant_sim::plant::AxisParameters;
 use rayon::prelude::*;
 
 use crate::laws::tuning::TunedLaw;
@@ -56,7 +56,7 @@ impl LawOutcome {
 pub fn compare_laws(
     laws: &[TunedLaw],
     feedforwards: &[FeedforwardKind],
-    (settings, truth): (&AxisSettings, &AxisTruth),
+    (settings, truth): (&AxisSettings, &AxisParameters),
     rate_hz: f64,
     seeds: std::ops::Range<u64>,
     progress: &(dyn Fn() + Sync),

@@ -7,7 +7,7 @@ use quadrant_sim::identify::characteristic::{
     CharacteristicError, CharacteristicSettings, measure,
 };
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 
 use crate::laws::comparison::{LawOutcome, compare_laws};
 use crate::laws::tuning::{TunedLaw, TuningError, tune_all};
@@ -57,7 +57,7 @@ pub fn run_study(
     advance: &(dyn Fn(f64) + Sync),
 ) -> Result<LawsStudy, LawsError> {
     let settings = &stage.axes[index];
-    let truth = &StageTruth::real().axes[index];
+    let truth = &StageParameters::real().axes[index];
     let mut rig = SimulatedTestAxis::new(index, truth.clone(), seed);
     let characteristic = measure(&mut rig, &CharacteristicSettings::default(), &mut |_| {})?;
     let laws = tune_all(settings, &characteristic, stage.rate_hz, seed, &|share| {

@@ -16,7 +16,7 @@ use quadrant_sim::design::{
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::sine_test::{SineTest, run_sine_tests};
 use quadrant_sim::identify::characteristic::Characteristic;
-use quadrant_sim::plant::{AxisTruth, Drive, FrictionTruth, Imperfections};
+use quadrant_sim::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 use rayon::prelude::*;
 
 /// Bounds that every law keeps at small errors.
@@ -88,9 +88,9 @@ pub enum TuningError {
 type Candidate = (f64, FeedbackSettings);
 
 /// An axis made of what its settings say of it: the twin that laws are trained on.
-pub fn twin(axis: &AxisSettings) -> Option<AxisTruth> {
+pub fn twin(axis: &AxisSettings) -> Option<AxisParameters> {
     let plant = axis.plant?;
-    Some(AxisTruth {
+    Some(AxisParameters {
         gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
         // The friction model's viscous part is all of the damping.
         damping_per_s: 0.0,
@@ -98,7 +98,7 @@ pub fn twin(axis: &AxisSettings) -> Option<AxisTruth> {
         delay_s: plant.delay_s,
         friction: axis.friction.sliding,
         gms: axis.friction.gms.clone(),
-        model: FrictionTruth::default(),
+        model: FrictionParameters::default(),
         drive: Drive::BallScrew,
         resolution_mm: axis.encoder.resolution_mm,
         full_scale_v: axis.amplifier.full_scale_v,
@@ -109,7 +109,7 @@ pub fn twin(axis: &AxisSettings) -> Option<AxisTruth> {
 /// Axis and bounds that tuning works with.
 struct Bench<'a> {
     axis: &'a AxisSettings,
-    twin: AxisTruth,
+    twin: AxisParameters,
     plant: PlantModel,
     process: Process,
     form: Form,

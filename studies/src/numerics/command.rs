@@ -1,7 +1,7 @@
 //! `quadrant-studies numerics`.
 
 use clap::Args;
-use quadrant_sim::command::output::{Output, progress};
+use quadrant_cli::output::{Output, progress};
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 
 use crate::numerics;

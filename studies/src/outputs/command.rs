@@ -1,7 +1,7 @@
 //! `quadrant-studies outputs`.
 
 use clap::Args;
-use quadrant_sim::command::output::Output;
+use quadrant_cli::output::Output;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 
 use crate::outputs;

@@ -33,7 +33,7 @@ pub(super) fn headline(context: &Context, progress: &Progress) -> anyhow::Result
     let share = comparison_s / (comparison_s + study_s);
     let comparison = context.comparison(&|done| progress.advance(share * done))?;
     let [_, identified] = context.setups();
-    let findings = study::<f32>(
+    let findings = study(
         &identified,
         &Change::ALL,
         context.seed,

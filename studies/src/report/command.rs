@@ -1,10 +1,9 @@
 //! `quadrant-studies report`.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use clap::builder::PossibleValuesParser;
-use quadrant_sim::command::output::{Output, share};
+use quadrant_cli::law_settings::LawSettings;
+use quadrant_cli::output::{Output, share};
 use quadrant_sim::report::{Block, Page, Table};
 
 use crate::report::{Context, Done, PARTS, Part, Request, compute};
@@ -24,10 +23,8 @@ pub struct Arguments {
     /// Runs of each configuration with the identified model, with consecutive seeds: means are shown with one standard deviation.
     #[arg(long, default_value_t = 10, value_parser = clap::value_parser!(u64).range(1..=1000))]
     seeds: u64,
-    /// Settings of the control law, as `quadrant commission` leaves them; without them, those that commissioning the
-    /// simulated stage gave.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     #[command(flatten)]
     output: Output,
 }
@@ -87,7 +84,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             if shown {
                 output.table(table)?;
             } else {
-                table.write_csv(output.file(&format!("{}.csv", table.id))?)?;
+                table.write_csv(&output.file(&format!("{}.csv", table.id))?)?;
             }
         }
     }

@@ -72,6 +72,6 @@ pub(super) fn circles(context: &Context, _: &Progress) -> anyhow::Result<Vec<Sec
         ..CircleRequest::default()
     };
     let setup = RunConfiguration::identified(context.settings.stage.clone());
-    let results = run_circle_tests(&request, &setup, &ProgressBar::hidden());
+    let results = run_circle_tests(&request, &setup, &|| {});
     Ok(circle_sections(&results))
 }

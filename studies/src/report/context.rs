@@ -3,9 +3,10 @@
 use std::path::PathBuf;
 use std::sync::OnceLock;
 
+use quadrant_cli::law_settings::LawSettings;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
 use quadrant_sim::experiment::configuration::Configuration;
-use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Provenance;
 use quadrant_sim::settings_file::SettingsFile;
@@ -29,16 +30,13 @@ impl Context {
     ///
     /// # Errors
     /// Settings that cannot be read or that are refused.
-    pub fn new(seed: u64, seeds: u64, settings_path: Option<PathBuf>) -> anyhow::Result<Self> {
-        let settings = match &settings_path {
-            Some(path) => SettingsFile::read(path)?,
-            None => identified_settings()?,
-        };
+    pub fn new(seed: u64, seeds: u64, law_settings: LawSettings) -> anyhow::Result<Self> {
+        let settings = law_settings.read()?;
         Ok(Self {
             seed,
             seeds,
             settings,
-            settings_path,
+            settings_path: law_settings.path,
             comparison: OnceLock::new(),
         })
     }
@@ -60,7 +58,7 @@ impl Context {
         }
         let setups = self.setups();
         let configurations = Configuration::all();
-        let comparison = self.request(&setups, &configurations).run::<f32>(advance)?;
+        let comparison = self.request(&setups, &configurations).run(advance)?;
         Ok(self.comparison.get_or_init(|| comparison))
     }
 

@@ -12,7 +12,7 @@ use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::time_varying::VaryingLoop;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::report::Section;
 
 use crate::report::{Context, Progress};
@@ -32,7 +32,7 @@ pub(super) fn identification(
     context: &Context,
     progress: &Progress,
 ) -> anyhow::Result<Vec<Section>> {
-    let [truth, ..] = StageTruth::real().axes;
+    let [truth, ..] = StageParameters::real().axes;
     let mut rig = SimulatedTestAxis::new(0, truth, context.seed);
     let found = commission(
         &mut rig,
@@ -122,7 +122,7 @@ pub(super) fn controllers(context: &Context, progress: &Progress) -> anyhow::Res
             })
             .collect(),
     };
-    let [truth, ..] = &StageTruth::real().axes;
+    let [truth, ..] = &StageParameters::real().axes;
     let data = data_section(stage, truth, context.seeds);
     Ok(chapter4_sections(&pid, &nonlinear, data))
 }

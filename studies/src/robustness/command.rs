@@ -4,14 +4,13 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant_sim::command::axis::Axis;
-use quadrant_sim::command::output::{Output, command_line, progress};
-use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::law_settings::LawSettings;
+use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::record::{ForceRecord, write_trace};
 use quadrant_sim::report::Page;
-use quadrant_sim::settings_file::SettingsFile;
 
 use crate::robustness::page::{robustness_full_table, robustness_sections, robustness_tables};
 use crate::robustness::study::{StudyRequest, run_study, runs};
@@ -22,10 +21,8 @@ pub struct Arguments {
     /// The axis of the simulated stage.
     #[arg(long, value_enum, default_value = "x")]
     axis: Axis,
-    /// Settings of the control law, as `quadrant commission` leaves them; without it, those that commissioning the
-    /// simulated stage gave.
-    #[arg(long, value_name = "FILE")]
-    settings: Option<PathBuf>,
+    #[command(flatten)]
+    settings: LawSettings,
     /// Runs of each scenario and law, with a seed each, 1 to 100.
     #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
@@ -59,10 +56,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             arguments.backlash_um
         );
     }
-    let stage = match &arguments.settings {
-        Some(path) => SettingsFile::read(path)?.stage,
-        None => identified_settings()?.stage,
-    };
+    let stage = arguments.settings.read()?.stage;
     let request = StudyRequest {
         stage,
         axis: axis.index(),
@@ -85,7 +79,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output.table(&table)?;
     }
     let all = robustness_full_table(&report);
-    all.write_csv(output.file(&format!("{}.csv", all.id))?)?;
+    all.write_csv(&output.file(&format!("{}.csv", all.id))?)?;
     write_cutting_force(output)?;
     let page = Page {
         title: "Robustness on the simulated stage".to_owned(),
@@ -131,7 +125,7 @@ fn write_cutting_force(output: &Output) -> anyhow::Result<()> {
     };
     let (feed, normal) = (force(Component::Feed), force(Component::Normal));
     write_trace(
-        output.file("synthetic-cutting-force.csv")?,
+        &output.file("synthetic-cutting-force.csv")?,
         &[("t_s", &time), ("force_x_n", &normal), ("force_y_n", &feed)],
     )?;
     Ok(())

@@ -10,7 +10,7 @@ use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::design::{OpenLoop, SampledLoop};
 use quadrant_sim::plant::load::Load;
-use quadrant_sim::plant::{AxisTruth, Imperfections};
+use quadrant_sim::plant::{AxisParameters, Imperfections};
 use rayon::prelude::*;
 
 use crate::robustness::RobustnessError;
@@ -52,7 +52,7 @@ pub fn linear_compliance(
 }
 
 /// The axis without imperfections and with all but no friction: what its linear model describes.
-pub fn frictionless(truth: &AxisTruth) -> AxisTruth {
+pub fn frictionless(truth: &AxisParameters) -> AxisParameters {
     let mut truth = truth.clone();
     truth.imperfections = Imperfections::default();
     truth.friction = truth.friction.map(|model| StaticFriction {
@@ -84,7 +84,7 @@ pub fn pid_alone(settings: &StageSettings) -> StageSettings {
 pub fn simulated_compliance(
     name: &str,
     stage: &StageSettings,
-    truth: &AxisTruth,
+    truth: &AxisParameters,
     seed: u64,
 ) -> Result<Compliance, RobustnessError> {
     let mm_per_v = FREQUENCIES_HZ

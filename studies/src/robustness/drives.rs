@@ -3,7 +3,7 @@
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionError, CommissionSettings, commission};
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::{AxisTruth, EncoderSide, StageTruth};
+use quadrant_sim::plant::{AxisParameters, EncoderSide, StageParameters};
 use rayon::prelude::*;
 
 use crate::robustness::Scenario;
@@ -16,7 +16,7 @@ pub struct DriveCase {
     /// Description, with its numbers.
     pub what: String,
     /// The axis on it.
-    pub truth: AxisTruth,
+    pub truth: AxisParameters,
 }
 
 /// Cogging of the linear motor, V: a sixth of the friction that is left to a direct drive. Chosen.
@@ -25,7 +25,7 @@ pub const COGGING_V: f64 = 0.004;
 /// The drives that the axis (0 to 2) is put on: a linear motor, and a rack with a gap of `backlash_mm` and the encoder on
 /// either side of it.
 pub fn drive_cases(axis: usize, backlash_mm: f64) -> Vec<DriveCase> {
-    let screw = || StageTruth::real().axes[axis].clone();
+    let screw = || StageParameters::real().axes[axis].clone();
     let gap_um = 1e3 * backlash_mm;
     let rack = |name: &str, place: &str, encoder| DriveCase {
         name: name.to_owned(),
@@ -52,7 +52,7 @@ pub fn drive_cases(axis: usize, backlash_mm: f64) -> Vec<DriveCase> {
 /// The step that fails.
 pub fn commission_drive(
     index: usize,
-    truth: &AxisTruth,
+    truth: &AxisParameters,
     seed: u64,
 ) -> Result<AxisSettings, CommissionError> {
     let mut rig = SimulatedTestAxis::new(index, truth.clone(), seed);

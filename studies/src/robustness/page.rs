@@ -1,6 +1,6 @@
 //! The robustness experiment's tables and figures.
 
-use quadrant_sim::experiment::metrics::{Score, change_percent};
+use quadrant_sim::experiment::metrics::{Metric, Score, change_percent};
 use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
 use quadrant_sim::report::{Block, Cell, Column, Section, Table};
 
@@ -8,30 +8,6 @@ use crate::robustness::compliance::{Compliance, FREQUENCIES_HZ, LOAD_V};
 use crate::robustness::figures::{compliance_figure, dots, error_figure};
 use crate::robustness::study::RobustnessReport;
 use crate::robustness::{RobustnessOutcome, baseline, find};
-
-struct Reading {
-    id: &'static str,
-    caption: &'static str,
-    read: fn(&Score) -> f64,
-}
-
-const READINGS: [Reading; 3] = [
-    Reading {
-        id: "robustness-largest",
-        caption: "Largest tracking error",
-        read: |score| score.largest_mm,
-    },
-    Reading {
-        id: "robustness-rms",
-        caption: "RMS tracking error",
-        read: |score| score.rms_mm,
-    },
-    Reading {
-        id: "robustness-glitch",
-        caption: "Quadrant glitch",
-        read: |score| score.glitch_mm,
-    },
-];
 
 impl RobustnessReport {
     /// The competitors, in the order in which they ran.
@@ -49,9 +25,9 @@ impl RobustnessReport {
 /// The tables: one for each score, with the change against the same competitor in the nominal scenario of the task; the
 /// drives that were refused; the compliances.
 pub fn robustness_tables(report: &RobustnessReport) -> Vec<Table> {
-    let mut tables: Vec<Table> = READINGS
-        .iter()
-        .map(|reading| score_table(reading, report))
+    let mut tables: Vec<Table> = Metric::ALL
+        .into_iter()
+        .map(|metric| score_table(metric, report))
         .collect();
     if !report.refused.is_empty() {
         tables.push(refused_table(report));
@@ -62,7 +38,7 @@ pub fn robustness_tables(report: &RobustnessReport) -> Vec<Table> {
     tables
 }
 
-fn score_table(reading: &Reading, report: &RobustnessReport) -> Table {
+fn score_table(metric: Metric, report: &RobustnessReport) -> Table {
     let competitors = report.competitors();
     let mut columns = vec![Column::new("Scenario")];
     for competitor in &competitors {
@@ -77,7 +53,7 @@ fn score_table(reading: &Reading, report: &RobustnessReport) -> Table {
             for competitor in &competitors {
                 let outcome = find(&report.outcomes, &scenario.name, competitor);
                 row.extend(outcome.map_or([Cell::Missing, Cell::Missing], |outcome| {
-                    score_cells(reading.read, outcome, &report.outcomes)
+                    score_cells(metric.read, outcome, &report.outcomes)
                 }));
             }
             row
@@ -86,10 +62,10 @@ fn score_table(reading: &Reading, report: &RobustnessReport) -> Table {
         .filter(|row: &Vec<Cell>| row[1..].iter().any(|cell| *cell != Cell::Missing))
         .collect();
     Table {
-        id: reading.id.to_owned(),
+        id: format!("robustness-{}", metric.name.to_lowercase()),
         caption: format!(
             "{}, mean over the seeds; change against the same law in the nominal scenario of the same task",
-            reading.caption
+            metric.title
         ),
         columns,
         rows,
@@ -127,7 +103,7 @@ pub fn robustness_full_table(report: &RobustnessReport) -> Table {
         Column::new("Task"),
         Column::new("Law"),
     ];
-    for name in ["Largest", "RMS", "Glitch"] {
+    for Metric { name, .. } in Metric::ALL {
         columns.push(Column::with_unit(name, "um"));
         columns.push(Column::with_unit(format!("{name} +-"), "um"));
     }
@@ -141,8 +117,8 @@ pub fn robustness_full_table(report: &RobustnessReport) -> Table {
                 Cell::text(outcome.task.name()),
                 Cell::text(&outcome.competitor),
             ];
-            for reading in &READINGS {
-                let statistic = outcome.statistic(reading.read);
+            for metric in Metric::ALL {
+                let statistic = outcome.statistic(metric.read);
                 row.extend(statistic_cells(statistic, UM_PER_MM, 2));
             }
             row.push(Cell::number(outcome.runs.len() as f64, 0));

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use quadrant::settings::AxisSettings;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::plant::{AxisTruth, NEWTONS_PER_VOLT, StageTruth};
+use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, StageParameters};
 
 use crate::robustness::Task;
 
@@ -17,7 +17,7 @@ pub struct Scenario {
     /// Difference from the nominal axis, with its numbers.
     pub what: String,
     /// The axis as it then is.
-    pub truth: AxisTruth,
+    pub truth: AxisParameters,
     /// Load on the axis.
     pub load: Load,
     /// Task of the axis.
@@ -30,7 +30,7 @@ pub struct Scenario {
 }
 
 impl Scenario {
-    fn new(task: Task, name: &str, what: &str, truth: AxisTruth) -> Self {
+    fn new(task: Task, name: &str, what: &str, truth: AxisParameters) -> Self {
         Self {
             name: name.to_owned(),
             what: what.to_owned(),
@@ -49,7 +49,7 @@ impl Scenario {
     }
 
     /// The sine on another machine, under the settings that were found on it.
-    pub fn on_drive(name: &str, what: &str, truth: AxisTruth, found: AxisSettings) -> Self {
+    pub fn on_drive(name: &str, what: &str, truth: AxisParameters, found: AxisSettings) -> Self {
         Self {
             commissioned: Some(found),
             ..Self::new(Task::Sine, name, what, truth)
@@ -79,7 +79,7 @@ fn milling(cut: Milling, engaged_s: (f64, f64)) -> Load {
 /// All scenarios of an axis (0 to 2) of the simulated stage but those of other drives; `recorded` adds those of a recorded
 /// force.
 pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
-    let nominal = || StageTruth::real().axes[axis].clone();
+    let nominal = || StageParameters::real().axes[axis].clone();
     let sine = |name: &str, what: &str, truth| Scenario::new(Task::Sine, name, what, truth);
     let mut all = vec![sine("nominal", "as commissioned", nominal())];
     all.extend(changed_axes(&nominal(), sine));
@@ -120,8 +120,8 @@ pub fn scenarios(axis: usize, recorded: Option<Force>) -> Vec<Scenario> {
 }
 
 fn changed_axes(
-    nominal: &AxisTruth,
-    sine: impl Fn(&str, &str, AxisTruth) -> Scenario,
+    nominal: &AxisParameters,
+    sine: impl Fn(&str, &str, AxisParameters) -> Scenario,
 ) -> Vec<Scenario> {
     let axis = || nominal.clone();
     vec![

@@ -1,7 +1,7 @@
 //! The whole study: the scenarios on the axis, the other drives, and the compliances.
 
 use quadrant::settings::StageSettings;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::plant::load::Force;
 
 use crate::robustness::compliance::{
@@ -117,7 +117,7 @@ fn compliances(
     stage: &StageSettings,
     request: &RobustnessRequest,
 ) -> Result<Vec<Compliance>, StudyError> {
-    let truth = StageTruth::real().axes[request.axis].clone();
+    let truth = StageParameters::real().axes[request.axis].clone();
     let first = |stage: &StageSettings| {
         let mut stage = stage.clone();
         stage.axes[0] = stage.axes[request.axis].clone();

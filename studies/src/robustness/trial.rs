@@ -12,7 +12,7 @@ use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
 use quadrant_sim::experiment::run::AxisTrace;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::load::Load;
-use quadrant_sim::plant::{AxisTruth, SimulatedAxis};
+use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
 
 use crate::robustness::RobustnessError;
 
@@ -115,7 +115,7 @@ fn without_reversals(errors: &[f64]) -> Score {
 /// A run to make; the axis under test is the first of the stage, the others stand still.
 pub(super) struct Trial<'a> {
     pub(super) stage: &'a StageSettings,
-    pub(super) truth: &'a AxisTruth,
+    pub(super) truth: &'a AxisParameters,
     pub(super) load: &'a Load,
     pub(super) task: Task,
     pub(super) seed: u64,

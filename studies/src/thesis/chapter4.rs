@@ -6,7 +6,7 @@ use quadrant_sim::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_
 use quadrant_sim::design::pages::npid::NonlinearPage;
 use quadrant_sim::design::pages::pid::PidPage;
 use quadrant_sim::pages::{columns, provenance};
-use quadrant_sim::plant::AxisTruth;
+use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::report::{Block, Cell, Section, Table};
 
 use crate::thesis::numbers::{Number, number};
@@ -51,7 +51,7 @@ pub fn chapter4_sections(
 }
 
 /// Data of the simulation (exact model) and of the experiment (identified model): rates, resolutions, cycles.
-pub fn data_section(stage: &StageSettings, truth: &AxisTruth, seeds: u64) -> Section {
+pub fn data_section(stage: &StageSettings, truth: &AxisParameters, seeds: u64) -> Section {
     let [x, ..] = &stage.axes;
     Section {
         provenance: None,
@@ -72,7 +72,7 @@ pub fn data_section(stage: &StageSettings, truth: &AxisTruth, seeds: u64) -> Sec
     }
 }
 
-fn data_rows(rate_hz: f64, x: &AxisSettings, truth: &AxisTruth, seeds: u64) -> Vec<Vec<Cell>> {
+fn data_rows(rate_hz: f64, x: &AxisSettings, truth: &AxisParameters, seeds: u64) -> Vec<Vec<Cell>> {
     let imperfections = &truth.imperfections;
     let same = |name: &str, unit: &str, value: f64, decimals| {
         vec![

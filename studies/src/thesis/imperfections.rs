@@ -2,7 +2,6 @@
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
 use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::compare::comparison::{Comparison, Request};
@@ -207,7 +206,7 @@ pub struct Finding {
 ///
 /// # Errors
 /// The first run that fails. An identification that does is told in its finding: it is an answer, too.
-pub fn study<S: Scalar>(
+pub fn study(
     setup: &RunConfiguration,
     changes: &[Change],
     seed: u64,
@@ -232,7 +231,7 @@ pub fn study<S: Scalar>(
                     seed,
                     seeds,
                 }
-                .run::<S>(&|done| advance(share * done))?),
+                .run(&|done| advance(share * done))?),
                 Err(error) => Err(error),
             };
             Ok(Finding { change, outcome })

@@ -14,7 +14,7 @@ use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
-use quadrant_sim::plant::AxisTruth;
+use quadrant_sim::plant::AxisParameters;
 use rand::{RngCore, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rayon::prelude::*;
@@ -190,7 +190,7 @@ pub fn with_wrong_model(settings: &AxisSettings, wrong: Wrong, seed: u64) -> Axi
 /// Refused settings or a fault.
 pub fn run_wrong_models(
     laws: &[TunedLaw],
-    (settings, truth): (&AxisSettings, &AxisTruth),
+    (settings, truth): (&AxisSettings, &AxisParameters),
     rate_hz: f64,
     seed: u64,
     progress: &(dyn Fn() + Sync),

@@ -177,7 +177,7 @@ fn the_same_runs_on_one_thread_and_on_three_give_the_same_scores() {
             .num_threads(threads)
             .build()
             .unwrap();
-        let comparison = pool.install(|| request.run::<f32>(&|_| {})).unwrap();
+        let comparison = pool.install(|| request.run(&|_| {})).unwrap();
         comparison
             .entries()
             .iter()
@@ -221,7 +221,7 @@ fn switching_an_imperfection_off_changes_that_and_nothing_else() {
 #[test]
 fn an_identification_that_fails_is_told_and_the_others_are_shown() {
     let [_, setup] = RunConfiguration::both(&identified_settings().unwrap().stage);
-    let findings = study::<f32>(
+    let findings = study(
         &setup,
         &[Change::AsItIs, Change::Elements(11)],
         1,

@@ -4,7 +4,7 @@ use crate::command::{fail, succeed};
 use indicatif::ProgressBar;
 use quadrant::settings::presets::x_axis;
 use quadrant::units::DacCode;
-use quadrant_sim::plant::{AxisTruth, FrictionTruth, SimulatedAxis, StageTruth};
+use quadrant_sim::plant::{AxisParameters, FrictionParameters, SimulatedAxis, StageParameters};
 use quadrant_studies::friction_models::{Behaviour, Model, Parameters, compare};
 
 fn observed(width: f64) -> Vec<Behaviour> {
@@ -91,10 +91,10 @@ fn the_force_is_continuous_and_its_slope_but_for_gms_too() {
 }
 
 /// x of the simulated stage, ideal, with another friction model.
-fn axis(model: FrictionTruth) -> AxisTruth {
-    AxisTruth {
+fn axis(model: FrictionParameters) -> AxisParameters {
+    AxisParameters {
         model,
-        ..StageTruth::ideal().axes[0].clone()
+        ..StageParameters::ideal().axes[0].clone()
     }
 }
 
@@ -102,10 +102,10 @@ fn axis(model: FrictionTruth) -> AxisTruth {
 fn any_model_can_be_the_truth_and_leaves_the_same_velocity_in_the_end() {
     let friction = x_axis().friction;
     let truths = [
-        FrictionTruth::Gms,
-        FrictionTruth::Smoothed(friction.smoothed_gms),
-        FrictionTruth::Lugre(friction.lugre.unwrap()),
-        FrictionTruth::Dahl(friction.dahl.unwrap()),
+        FrictionParameters::Gms,
+        FrictionParameters::Smoothed(friction.smoothed_gms),
+        FrictionParameters::Lugre(friction.lugre.unwrap()),
+        FrictionParameters::Dahl(friction.dahl.unwrap()),
     ];
     let velocities = truths.map(|truth| {
         let mut axis = SimulatedAxis::new(axis(truth), 10e3, 1);

@@ -6,14 +6,14 @@ use quadrant_sim::design::{Form, Process};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::identify::characteristic::{CharacteristicSettings, measure};
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::StageTruth;
+use quadrant_sim::plant::StageParameters;
 use quadrant_studies::laws::comparison::compare_laws;
 use quadrant_studies::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw, tune_all};
 use quadrant_studies::wrong_model::{Competitor, Wrong, feedback, with_wrong_model};
 
 fn tuned() -> (quadrant::settings::AxisSettings, Vec<TunedLaw>) {
     let settings = identified_settings().unwrap().stage.axes[0].clone();
-    let mut rig = SimulatedTestAxis::new(0, StageTruth::real().axes[0].clone(), 1);
+    let mut rig = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let characteristic =
         measure(&mut rig, &CharacteristicSettings::default(), &mut |_| {}).unwrap();
     let laws = tune_all(&settings, &characteristic, 1e4, 1, &|_| {}).unwrap();
@@ -68,7 +68,7 @@ fn every_law_is_tuned_at_equal_robustness_and_runs() {
     let largest = cautious.nonlinear.unwrap().largest();
     assert!((cautious.pid.kp_v_per_mm * largest / pid.pid.kp_v_per_mm - 1.0).abs() < 1e-9);
 
-    let truth = &StageTruth::real().axes[0];
+    let truth = &StageParameters::real().axes[0];
     let two: Vec<TunedLaw> = laws
         .into_iter()
         .filter(|t| matches!(t.law, LawKind::Pid | LawKind::Cascade))

@@ -4,6 +4,7 @@ use std::cell::Cell;
 use std::path::Path;
 
 use indicatif::ProgressBar;
+use quadrant_cli::law_settings::LawSettings;
 use quadrant_sim::report::{Block, Cell as TableCell, Column, Page, Section, Table};
 use quadrant_studies::report::{Context, Part, Progress, Request, compute};
 
@@ -88,7 +89,7 @@ fn report(
 }
 
 fn context(seed: u64) -> Context {
-    Context::new(seed, 2, None).unwrap()
+    Context::new(seed, 2, LawSettings::default()).unwrap()
 }
 
 fn html(sections: Vec<Section>) -> String {
@@ -177,11 +178,11 @@ fn a_file_that_is_damaged_or_of_other_inputs_is_said_so_and_computed_again() {
 
     again(&context(2), "first.json is of another seed");
     again(
-        &Context::new(2, 3, None).unwrap(),
+        &Context::new(2, 3, LawSettings::default()).unwrap(),
         "first.json is of another number of seeds",
     );
 
-    let mut other = Context::new(2, 3, None).unwrap();
+    let mut other = Context::new(2, 3, LawSettings::default()).unwrap();
     other.settings.stage.axes[0].feedback.pid.kp_v_per_mm *= 1.01;
     again(&other, "first.json is of other settings");
     let (_, told, computed) = report(folder.path(), &other, false);

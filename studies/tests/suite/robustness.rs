@@ -9,7 +9,7 @@ use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
-use quadrant_sim::plant::{NEWTONS_PER_VOLT, StageTruth};
+use quadrant_sim::plant::{NEWTONS_PER_VOLT, StageParameters};
 use quadrant_sim::record::ForceRecord;
 use quadrant_studies::robustness::compliance::{
     FREQUENCIES_HZ, frictionless, linear_compliance, pid_alone, simulated_compliance,
@@ -156,7 +156,7 @@ fn a_cut_s_vibration_and_not_its_mean_spoils_the_compensation() {
 fn without_friction_the_compliance_is_that_of_the_linear_loop() {
     let alone = pid_alone(&stage());
     let own = &alone.axes[0];
-    let truth = StageTruth::real().axes[0].clone();
+    let truth = StageParameters::real().axes[0].clone();
     let simulated = simulated_compliance("PID", &alone, &frictionless(&truth), 1).unwrap();
     for (hz, simulated) in FREQUENCIES_HZ.into_iter().zip(simulated.mm_per_v) {
         let linear = linear_compliance(&own.plant.unwrap(), own, 1e4, hz).norm();
@@ -185,7 +185,7 @@ fn the_committed_force_is_the_generated_one() {
         env!("CARGO_MANIFEST_DIR"),
         "/../host-sim/data/synthetic-cutting-force.csv"
     );
-    let [across, along, none] = ForceRecord::read_csv(path).unwrap().axes;
+    let [across, along, none] = ForceRecord::read_csv(path.as_ref()).unwrap().axes;
     assert_eq!(none, None);
     let cut = Milling::slot();
     for (force, component) in [(across, Component::Normal), (along, Component::Feed)] {

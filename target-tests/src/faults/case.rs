@@ -9,7 +9,7 @@ use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
-use quadrant_sim::plant::MarkTruth;
+use quadrant_sim::plant::MarkParameters;
 
 use super::approach::{SPEED_MM_S, enabled, homed, homing, moving, start_homing};
 use super::fixture::{Configuration, Fixture, InputFault};
@@ -52,11 +52,11 @@ pub(crate) fn configuration() -> Configuration {
                 motions: [MotionSettings::Harmonic(sine); 3],
             },
         },
-        marks: MarkTruth {
+        marks: MarkParameters {
             home_mm: -1.0,
             index_count: -1_000,
             counts_per_index: COUNTS_PER_INDEX.into(),
-            ..MarkTruth::default()
+            ..MarkParameters::default()
         },
         flash: MemoryFlash::default(),
     }

@@ -109,7 +109,7 @@ fn a_circle_without_a_radius_is_refused() {
 #[test]
 fn a_page_that_cannot_be_written_is_named() {
     let error = page(vec![])
-        .write_html("no/such/folder/report.html")
+        .write_html("no/such/folder/report.html".as_ref())
         .unwrap_err();
     assert!(
         error.to_string().contains("no/such/folder/report.html"),

@@ -13,7 +13,8 @@ use super::super::response::{FrequencyResponse, ResponsePoint};
 use crate::record::Recording;
 
 /// Estimator of the response: the quotient of spectra that it is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
 pub enum Estimator {
     /// `S_yr / S_ur` with the injected excitation as instrument: free of bias under feedback.
     Instrument,

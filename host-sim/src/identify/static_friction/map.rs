@@ -1,6 +1,8 @@
 //! The friction-velocity map: what the runs showed, in memory and as CSV.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
+
+use crate::identify::measured_table::{Columns, TableError};
 
 /// One run at constant velocity.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,61 +24,33 @@ pub struct FrictionMap {
     pub runs: Vec<FrictionRun>,
 }
 
-/// Reasons for which a file holds no map.
-#[derive(Debug, thiserror::Error)]
-pub enum MapError {
-    /// The file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    Csv { path: PathBuf, source: csv::Error },
-    /// A column is missing.
-    #[error("{}: no column {name}; a friction map has the columns {}", path.display(), COLUMNS.join(", "))]
-    Column { path: PathBuf, name: &'static str },
-    /// A value that cannot be.
-    #[error("{}, row {row}, column {name}: {value:?} is not {expected}", path.display())]
-    Value {
-        path: PathBuf,
-        /// Row of data, from 1.
-        row: usize,
-        name: &'static str,
-        value: String,
-        expected: &'static str,
-    },
-}
-
-const COLUMNS: [&str; 4] = ["velocity_mm_s", "voltage_v", "deviation_v", "stick_slip"];
-const EXPECTED: [&str; 4] = [
-    "a finite number other than zero",
-    "a finite number",
-    "a number above zero",
-    "0 or 1",
-];
+const COLUMNS: Columns<4> = Columns {
+    what: "a friction map",
+    names: &["velocity_mm_s", "voltage_v", "deviation_v", "stick_slip"],
+    expected: [
+        "a finite number other than zero",
+        "a finite number",
+        "a number above zero",
+        "0 or 1",
+    ],
+};
 
 impl FrictionMap {
     /// Writes it as CSV: `velocity_mm_s`, `voltage_v`, `deviation_v`, `stick_slip` (0 or 1).
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn write_csv(&self, path: impl AsRef<Path>) -> Result<(), MapError> {
-        let path = path.as_ref();
-        let refuse = |source| MapError::Csv {
-            path: path.to_owned(),
-            source,
-        };
-        let mut writer = csv::Writer::from_path(path).map_err(refuse)?;
-        writer.write_record(COLUMNS).map_err(refuse)?;
-        for run in &self.runs {
+    pub fn write_csv(&self, path: &Path) -> Result<(), TableError> {
+        let row = |run: &FrictionRun| {
             let stick_slip = f64::from(u8::from(run.stick_slip));
-            let row = [
+            [
                 run.velocity_mm_s,
                 run.voltage_v,
                 run.deviation_v,
                 stick_slip,
-            ];
-            writer
-                .write_record(row.map(|value| value.to_string()))
-                .map_err(refuse)?;
-        }
-        writer.flush().map_err(|source| refuse(source.into()))
+            ]
+        };
+        COLUMNS.write(path, self.runs.iter().map(row))
     }
 
     /// Reads what [`write_csv`](Self::write_csv) writes; the order of columns and rows is free, other columns are passed
@@ -84,55 +58,20 @@ impl FrictionMap {
     ///
     /// # Errors
     /// A file that cannot be read or is not a friction map; names the row and the column.
-    pub fn read_csv(path: impl AsRef<Path>) -> Result<Self, MapError> {
-        let path = path.as_ref();
-        let refuse = |source| MapError::Csv {
-            path: path.to_owned(),
-            source,
+    pub fn read_csv(path: &Path) -> Result<Self, TableError> {
+        let rows = COLUMNS.read(path, |column, value, _| match column {
+            0 => value != 0.0,
+            2 => value > 0.0,
+            3 => value == 0.0 || value == 1.0,
+            _ => true,
+        })?;
+        let run = |[velocity_mm_s, voltage_v, deviation_v, flag]: [f64; 4]| FrictionRun {
+            velocity_mm_s,
+            voltage_v,
+            deviation_v,
+            stick_slip: flag == 1.0,
         };
-        let mut reader = csv::Reader::from_path(path).map_err(refuse)?;
-        let header = reader.headers().map_err(refuse)?.clone();
-        let mut places = [0; 4];
-        for (place, name) in places.iter_mut().zip(COLUMNS) {
-            *place = header
-                .iter()
-                .position(|heading| heading.trim() == name)
-                .ok_or_else(|| MapError::Column {
-                    path: path.to_owned(),
-                    name,
-                })?;
-        }
-        let allowed: [fn(f64) -> bool; 4] = [
-            |velocity| velocity != 0.0,
-            |_| true,
-            |deviation| deviation > 0.0,
-            |flag| flag == 0.0 || flag == 1.0,
-        ];
-        let mut runs = Vec::new();
-        for (index, record) in reader.records().enumerate() {
-            let record = record.map_err(refuse)?;
-            let mut row = [0.0; 4];
-            for (column, value) in row.iter_mut().enumerate() {
-                let text = record.get(places[column]).unwrap_or_default().trim();
-                let number = text.parse().ok().filter(|number: &f64| number.is_finite());
-                *value = number
-                    .filter(|number| allowed[column](*number))
-                    .ok_or_else(|| MapError::Value {
-                        path: path.to_owned(),
-                        row: index + 1,
-                        name: COLUMNS[column],
-                        value: text.to_owned(),
-                        expected: EXPECTED[column],
-                    })?;
-            }
-            let [velocity_mm_s, voltage_v, deviation_v, flag] = row;
-            runs.push(FrictionRun {
-                velocity_mm_s,
-                voltage_v,
-                deviation_v,
-                stick_slip: flag == 1.0,
-            });
-        }
+        let mut runs: Vec<FrictionRun> = rows.into_iter().map(run).collect();
         runs.sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
         Ok(Self { runs })
     }

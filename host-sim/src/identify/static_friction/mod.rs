@@ -13,5 +13,5 @@ mod map;
 mod measure;
 
 pub use fit::{DirectionFit, Exponent, FrictionFit, FrictionFitError, fit_map};
-pub use map::{FrictionMap, FrictionRun, MapError};
+pub use map::{FrictionMap, FrictionRun};
 pub use measure::{StaticFrictionError, StaticFrictionSettings, measure};

@@ -12,7 +12,7 @@ use super::controller::{LawMachine, Operator};
 use super::recorder::{Period, Recorder};
 use super::watch::Watch;
 use crate::machine::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
-use crate::plant::{AxisTruth, SimulatedAxis};
+use crate::plant::{AxisParameters, SimulatedAxis};
 use crate::record::Recording;
 
 /// Room for GMS elements in the law.
@@ -43,7 +43,7 @@ pub struct SimulatedTestAxis {
 impl SimulatedTestAxis {
     /// Axis 0 to 2 with `truth`, under the default settings of that axis without feedforward and nonlinear gain; `seed`
     /// decides the noise.
-    pub fn new(index: usize, truth: AxisTruth, seed: u64) -> Self {
+    pub fn new(index: usize, truth: AxisParameters, seed: u64) -> Self {
         let mut stage = StageSettings::simulated();
         let mut axis = stage.axes[index].clone();
         axis.feedback.law = LawKind::Pid;

@@ -7,12 +7,12 @@ use quadrant::settings::StageSettings;
 use super::axis::{SimulatedTestAxis, TRAVEL_MM};
 use crate::machine::interface::{Machine, MachineError};
 use crate::machine::test_axis::TestAxis;
-use crate::plant::StageTruth;
+use crate::plant::StageParameters;
 
 /// The simulated stage, with everything a real one has, under the control law alone.
 #[derive(Clone, Debug)]
 pub struct LawStage {
-    truth: StageTruth,
+    truth: StageParameters,
     seed: u64,
     settings: StageSettings,
 }
@@ -21,7 +21,7 @@ impl LawStage {
     /// A stage on the default settings; `seed` decides its noise.
     pub fn new(seed: u64) -> Self {
         Self {
-            truth: StageTruth::real(),
+            truth: StageParameters::real(),
             seed,
             settings: StageSettings::simulated(),
         }

@@ -47,7 +47,7 @@ fn a_byte_order_mark_is_no_part_of_the_first_name() {
 
 #[test]
 fn a_file_that_is_not_there_is_named() {
-    let error = Record::read("no/such/file.csv", &LIMITS).unwrap_err();
+    let error = Record::read("no/such/file.csv".as_ref(), &LIMITS).unwrap_err();
     assert!(error.to_string().contains("no/such/file.csv"), "{error}");
 }
 

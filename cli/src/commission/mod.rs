@@ -1,0 +1,345 @@
+//! `quadrant commission`, and what it shares with `quadrant connect commission`.
+
+mod saved;
+
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+use anyhow::Context;
+use clap::Args;
+use quadrant::axes::AxisName;
+use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
+use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
+use quadrant_sim::design::Target;
+use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
+use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
+use quadrant_sim::identify::pages::revise::revise_table;
+use quadrant_sim::machine::{Machine, TestAxis};
+use quadrant_sim::pages::provenance;
+use quadrant_sim::report::Table;
+use quadrant_sim::settings_file::SettingsFile;
+use serde_json::{Value, json};
+
+use super::endpoint::Endpoint;
+use super::subject::{travel, travel_mm};
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::{Output, command_line, share};
+
+/// Options of `quadrant commission`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Arguments {
+    /// The axis to commission.
+    #[arg(long, value_enum)]
+    axis: Axis,
+    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it),
+    /// emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
+    #[arg(
+        long,
+        default_value = "law",
+        value_name = "MACHINE",
+        conflicts_with = "record"
+    )]
+    machine: Endpoint,
+    /// The folder of an earlier commissioning instead, whose recordings are identified anew; nothing moves, so there is no
+    /// verdict and no cross-check.
+    #[arg(long, value_name = "FOLDER")]
+    record: Option<PathBuf>,
+    /// Travel either way from where the axis stands, mm; without it, that to the soft limits of a homed axis.
+    #[arg(long, value_name = "MM", value_parser = travel, conflicts_with = "record")]
+    travel: Option<f64>,
+    /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
+    /// Without them those of --into if it is there, else those that the machine has.
+    #[arg(long, value_name = "FILE")]
+    settings: Option<PathBuf>,
+    /// Write the settings into this file; without it, into settings.toml in the folder for results.
+    #[arg(long, value_name = "FILE")]
+    into: Option<PathBuf>,
+    /// Let the settings that were found act on the machine. Without it the machine keeps those that it had.
+    #[arg(long, conflicts_with = "record")]
+    apply: bool,
+    /// Keep them in the machine's flash too.
+    #[arg(long, requires = "apply")]
+    store: bool,
+    #[command(flatten)]
+    request: Request,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// Options of a commissioning on any machine.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Request {
+    /// Gain margin of the PID, dB.
+    #[arg(long, default_value_t = 9.9, value_name = "DB")]
+    gain_margin_db: f64,
+    /// Phase margin of the PID, deg.
+    #[arg(long, default_value_t = 54.2, value_name = "DEG")]
+    phase_margin_deg: f64,
+    /// Leave out the cross-checks: the response at rest, with the linear model revised for explicit friction, and an ordinary
+    /// motion.
+    #[arg(long)]
+    quick: bool,
+}
+
+/// Results of a commissioning.
+struct Found {
+    found: Commissioned,
+    checked: Option<CrossCheck>,
+}
+
+/// A commissioning of one axis of a machine.
+pub(super) struct Job<'a> {
+    pub(super) axis: AxisName,
+    /// Travel either way, mm; without it, that to the soft limits.
+    pub(super) travel_mm: Option<f64>,
+    /// Settings to start from; without them, those of the machine.
+    pub(super) start: Option<SettingsFile>,
+    /// File for the settings, in place of `settings.toml` in the folder for results.
+    pub(super) into: Option<&'a Path>,
+    pub(super) request: &'a Request,
+    pub(super) output: &'a Output,
+    /// True if the machine is to run on the new settings.
+    pub(super) apply: bool,
+    /// True if it is to keep them in its flash.
+    pub(super) store: bool,
+}
+
+/// A commissioning that is done: for a person, and as data.
+pub(super) struct Done {
+    pub(super) text: String,
+    pub(super) data: Value,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Arguments {
+        axis,
+        into,
+        request,
+        output,
+        ..
+    } = arguments;
+    let existing = into.as_deref().filter(|path| path.exists());
+    let start = arguments.settings.as_deref().or(existing);
+    let start = start.map(SettingsFile::read).transpose()?;
+    if let Some(folder) = &arguments.record {
+        return arguments.run_saved(folder, start);
+    }
+    let mut machine = arguments.machine.open(output.seed)?;
+    let job = Job {
+        axis: (*axis).into(),
+        travel_mm: arguments.travel,
+        start,
+        into: into.as_deref(),
+        request,
+        output,
+        apply: arguments.apply,
+        store: arguments.store,
+    };
+    let done = job.run(&mut *machine)?;
+    if machine.is_simulated() {
+        println!(
+            "Simulated, not measured: {} axis, seed {}\n",
+            axis.name(),
+            output.seed
+        );
+    }
+    print!("{}", done.text);
+    Ok(())
+}
+
+impl Arguments {
+    /// Identifies the recordings of an earlier commissioning anew.
+    fn run_saved(&self, folder: &Path, start: Option<SettingsFile>) -> anyhow::Result<()> {
+        let Self { output, .. } = self;
+        let axis = AxisName::from(self.axis);
+        let mut file = start.unwrap_or_else(|| SettingsFile::new(StageSettings::simulated()));
+        let base = file.stage.axes[axis as usize].clone();
+        let found = Found {
+            found: saved::read(folder, base.encoder.resolution_mm)?.commissioned(
+                &base,
+                &self.request.settings(),
+                file.stage.rate_hz,
+            )?,
+            checked: None,
+        };
+        print!("{}", found.text());
+        let path = match &self.into {
+            Some(path) => path.clone(),
+            None => output.file("settings.toml")?,
+        };
+        let who = format!("the {axis} axis, recorded in {}", folder.display());
+        for line in found.keep(output, &mut file, &path, axis, &who)? {
+            println!("{line}");
+        }
+        Ok(())
+    }
+}
+
+impl Job<'_> {
+    /// Commissions the axis, and writes everything that was found. The machine has its old settings afterwards unless the
+    /// new ones are to act, whatever came of it.
+    pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
+        let Self { axis, output, .. } = self;
+        let travel_mm = travel_mm(machine, axis, self.travel_mm, None)?;
+        let before = machine.settings()?;
+        let mut file = match self.start {
+            Some(file) => file,
+            None => SettingsFile::new(before.clone()),
+        };
+        let base = file.stage.axes[axis as usize].clone();
+        let outcome = {
+            let mut test_axis = machine.test_axis(axis, travel_mm)?;
+            self.request.run(&mut *test_axis, &base, output.seed)
+        };
+        machine
+            .load(&before)
+            .context("the machine did not take its old settings back")?;
+        let found = outcome?;
+
+        let who = format!("the {axis} axis of {}", machine.description());
+        let path = match self.into {
+            Some(path) => path.to_owned(),
+            None => output.file("settings.toml")?,
+        };
+        let mut text = found.text();
+        for line in found.keep(output, &mut file, &path, axis, &who)? {
+            text.push_str(&line);
+            text.push('\n');
+        }
+        if self.apply {
+            machine
+                .load(&file.stage)
+                .context("the settings that were found")?;
+            text.push_str("The settings act; the outputs are off.\n");
+        }
+        if self.store {
+            let origin = format!("quadrant {} commission {axis}", env!("CARGO_PKG_VERSION"));
+            machine.store(&origin)?;
+            text.push_str("They are kept for the next start.\n");
+        }
+        let verdict: Vec<_> = found
+            .found
+            .results
+            .iter()
+            .map(|result| json!({ "law": result.law, "rms_um": 1e3 * result.score.rms_mm }))
+            .collect();
+        let data = json!({
+            "settings": path,
+            "verdict": verdict,
+            "applied": self.apply,
+            "stored": self.store,
+        });
+        Ok(Done { text, data })
+    }
+}
+
+impl Request {
+    fn settings(&self) -> CommissionSettings {
+        CommissionSettings {
+            target: Target::Margins {
+                gain_margin_db: self.gain_margin_db,
+                phase_margin_deg: self.phase_margin_deg,
+                crossover_hz: None,
+            },
+            ..CommissionSettings::default()
+        }
+    }
+
+    /// Commissions the test_axis's axis, with a bar for whoever watches.
+    fn run(
+        &self,
+        test_axis: &mut dyn TestAxis,
+        base: &AxisSettings,
+        seed: u64,
+    ) -> anyhow::Result<Found> {
+        let request = self.settings();
+        let bar = share("commissioning");
+        let mut report = |step, done: f64| {
+            bar.set_message(step);
+            bar.set_position((1000.0 * done) as u64);
+        };
+        let found = commission(test_axis, base, &request, &mut report)?;
+        let checked = if self.quick {
+            None
+        } else {
+            bar.enable_steady_tick(Duration::from_millis(200));
+            let checked = CrossCheck::run(test_axis, &found.settings, seed, &mut report)?;
+            Some(checked)
+        };
+        bar.finish_and_clear();
+        Ok(Found { found, checked })
+    }
+}
+
+impl Found {
+    fn tables(&self) -> Vec<Table> {
+        let found = &self.found;
+        let [parameters, bands] = plant_tables(&found.plant);
+        let (_, friction, _) = &found.friction;
+        let mut tables = vec![
+            motor_constant_table(&found.motor, None),
+            parameters,
+            bands,
+            friction_table(friction),
+            gms_table(&found.presliding.0),
+            gains_table(found),
+        ];
+        if !found.results.is_empty() {
+            tables.push(results_table(&found.results));
+        }
+        if let Some(checked) = &self.checked {
+            tables.push(revise_table(&found.plant.plant, &checked.revisions));
+        }
+        tables
+    }
+
+    /// The tables for a terminal.
+    fn text(&self) -> String {
+        let mut text = String::new();
+        for table in self.tables() {
+            let _ = writeln!(text, "{}\n", table.to_text());
+        }
+        let agreement = self
+            .checked
+            .as_ref()
+            .and_then(|checked| checked.inertia_agreement(&self.found.settings));
+        if let Some(agreement) = agreement {
+            let _ = writeln!(
+                text,
+                "An ordinary motion gives {agreement:.3} times the A of the frequency response.\n"
+            );
+        }
+        text
+    }
+
+    /// Writes everything: recordings, tables, the page, and the settings, which become those of `file`. Returns lines that say what is where.
+    fn keep(
+        &self,
+        output: &Output,
+        file: &mut SettingsFile,
+        path: &Path,
+        axis: AxisName,
+        who: &str,
+    ) -> anyhow::Result<Vec<String>> {
+        let (found, checked) = (&self.found, self.checked.as_ref());
+        for table in self.tables() {
+            output.keep_table(&table)?;
+        }
+        let command = command_line();
+        let records = saved::write(output, found, checked)?;
+        file.stage.axes[axis as usize] = found.settings.clone();
+        file.add_provenance(
+            &command,
+            axis.as_str(),
+            records,
+            &["feedback", "friction", "feedforward", "plant"],
+        );
+        file.write(path)?;
+        let page = commission_page(who, found, checked, provenance(&command, output.seed));
+        let mut lines = vec![format!("{}: the settings of the stage", path.display())];
+        lines.extend(output.keep_page(&page, "commission.html")?);
+        Ok(lines)
+    }
+}

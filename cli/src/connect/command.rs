@@ -1,0 +1,459 @@
+//! Commands of the console, as they are written on a command line or in a script.
+
+use std::path::PathBuf;
+
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Subcommand, ValueEnum};
+use quadrant::link::message::Channel;
+use quadrant_sim::machine::simulated_io;
+
+use crate::commission::Request;
+use crate::plane::PlaneName;
+use crate::subject::travel;
+use quadrant_cli::axis::Axis;
+use quadrant_cli::output::Output;
+
+/// One thing to ask of the machine.
+#[derive(Clone, Debug, Subcommand)]
+pub(super) enum Command {
+    /// Say who the machine is: firmware, board, control rate.
+    Hello,
+    /// Say how the machine is: state, fault, and of each axis position, error and output.
+    Status,
+    /// Say which fault is latched, its cause, and what to do about it.
+    Fault,
+    /// Clear the latched fault; the outputs stay off.
+    Reset,
+    /// Switch the outputs on; the axes hold where they stand.
+    Enable,
+    /// Switch the outputs off.
+    Disable,
+    /// Brake all axes to rest; the outputs stay on.
+    Stop,
+    /// Find the home position of axes; without any, of all. `wait homed` waits for it.
+    Home {
+        /// The axes: x, y, z.
+        #[arg(value_enum)]
+        axes: Vec<Axis>,
+    },
+    /// Move one axis to a position. `wait rest` waits for it.
+    #[command(allow_negative_numbers = true)]
+    Move {
+        /// The axis: x, y or z.
+        #[arg(value_enum)]
+        axis: Axis,
+        /// Target, mm from the home position; without homing, from where the axis stood at the start.
+        target_mm: f64,
+        /// Largest velocity, mm/s; at most the axis' largest velocity.
+        #[arg(long, default_value_t = 10.0, value_name = "MM_S")]
+        velocity: f64,
+    },
+    /// Move one axis at a velocity until `stop`, or `jog` at 0.
+    #[command(allow_negative_numbers = true)]
+    Jog {
+        /// The axis: x, y or z.
+        #[arg(value_enum)]
+        axis: Axis,
+        /// The velocity, mm/s, with its sign; 0 brakes.
+        velocity_mm_s: f64,
+    },
+    /// Start the plan: the motions of `plan` or `circle`, from where the axes stand. `wait rest` waits for their end.
+    Run,
+    /// SimulatedPeer the plan for that of a TOML file: `motions`, one for each axis.
+    Plan {
+        /// The file: TOML.
+        file: PathBuf,
+    },
+    /// SimulatedPeer the plan for a circle from where the axes stand; `run` starts it.
+    Circle(CircleOptions),
+    /// Follow a part program in G-code from where the axes stand, and wait for its end.
+    Stream(StreamOptions),
+    /// Show a setting, or all below a path, as they are edited.
+    Get {
+        /// Its path: /axes/x/feedback/pid/kp_v_per_mm, or x/feedback/pid/kp_v_per_mm for short.
+        path: String,
+    },
+    /// Change a setting of the draft; `apply` lets the draft act.
+    #[command(allow_negative_numbers = true)]
+    Set {
+        /// Its path, as for `get`.
+        path: String,
+        /// Its value: a number, true, false, a name, a list in JSON, null to leave a part out, present to make it.
+        value: String,
+    },
+    /// List the paths of the settings.
+    List {
+        /// Only those below this path.
+        #[arg(default_value = "")]
+        prefix: String,
+    },
+    /// Write all settings to a file that every other command reads.
+    Dump {
+        /// The file: TOML.
+        file: PathBuf,
+    },
+    /// Load all settings from a file and let them act as a whole; what the machine refuses changes nothing.
+    Load {
+        /// The file: TOML, as from `dump` or `quadrant commission`.
+        file: PathBuf,
+    },
+    /// Let the edited settings act, checked as a whole, without a bump.
+    Apply,
+    /// Forget what was edited: the draft is what acts again.
+    Revert,
+    /// Make the draft the defaults; `apply` lets them act.
+    Defaults,
+    /// Keep the settings for the next start; the outputs must be off.
+    Store {
+        /// Their origin, at most 200 bytes; without it, the program and its version.
+        #[arg(value_name = "TEXT")]
+        provenance: Option<String>,
+    },
+    /// Say where the kept settings come from.
+    Provenance,
+    /// Record channels to a CSV file that every other command reads.
+    Record(RecordOptions),
+    /// Capture channels at the full control rate, around a trigger.
+    #[command(subcommand)]
+    Capture(CaptureCommand),
+    /// Draw channels in the terminal while they are sampled; with --svg, --png or --csv, keep what was drawn.
+    Scope(ScopeOptions),
+    /// Show events as the link tells them: states, faults, motions, settings.
+    Events {
+        /// Duration, s; 0 shows only those that have come already.
+        #[arg(default_value_t = 0.0)]
+        seconds: f64,
+    },
+    /// Show the firmware's log (defmt): of the emulated board what has come since the last time; of a board, with --elf and
+    /// without a connection, through its debug probe until Ctrl-C.
+    Log(LogOptions),
+    /// Press inputs of a simulated or emulated machine, until `release`.
+    Press {
+        /// The inputs: emergency-stop, x.negative-limit, x.positive-limit, x.home, x.amplifier-fault, and of y and z.
+        #[arg(required = true, value_parser = input_parser())]
+        inputs: Vec<String>,
+    },
+    /// Let go of inputs; without any, of all.
+    Release {
+        /// The inputs, as for `press`.
+        #[arg(value_parser = input_parser())]
+        inputs: Vec<String>,
+    },
+    /// Cut the supply of a simulated or emulated machine for a second, whatever it does; what is stored stays.
+    PowerCycle,
+    /// Wait: for some seconds of the machine's time, for the axes to rest, or until axes are homed.
+    Wait {
+        /// Seconds, `rest` or `homed`.
+        what: String,
+        /// After `homed`: the axes; without any, all.
+        #[arg(value_enum)]
+        axes: Vec<Axis>,
+        /// Longest time to wait for rest or homing, s.
+        #[arg(long, default_value_t = 600.0, value_name = "S")]
+        timeout: f64,
+    },
+    /// Measure an axis, and say what it is like; the machine keeps its settings.
+    #[command(subcommand)]
+    Identify(IdentifyCommand),
+    /// Measure an axis of which only encoder, amplifier and limits are known, and make settings for it, unattended; it moves
+    /// within its travel for about a quarter of an hour.
+    Commission(CommissionOptions),
+    /// Restart the machine, as after power-up; the outputs must be off.
+    Reboot,
+    /// Flash firmware onto the board through its debug probe; needs probe-rs, and no connection.
+    Flash(FlashOptions),
+    /// Take commands from standard input, one a line; `#` begins a comment. The same as no command.
+    #[command(name = "-")]
+    Script,
+}
+
+/// Options of the command `circle`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct CircleOptions {
+    /// Radius of the circle, mm.
+    #[arg(long, value_name = "MM")]
+    pub(super) radius_mm: f64,
+    /// Feed along the path, mm/min.
+    #[arg(long, value_name = "MM_MIN")]
+    pub(super) feed_mm_min: f64,
+    /// Plane: xy, yz or zx.
+    #[arg(long, value_enum, default_value_t = PlaneName::Xy)]
+    pub(super) plane: PlaneName,
+    /// Turns at full feed.
+    #[arg(long, default_value_t = 2.0)]
+    pub(super) turns: f64,
+    /// Clockwise (G2) instead of counter-clockwise (G3).
+    #[arg(long)]
+    pub(super) clockwise: bool,
+    /// Duration of the lead-in and of the lead-out, s.
+    #[arg(long, default_value_t = 0.5, value_name = "S")]
+    pub(super) lead_s: f64,
+}
+
+/// Options of the command `stream`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct StreamOptions {
+    /// The part program: G0-G3, G17-G19, G20/G21, G90/G91, I, J, K or R, F in mm/min, M2/M30.
+    pub(super) file: PathBuf,
+    /// Control ticks from one set point to the next, 4 to 1000.
+    #[arg(long, default_value_t = 50, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(4..=1000))]
+    pub(super) period_ticks: u16,
+    /// Largest distance of the path from a corner between straight lines, mm, 0 to 10; 0 stops at it exactly.
+    #[arg(long, default_value_t = 0.0, value_name = "MM")]
+    pub(super) corner_deviation_mm: f64,
+}
+
+/// Options of the command `record`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct RecordOptions {
+    /// Channels, at most 8: x.reference, x.position, x.error, x.output, stage.state, ...
+    #[arg(long, value_delimiter = ',', default_values_t = default_channels(), value_name = "CHANNEL,...")]
+    pub(super) channels: Vec<Channel>,
+    /// Duration, s of the machine's time; without it, until the axes rest after a motion.
+    #[arg(long, value_name = "S")]
+    pub(super) seconds: Option<f64>,
+    /// Control ticks between samples; without it, as few as a serial port carries.
+    #[arg(long, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) every: Option<u16>,
+    /// The file; of several axes each gets its own, such as run-x.csv.
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: PathBuf,
+    /// Write the file though samples were lost; its time has gaps then.
+    #[arg(long)]
+    pub(super) allow_gaps: bool,
+    /// After `--`: a command that is given once recording has begun, such as `run` or `move x 10`.
+    #[arg(last = true, value_name = "COMMAND")]
+    pub(super) then: Vec<String>,
+}
+
+fn default_channels() -> Vec<Channel> {
+    ["x.reference", "x.position", "x.error", "x.output"]
+        .into_iter()
+        .filter_map(|name| name.parse().ok())
+        .collect()
+}
+
+/// Commands that concern the capture.
+#[derive(Clone, Debug, Subcommand)]
+pub(super) enum CaptureCommand {
+    /// Forget what was captured and wait for a trigger; a fault triggers in any case.
+    Arm(ArmOptions),
+    /// Say how far it is.
+    State,
+    /// Freeze what there is.
+    Stop,
+    /// Read what was captured into a CSV file, waiting until it is frozen.
+    Read {
+        /// The file; of several axes each gets its own, such as trace-x.csv.
+        #[arg(long, value_name = "FILE")]
+        out: PathBuf,
+        /// Longest time to wait, s.
+        #[arg(long, default_value_t = 10.0, value_name = "S")]
+        timeout: f64,
+    },
+}
+
+/// Options of `capture arm`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ArmOptions {
+    /// Channels, at most 8; the ring of 2048 words is shared out among them.
+    #[arg(long, value_delimiter = ',', default_values_t = default_channels(), value_name = "CHANNEL,...")]
+    pub(super) channels: Vec<Channel>,
+    /// Control ticks between samples.
+    #[arg(long, default_value_t = 1, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(1..))]
+    pub(super) every: u16,
+    /// Share of the ring for what comes before the trigger, percent, 0 to 100.
+    #[arg(long, default_value_t = 25, value_name = "PERCENT")]
+    pub(super) pre_trigger: u8,
+    /// The trigger: now, command, fault, motion, or a channel that crosses a level.
+    #[arg(long, value_enum, default_value_t = TriggerEvent::Fault, conflicts_with = "channel")]
+    pub(super) on: TriggerEvent,
+    /// The channel whose level triggers.
+    #[arg(long, requires = "level")]
+    pub(super) channel: Option<Channel>,
+    /// The level, in the channel's unit: x.error in mm, x.output in V.
+    #[arg(long, requires = "channel", allow_negative_numbers = true)]
+    pub(super) level: Option<f64>,
+    /// Direction in which the level is crossed.
+    #[arg(long, value_enum, default_value_t = CrossedEdge::Either)]
+    pub(super) edge: CrossedEdge,
+}
+
+/// Options of the command `scope`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct ScopeOptions {
+    /// Channels, at most 8.
+    #[arg(
+        value_delimiter = ',',
+        value_name = "CHANNEL,...",
+        default_value = "x.error"
+    )]
+    pub(super) channels: Vec<Channel>,
+    /// Duration, s of the machine's time.
+    #[arg(long, default_value_t = 10.0, value_name = "S")]
+    pub(super) seconds: f64,
+    /// Time across the screen, s.
+    #[arg(long, default_value_t = 2.0, value_name = "S")]
+    pub(super) window: f64,
+    /// Width, characters; height of each channel, lines.
+    #[arg(long, num_args = 2, default_values_t = [100, 6], value_names = ["WIDTH", "HEIGHT"])]
+    pub(super) size: Vec<usize>,
+    /// Write what was sampled as a figure for print.
+    #[arg(long, value_name = "FILE")]
+    pub(super) svg: Option<PathBuf>,
+    /// Write what was sampled as CSV.
+    #[arg(long, value_name = "FILE")]
+    pub(super) csv: Option<PathBuf>,
+}
+
+/// Event that a capture waits for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum TriggerEvent {
+    /// None: it begins at once.
+    Now,
+    /// The next command that is given.
+    Command,
+    /// The next fault that occurs.
+    Fault,
+    /// The start of the next motion.
+    Motion,
+}
+
+/// Direction in which a level is crossed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub(super) enum CrossedEdge {
+    /// From below the level.
+    Rising,
+    /// From above the level.
+    Falling,
+    /// From either side of it.
+    Either,
+}
+
+/// Measurements on a connected axis.
+#[derive(Clone, Debug, Subcommand)]
+pub(super) enum IdentifyCommand {
+    /// Move the axis to and fro by up to 60 mm, and find inertia and friction in that motion.
+    Motion(IdentifyOptions),
+    /// Move the axis at 16 velocities from 0.1 to 40 mm/s, both ways, and fit the static model; within +-100 mm.
+    StaticFriction(IdentifyOptions),
+    /// Move the axis in a slow sine of micrometres under a quiet controller, and identify the GMS model; needs a plant in the
+    /// settings.
+    VirginCurve(IdentifyOptions),
+    /// Measure the acceleration per volt in open loop, within some millimetres; needs nothing that works but encoder and
+    /// amplifier.
+    MotorConstant(IdentifyOptions),
+    /// Excite the axis while it moves at 37 mm/s, measure its frequency response, position over voltage, and fit the linear
+    /// model; the file holds the response.
+    Plant(IdentifyOptions),
+}
+
+/// Options of a measurement.
+#[derive(Clone, Debug, Args)]
+pub(super) struct IdentifyOptions {
+    /// The axis: x, y or z.
+    #[arg(value_enum)]
+    pub(super) axis: Axis,
+    /// Travel either way from where the axis stands, mm; without it, that to its soft limits, once it is homed.
+    #[arg(long, value_name = "MM", value_parser = travel)]
+    pub(super) travel: Option<f64>,
+    /// File for the recording, CSV, which `quadrant identify ... --record` reads; of `plant`, the response.
+    #[arg(long, value_name = "FILE")]
+    pub(super) out: PathBuf,
+}
+
+/// Options of the command `commission`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct CommissionOptions {
+    /// The axis: x, y or z. It must stand where it can move by the travel either way.
+    #[arg(long, value_enum)]
+    pub(super) axis: Axis,
+    /// Travel either way from where the axis stands, mm; without it, that to its soft limits, once it is homed.
+    #[arg(long, value_name = "MM", value_parser = travel)]
+    pub(super) travel: Option<f64>,
+    /// Let the settings that were found act on the machine. Without it the machine keeps those that it had.
+    #[arg(long)]
+    pub(super) apply: bool,
+    /// Keep them in the machine's flash too.
+    #[arg(long, requires = "apply")]
+    pub(super) store: bool,
+    #[command(flatten)]
+    pub(super) request: Request,
+    #[command(flatten)]
+    pub(super) output: Output,
+}
+
+/// Options of the command `flash`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct FlashOptions {
+    /// The firmware: the ELF file that `cargo build --release` leaves in target/thumbv7em-none-eabihf/release.
+    pub(super) elf: PathBuf,
+    /// The chip, as probe-rs calls it.
+    #[arg(long, default_value = "STM32F446RETx")]
+    pub(super) chip: String,
+    /// Stay, and show the firmware's log (defmt) until Ctrl-C.
+    #[arg(long)]
+    pub(super) run: bool,
+}
+
+/// Options of the command `log`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct LogOptions {
+    /// The firmware that is on the board: the ELF file it was flashed from, for its strings.
+    #[arg(long, value_name = "FILE")]
+    pub(super) elf: Option<PathBuf>,
+    /// The chip, as probe-rs calls it.
+    #[arg(long, default_value = "STM32F446RETx", requires = "elf")]
+    pub(super) chip: String,
+}
+
+/// Reads the name of an input that can be pressed.
+fn input_parser() -> PossibleValuesParser {
+    PossibleValuesParser::new(simulated_io::INPUTS.map(|(name, _)| name))
+}
+
+impl Command {
+    /// Returns its name, for `--json` and messages.
+    pub(super) const fn name(&self) -> &'static str {
+        match self {
+            Self::Hello => "hello",
+            Self::Status => "status",
+            Self::Fault => "fault",
+            Self::Reset => "reset",
+            Self::Enable => "enable",
+            Self::Disable => "disable",
+            Self::Stop => "stop",
+            Self::Home { .. } => "home",
+            Self::Move { .. } => "move",
+            Self::Jog { .. } => "jog",
+            Self::Run => "run",
+            Self::Plan { .. } => "plan",
+            Self::Circle(_) => "circle",
+            Self::Stream(_) => "stream",
+            Self::Get { .. } => "get",
+            Self::Set { .. } => "set",
+            Self::List { .. } => "list",
+            Self::Dump { .. } => "dump",
+            Self::Load { .. } => "load",
+            Self::Apply => "apply",
+            Self::Revert => "revert",
+            Self::Defaults => "defaults",
+            Self::Store { .. } => "store",
+            Self::Provenance => "provenance",
+            Self::Record(_) => "record",
+            Self::Capture(_) => "capture",
+            Self::Scope(_) => "scope",
+            Self::Events { .. } => "events",
+            Self::Log(_) => "log",
+            Self::Press { .. } => "press",
+            Self::Release { .. } => "release",
+            Self::PowerCycle => "power-cycle",
+            Self::Wait { .. } => "wait",
+            Self::Identify(_) => "identify",
+            Self::Commission(_) => "commission",
+            Self::Reboot => "reboot",
+            Self::Flash(_) => "flash",
+            Self::Script => "-",
+        }
+    }
+}

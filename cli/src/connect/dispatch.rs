@@ -1,0 +1,99 @@
+//! Each command, given to its part of the console.
+
+use anyhow::bail;
+use quadrant_sim::client::ClientError;
+
+use super::answer::Answer;
+use super::command::{Command, RecordOptions};
+use super::line::{self, Said};
+use super::session::Session;
+use super::{commission, identify, machine, observe, program, scope, settings, simulated_io};
+
+/// Gives a command and prints its result; returns true if it succeeded. `source` is its line, for messages.
+pub(super) fn run(session: &mut Session, command: &Command, source: &str) -> bool {
+    match answer(session, command) {
+        Ok(Answer { text, data }) => {
+            session.printer.result(command.name(), &text, &data);
+            true
+        }
+        Err(error) => {
+            let error = explained(&error);
+            session.printer.error(command.name(), source, &error);
+            false
+        }
+    }
+}
+
+fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
+    let client = &mut session.client;
+    match command {
+        Command::Hello => machine::hello(client),
+        Command::Status => machine::status(client),
+        Command::Fault => machine::fault(client),
+        Command::Reset
+        | Command::Enable
+        | Command::Disable
+        | Command::Stop
+        | Command::Home { .. }
+        | Command::Move { .. }
+        | Command::Jog { .. }
+        | Command::Run
+        | Command::Reboot => machine::order(client, command),
+        Command::Wait {
+            what,
+            axes,
+            timeout,
+        } => machine::wait(client, what, axes, *timeout),
+        Command::Plan { file } => program::plan(client, file),
+        Command::Circle(options) => program::circle_plan(client, options),
+        Command::Stream(options) => program::stream_program(client, options),
+        Command::Get { path } => settings::get(client, path),
+        Command::Set { path, value } => settings::set(client, path, value),
+        Command::List { prefix } => settings::list(client, prefix),
+        Command::Dump { file } => settings::dump(client, file),
+        Command::Load { file } => settings::load(client, file),
+        Command::Apply => settings::apply(client),
+        Command::Revert | Command::Defaults => settings::draft(client, command),
+        Command::Store { provenance } => settings::store(client, provenance.as_deref()),
+        Command::Provenance => settings::provenance(client),
+        Command::Record(options) => record(session, options),
+        Command::Capture(command) => observe::capture(client, command),
+        Command::Scope(options) => scope::run(session, options),
+        Command::Events { seconds } => observe::events(session, *seconds),
+        Command::Log(options) => simulated_io::log(session, options),
+        Command::Press { inputs } => simulated_io::press(session, inputs),
+        Command::Release { inputs } => simulated_io::release(session, inputs),
+        Command::PowerCycle => simulated_io::power_cycle(client),
+        Command::Identify(command) => identify::run(client, command),
+        Command::Commission(options) => commission::run(client, options),
+        Command::Flash(_) | Command::Script => {
+            anyhow::bail!("this command is for the shell, not for a session")
+        }
+    }
+}
+
+/// Records channels while the command behind `--` runs, if there is one.
+fn record(session: &mut Session, options: &RecordOptions) -> anyhow::Result<Answer> {
+    let then = match options.then.as_slice() {
+        [] => None,
+        words => {
+            let line = words.join(" ");
+            match line::parse(&line) {
+                Ok(Said::Ask(command)) => Some(command),
+                Ok(_) => bail!("record: `{line}` is no command of the machine"),
+                Err(error) => bail!("record: {error}"),
+            }
+        }
+    };
+    observe::record(session, options, |session| {
+        then.is_none_or(|command| run(session, &command, "record"))
+    })
+}
+
+/// An error and its causes; most messages contain their cause's already.
+fn explained(error: &anyhow::Error) -> String {
+    match error.downcast_ref::<ClientError>() {
+        Some(error) => error.to_string(),
+        None => quadrant_cli::explained(error),
+    }
+}

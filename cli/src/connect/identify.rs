@@ -1,0 +1,105 @@
+//! `identify`: measurements on the connected machine, by the code of `quadrant identify`.
+
+use anyhow::Context;
+use quadrant::axes::AxisName;
+use quadrant::settings::AxisSettings;
+use quadrant_sim::client::Client;
+use quadrant_sim::identify::frf::FrfSettings;
+use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended};
+use quadrant_sim::identify::motor_constant::MotorConstantSettings;
+use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
+use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
+use quadrant_sim::identify::pages::motion::motion_table;
+use quadrant_sim::identify::plant::{PlantFitSettings, Stiffness, fit_plant};
+use quadrant_sim::identify::static_friction::{Exponent, StaticFrictionSettings, fit_map};
+use quadrant_sim::identify::virgin_curve::{self, Knots};
+use quadrant_sim::machine::TestAxis;
+use quadrant_sim::report::Table;
+use serde_json::json;
+
+use super::answer::Answer;
+use super::command::{IdentifyCommand, IdentifyOptions};
+use crate::identify::{frf, friction, motion, motor_constant, virgin_curve as sine};
+use crate::subject::{on_axis, travel_mm};
+
+/// Times that the axis moves to and fro.
+const ROUNDS: usize = 1;
+/// Slip-blocks of the GMS model.
+const BLOCKS: usize = 4;
+
+pub(super) fn run(client: &mut Client, command: &IdentifyCommand) -> anyhow::Result<Answer> {
+    let (options, fallback_mm) = match command {
+        IdentifyCommand::Motion(options) => (options, Some(motion::TRAVEL_MM)),
+        IdentifyCommand::StaticFriction(options) => (options, Some(friction::TRAVEL_MM)),
+        IdentifyCommand::VirginCurve(options) => (options, Some(sine::TRAVEL_MM)),
+        IdentifyCommand::MotorConstant(options) => (options, Some(motor_constant::TRAVEL_MM)),
+        IdentifyCommand::Plant(options) => (options, None),
+    };
+    let axis = AxisName::from(options.axis);
+    let travel_mm = travel_mm(client, axis, options.travel, fallback_mm)?;
+    let table = on_axis(client, axis, travel_mm, None, |test_axis, base| {
+        measure(test_axis, base, command, options)
+    })?;
+    let text = format!(
+        "{}\n{}: the recording",
+        table.to_text(),
+        options.out.display()
+    );
+    Ok(Answer::new(
+        text,
+        json!({ "file": options.out, "table": table.to_csv()? }),
+    ))
+}
+
+fn measure(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    command: &IdentifyCommand,
+    options: &IdentifyOptions,
+) -> anyhow::Result<Table> {
+    match command {
+        IdentifyCommand::Motion(_) => {
+            let recording = motion::move_to_and_fro(test_axis, ROUNDS)?;
+            recording.write_csv(&options.out)?;
+            let settings = MotionFitSettings::default();
+            let candidates = fit_motion(&recording, &settings, &|_| {})?;
+            let chosen =
+                recommended(&candidates).context("no model of the motion is one of friction")?;
+            Ok(motion_table(&chosen.model, None))
+        }
+        IdentifyCommand::StaticFriction(_) => {
+            let settings = StaticFrictionSettings::default();
+            let (map, _) = friction::run_at_velocities(test_axis, base, &settings)?;
+            map.write_csv(&options.out)?;
+            Ok(friction_table(&fit_map(&map, Exponent::Free)?))
+        }
+        IdentifyCommand::VirginCurve(_) => {
+            let (recording, _) = sine::Sine::default().measure(test_axis, base)?;
+            recording.write_csv(&options.out)?;
+            let known = Some(&base.friction.sliding);
+            let found = virgin_curve::identify(&recording, known, &Knots::Automatic(BLOCKS))?;
+            Ok(gms_table(&found))
+        }
+        IdentifyCommand::Plant(_) => {
+            let found = frf::excite(test_axis, base, &FrfSettings::default())?;
+            let response = &found.estimate.response;
+            response.write_csv(&options.out)?;
+            let [parameters, _] = plant_tables(&fit_plant(response, &plant_fit())?);
+            Ok(parameters)
+        }
+        IdentifyCommand::MotorConstant(_) => {
+            let settings = MotorConstantSettings::default();
+            let found = motor_constant::step_voltage(test_axis, base, &settings)?;
+            found.recording.write_csv(&options.out)?;
+            Ok(motor_constant_table(&found, None))
+        }
+    }
+}
+
+/// A model without a spring: that of an axis on its guides.
+fn plant_fit() -> PlantFitSettings {
+    PlantFitSettings {
+        stiffness: Stiffness::Zero,
+        ..PlantFitSettings::default()
+    }
+}

@@ -1,0 +1,185 @@
+//! Identity and status of the machine, and orders to it.
+
+use std::fmt::Write as _;
+
+use anyhow::bail;
+use quadrant::axes::AxisName;
+use quadrant::link::message::{AxisSet, Body, Status};
+use quadrant_sim::client::{Client, settle, with_reset};
+use serde_json::json;
+
+use super::answer::{Answer, name, seconds};
+use super::command::Command;
+use quadrant_cli::axis::Axis;
+
+pub(super) fn hello(client: &mut Client) -> anyhow::Result<Answer> {
+    // Asked again: the machine may have been exchanged since.
+    client.request(Body::Hello)?;
+    let identity = client.identity();
+    let text = format!(
+        "{board}, firmware {firmware}, protocol {protocol}\ncontrol at {rate} Hz in {number}, {tick} ticks since the start",
+        board = identity.board,
+        firmware = identity.firmware,
+        protocol = identity.protocol,
+        rate = identity.rate_hz,
+        number = name(&identity.number),
+        tick = identity.tick,
+    );
+    Ok(Answer::new(text, json!(identity)))
+}
+
+pub(super) fn status(client: &mut Client) -> anyhow::Result<Answer> {
+    let status = client.status()?;
+    let text = status_text(
+        &status,
+        client.identity().rate_hz,
+        client.identity().cycle_hz,
+    );
+    Ok(Answer::new(text, json!(status)))
+}
+
+fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
+    let mut text = format!(
+        "{state}{fault}, {motion}; tick {tick} ({time:.4} s)\n",
+        state = status.state.as_str(),
+        fault = status
+            .fault
+            .map(|code| format!(" {code} (`fault` says more)"))
+            .unwrap_or_default(),
+        motion = if status.running { "moving" } else { "at rest" },
+        tick = status.tick,
+        time = f64::from(status.tick) / rate_hz,
+    );
+    text.push_str(
+        "axis  homed  follows   position mm   error um  output V  limited by    high mark\n",
+    );
+    for (axis, seen) in AxisName::ALL.into_iter().zip(&status.axes) {
+        let _ = writeln!(
+            text,
+            "{axis:<4}  {homed:<5}  {mode:<8}  {position:>11.4}  {error:>9.2}  {output:>8.4}  {limit:<12}  {mark:>9.3}",
+            axis = axis.as_str(),
+            homed = if status.homed.contains(axis.into()) {
+                "yes"
+            } else {
+                "no"
+            },
+            mode = name(&seen.mode),
+            position = seen.position_mm,
+            error = 1e3 * seen.error_mm,
+            output = seen.output_v,
+            limit = name(&seen.limited_by),
+            mark = seen.high_mark,
+        );
+    }
+    // A simulated machine measures no time.
+    if cycle_hz > 0 {
+        let _ = write!(
+            text,
+            "longest tick {:.2} us, {} overruns; ",
+            1e6 * f64::from(status.longest_tick_cycles) / f64::from(cycle_hz),
+            status.overruns,
+        );
+    }
+    let _ = writeln!(text, "capture {}", name(&status.capture));
+    let frames = status.frames;
+    let _ = write!(
+        text,
+        "link {good} good frames, {bad} bad; dropped {samples} samples, {events} events",
+        good = frames.good,
+        bad = frames
+            .damaged
+            .wrapping_add(frames.overlong)
+            .wrapping_add(frames.undecodable),
+        samples = status.dropped_samples,
+        events = status.dropped_events,
+    );
+    text
+}
+
+pub(super) fn fault(client: &mut Client) -> anyhow::Result<Answer> {
+    let Some(fault) = client.fault()? else {
+        return Ok(Answer::new("no fault", json!(null)));
+    };
+    let axis = fault
+        .axis
+        .map(|axis| format!(" of {axis}"))
+        .unwrap_or_default();
+    let trace = if fault.captured {
+        "\ntrace: captured; `capture read --out FILE` fetches it"
+    } else {
+        ""
+    };
+    let text = format!(
+        "fault {code} {name}{axis} at tick {tick}\ncause: {cause}\nremedy: {remedy}{trace}",
+        code = fault.code,
+        name = fault.name,
+        tick = fault.tick,
+        cause = fault.cause,
+        remedy = with_reset(&fault.remedy),
+    );
+    Ok(Answer::new(text, json!(fault)))
+}
+
+pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<Answer> {
+    let body = match command {
+        Command::Reset => Body::ResetFault,
+        Command::Enable => Body::Enable,
+        Command::Disable => Body::Disable,
+        Command::Stop => Body::Stop,
+        Command::Home { axes } => Body::Home(some_or_all(axes)),
+        Command::Move {
+            axis,
+            target_mm,
+            velocity,
+        } => Body::Move {
+            axis: (*axis).into(),
+            target_mm: *target_mm,
+            velocity_mm_s: *velocity,
+        },
+        Command::Jog {
+            axis,
+            velocity_mm_s,
+        } => Body::Jog {
+            axis: (*axis).into(),
+            velocity_mm_s: *velocity_mm_s,
+        },
+        Command::Run => Body::Run,
+        Command::Reboot => Body::Reboot,
+        other => bail!("{}: not an order", other.name()),
+    };
+    client.order(body)?;
+    Ok(Answer::done())
+}
+
+fn some_or_all(axes: &[Axis]) -> AxisSet {
+    if axes.is_empty() {
+        AxisSet::ALL
+    } else {
+        axes.iter().copied().map(Into::into).collect()
+    }
+}
+
+pub(super) fn wait(
+    client: &mut Client,
+    what: &str,
+    axes: &[Axis],
+    timeout: f64,
+) -> anyhow::Result<Answer> {
+    let timeout = seconds("--timeout", timeout)?;
+    if !axes.is_empty() && what != "homed" {
+        bail!("wait {what}: axes belong behind `homed`");
+    }
+    match what {
+        "rest" => {
+            settle::rest(client, timeout)?;
+        }
+        "homed" => {
+            settle::homed(client, some_or_all(axes), timeout)?;
+        }
+        number => match number.parse() {
+            Ok(time_s) => client.wait(seconds("wait", time_s)?)?,
+            Err(_) => bail!("wait {number}: give seconds, `rest` or `homed`"),
+        },
+    }
+    Ok(Answer::done())
+}

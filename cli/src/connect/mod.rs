@@ -1,0 +1,115 @@
+//! The command `quadrant connect`: the console.
+
+mod answer;
+mod command;
+mod commission;
+mod dispatch;
+mod flash;
+mod identify;
+mod line;
+mod machine;
+mod observe;
+mod printer;
+mod program;
+mod scope;
+mod script;
+mod session;
+mod settings;
+mod simulated_io;
+
+use std::path::PathBuf;
+
+use clap::Args;
+use quadrant_sim::client::Client;
+
+use self::command::Command;
+use self::printer::Printer;
+use self::session::Session;
+use crate::endpoint::{DEFAULT_IMAGE, LinkEndpoint};
+
+/// Options of `quadrant connect`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    machine: MachineOptions,
+    /// Seed of the simulated stage's noise; the same seed gives the same results.
+    #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp"])]
+    seed: u64,
+    /// Keep the flash of the simulated or emulated machine in a file, so that what is stored survives this command.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "tcp"])]
+    flash: Option<PathBuf>,
+    /// Print one JSON object a line: {"command": ..., "result": ...} or {"command": ..., "error": ...}.
+    #[arg(long)]
+    json: bool,
+    /// Print each command of a script before what comes of it.
+    #[arg(long, conflicts_with = "json")]
+    echo: bool,
+    /// Go on after a command that failed; the exit code is 1 all the same.
+    #[arg(long)]
+    keep_going: bool,
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+/// Options that name the machine, one at most.
+#[derive(Clone, Debug, Args)]
+#[group(required = false, multiple = false)]
+struct MachineOptions {
+    /// A board at a serial port, such as /dev/ttyACM0 or COM3; 921600 baud.
+    #[arg(long, value_name = "PATH")]
+    port: Option<String>,
+    /// A machine behind a socket: a port that is shared over a network, or an emulator's.
+    #[arg(long, value_name = "HOST:PORT")]
+    tcp: Option<String>,
+    /// The firmware's own code on the simulated stage, in this process. Its time passes as fast as it can, only while it is
+    /// waited for.
+    #[arg(long)]
+    simulated: bool,
+    /// The firmware's image in QEMU on the simulated stage, the same way; without a path, the one that `cargo xtask build
+    /// --board mps2` has left below this folder.
+    #[arg(long, value_name = "ELF", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_IMAGE)]
+    emulated: Option<PathBuf>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if let Some(Command::Flash(flash)) = &arguments.command {
+        return flash::run(flash);
+    }
+    if let Some(Command::Log(log)) = &arguments.command
+        && let Some(elf) = &log.elf
+    {
+        return flash::log(elf, log);
+    }
+    let printer = Printer {
+        json: arguments.json,
+    };
+    let mut session = Session::new(connect(arguments)?, printer);
+    let succeeded = match &arguments.command {
+        None | Some(Command::Script) => {
+            script::run(&mut session, arguments.echo, arguments.keep_going)?
+        }
+        Some(command) => dispatch::run(&mut session, command, ""),
+    };
+    if succeeded {
+        Ok(())
+    } else {
+        // What failed has been said. The emulator ends with the session.
+        drop(session);
+        std::process::exit(1)
+    }
+}
+
+fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
+    let named = &arguments.machine;
+    let endpoint = match (&named.port, &named.tcp, &named.emulated, named.simulated) {
+        (Some(path), ..) => LinkEndpoint::Serial(path.clone()),
+        (_, Some(address), ..) => LinkEndpoint::Tcp(address.clone()),
+        (_, _, Some(image), _) => LinkEndpoint::Emulated(image.clone()),
+        (.., true) => LinkEndpoint::Simulated,
+        _ => anyhow::bail!(
+            "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \
+             without one"
+        ),
+    };
+    endpoint.connect(arguments.seed, arguments.flash.as_deref())
+}

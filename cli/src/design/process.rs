@@ -1,0 +1,138 @@
+//! Options that name the model to design on.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use quadrant::control::plant_model::PlantModel;
+use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_cli::output::Output;
+use quadrant_sim::design::Form;
+use quadrant_sim::settings_file::SettingsFile;
+
+use quadrant_cli::axis::Axis;
+
+/// Options that name a model of an axis: numbers, or settings that hold one.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Model {
+    /// The axis of the settings whose model and gains are taken.
+    #[arg(long, value_enum, default_value_t = Axis::X)]
+    pub(super) axis: Axis,
+    /// Settings of the stage, as `quadrant commission` writes them; without it, the built-in ones.
+    #[arg(long, value_name = "FILE")]
+    pub(super) settings: Option<PathBuf>,
+    /// A, acceleration per volt, mm/(V s²), in place of the settings' model; the next three go with it.
+    #[arg(
+        long,
+        value_name = "MM_PER_V_S2",
+        requires = "damping",
+        conflicts_with = "settings"
+    )]
+    gain: Option<f64>,
+    /// B, damping over mass, 1/s.
+    #[arg(long, value_name = "PER_S", requires = "gain")]
+    damping: Option<f64>,
+    /// C, stiffness over mass, 1/s².
+    #[arg(long, value_name = "PER_S2", requires = "gain")]
+    stiffness: Option<f64>,
+    /// Td, dead time without the converter's hold, s.
+    #[arg(long, value_name = "S", requires = "gain")]
+    delay: Option<f64>,
+    /// Control rate, Hz; without it, that of the settings.
+    #[arg(long, value_name = "HZ")]
+    rate_hz: Option<f64>,
+    /// From reading the encoder to writing the converter, s.
+    #[arg(long, default_value_t = 0.0, value_name = "S")]
+    pub(super) computation_delay_s: f64,
+}
+
+impl Model {
+    /// Reads the stage's settings.
+    pub(super) fn file(&self) -> anyhow::Result<SettingsFile> {
+        Ok(match &self.settings {
+            Some(path) => SettingsFile::read(path)?,
+            None => SettingsFile::new(StageSettings::simulated()),
+        })
+    }
+
+    /// The axis' settings in them.
+    pub(super) fn axis<'a>(&self, file: &'a SettingsFile) -> &'a AxisSettings {
+        &file.stage.axes[self.axis.index()]
+    }
+
+    /// Returns the linear model, checked.
+    pub(super) fn plant(&self, file: &SettingsFile) -> anyhow::Result<PlantModel> {
+        let plant = match self.gain {
+            None => self.axis(file).plant.with_context(|| {
+                format!(
+                    "the settings hold no model of the {} axis: commission it, or give --gain, --damping, --stiffness and --delay",
+                    self.axis.name()
+                )
+            })?,
+            Some(gain_mm_per_v_s2) => PlantModel {
+                gain_mm_per_v_s2,
+                damping_per_s: self.damping.unwrap_or(0.0),
+                stiffness_per_s2: self.stiffness.unwrap_or(0.0),
+                delay_s: self.delay.unwrap_or(0.0),
+            },
+        };
+        if !plant.is_valid() {
+            bail!(
+                "A = {} mm/(V s²), B = {} 1/s, C = {} 1/s², Td = {} s is no model: A must be above zero, the others zero or more",
+                plant.gain_mm_per_v_s2,
+                plant.damping_per_s,
+                plant.stiffness_per_s2,
+                plant.delay_s
+            );
+        }
+        Ok(plant)
+    }
+
+    /// The loop as it runs.
+    pub(super) fn sampled(&self, file: &SettingsFile) -> anyhow::Result<Form> {
+        let rate_hz = self.rate_hz.unwrap_or(file.stage.rate_hz);
+        if !(1e3..=1e5).contains(&rate_hz) {
+            bail!("--rate-hz {rate_hz}: the control rate must be 1000 to 100000 Hz");
+        }
+        if !(0.0..=10.0 / rate_hz).contains(&self.computation_delay_s) {
+            bail!(
+                "--computation-delay-s {}: it must be zero to ten control periods",
+                self.computation_delay_s
+            );
+        }
+        Ok(Form::Sampled {
+            sample_time_s: 1.0 / rate_hz,
+            computation_delay_s: self.computation_delay_s,
+        })
+    }
+
+    /// Whence the model comes, for a page.
+    pub(super) fn subject(&self) -> String {
+        match (&self.gain, &self.settings) {
+            (Some(_), _) => "A model given by its parameters".to_owned(),
+            (None, Some(path)) => {
+                format!("The {} axis of {}", self.axis.name(), path.display())
+            }
+            (None, None) => format!("The {} axis of the built-in settings", self.axis.name()),
+        }
+    }
+
+    /// Writes settings with what a design changed, checked as a whole.
+    pub(super) fn write(
+        &self,
+        output: &Output,
+        mut file: SettingsFile,
+        command: &str,
+        records: Vec<String>,
+        sets: &str,
+    ) -> anyhow::Result<()> {
+        file.add_provenance(command, self.axis.name(), records, &[sets]);
+        let path = output.file("settings.toml")?;
+        file.write(&path)?;
+        println!(
+            "{}: the settings of the stage with this {sets}",
+            path.display()
+        );
+        Ok(())
+    }
+}

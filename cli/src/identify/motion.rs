@@ -1,0 +1,230 @@
+//! The command `quadrant identify motion`.
+
+use std::path::PathBuf;
+
+use anyhow::{Context, bail};
+use clap::Args;
+use quadrant::settings::StageSettings;
+use quadrant_sim::identify::motion::{
+    Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, refined,
+    replay_closed_loop, replay_open_loop, shuttle, validate,
+};
+use quadrant_sim::identify::pages::motion::{
+    Reruns, candidates_table, motion_page, motion_table, validation_table,
+};
+use quadrant_sim::machine::TestAxis;
+use quadrant_sim::pages::provenance;
+use quadrant_sim::record::Recording;
+use quadrant_sim::report::Table;
+
+use super::recorded;
+use crate::subject::{Destination, Subject};
+use quadrant_cli::output::{Output, command_line, share, with_bar};
+
+/// Options of `quadrant identify motion`.
+#[derive(Clone, Debug, Args)]
+pub(crate) struct Arguments {
+    #[command(flatten)]
+    subject: Subject,
+    /// A recorded motion: a CSV file with t_s, position_mm (or position_m), voltage_v and, for a closed loop, reference_mm (or
+    /// reference_m).
+    #[arg(long, value_name = "FILE")]
+    record: Option<PathBuf>,
+    /// Another recorded motion of the same axis, taken later: every model is judged on it, and none is fitted to it.
+    #[arg(long, value_name = "FILE", requires = "record")]
+    validate: Option<PathBuf>,
+    /// Force per volt at the amplifier's input, N/V: adds parameters in kg, N s/m and N.
+    #[arg(long, value_name = "N_PER_V")]
+    force_per_volt: Option<f64>,
+    /// Cut-off of the position's low-pass, Hz.
+    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
+    cutoff_hz: f64,
+    /// Rows of the regression a second, Hz.
+    #[arg(long, default_value_t = 100.0, value_name = "HZ")]
+    row_rate_hz: f64,
+    /// Time cut at each end, s.
+    #[arg(long, default_value_t = 0.05, value_name = "S")]
+    edge_s: f64,
+    /// Displacements at which pre-sliding elements may slip, um; at most 8.
+    #[arg(long, value_delimiter = ',', default_values_t = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0], value_name = "UM,...")]
+    knots_um: Vec<f64>,
+    /// Dead time from voltage to force, s, if it is known, from a frequency response for instance: gentle motions hardly tell it
+    /// from inertia.
+    #[arg(long, value_name = "S")]
+    dead_time_s: Option<f64>,
+    /// Position gain kp of the cascade that followed the record's reference, 1/s: adds its simulation in closed loop.
+    #[arg(long, value_name = "PER_S", requires = "cascade_kv")]
+    cascade_kp: Option<f64>,
+    /// Velocity gain kv of that cascade, V s/m.
+    #[arg(long, value_name = "V_S_PER_M", requires = "cascade_kp")]
+    cascade_kv: Option<f64>,
+    /// Times that the axis is moved to and fro.
+    #[arg(
+        long,
+        default_value_t = 2,
+        value_name = "TIMES",
+        conflicts_with = "record"
+    )]
+    rounds: usize,
+    #[command(flatten)]
+    destination: Destination,
+    #[command(flatten)]
+    output: Output,
+}
+
+/// The amplifier's range in a simulated cascade, V.
+const LIMIT_V: f64 = 10.0;
+
+pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let output = &arguments.output;
+    if let Some(force) = arguments.force_per_volt
+        && !(force > 0.0 && force.is_finite())
+    {
+        bail!("--force-per-volt {force}: it must be above zero");
+    }
+    let cascade = cascade(arguments)?;
+    let (recording, title, stage) = recording(arguments)?;
+    let settings = MotionFitSettings {
+        cutoff_hz: arguments.cutoff_hz,
+        edge_s: arguments.edge_s,
+        row_rate_hz: arguments.row_rate_hz,
+        knots_mm: arguments.knots_um.iter().map(|um| 1e-3 * um).collect(),
+        dead_time_s: arguments.dead_time_s,
+    };
+    let bar = share("fitting models");
+    let mut candidates = fit_motion(&recording, &settings, &|done| {
+        bar.set_position((1000.0 * done) as u64);
+    })?;
+    bar.set_message("refining the best");
+    let best = recommended(&candidates).context("no model of the record is one of friction")?;
+    let refined = refined(best, &recording, &settings);
+    let validated = arguments
+        .validate
+        .as_ref()
+        .map(|path| validation(&candidates, path, &settings))
+        .transpose()?;
+    bar.set_message("running the models");
+    let signals = Signals::new(&recording, &settings);
+    let rerun = |candidate: &Candidate| Reruns {
+        open_loop: replay_open_loop(&candidate.model, &recording, &signals),
+        closed_loop: cascade
+            .as_ref()
+            .map(|cascade| replay_closed_loop(&candidate.model, &recording, &signals, cascade)),
+    };
+    let mut chosen = best.clone();
+    // A search that found no end, or nothing better, leaves the best as it is.
+    if let Ok(refined) = refined {
+        let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
+        if rms(&refined) < rms(best) {
+            chosen = refined.clone();
+        }
+        candidates.push(refined);
+    }
+    let reruns: Vec<Reruns> = candidates.iter().map(rerun).collect();
+    bar.finish_and_clear();
+    let mut tables = vec![candidates_table(&candidates, &reruns)];
+    tables.extend(validated);
+    tables.push(motion_table(&chosen.model, arguments.force_per_volt));
+    for table in &tables {
+        output.table(table)?;
+    }
+    let page = motion_page(
+        &title,
+        tables,
+        &chosen,
+        provenance(&command_line(), output.seed),
+    );
+    output.page(&page, "motion.html")?;
+    let Arguments {
+        subject,
+        destination,
+        ..
+    } = arguments;
+    let records: Vec<PathBuf> = arguments
+        .record
+        .iter()
+        .chain(&arguments.validate)
+        .cloned()
+        .collect();
+    destination.write(
+        subject,
+        stage,
+        &records,
+        &["friction", "plant"],
+        |settings| {
+            settings.plant = Some(chosen.model.plant());
+            settings.friction = chosen.model.friction_settings();
+        },
+    )
+}
+
+/// Every candidate on another record.
+fn validation(
+    candidates: &[Candidate],
+    path: &PathBuf,
+    settings: &MotionFitSettings,
+) -> anyhow::Result<Table> {
+    let other = recorded::read(path)?;
+    let errors = candidates
+        .iter()
+        .map(|candidate| Ok((candidate, validate(candidate, &other, settings)?)))
+        .collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(validation_table(&errors, &path.display().to_string()))
+}
+
+fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {
+    let (Some(position_gain_per_s), Some(kv)) = (arguments.cascade_kp, arguments.cascade_kv) else {
+        return Ok(None);
+    };
+    if !(position_gain_per_s > 0.0 && kv > 0.0) {
+        bail!("--cascade-kp {position_gain_per_s} --cascade-kv {kv}: both must be above zero");
+    }
+    Ok(Some(CascadeLoop {
+        position_gain_per_s,
+        velocity_gain_v_s_per_mm: 1e-3 * kv,
+        limit_v: LIMIT_V,
+    }))
+}
+
+/// Travel of an axis of which none is known, mm.
+pub(crate) const TRAVEL_MM: f64 = 200.0;
+
+/// Moves an axis to and fro, under the settings in force.
+pub(crate) fn move_to_and_fro(
+    test_axis: &mut dyn TestAxis,
+    rounds: usize,
+) -> anyhow::Result<Recording> {
+    let found = with_bar("moving to and fro", |progress| {
+        shuttle(test_axis, rounds, progress)
+    })?;
+    Ok(found)
+}
+
+/// The record, its title on a page, and the settings of the machine, if one was measured.
+fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option<StageSettings>)> {
+    let Arguments {
+        subject,
+        destination,
+        output,
+        ..
+    } = arguments;
+    if let Some(path) = &arguments.record {
+        let title = recorded::title(std::slice::from_ref(path));
+        return Ok((recorded::read(path)?, title, None));
+    }
+    let start = subject.start_axis(destination.into.as_deref())?;
+    let measured = subject.measure(
+        output.seed,
+        start.as_ref(),
+        Some(TRAVEL_MM),
+        |test_axis, base| {
+            if start.is_some() {
+                test_axis.apply(base)?;
+            }
+            move_to_and_fro(test_axis, arguments.rounds)
+        },
+    )?;
+    let recording = measured.found;
+    recording.write_csv(&output.file("motion-recording.csv")?)?;
+    Ok((recording, measured.title, Some(measured.stage)))
+}

@@ -1,0 +1,161 @@
+//! Output of the commands: results to the terminal, pages into files.
+
+use std::path::{Path, PathBuf};
+
+use anyhow::Context;
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use quadrant_sim::pages::provenance;
+use quadrant_sim::report::{Block, Format, Page, Section, Table};
+
+/// Options that every experiment has.
+#[derive(Clone, Debug, Args)]
+pub struct Output {
+    /// Folder for results; made if it is missing.
+    #[arg(long, default_value = Self::FOLDER, value_name = "FOLDER")]
+    out: PathBuf,
+    /// Seed of the simulated noise; the same seed gives the same results.
+    #[arg(long, default_value_t = Self::SEED)]
+    pub seed: u64,
+    /// Formats of the results; may be given several times.
+    #[arg(long, value_enum, default_values_t = Self::FORMATS, value_name = "FORMAT")]
+    format: Vec<Format>,
+}
+
+impl Default for Output {
+    fn default() -> Self {
+        Self {
+            out: Self::FOLDER.into(),
+            seed: Self::SEED,
+            format: Self::FORMATS.into(),
+        }
+    }
+}
+
+impl Output {
+    const FOLDER: &str = "quadrant-out";
+    const SEED: u64 = 1;
+    const FORMATS: [Format; 2] = [Format::Html, Format::Csv];
+
+    /// The path of a file in the folder, which is made.
+    pub fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
+        std::fs::create_dir_all(&self.out)
+            .with_context(|| format!("cannot make the folder {}", self.out.display()))?;
+        Ok(self.out.join(name))
+    }
+
+    /// Prints a table and, where CSV is wanted, writes it.
+    pub fn table(&self, table: &Table) -> anyhow::Result<()> {
+        println!("{}\n", table.to_text());
+        self.keep_table(table)
+    }
+
+    /// Writes a table where CSV is wanted.
+    pub fn keep_table(&self, table: &Table) -> anyhow::Result<()> {
+        if self.format.contains(&Format::Csv) {
+            table.write_csv(&self.file(&format!("{}.csv", table.id))?)?;
+        }
+        Ok(())
+    }
+
+    /// Writes a page in the formats that are wanted, under the stem of `name`.
+    pub fn page(&self, page: &Page, name: &str) -> anyhow::Result<()> {
+        for line in self.keep_page(page, name)? {
+            println!("{line}");
+        }
+        Ok(())
+    }
+
+    /// The same, and says where it is instead of printing it.
+    pub fn keep_page(&self, page: &Page, name: &str) -> anyhow::Result<Vec<String>> {
+        let stem = name.strip_suffix(".html").unwrap_or(name);
+        page.write(&self.out, stem, &self.format)?;
+        let folder = self.out.display();
+        let line = |format: &Format| match format {
+            Format::Html => format!("{folder}/{stem}.html: open it in a browser"),
+            Format::Json => format!("{folder}/{stem}.json: the page as data"),
+            Format::Csv => format!("{folder}/*.csv: its tables, and in figures/ its curves"),
+            Format::Svg => format!("{folder}/figures/*.svg: its figures, for print"),
+        };
+        Ok(self.format.iter().map(line).collect())
+    }
+
+    /// Prints tables and writes a page of nothing else.
+    pub fn tables(
+        &self,
+        title: &str,
+        subtitle: &str,
+        tables: Vec<Table>,
+        name: &str,
+    ) -> anyhow::Result<()> {
+        for table in &tables {
+            self.table(table)?;
+        }
+        let section = Section {
+            id: "results".to_owned(),
+            heading: "Results".to_owned(),
+            provenance: None,
+            prose: vec![],
+            blocks: tables.into_iter().map(Block::Table).collect(),
+        };
+        self.section(title, subtitle, section, name)
+    }
+
+    /// Writes a page of one section.
+    pub fn section(
+        &self,
+        title: &str,
+        subtitle: &str,
+        section: Section,
+        name: &str,
+    ) -> anyhow::Result<()> {
+        let page = Page {
+            title: title.to_owned(),
+            subtitle: subtitle.to_owned(),
+            provenance: provenance(&command_line(), self.seed),
+            sections: vec![section],
+        };
+        self.page(&page, name)
+    }
+}
+
+/// A progress bar over a share of 0 to 1, in thousandths; hidden where nobody watches.
+pub fn share(what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {percent} %, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(1000).with_style(style).with_message(what)
+}
+
+/// Runs `work` under a progress bar; what it is given takes the share that is done, 0 to 1.
+pub fn with_bar<T>(message: &'static str, work: impl FnOnce(&mut dyn FnMut(f64)) -> T) -> T {
+    let bar = share(message);
+    let done = work(&mut |done| bar.set_position((1000.0 * done) as u64));
+    bar.finish_and_clear();
+    done
+}
+
+/// A progress bar over `runs`; hidden where nobody watches.
+pub fn progress(runs: u64, what: &'static str) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg} {wide_bar} {pos}/{len} runs, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(runs).with_style(style).with_message(what)
+}
+
+/// The command line as it was given, but for the folder and the formats of the results: what a reader repeats.
+pub fn command_line() -> String {
+    const LEFT_OUT: [&str; 2] = ["--out", "--format"];
+    let mut given = std::env::args();
+    let program = given.next().unwrap_or_default();
+    let program = Path::new(&program).file_stem().unwrap_or_default();
+    let mut words = vec![program.to_string_lossy().into_owned()];
+    while let Some(word) = given.next() {
+        let name = word.split('=').next().unwrap_or_default();
+        if !LEFT_OUT.contains(&name) {
+            words.push(word);
+        } else if word == name {
+            given.next();
+        }
+    }
+    words.join(" ")
+}

@@ -1,0 +1,93 @@
+//! `quadrant replay`.
+
+use std::path::PathBuf;
+
+use anyhow::{bail, ensure};
+use clap::Args;
+use quadrant_cli::law_settings::LawSettings;
+use quadrant_cli::output::{Output, progress};
+use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
+use quadrant_sim::pages::provenance;
+use quadrant_sim::record::Record;
+use quadrant_sim::replay::recorded;
+use quadrant_sim::replay::recorded::RecordedAxis;
+use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
+
+use super::replay_program::{self, ProgramOptions};
+
+/// Options of `quadrant replay`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct Arguments {
+    /// CSV file with the columns t_s and reference_m (or reference_mm); position_m (or position_mm), if present, is the
+    /// recorded machine's own.
+    #[arg(
+        long,
+        value_name = "FILE",
+        requires = "axis",
+        required_unless_present = "gcode",
+        conflicts_with = "gcode"
+    )]
+    reference: Option<PathBuf>,
+    /// The axis that follows the reference.
+    #[arg(long, value_enum, conflicts_with = "gcode")]
+    axis: Option<RecordedAxis>,
+    #[command(flatten)]
+    program: ProgramOptions,
+    /// Model that the law has of the simulated stage: as identified, on a stage with noise, offset and ripple, or exact, on
+    /// one without. The controllers are the same.
+    #[arg(long, value_enum, default_value = "identified")]
+    model: ModelKnowledge,
+    #[command(flatten)]
+    settings: LawSettings,
+    #[command(flatten)]
+    output: Output,
+}
+
+pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    let Arguments {
+        reference,
+        axis,
+        program,
+        model,
+        settings,
+        output,
+    } = arguments;
+    ensure!(
+        settings.path.is_none() || *axis != Some(RecordedAxis::Emps),
+        "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
+    );
+    let stage = settings.read()?.stage;
+    let setup = RunConfiguration::new(*model, stage);
+    if let Some(path) = &program.gcode {
+        return replay_program::run(path, program, &setup, output);
+    }
+    // The command line has either a program, or a reference and its axis.
+    let (Some(reference), Some(axis)) = (reference, axis) else {
+        bail!("nothing to follow; give --gcode, or --reference with --axis");
+    };
+    let record = Record::read(reference, &axis.limits())?;
+    for doubt in &record.doubts {
+        eprintln!("note: {doubt}");
+    }
+    let bar = progress(recorded::RUNS, "following the record");
+    let outcomes = recorded::replay(&record, *axis, &setup, output.seed, &|| bar.inc(1))?;
+    bar.finish_and_clear();
+    output.table(&recorded_table(&outcomes, *axis))?;
+    let settings = settings.option();
+    let model = match model {
+        ModelKnowledge::Identified => "",
+        ModelKnowledge::Exact => " --model exact",
+    };
+    let command = format!(
+        "quadrant replay --reference {} --axis {}{model}{settings} --seed {}",
+        reference
+            .file_name()
+            .unwrap_or(reference.as_os_str())
+            .display(),
+        clap::ValueEnum::to_possible_value(axis)
+            .map_or_else(String::new, |value| value.get_name().to_owned()),
+        output.seed
+    );
+    let page = recorded_page(&outcomes, *axis, provenance(&command, output.seed));
+    output.page(&page, "replay.html")
+}

@@ -1,0 +1,97 @@
+//! The commands `quadrant design pid` and `npid`, from end to end.
+
+use crate::command;
+use std::path::Path;
+
+use quadrant_sim::settings_file::SettingsFile;
+
+fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    command::succeed(folder, &[&["design"], arguments].concat())
+}
+
+fn fail(folder: &Path, arguments: &[&str]) -> String {
+    command::fail(folder, &[&["design"], arguments].concat())
+}
+
+/// The cells of a row of a table's CSV file.
+fn row(path: &Path, first: &str) -> Vec<String> {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let row = reader
+        .records()
+        .map(Result::unwrap)
+        .find(|row| row[0].starts_with(first))
+        .unwrap();
+    row.iter().map(str::to_owned).collect()
+}
+
+#[test]
+fn the_thesis_targets_print_the_thesis_margins() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeed(
+        at,
+        &[
+            "pid",
+            "--gain-margin-db",
+            "9.9",
+            "--phase-margin-deg",
+            "54.2",
+            "--crossover-hz",
+            "64.9",
+            "--out",
+            "x",
+        ],
+    );
+    let margins = row(&at.join("x/margins.csv"), "continuous");
+    let value = |index: usize| -> f64 { margins[index].parse().unwrap() };
+    assert_eq!(format!("{:.1} {:.0}", value(1), value(2)), "9.9 194");
+    assert_eq!(format!("{:.1} {:.1}", value(3), value(4)), "54.2 64.9");
+    assert!(at.join("x/pid.html").exists());
+}
+
+#[test]
+fn one_design_builds_on_another_and_the_settings_tell_both() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let bounds = ["--sensitivity-peak", "1.7", "--design-on", "sampled"];
+    let mut arguments = vec!["pid", "--axis", "y", "--out", "pid"];
+    arguments.extend(bounds);
+    succeed(at, &arguments);
+    succeed(
+        at,
+        &[
+            "npid",
+            "--axis",
+            "y",
+            "--settings",
+            "pid/settings.toml",
+            "--draws",
+            "50",
+            "--out",
+            "npid",
+        ],
+    );
+    let file = SettingsFile::read(&at.join("npid/settings.toml")).unwrap();
+    let axes: Vec<&str> = file.provenance.iter().map(|p| p.axis.as_str()).collect();
+    assert_eq!(axes, ["y", "y"]);
+    assert_eq!(file.provenance[1].sets, ["feedback.nonlinear"]);
+    let default = quadrant::settings::presets::y_axis();
+    assert!(file.stage.axes[1].feedback.pid.kp_v_per_mm > default.feedback.pid.kp_v_per_mm);
+    assert!(at.join("npid/npid.html").exists());
+}
+
+#[test]
+fn what_cannot_be_designed_is_refused_with_what_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let crossover = ["pid", "--crossover-hz", "150", "--phase-margin-deg", "80"];
+    assert!(fail(at, &crossover).contains("can only lie between"));
+    let missing = fail(at, &["pid", "--frf", "none.csv"]);
+    assert!(missing.contains("none.csv"), "{missing}");
+    let zero = ["pid", "--gain", "0", "--damping", "10"];
+    assert!(fail(at, &zero).contains("A must be above zero"));
+    let share = ["npid", "--sector-share", "2"];
+    assert!(fail(at, &share).contains("at most 1"));
+    let rate = ["pid", "--rate-hz", "20"];
+    assert!(fail(at, &rate).contains("1000 to 100000"));
+}

@@ -1,0 +1,16 @@
+//! The command `quadrant`, run as a program.
+//!
+//! One program of many modules: each would otherwise be linked once more.
+
+mod circle;
+mod command;
+mod commission;
+mod connect;
+mod connect_commission;
+mod design_commands;
+mod identify_commands;
+mod part_program;
+mod record_bad_input;
+#[cfg(target_os = "linux")]
+mod record_large;
+mod transcript;
