@@ -180,7 +180,7 @@ impl Arguments {
                 .measure(self.output.seed, start.as_ref(), None, |test_axis, base| {
                     let settings = if unknown {
                         let base = &StageSettings::simulated().axes[self.subject.axis()?.index()];
-                        let request = CommissionSettings::default();
+                        let request = CommissionSettings::thesis();
                         commission(test_axis, base, &request, &mut |_, done| {
                             bar.set_position((1000.0 * done) as u64);
                         })?

@@ -49,17 +49,16 @@ pub fn commission(
     };
 
     test_axis.apply(&zero_gain_settings(base))?;
-    let motor =
-        motor_constant::measure(test_axis, &MotorConstantSettings::default(), &mut |share| {
-            report(step, share);
-        })?;
+    let steps = MotorConstantSettings::default().fitted_to(test_axis.info().travel_mm);
+    let motor = motor_constant::measure(test_axis, &steps, &mut |share| {
+        report(step, share);
+    })?;
 
     step += 1;
     test_axis.apply(&bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz))?;
-    approach(test_axis, HOME_MM)?;
     let response = sliding_response(test_axis, &mut |share| report(step, share))?;
     let plant = models::plant(&response)?;
-    let pid = models::pid(&plant, base, request)?;
+    let pid = models::pid(&plant, base, request, rate_hz)?;
 
     step += 1;
     let mut settings = base.clone();
@@ -67,7 +66,8 @@ pub fn commission(
     settings.feedback.pid = pid;
     test_axis.apply(&measuring_settings(&settings))?;
     approach(test_axis, HOME_MM)?;
-    let (map, recordings) = static_friction::measure(test_axis, &request.friction, &mut |share| {
+    let runs = request.friction.fitted_to(test_axis.info().travel_mm);
+    let (map, recordings) = static_friction::measure(test_axis, &runs, &mut |share| {
         report(step, share);
     })?;
     let friction = models::friction(&map)?;
@@ -78,7 +78,7 @@ pub fn commission(
     let (_, breakaway_v) = friction.mean_levels_v();
     let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
     let recording = virgin_curve::measure(test_axis, &sine, &mut |share| report(step, share))?;
-    let gms = models::presliding(&recording, &friction)?;
+    let gms = models::presliding(&recording, &friction);
 
     step += 1;
     let measurements = Measurements {
@@ -96,13 +96,13 @@ pub fn commission(
     };
     let mut found = models.commissioned(measurements, base, request, rate_hz);
 
+    if !request.trials {
+        return Ok(found);
+    }
     step += 1;
-    found.results = verify(
-        test_axis,
-        &found.settings,
-        request.sine_test,
-        &mut |share| report(step, share),
-    )?;
+    let verification = verify(test_axis, &found.settings, &mut |share| report(step, share))?;
+    found.settings = verification.settings(&found.settings);
+    found.verification = Some(verification);
     Ok(found)
 }
 
@@ -111,8 +111,10 @@ fn sliding_response(
     test_axis: &mut dyn TestAxis,
     progress: &mut dyn FnMut(f64),
 ) -> Result<FrfMeasurement, CommissionError> {
-    let mut settings = FrfSettings::default();
+    let mut settings = FrfSettings::default().fitted_to(test_axis.info().travel_mm);
     for _ in 0..HALVINGS {
+        // A pass that was given up ended somewhere on its way.
+        approach(test_axis, HOME_MM)?;
         match frf::measure(test_axis, &settings, progress) {
             Err(FrfError::NotSliding { .. }) => {
                 settings.excitation = Excitation {
@@ -123,5 +125,6 @@ fn sliding_response(
             outcome => return Ok(outcome?),
         }
     }
+    approach(test_axis, HOME_MM)?;
     Ok(frf::measure(test_axis, &settings, progress)?)
 }

@@ -2,44 +2,55 @@
 
 use quadrant::settings::AxisSettings;
 
-use super::verify::{SINE, SineResult};
+use super::verify::Verification;
 use crate::design::{MarginError, Margins, Target};
-use crate::experiment::sine_test::SineTest;
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::PlantFit;
 use crate::identify::static_friction::{FrictionFit, FrictionMap, StaticFrictionSettings};
-use crate::identify::virgin_curve::GmsFit;
+use crate::identify::virgin_curve::{GmsFit, VirginCurveError};
 use crate::record::Recording;
 
 /// Request for a commissioning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CommissionSettings {
-    /// Target of the PID, on the continuous loop.
-    pub target: Target,
+    /// Target of the PID, on the continuous loop; without one it is the [best](crate::design::best_pid) on the sampled loop.
+    pub target: Option<Target>,
     /// Share of the Popov bound that the nonlinear gain may take, 0 to 1.
     pub sector_share: f64,
+    /// True if laws are tried on the axis, and the best is chosen that is nowhere worse than the PID alone. Without trials the
+    /// settings are the N-PID's with combined feedforward.
+    pub trials: bool,
     /// The runs that the friction is taken from.
     pub friction: StaticFrictionSettings,
-    /// The sine on which the result is judged.
-    pub sine_test: SineTest,
 }
 
 impl Default for CommissionSettings {
-    /// The thesis' margins, and three quarters of the Popov bound.
+    /// The best PID, and three quarters of the Popov bound.
     fn default() -> Self {
         Self {
-            target: Target::Margins {
-                gain_margin_db: 9.9,
-                phase_margin_deg: 54.2,
-                crossover_hz: None,
-            },
+            target: None,
             sector_share: 0.75,
+            trials: true,
             friction: StaticFrictionSettings {
                 velocities_mm_s: (0.1, 40.0),
                 ..StaticFrictionSettings::default()
             },
-            sine_test: SINE,
+        }
+    }
+}
+
+impl CommissionSettings {
+    /// The thesis' margins for the PID, and its law, untried.
+    pub fn thesis() -> Self {
+        Self {
+            target: Some(Target::Margins {
+                gain_margin_db: 9.9,
+                phase_margin_deg: 54.2,
+                crossover_hz: None,
+            }),
+            trials: false,
+            ..Self::default()
         }
     }
 }
@@ -57,12 +68,62 @@ pub struct Commissioned {
     pub margins: Result<Margins, MarginError>,
     /// The friction-velocity map, its model, and the recordings of the runs.
     pub friction: (FrictionMap, FrictionFit, Vec<Recording>),
-    /// Pre-sliding friction, and its recording.
-    pub presliding: (GmsFit, Recording),
+    /// Pre-sliding friction, or the reason why it was not found, and its recording.
+    pub presliding: (Result<GmsFit, VirginCurveError>, Recording),
     /// The Popov bound of the nonlinear gain.
     pub sector_bound: f64,
     /// Settings of the axis, finished.
     pub settings: AxisSettings,
-    /// Results of the sine on the axis; none of a commissioning from saved recordings.
-    pub results: Vec<SineResult>,
+    /// Trials on the axis; none of a commissioning from saved recordings, or where none were asked for.
+    pub verification: Option<Verification>,
 }
+
+/// Relative error of the predicted hysteresis from which on it is worth a note.
+const NOTED_HYSTERESIS_ERROR: f64 = 0.10;
+/// Change of the PID's error during the commissioning from which on it is worth a note.
+const NOTED_DRIFT: f64 = 0.10;
+
+impl Commissioned {
+    /// What a person should know of the result beside its tables, in sentences.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes = Vec::new();
+        match &self.presliding.0 {
+            Ok(gms) if gms.prediction.relative_error > NOTED_HYSTERESIS_ERROR => {
+                notes.push(format!(
+                    "The GMS model misses the measured hysteresis by {:.1} % of the breakaway level.",
+                    100.0 * gms.prediction.relative_error
+                ));
+            }
+            Ok(_) => {}
+            Err(reason) => notes.push(format!(
+                "No pre-sliding friction was identified ({reason}); one spring over {} um stands for it.",
+                1e3 * ASSUMED_RANGE_MM
+            )),
+        }
+        if let Some(verification) = &self.verification {
+            if (verification.drift - 1.0).abs() > NOTED_DRIFT {
+                notes.push(format!(
+                    "The axis changed while it was tried: the PID's RMS error at the end was {:.2} times that at the start.",
+                    verification.drift
+                ));
+            }
+            notes.push(if verification.is_better_than_pid() {
+                let chosen = verification.chosen();
+                let (worst, mean) = chosen.against(&verification.laws[0]);
+                format!(
+                    "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst.",
+                    chosen.law,
+                    100.0 * mean,
+                    verification.sines.len(),
+                    100.0 * worst
+                )
+            } else {
+                "Nothing was better than the PID alone on every sine: the settings are those of the PID.".to_owned()
+            });
+        }
+        notes
+    }
+}
+
+/// Pre-sliding range where none was identified, mm.
+pub(super) const ASSUMED_RANGE_MM: f64 = 0.02;

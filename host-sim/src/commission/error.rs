@@ -43,15 +43,6 @@ pub enum CommissionError {
     /// The GMS model was not found.
     #[error("pre-sliding friction: {0}")]
     Presliding(#[from] VirginCurveError),
-    /// The GMS model does not predict what was measured.
-    #[error(
-        "the GMS model misses the measured hysteresis by {percent:.1} % of the breakaway level: the axis' friction changes with \
-         position or time; look for a bent screw, a tight guide, a cold machine"
-    )]
-    Hysteresis {
-        /// RMS of the miss, %.
-        percent: f64,
-    },
     /// The response at rest.
     #[error("linear model with friction: {0}")]
     Revise(#[from] ReviseError),

@@ -1,23 +1,26 @@
 //! From the measurements of a commissioning to its models and settings: without an axis.
 
+use heapless::Vec as ShortVec;
 use quadrant::control::pid::PidGains;
 use quadrant::control::popov::sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::friction::PerDirection;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 
-use super::commissioned::{CommissionSettings, Commissioned};
+use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
 use super::error::CommissionError;
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
-use crate::design::{Form, PidRequest, Process, design_pid};
+use crate::design::{Form, PidRequest, Process, best_pid, design_pid};
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
 use crate::identify::single_state::with_all_models;
 use crate::identify::static_friction::{Exponent, FrictionFit, FrictionMap, fit_map};
-use crate::identify::virgin_curve::{self, GmsFit, Knots, VirginCurveError};
+use crate::identify::virgin_curve::{
+    self, ASSUMED_ATTRACTION_V_S, GmsFit, Knots, VirginCurveError,
+};
 use crate::record::Recording;
 
 /// Elements that find their own knots.
@@ -27,8 +30,6 @@ const FEW_ELEMENTS: usize = 4;
 const RISEN: f64 = 0.95;
 const SPREAD: f64 = 1.7;
 const DENSITY: f64 = 1.6;
-/// Largest relative error of the predicted hysteresis.
-const MOST_HYSTERESIS_ERROR: f64 = 0.10;
 
 /// Measurements of a commissioning.
 #[derive(Clone, Debug)]
@@ -50,7 +51,7 @@ pub(super) struct Models {
     pub(super) plant: PlantFit,
     pub(super) pid: PidGains,
     pub(super) friction: FrictionFit,
-    pub(super) gms: GmsFit,
+    pub(super) gms: Result<GmsFit, VirginCurveError>,
 }
 
 /// Fits the linear model to the response.
@@ -69,14 +70,28 @@ pub(super) fn pid(
     plant: &PlantFit,
     base: &AxisSettings,
     request: &CommissionSettings,
+    rate_hz: f64,
 ) -> Result<PidGains, CommissionError> {
+    let process = Process::Model(plant.plant);
+    let filter_s = base.feedback.pid.derivative_filter_s;
+    let Some(target) = request.target else {
+        return Ok(best_pid(&process, sampled(rate_hz), filter_s)?.gains);
+    };
     let design = PidRequest {
-        target: request.target,
+        target,
         form: Form::Continuous,
-        derivative_filter_s: base.feedback.pid.derivative_filter_s,
+        derivative_filter_s: filter_s,
         ki_v_per_mm_s: None,
     };
-    Ok(design_pid(&Process::Model(plant.plant), &design)?.gains)
+    Ok(design_pid(&process, &design)?.gains)
+}
+
+/// The loop as it runs.
+fn sampled(rate_hz: f64) -> Form {
+    Form::Sampled {
+        sample_time_s: 1.0 / rate_hz,
+        computation_delay_s: 0.0,
+    }
 }
 
 /// Fits the static friction model to the map.
@@ -87,18 +102,23 @@ pub(super) fn friction(map: &FrictionMap) -> Result<FrictionFit, CommissionError
 /// Identifies the GMS model from the slow sine.
 ///
 /// # Errors
-/// A model that does not predict the recording.
+/// A recording that gives none.
 pub(super) fn presliding(
     recording: &Recording,
     friction: &FrictionFit,
-) -> Result<GmsFit, CommissionError> {
-    let gms = identify_elements(recording, &friction.models())?;
-    if gms.prediction.relative_error > MOST_HYSTERESIS_ERROR {
-        return Err(CommissionError::Hysteresis {
-            percent: 100.0 * gms.prediction.relative_error,
-        });
+) -> Result<GmsFit, VirginCurveError> {
+    identify_elements(recording, &friction.models())
+}
+
+/// One spring that stands for a pre-sliding friction which was not identified.
+fn assumed(breakaway_v: f64) -> GmsParameters {
+    GmsParameters {
+        elements: ShortVec::from_iter([GmsElement {
+            stiffness_v_per_mm: breakaway_v / ASSUMED_RANGE_MM,
+            weight: 1.0,
+        }]),
+        attraction_v_s: ASSUMED_ATTRACTION_V_S,
     }
-    Ok(gms)
 }
 
 impl Measurements {
@@ -113,9 +133,9 @@ impl Measurements {
         rate_hz: f64,
     ) -> Result<Commissioned, CommissionError> {
         let plant = plant(&self.response)?;
-        let pid = pid(&plant, base, request)?;
+        let pid = pid(&plant, base, request, rate_hz)?;
         let friction = friction(&self.map)?;
-        let gms = presliding(&self.presliding, &friction)?;
+        let gms = presliding(&self.presliding, &friction);
         let models = Models {
             plant,
             pid,
@@ -158,7 +178,10 @@ impl Models {
             transfer_s: base.feedback.transfer_s,
             ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
         };
-        settings.friction = with_all_models(friction.models(), gms.gms.clone());
+        let elements = gms
+            .as_ref()
+            .map_or_else(|_| assumed(breakaway_v), |found| found.gms.clone());
+        settings.friction = with_all_models(friction.models(), elements);
         settings.feedforward.kind = FeedforwardKind::Combined;
         settings.feedforward.gains = FeedforwardGains {
             level: 1.0,
@@ -167,13 +190,7 @@ impl Models {
             inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
         };
         settings.feedforward.preview_s = plant.plant.delay_s;
-        let margins = Process::Model(plant.plant).margins(
-            &pid,
-            Form::Sampled {
-                sample_time_s: 1.0 / rate_hz,
-                computation_delay_s: 0.0,
-            },
-        );
+        let margins = Process::Model(plant.plant).margins(&pid, sampled(rate_hz));
         Commissioned {
             motor: measurements.motor,
             response: measurements.response,
@@ -183,7 +200,7 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
-            results: Vec::new(),
+            verification: None,
         }
     }
 }

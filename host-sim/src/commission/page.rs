@@ -1,7 +1,8 @@
 //! The page of a commissioning.
 
-use crate::commission::verify::SineResult;
+use crate::commission::verify::Verification;
 use crate::commission::{Commissioned, CrossCheck};
+use crate::experiment::metrics::{Score, change_percent};
 use crate::identify::motion::recommended;
 use crate::identify::pages::friction::{friction_section, presliding_section};
 use crate::identify::pages::linear::{motor_constant_table, plant_tables, response_section};
@@ -59,35 +60,69 @@ pub fn gains_table(found: &Commissioned) -> Table {
     }
 }
 
-/// Returns the table of each law's sine tests on the axis, by its own encoder.
-pub fn results_table(results: &[SineResult]) -> Table {
-    let baseline = results.first().map(|result| result.score);
+/// The errors of each law that was tried on the axis, by its own encoder.
+pub fn results_table(verification: &Verification) -> Table {
+    let pid = &verification.laws[0];
+    let rows = verification.laws.iter().enumerate().map(|(index, law)| {
+        let first = law.scores.first();
+        let change = |read: fn(&Score) -> f64| match (first, pid.scores.first()) {
+            (Some(own), Some(pid)) => Cell::number(change_percent(read(pid), read(own)), 1),
+            _ => Cell::Missing,
+        };
+        let um = |read: fn(&Score) -> f64, decimals| {
+            first.map_or(Cell::Missing, |score| {
+                Cell::number(UM_PER_MM * read(score), decimals)
+            })
+        };
+        let (worst, mean) = law.against(pid);
+        let percent = |ratio: f64| {
+            if ratio.is_finite() {
+                Cell::number(100.0 * ratio, 0)
+            } else {
+                Cell::Missing
+            }
+        };
+        let state = match &law.stopped {
+            Some(_) => "stopped",
+            None if index == verification.chosen => "chosen",
+            None => "",
+        };
+        vec![
+            Cell::text(law.law.as_str()),
+            um(|score| score.largest_mm, 2),
+            um(|score| score.rms_mm, 3),
+            change(|score| score.largest_mm),
+            change(|score| score.rms_mm),
+            Cell::number(law.scores.len() as f64, 0),
+            percent(mean),
+            percent(worst),
+            Cell::text(state),
+        ]
+    });
+    let sines: Vec<String> = verification
+        .sines
+        .iter()
+        .map(|sine| format!("{} mm at {} mm/s", sine.amplitude_mm, sine.velocity_mm_s))
+        .collect();
     Table {
         id: "verdict".to_owned(),
-        caption: "Tracking error on the sine, by the axis' own encoder, over two cycles; change against the PID"
-            .to_owned(),
+        caption: format!(
+            "Tracking error by the axis' own encoder, over two cycles, on the first sine, and its change against the PID; then largest \
+             and RMS errors over those of the PID, on the mean and at worst, over as many sines as the law ran on: {}",
+            sines.join(", ")
+        ),
         columns: vec![
             Column::new("Law"),
             Column::with_unit("Largest", "um"),
             Column::with_unit("RMS", "um"),
             Column::with_unit("Change of largest", "%"),
             Column::with_unit("Change of RMS", "%"),
+            Column::new("Sines"),
+            Column::with_unit("Mean of PID", "%"),
+            Column::with_unit("Worst of PID", "%"),
+            Column::new(""),
         ],
-        rows: results
-            .iter()
-            .map(|result| {
-                let change = |from: Option<f64>, to: f64| {
-                    from.map_or(Cell::Missing, |from| Cell::number(100.0 * (to / from - 1.0), 1))
-                };
-                vec![
-                    Cell::text(result.law),
-                    Cell::number(UM_PER_MM * result.score.largest_mm, 2),
-                    Cell::number(UM_PER_MM * result.score.rms_mm, 3),
-                    change(baseline.map(|score| score.largest_mm), result.score.largest_mm),
-                    change(baseline.map(|score| score.rms_mm), result.score.rms_mm),
-                ]
-            })
-            .collect(),
+        rows: rows.collect(),
     }
 }
 
@@ -99,8 +134,9 @@ pub fn commission_page(
     provenance: Provenance,
 ) -> Page {
     let error_curves = found
-        .results
+        .verification
         .iter()
+        .flat_map(|verification| &verification.laws)
         .enumerate()
         .map(|(index, result)| {
             let recording = &result.recording;
@@ -111,7 +147,7 @@ pub fn commission_page(
                 .map(|(reference, position)| reference - position)
                 .collect();
             error_curve(
-                result.law.to_owned(),
+                result.law.clone(),
                 &errors,
                 recording.sample_time_s,
                 Style::nth(index),
@@ -128,14 +164,20 @@ pub fn commission_page(
     response
         .blocks
         .extend([parameters, bands].map(Block::Table));
-    let mut sections = vec![
-        Section {
-            provenance: None,
-            id: "result".to_owned(),
-            heading: "What it achieves".to_owned(),
-            prose: Vec::new(),
-            blocks: vec![
-                Block::Table(results_table(&found.results)),
+    let mut result = Section {
+        provenance: None,
+        id: "result".to_owned(),
+        // From saved recordings nothing ran on the settings.
+        heading: "Controller".to_owned(),
+        prose: found.notes(),
+        blocks: vec![Block::Table(gains_table(found))],
+    };
+    if let Some(verification) = &found.verification {
+        result.heading = "What it achieves".to_owned();
+        result.blocks.splice(
+            ..0,
+            [
+                Block::Table(results_table(verification)),
                 Block::Figure(Figure {
                     id: "verdict-errors".to_owned(),
                     caption: "Tracking error, by the axis' own encoder".to_owned(),
@@ -146,17 +188,12 @@ pub fn commission_page(
                         ..Lines::default()
                     }),
                 }),
-                Block::Table(gains_table(found)),
             ],
-        },
-        response,
-        friction_section(map, friction),
-        presliding_section(gms, friction.mean_levels_v().1),
-    ];
-    if found.results.is_empty() {
-        // From saved recordings: nothing ran on the settings.
-        sections[0].heading = "Controller".to_owned();
-        sections[0].blocks.drain(..2);
+        );
+    }
+    let mut sections = vec![result, response, friction_section(map, friction)];
+    if let Ok(gms) = gms {
+        sections.push(presliding_section(gms, friction.mean_levels_v().1));
     }
     sections.extend(
         checked

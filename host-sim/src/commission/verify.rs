@@ -1,30 +1,307 @@
-//! Sine tests of the commissioned settings on the axis itself, measured by its own encoder.
+//! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: nothing is handed over
+//! that is worse than the PID alone on any of the sines.
 
-use quadrant::feedforward::FeedforwardKind;
+use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::bootstrap::measuring_settings;
 use crate::experiment::metrics::{Score, score};
 use crate::experiment::sine_test::SineTest;
-use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, approach};
 use crate::record::Recording;
 
-/// The sine on which settings are judged: the middle velocity of the thesis, on a travel that every axis has.
-pub const SINE: SineTest = SineTest {
-    amplitude_mm: 5.0,
-    velocity_mm_s: 10.0,
-};
+/// The sines on an axis with room: the middle velocity of the thesis first, then short, slow and fast.
+const SINES: [SineTest; 4] = [
+    SineTest {
+        amplitude_mm: 5.0,
+        velocity_mm_s: 10.0,
+    },
+    SineTest {
+        amplitude_mm: 0.2,
+        velocity_mm_s: 1.0,
+    },
+    SineTest {
+        amplitude_mm: 1.0,
+        velocity_mm_s: 2.0,
+    },
+    SineTest {
+        amplitude_mm: 15.0,
+        velocity_mm_s: 60.0,
+    },
+];
+/// Sines on which kinds of feedforward are compared; the best then runs on all.
+const COMPARED: usize = 2;
+/// Share of the travel that a sine's amplitude takes at most, and share of the velocity limit.
+const MOST_TRAVEL: f64 = 0.4;
+const MOST_VELOCITY: f64 = 0.5;
+/// Kinds of feedforward that are tried, as far as they were identified.
+const KINDS: [FeedforwardKind; 5] = [
+    FeedforwardKind::Combined,
+    FeedforwardKind::SmoothedGms,
+    FeedforwardKind::Lugre,
+    FeedforwardKind::Dahl,
+    FeedforwardKind::Static,
+];
+/// Shares of the identified friction that are tried where the whole of it is worse than the PID anywhere.
+const SHARES: [f64; 3] = [0.75, 0.5, 0.25];
+/// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
+const NO_WORSE: f64 = 1.01;
 
-/// Score of one law on the sine.
+/// The sines that fit an axis.
+pub fn sines(info: &AxisInfo) -> Vec<SineTest> {
+    SINES
+        .iter()
+        .map(|sine| {
+            let amplitude_mm = sine.amplitude_mm.min(MOST_TRAVEL * info.travel_mm);
+            // As many cycles a second: half the amplitude at half the velocity.
+            let velocity_mm_s = sine.velocity_mm_s * amplitude_mm / sine.amplitude_mm;
+            SineTest {
+                amplitude_mm,
+                velocity_mm_s: velocity_mm_s.min(MOST_VELOCITY * info.max_velocity_mm_s),
+            }
+        })
+        .collect()
+}
+
+/// Scores of one law.
 #[derive(Clone, Debug)]
-pub struct SineResult {
+pub struct LawResult {
     /// Name of the law.
-    pub law: &'static str,
-    /// Its score, on the measured position.
-    pub score: Score,
-    /// Recording of the scored cycles.
+    pub law: String,
+    /// Its scores, on the measured position, sine by sine as far as it ran.
+    pub scores: Vec<Score>,
+    /// Recording of the first sine's scored cycles.
     pub recording: Recording,
+    /// The reason why the axis was stopped, if it was.
+    pub stopped: Option<String>,
+    settings: AxisSettings,
+}
+
+impl LawResult {
+    /// Its errors over those of the PID: the largest of all ratios, and their geometric mean, over the sines that both ran;
+    /// infinite for a law that was stopped.
+    pub fn against(&self, pid: &Self) -> (f64, f64) {
+        if self.stopped.is_some() {
+            return (f64::INFINITY, f64::INFINITY);
+        }
+        let pairs = self.scores.iter().zip(&pid.scores);
+        let ratios: Vec<f64> = pairs
+            .flat_map(|(own, pid)| [own.largest_mm / pid.largest_mm, own.rms_mm / pid.rms_mm])
+            .collect();
+        let worst = ratios.iter().copied().fold(0.0, f64::max);
+        let logarithms: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
+        (worst, (logarithms / ratios.len() as f64).exp())
+    }
+}
+
+/// All trials, and the law that is handed over.
+#[derive(Clone, Debug)]
+pub struct Verification {
+    pub sines: Vec<SineTest>,
+    /// The PID alone first.
+    pub laws: Vec<LawResult>,
+    /// Index of the law that is handed over.
+    pub chosen: usize,
+    /// RMS error of the PID at the end over that at the start, on the first sine: how far the axis changed meanwhile.
+    pub drift: f64,
+}
+
+impl Verification {
+    /// True if a law was found that is better than the PID alone, and nowhere worse.
+    pub fn is_better_than_pid(&self) -> bool {
+        self.chosen != 0
+    }
+
+    pub fn chosen(&self) -> &LawResult {
+        &self.laws[self.chosen]
+    }
+
+    /// Settings of the law that is handed over, with the limits of `base`.
+    pub fn settings(&self, base: &AxisSettings) -> AxisSettings {
+        AxisSettings {
+            limits: base.limits.clone(),
+            ..self.chosen().settings.clone()
+        }
+    }
+}
+
+/// Reason why the trials cannot be run.
+#[derive(Debug, thiserror::Error)]
+pub enum VerifyError {
+    /// The settings are refused.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The PID alone was stopped.
+    #[error(transparent)]
+    TestAxis(#[from] ExperimentError),
+}
+
+/// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, and
+/// less of the best where it is worse than the PID anywhere. Chooses the best of those that are not.
+///
+/// # Errors
+/// A PID whose settings are refused, or that is stopped.
+pub fn verify(
+    test_axis: &mut dyn TestAxis,
+    settings: &AxisSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Verification, VerifyError> {
+    let sines = sines(&test_axis.info());
+    let mut bench = Bench {
+        test_axis,
+        sines: &sines,
+        progress,
+        done: 0.0,
+    };
+    let pid = measuring_settings(settings);
+    let npid = AxisSettings {
+        feedback: settings.feedback.clone(),
+        ..pid.clone()
+    };
+    let full = |kind: FeedforwardKind, share: f64| {
+        let mut full = npid.clone();
+        full.feedforward = settings.feedforward.clone();
+        full.feedforward.kind = kind;
+        let gains = &settings.feedforward.gains;
+        full.feedforward.gains = FeedforwardGains {
+            level: share * gains.level,
+            gms: share * gains.gms,
+            ..*gains
+        };
+        full
+    };
+    let alone = bench.try_law("PID", &pid, sines.len())?;
+    if let Some(stopped) = alone.1 {
+        return Err(stopped.into());
+    }
+    let pid_alone = alone.0.clone();
+    let mut laws = vec![alone.0];
+    let nonlinear = bench.try_law("N-PID", &npid, sines.len());
+    laws.extend(nonlinear.ok().map(|found| found.0));
+
+    let mut kinds: Vec<(FeedforwardKind, LawResult)> = Vec::new();
+    for kind in KINDS {
+        // A model that was not identified, or that the control rate does not resolve, is refused.
+        let law = format!("N-PID + {}", kind.name());
+        if let Ok((found, _)) = bench.try_law(&law, &full(kind, 1.0), COMPARED) {
+            kinds.push((kind, found));
+        }
+    }
+    let mean = |law: &LawResult| law.against(&pid_alone).1;
+    let best = kinds
+        .iter()
+        .enumerate()
+        .min_by(|a, b| mean(&a.1.1).total_cmp(&mean(&b.1.1)))
+        .map(|(index, _)| index);
+    if let Some(index) = best {
+        let (kind, mut whole) = kinds.remove(index);
+        bench.finish(&mut whole);
+        let mut worst = whole.against(&pid_alone).0;
+        laws.push(whole);
+        for share in SHARES {
+            if worst <= NO_WORSE {
+                break;
+            }
+            let law = format!("N-PID + {:.0} % of {}", 100.0 * share, kind.name());
+            if let Ok((found, _)) = bench.try_law(&law, &full(kind, share), sines.len()) {
+                worst = found.against(&pid_alone).0;
+                laws.push(found);
+            }
+        }
+    }
+    let good = |law: &LawResult| {
+        let (worst, mean) = law.against(&pid_alone);
+        law.scores.len() == sines.len() && worst <= NO_WORSE && mean < 1.0
+    };
+    let chosen = (1..laws.len())
+        .filter(|&index| good(&laws[index]))
+        .min_by(|&a, &b| mean(&laws[a]).total_cmp(&mean(&laws[b])))
+        .unwrap_or(0);
+    let again = bench.try_law("PID, again", &pid, 1)?.0;
+    let rms = |law: &LawResult| law.scores.first().map_or(f64::NAN, |score| score.rms_mm);
+    let drift = rms(&again) / rms(&pid_alone);
+    // The others are shown, too, after those that ran on every sine.
+    laws.extend(kinds.into_iter().map(|(_, law)| law));
+    Ok(Verification {
+        sines,
+        laws,
+        chosen,
+        drift,
+    })
+}
+
+/// Runs that all trials make at most, for progress.
+const MOST_RUNS: f64 = 33.0;
+
+struct Bench<'a> {
+    test_axis: &'a mut dyn TestAxis,
+    sines: &'a [SineTest],
+    progress: &'a mut dyn FnMut(f64),
+    done: f64,
+}
+
+impl Bench<'_> {
+    /// A law on the first sines; stops where the axis is stopped. Settings that are refused are an error.
+    fn try_law(
+        &mut self,
+        law: &str,
+        settings: &AxisSettings,
+        count: usize,
+    ) -> Result<(LawResult, Option<ExperimentError>), SettingsError> {
+        let mut settings = settings.clone();
+        // Room for the error that a poor law makes, as for the PID.
+        let measuring = measuring_settings(&settings);
+        settings.limits = measuring.limits;
+        self.test_axis.apply(&settings)?;
+        let mut result = LawResult {
+            law: law.to_owned(),
+            scores: Vec::new(),
+            recording: Recording::default(),
+            stopped: None,
+            settings,
+        };
+        let stopped = self.run_on(&mut result, count);
+        Ok((result, stopped))
+    }
+
+    /// The sines that a law has not run on yet.
+    fn finish(&mut self, result: &mut LawResult) {
+        if result.stopped.is_none() && self.test_axis.apply(&result.settings).is_ok() {
+            self.run_on(result, self.sines.len());
+        }
+    }
+
+    fn run_on(&mut self, result: &mut LawResult, count: usize) -> Option<ExperimentError> {
+        for index in result.scores.len()..count {
+            let done = self.done;
+            let progress = &mut *self.progress;
+            let outcome = approach(self.test_axis, 0.0).and_then(|()| {
+                run(
+                    self.test_axis,
+                    &result.law,
+                    self.sines[index],
+                    &mut |share| {
+                        progress(((done + share) / MOST_RUNS).min(1.0));
+                    },
+                )
+            });
+            self.done += 1.0;
+            match outcome {
+                Ok((score, recording)) => {
+                    result.scores.push(score);
+                    if index == 0 {
+                        result.recording = recording;
+                    }
+                }
+                Err(error) => {
+                    result.stopped = Some(error.to_string());
+                    return Some(error);
+                }
+            }
+        }
+        None
+    }
 }
 
 /// Cycles at full speed, of which the last [`SCORED_CYCLES`] count.
@@ -34,56 +311,12 @@ const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-/// Reason why the sine cannot be run.
-#[derive(Debug, thiserror::Error)]
-pub enum VerifyError {
-    /// The settings are refused.
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
-    /// The run was stopped.
-    #[error(transparent)]
-    TestAxis(#[from] ExperimentError),
-}
-
-/// Runs the PID alone, the N-PID alone, and `settings` as they are, on a sine.
-///
-/// # Errors
-/// Refused settings, or a run that is stopped.
-pub fn verify(
-    test_axis: &mut dyn TestAxis,
-    settings: &AxisSettings,
-    sine_test: SineTest,
-    progress: &mut dyn FnMut(f64),
-) -> Result<Vec<SineResult>, VerifyError> {
-    let pid = measuring_settings(settings);
-    let npid = AxisSettings {
-        feedback: settings.feedback.clone(),
-        ..pid.clone()
-    };
-    let mut full = settings.clone();
-    full.feedforward.kind = FeedforwardKind::Combined;
-    let laws = [
-        ("PID", pid),
-        ("N-PID", npid),
-        ("N-PID + static + GMS", full),
-    ];
-    let mut results = Vec::new();
-    for (index, (law, settings)) in laws.into_iter().enumerate() {
-        test_axis.apply(&settings)?;
-        let share = |done: f64| (index as f64 + done) / 3.0;
-        results.push(run(test_axis, law, sine_test, &mut |done| {
-            progress(share(done))
-        })?);
-    }
-    Ok(results)
-}
-
 fn run(
     test_axis: &mut dyn TestAxis,
-    law: &'static str,
+    law: &str,
     sine_test: SineTest,
     progress: &mut dyn FnMut(f64),
-) -> Result<SineResult, VerifyError> {
+) -> Result<(Score, Recording), ExperimentError> {
     let sine = HarmonicSettings::with_velocity(
         sine_test.amplitude_mm,
         sine_test.velocity_mm_s,
@@ -111,9 +344,5 @@ fn run(
         .zip(&scored.position_mm)
         .map(|(reference, position)| reference - position)
         .collect();
-    Ok(SineResult {
-        law,
-        score: score(&scored.reference_mm, &errors, cycle),
-        recording: scored,
-    })
+    Ok((score(&scored.reference_mm, &errors, cycle), scored))
 }

@@ -1,5 +1,10 @@
 //! Continuous or sampled: the form in which a loop is closed.
 
+use num_complex::Complex64;
+use quadrant::control::pid::PidGains;
+
+use super::loop_shape::controller_response;
+
 /// Form in which a loop is closed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Form {
@@ -12,4 +17,17 @@ pub enum Form {
         /// From reading the encoder to writing the converter, s; zero or more.
         computation_delay_s: f64,
     },
+}
+
+impl Form {
+    /// The response of a PID in this form at a frequency in rad/s, V/mm.
+    pub(super) fn controller(self, gains: &PidGains, omega_rad_s: f64) -> Complex64 {
+        match self {
+            Self::Continuous => gains.response(omega_rad_s),
+            Self::Sampled { sample_time_s, .. } => {
+                let z = Complex64::cis(omega_rad_s * sample_time_s);
+                controller_response(gains, sample_time_s, z)
+            }
+        }
+    }
 }

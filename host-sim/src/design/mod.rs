@@ -5,6 +5,7 @@
 //! How much *nonlinear* gain a design then bears is [`quadrant::control::popov::sector_bound`]'s answer.
 
 mod bandwidth;
+pub mod best;
 mod form;
 pub mod held_plant;
 pub mod integral_gain;
@@ -23,6 +24,7 @@ pub mod time_varying;
 #[cfg(test)]
 mod time_domain;
 
+pub use best::{best_pid, load_step_error};
 pub use form::Form;
 pub use integral_gain::{
     Printed, PrintedMargins, largest_integral_gain, largest_integral_gain_where,

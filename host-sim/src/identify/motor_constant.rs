@@ -36,6 +36,22 @@ impl Default for MotorConstantSettings {
     }
 }
 
+/// Travel that the usual test needs at most, mm, and the shortest dwell over the usual one.
+const ROOM_MM: f64 = 40.0;
+const SHORTEST: f64 = 0.4;
+
+impl MotorConstantSettings {
+    /// Shorter levels where the travel, either way, is short: the way goes with the square of the time.
+    #[must_use]
+    pub fn fitted_to(self, travel_mm: f64) -> Self {
+        let share = (travel_mm / ROOM_MM).sqrt().clamp(SHORTEST, 1.0);
+        Self {
+            dwell_s: share * self.dwell_s,
+            ..self
+        }
+    }
+}
+
 /// Result of the test.
 #[derive(Clone, Debug)]
 pub struct MotorConstant {

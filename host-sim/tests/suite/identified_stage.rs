@@ -27,7 +27,7 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
         .enumerate()
         .for_each(|(index, (axis, truth))| {
             let mut rig = SimulatedTestAxis::new(index, truth, 1);
-            let request = CommissionSettings::default();
+            let request = CommissionSettings::thesis();
             *axis = commission(&mut rig, axis, &request, &mut |_, _| {})
                 .unwrap()
                 .settings;

@@ -134,7 +134,7 @@ pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, Commission
     let found = commission(
         &mut rig,
         &base,
-        &CommissionSettings::default(),
+        &CommissionSettings::thesis(),
         &mut |_, _| {},
     )?;
     Ok(Judgement {
@@ -142,7 +142,7 @@ pub fn judge(axis: usize, noise: f64, seed: u64) -> Result<Judgement, Commission
         noise,
         seed,
         estimates: estimates(&found, &truth),
-        hysteresis_percent: 100.0 * found.presliding.0.prediction.relative_error,
+        hysteresis_percent: 100.0 * found.presliding.0.clone()?.prediction.relative_error,
     })
 }
 

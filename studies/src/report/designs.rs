@@ -37,7 +37,7 @@ pub(super) fn identification(
     let found = commission(
         &mut rig,
         &StageSettings::simulated().axes[0],
-        &CommissionSettings::default(),
+        &CommissionSettings::thesis(),
         &mut |_, done| progress.at(COMMISSIONED * done),
     )?;
     let checked = CrossCheck::run(&mut rig, &found.settings, context.seed, &mut |_, _| {

@@ -57,7 +57,7 @@ pub fn commission_drive(
 ) -> Result<AxisSettings, CommissionError> {
     let mut rig = SimulatedTestAxis::new(index, truth.clone(), seed);
     let base = StageSettings::simulated().axes[index].clone();
-    let request = CommissionSettings::default();
+    let request = CommissionSettings::thesis();
     Ok(commission(&mut rig, &base, &request, &mut |_, _| {})?.settings)
 }
 

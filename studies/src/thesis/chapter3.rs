@@ -52,16 +52,18 @@ pub fn chapter3_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Sect
         let figure = Block::Figure(constant_velocity_figure(run));
         constant_velocity.blocks.insert(0, figure);
     }
-    let mut presliding = presliding_section(gms, friction.mean_levels_v().1);
-    presliding
-        .blocks
-        .insert(1, Block::Figure(hysteresis_figure(slow_sine)));
+    let presliding = gms.as_ref().ok().map(|gms| {
+        let mut section = presliding_section(gms, friction.mean_levels_v().1);
+        let figure = Block::Figure(hysteresis_figure(slow_sine));
+        section.blocks.insert(1, figure);
+        section
+    });
     let mut sections = vec![
         response,
         motor_constant_section(&found.motor, None),
         constant_velocity,
-        presliding,
     ];
+    sections.extend(presliding);
     sections.extend(revise_sections(
         &checked.at_rest,
         plant,

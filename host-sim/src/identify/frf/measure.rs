@@ -97,10 +97,23 @@ const BLOCK_PERIODS: usize = 2;
 /// Acceleration and jerk of the passes.
 const ACCELERATION_MM_S2: f64 = 500.0;
 const JERK_MM_S3: f64 = 2e4;
+/// Slowest pass that is chosen for a short travel, mm/s.
+const SLOWEST_MM_S: f64 = 0.5;
 /// Share of the travel that passes use.
 const TRAVEL_SHARE: f64 = 0.9;
 
 impl FrfSettings {
+    /// Slower passes where the travel, either way, does not hold one at the velocity.
+    #[must_use]
+    pub fn fitted_to(mut self, travel_mm: f64) -> Self {
+        while pass_length_mm(&self, 1) > TRAVEL_SHARE * travel_mm
+            && self.bias_velocity_mm_s > SLOWEST_MM_S
+        {
+            self.bias_velocity_mm_s *= 0.9;
+        }
+        self
+    }
+
     fn check(&self, rate_hz: f64) -> Result<(), FrfError> {
         let refuse = |field, value, expected| {
             Err(SettingError {

@@ -11,6 +11,10 @@ const VELOCITIES_MM_S: [f64; 6] = [5.0, 80.0, 10.0, 40.0, 20.0, 120.0];
 const LENGTH_MM: f64 = 60.0;
 /// Longest time of a move, s.
 const LONGEST_S: f64 = 2.0;
+/// Share of the travel either way that a move takes, and of the velocity limit; shortest time of a move, s.
+const TRAVEL_SHARE: f64 = 0.8;
+const VELOCITY_SHARE: f64 = 0.8;
+const SHORTEST_S: f64 = 0.2;
 /// Acceleration and jerk of the moves.
 const ACCELERATION_MM_S2: f64 = 1500.0;
 const JERK_MM_S3: f64 = 5e4;
@@ -29,8 +33,12 @@ pub fn shuttle(
     rounds: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Recording, ExperimentError> {
+    let info = test_axis.info();
+    let room_mm = LENGTH_MM.min(TRAVEL_SHARE * info.travel_mm);
+    let fastest_mm_s = (room_mm / SHORTEST_S).min(VELOCITY_SHARE * info.max_velocity_mm_s);
     let there_and_back = VELOCITIES_MM_S.into_iter().flat_map(|velocity_mm_s| {
-        let distance_mm = LENGTH_MM.min(velocity_mm_s * LONGEST_S);
+        let velocity_mm_s = velocity_mm_s.min(fastest_mm_s);
+        let distance_mm = room_mm.min(velocity_mm_s * LONGEST_S);
         [distance_mm, -distance_mm].map(|distance_mm| {
             MotionSettings::PointToPoint(PointToPointSettings {
                 distance_mm,
@@ -41,8 +49,8 @@ pub fn shuttle(
         })
     });
     let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(
-        SINE_AMPLITUDE_MM,
-        SINE_VELOCITY_MM_S,
+        SINE_AMPLITUDE_MM.min(0.5 * room_mm),
+        SINE_VELOCITY_MM_S.min(fastest_mm_s),
         SINE_CYCLES,
         SINE_LEAD_S,
     ));

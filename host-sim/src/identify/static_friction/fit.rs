@@ -4,7 +4,7 @@ use quadrant::friction::PerDirection;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use super::map::{FrictionMap, FrictionRun};
-use crate::identify::fit::{Fit, FitError, Loss, Parameter, fit};
+use crate::identify::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
 
 /// Treatment of delta, the exponent of the Stribeck curve.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ pub enum Exponent {
 pub struct DirectionFit {
     /// The model: levels as seen at the amplifier's input, viscous friction with the linear damping in it.
     pub model: StaticFriction,
-    /// Fc, Fs - Fc, Vs, sigma and, if it was free, delta, with standard errors and correlations.
+    /// Fc, Fs - Fc (below zero where the level rises with the speed), Vs, sigma and, if it was free, delta, with standard errors and correlations.
     pub fit: Fit,
     /// Standard deviation of Fs, V.
     pub breakaway_error_v: f64,
@@ -81,6 +81,9 @@ pub enum FrictionFitError {
 
 /// Fewest runs of a direction.
 const LEAST_RUNS: usize = 6;
+/// Residuals of a level that rises with the speed, over those of one that does not, from which on it is taken: a rise is easily
+/// mistaken for viscous friction.
+const RISING: f64 = 0.7;
 /// An error of each mean that does not scatter within its run, over the voltage.
 const SYSTEMATIC: f64 = 2e-4;
 
@@ -172,7 +175,7 @@ fn fit_direction(
             1.0
         }
     };
-    let fit = fit(&parameters, Loss::Huber, |values| {
+    let residuals = |values: &[f64]| -> Vec<f64> {
         let model = model(values, fixed);
         runs.iter()
             .map(|run| {
@@ -180,8 +183,27 @@ fn fit_direction(
                 (model.friction_v(run.velocity_mm_s) - run.voltage_v) / deviation
             })
             .collect()
-    })?
-    .no_better_than_stated();
+    };
+    // Where Fs hardly differs from Fc, Vs means nothing, and a search for it has no end: where it stands will do.
+    let search = |parameters: &[Parameter]| match fit(parameters, Loss::Huber, residuals) {
+        Err(FitError::NotConverged) => fit_nearest(parameters, Loss::Huber, residuals),
+        found => found,
+    };
+    let mut fit = search(&parameters)?;
+    let mut rising = parameters;
+    rising[1] = Parameter {
+        start: slowest.voltage_v - fastest.voltage_v,
+        bounds: (-most, 0.0),
+        ..rising[1]
+    };
+    rising[0].start = fastest.voltage_v;
+    if rising[1].start < 0.0
+        && let Ok(rising) = search(&rising)
+        && rising.residual_rms < RISING * fit.residual_rms
+    {
+        fit = rising;
+    }
+    let fit = fit.no_better_than_stated();
     let variance = fit.covariance(0, 0) + 2.0 * fit.covariance(0, 1) + fit.covariance(1, 1);
     Ok(DirectionFit {
         model: model(&fit.values, fixed),

@@ -56,6 +56,9 @@ pub enum StaticFrictionError {
 /// Acceleration and jerk of the moves.
 const ACCELERATION_MM_S2: f64 = 500.0;
 const JERK_MM_S3: f64 = 2e4;
+/// Share of a short travel that is the stretch, and the settling time there, s.
+const STRETCH_SHARE: f64 = 0.4;
+const SHORT_SETTLING_S: f64 = 1.0;
 /// Share of the travel that runs use.
 const TRAVEL_SHARE: f64 = 0.9;
 /// Samples of a run's recording at least: about one a count of the encoder at the slowest velocities.
@@ -69,6 +72,25 @@ const STICKING: f64 = 0.3;
 const SLIPPING: f64 = 2.0;
 
 impl StaticFrictionSettings {
+    /// A shorter stretch, less settling and slower runs where the travel, either way, does not hold the fastest.
+    #[must_use]
+    pub fn fitted_to(mut self, travel_mm: f64) -> Self {
+        let room_mm = TRAVEL_SHARE * travel_mm;
+        let (slowest, fastest) = &mut self.velocities_mm_s;
+        if self.stretch_mm > STRETCH_SHARE * room_mm {
+            self.stretch_mm = STRETCH_SHARE * room_mm;
+            self.settling_s = self.settling_s.min(SHORT_SETTLING_S);
+        }
+        let length_mm = |velocity: f64| {
+            let ramp_s = velocity / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
+            self.stretch_mm + velocity * (self.settling_s + 2.0 * ramp_s)
+        };
+        while length_mm(*fastest) > room_mm && *fastest > 2.0 * *slowest {
+            *fastest *= 0.9;
+        }
+        self
+    }
+
     fn check(&self) -> Result<(), StaticFrictionError> {
         let (slowest, fastest) = self.velocities_mm_s;
         let checks = [

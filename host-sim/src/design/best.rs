@@ -1,0 +1,140 @@
+//! The best PID under bounds on sensitivity: the baseline that everything else is compared with.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+use quadrant::control::pid::PidGains;
+
+use super::form::Form;
+use super::loop_shape::OpenLoop;
+use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
+use super::process::Process;
+
+/// Bounds on the peaks of `|S|` and `|T|`: usual ones (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
+pub const SENSITIVITY_PEAK: f64 = 1.7;
+pub const COMPLEMENTARY_PEAK: f64 = 1.5;
+/// Shares of the bounds that are tried for integral action.
+const INTEGRAL_SHARES: [f64; 5] = [0.05, 0.1, 0.15, 0.2, 0.3];
+/// Band over which a disturbance counts, Hz, and the frequencies in it.
+const BAND_HZ: (f64, f64) = (0.1, 2000.0);
+const FREQUENCIES: usize = 400;
+
+/// The PID with the least error after a step of the load, squared and summed over time, among those whose `|S|` and `|T|`
+/// stay within [`SENSITIVITY_PEAK`] and [`COMPLEMENTARY_PEAK`]. A reversal of Coulomb friction is such a step.
+///
+/// # Errors
+/// As [`design_pid`]: a process that allows no such loop.
+pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
+    let mut best: Result<(PidDesign, f64), Option<DesignError>> = Err(None);
+    for integral_share in INTEGRAL_SHARES {
+        let request = PidRequest {
+            target: Target::Bandwidth {
+                sensitivity_peak: SENSITIVITY_PEAK,
+                complementary_peak: COMPLEMENTARY_PEAK,
+                integral_share,
+            },
+            form,
+            derivative_filter_s: filter_s,
+            ki_v_per_mm_s: None,
+        };
+        match (design_pid(process, &request), &best) {
+            (Ok(design), _) if design.gains.ki_v_per_mm_s > 0.0 => {
+                let error = load_step_error(process, &design.gains, form);
+                if best.as_ref().map_or(f64::INFINITY, |found| found.1) > error {
+                    best = Ok((design, error));
+                }
+            }
+            (Err(error), Err(None)) => best = Err(Some(error)),
+            _ => {}
+        }
+    }
+    match best {
+        Ok((design, _)) => Ok(design),
+        Err(Some(error)) => Err(error),
+        Err(None) => Err(DesignError::Bounds {
+            sensitivity_peak: SENSITIVITY_PEAK,
+            complementary_peak: COMPLEMENTARY_PEAK,
+            percent: 0.0,
+        }),
+    }
+}
+
+/// Square root of the integral over time of the squared error after a load step of 1 V, mm sqrt(s), by Parseval's theorem.
+pub fn load_step_error(process: &Process, gains: &PidGains, form: Form) -> f64 {
+    let open_loop = process.open_loop(gains, form);
+    let (lowest, highest) = open_loop.band_rad_s();
+    let (first, last) = (
+        (TAU * BAND_HZ.0).max(lowest).ln(),
+        (TAU * BAND_HZ.1).min(highest).ln(),
+    );
+    let spacing = (last - first) / (FREQUENCIES - 1) as f64;
+    let sum: f64 = (0..FREQUENCIES)
+        .map(|index| {
+            let omega = (first + spacing * index as f64).exp();
+            let open = open_loop.response(omega);
+            let compliance =
+                open / form.controller(gains, omega) / (Complex64::new(1.0, 0.0) + open);
+            // d omega = omega d ln(omega), and the step's spectrum is 1 / omega.
+            compliance.norm_sqr() / omega
+        })
+        .sum();
+    (sum * spacing / std::f64::consts::PI).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::fixtures::{FILTER_S, X_PLANT, Y_PLANT, Z_PLANT};
+
+    const SAMPLED: Form = Form::Sampled {
+        sample_time_s: 1e-4,
+        computation_delay_s: 0.0,
+    };
+
+    #[test]
+    fn the_best_pid_keeps_its_bounds_and_beats_the_thesis_criterion_on_every_axis() {
+        for plant in [X_PLANT, Y_PLANT, Z_PLANT] {
+            let process = Process::Model(plant);
+            let best = best_pid(&process, SAMPLED, FILTER_S).unwrap();
+            assert!(best.margins.sensitivity_peak <= SENSITIVITY_PEAK);
+            assert!(best.margins.complementary_peak <= COMPLEMENTARY_PEAK);
+            let thesis = design_pid(
+                &process,
+                &PidRequest {
+                    target: Target::Margins {
+                        gain_margin_db: 9.9,
+                        phase_margin_deg: 54.2,
+                        crossover_hz: None,
+                    },
+                    form: Form::Continuous,
+                    derivative_filter_s: FILTER_S,
+                    ki_v_per_mm_s: None,
+                },
+            )
+            .unwrap();
+            let error = |gains: &PidGains| load_step_error(&process, gains, SAMPLED);
+            let ratio = error(&best.gains) / error(&thesis.gains);
+            assert!(ratio < 0.6, "{ratio}: {:?}", best.gains);
+        }
+    }
+
+    #[test]
+    fn the_error_of_a_stiff_spring_under_integral_action_is_that_of_the_formula() {
+        // Slow: the plant is its spring, 1/k; with L = Ki/(k s) the error is exp(-Ki t / k) / k.
+        let plant = quadrant::control::plant_model::PlantModel {
+            gain_mm_per_v_s2: 1e8,
+            damping_per_s: 1e4,
+            stiffness_per_s2: 1e8,
+            delay_s: 0.0,
+        };
+        let gains = PidGains {
+            kp_v_per_mm: 0.0,
+            ki_v_per_mm_s: 20.0,
+            kd_v_s_per_mm: 0.0,
+            derivative_filter_s: FILTER_S,
+        };
+        let found = load_step_error(&Process::Model(plant), &gains, Form::Continuous);
+        let exact = (1.0_f64 / (2.0 * 20.0)).sqrt();
+        assert!((found / exact - 1.0).abs() < 0.05, "{found} {exact}");
+    }
+}
