@@ -10,6 +10,7 @@
 //! - [`numerics`]: f32 and fixed point against f64;
 //! - [`outputs`]: the amplifier outputs' resolution;
 //! - [`identification`]: identification judged by the plant's parameters;
+//! - [`random_axes`]: commissioning of axes that are not the simulated stage's;
 //! - [`report`]: all of the first five and the circle test in one page, kept part by part.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
@@ -19,6 +20,7 @@ pub mod identification;
 pub mod laws;
 pub mod numerics;
 pub mod outputs;
+pub mod random_axes;
 pub mod report;
 pub mod robustness;
 pub mod thesis;

@@ -12,9 +12,12 @@ use super::verify::verify;
 use crate::identify::excitation::Excitation;
 use crate::identify::frf::{self, FrfError, FrfMeasurement, FrfSettings};
 use crate::identify::motor_constant::{self, MotorConstantSettings};
-use crate::identify::static_friction;
+use crate::identify::static_friction::{
+    self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionSettings,
+};
 use crate::identify::virgin_curve::{self, VirginCurveSettings};
-use crate::machine::{TestAxis, approach};
+use crate::machine::{ExperimentError, TestAxis, approach};
+use crate::record::Recording;
 
 /// The steps, for progress: name and share of the whole.
 const STEPS: [(&str, f64); 6] = [
@@ -28,6 +31,8 @@ const STEPS: [(&str, f64); 6] = [
 
 /// Position from which the experiments begin, mm: that in which the axis was switched on, in the middle of its travel.
 const HOME_MM: f64 = 0.0;
+/// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
+const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
 /// Times that the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
 /// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
@@ -56,7 +61,8 @@ pub fn commission(
 
     step += 1;
     test_axis.apply(&bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz))?;
-    let response = sliding_response(test_axis, &mut |share| report(step, share))?;
+    let gain = motor.gain_mm_per_v_s2;
+    let response = sliding_response(test_axis, gain, &mut |share| report(step, share))?;
     let plant = models::plant(&response)?;
     let pid = models::pid(&plant, base, request, rate_hz)?;
 
@@ -67,10 +73,9 @@ pub fn commission(
     test_axis.apply(&measuring_settings(&settings))?;
     approach(test_axis, HOME_MM)?;
     let runs = request.friction.fitted_to(test_axis.info().travel_mm);
-    let (map, recordings) = static_friction::measure(test_axis, &runs, &mut |share| {
+    let (map, recordings, friction) = friction(test_axis, runs, &mut |share| {
         report(step, share);
     })?;
-    let friction = models::friction(&map)?;
 
     step += 1;
     let quiet = low_bandwidth_settings(&settings, &plant.plant, rate_hz);
@@ -106,17 +111,52 @@ pub fn commission(
     Ok(found)
 }
 
-/// The response of the sliding axis, with less excitation as long as it slows the axis too much.
+/// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest.
+fn friction(
+    test_axis: &mut dyn TestAxis,
+    mut runs: StaticFrictionSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(FrictionMap, Vec<Recording>, FrictionFit), CommissionError> {
+    loop {
+        let (map, recordings) = static_friction::measure(test_axis, &runs, progress)?;
+        let (slowest, fastest) = &mut runs.velocities_mm_s;
+        match models::friction(&map) {
+            Err(CommissionError::FrictionFit(FrictionFitError::TooFewRuns { .. }))
+                if FASTER * *slowest < *fastest / FASTER =>
+            {
+                *slowest *= FASTER;
+                approach(test_axis, HOME_MM)?;
+            }
+            found => return Ok((map, recordings, found?)),
+        }
+    }
+}
+
+/// Factor by which the slowest velocity is raised where the axis sticks and slips.
+const FASTER: f64 = 3.0;
+
+/// The response of the sliding axis, with less excitation as long as it slows the axis too much, or drives it too far.
 fn sliding_response(
     test_axis: &mut dyn TestAxis,
+    gain_mm_per_v_s2: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<FrfMeasurement, CommissionError> {
-    let mut settings = FrfSettings::default().fitted_to(test_axis.info().travel_mm);
+    let usual = FrfSettings::default();
+    let mut settings = usual.fitted_to(test_axis.info().travel_mm);
+    // As large a share of the velocity as on the simulated stage.
+    let slower = settings.bias_velocity_mm_s / usual.bias_velocity_mm_s;
+    let lighter = gain_mm_per_v_s2 / USUAL_GAIN_MM_PER_V_S2;
+    settings.excitation.rms_v *= (slower / lighter).min(1.0);
     for _ in 0..HALVINGS {
         // A pass that was given up ended somewhere on its way.
         approach(test_axis, HOME_MM)?;
         match frf::measure(test_axis, &settings, progress) {
-            Err(FrfError::NotSliding { .. }) => {
+            Err(
+                FrfError::NotSliding { .. }
+                | FrfError::Experiment(
+                    ExperimentError::Travel { .. } | ExperimentError::Overspeed { .. },
+                ),
+            ) => {
                 settings.excitation = Excitation {
                     rms_v: 0.5 * settings.excitation.rms_v,
                     ..settings.excitation

@@ -277,7 +277,7 @@ impl Bench<'_> {
             let done = self.done;
             let progress = &mut *self.progress;
             let outcome = approach(self.test_axis, 0.0).and_then(|()| {
-                run(
+                run_sine(
                     self.test_axis,
                     &result.law,
                     self.sines[index],
@@ -311,7 +311,11 @@ const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
-fn run(
+/// Runs the settings in force on a sine: score and recording of the last whole cycles.
+///
+/// # Errors
+/// A run that is stopped.
+pub fn run_sine(
     test_axis: &mut dyn TestAxis,
     law: &str,
     sine_test: SineTest,

@@ -59,24 +59,25 @@ pub(super) fn stiffest(
         .half_turn_hz()
         .ok_or(NoLoop::Shaping(ShapingError::NoHalfTurn))?;
     let unit_s = 1.0 / (TAU * half_turn_hz);
-    let at =
-        |log_ratio: f64| stiffest_at(process, form, filter_s, unit_s * log_ratio.exp(), bounds);
+    let at = |log_ratio: f64, least_kp: f64| {
+        let ratio_s = unit_s * log_ratio.exp();
+        stiffest_at(process, form, filter_s, ratio_s, bounds, least_kp)
+    };
     let (first, last) = (SMALLEST_RATIO.ln(), LARGEST_RATIO.ln());
     let spacing = (last - first) / (RATIOS - 1) as f64;
     let mut best: Option<(PidGains, f64)> = None;
     let mut least_excess = f64::INFINITY;
     for index in 0..RATIOS {
         let log_ratio = first + spacing * index as f64;
-        match at(log_ratio) {
-            Ok(gains) if best.is_none_or(|(most, _)| gains.kp_v_per_mm > most.kp_v_per_mm) => {
-                best = Some((gains, log_ratio));
-            }
+        let least_kp = best.map_or(0.0, |(most, _)| most.kp_v_per_mm);
+        match at(log_ratio, least_kp) {
+            Ok(gains) if gains.kp_v_per_mm > least_kp => best = Some((gains, log_ratio)),
             Ok(_) => {}
             Err(excess) => least_excess = least_excess.min(excess),
         }
     }
     let (mut gains, centre) = best.ok_or(NoLoop::Excess(least_excess))?;
-    let stiffness = |log_ratio: f64| at(log_ratio).map_or(0.0, |gains| gains.kp_v_per_mm);
+    let stiffness = |log_ratio: f64| at(log_ratio, 0.0).map_or(0.0, |gains| gains.kp_v_per_mm);
     let (mut low, mut high) = (centre - spacing, centre + spacing);
     let golden = (5.0_f64.sqrt() - 1.0) / 2.0;
     for _ in 0..GOLDEN_STEPS {
@@ -87,7 +88,7 @@ pub(super) fn stiffest(
             low = high - width;
         }
     }
-    if let Ok(refined) = at(0.5 * (low + high))
+    if let Ok(refined) = at(0.5 * (low + high), 0.0)
         && refined.kp_v_per_mm > gains.kp_v_per_mm
     {
         gains = refined;
@@ -95,13 +96,15 @@ pub(super) fn stiffest(
     Ok(gains)
 }
 
-/// The largest gains with a ratio Kd/Kp, s, that keep the bounds; otherwise the smallest excess.
+/// The largest gains with a ratio Kd/Kp, s, that keep the bounds; otherwise the smallest excess. The search ends where Kp falls
+/// below `least_kp`, V/mm: less is of no use.
 fn stiffest_at(
     process: &Process,
     form: Form,
     filter_s: f64,
     ratio_s: f64,
     bounds: &PeakBounds,
+    least_kp: f64,
 ) -> Result<PidGains, f64> {
     let unit = proportional_derivative(1.0, ratio_s, filter_s);
     let scaled = |gain_margin_db: f64| scale_to_gain_margin(process, form, &unit, gain_margin_db);
@@ -113,6 +116,11 @@ fn stiffest_at(
     let gain_margin_db = |index: usize| 1.0 + 0.75 * index as f64;
     let mut least = f64::INFINITY;
     for index in 0..GAIN_MARGINS {
+        // Gains fall with the margin, and lie above these as long as one step back might be enough.
+        let one_back = scaled(gain_margin_db(index.saturating_sub(1)));
+        if one_back.is_ok_and(|gains| gains.kp_v_per_mm <= least_kp) {
+            break;
+        }
         let found = excess(gain_margin_db(index));
         if found <= 1.0 {
             let (mut outside, mut inside) = (

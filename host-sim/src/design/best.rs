@@ -14,7 +14,7 @@ use super::process::Process;
 pub const SENSITIVITY_PEAK: f64 = 1.7;
 pub const COMPLEMENTARY_PEAK: f64 = 1.5;
 /// Shares of the bounds that are tried for integral action.
-const INTEGRAL_SHARES: [f64; 5] = [0.05, 0.1, 0.15, 0.2, 0.3];
+const INTEGRAL_SHARES: [f64; 3] = [0.05, 0.1, 0.2];
 /// Band over which a disturbance counts, Hz, and the frequencies in it.
 const BAND_HZ: (f64, f64) = (0.1, 2000.0);
 const FREQUENCIES: usize = 400;

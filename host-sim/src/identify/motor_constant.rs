@@ -112,11 +112,16 @@ const RAISE: f64 = 1.3;
 const BREAKING_AWAY: usize = 6;
 /// Time at rest between passes, s.
 const REST_S: f64 = 0.1;
-/// Slowest sliding, counts of the encoder in a level's dwell.
+/// Slowest sliding in a level's dwell: counts of the encoder that are enough, those that are needed, and the way that will do
+/// with fewer than are enough, mm, in the usual dwell.
 const SLIDING_COUNTS: f64 = 600.0;
+const LEAST_COUNTS: f64 = 60.0;
+const SLIDING_MM: f64 = 0.3;
 /// Dead times tried, s.
 const DELAY_STEP_S: f64 = 1e-4;
 const LONGEST_DELAY_S: f64 = 6e-3;
+/// The same over the dwell.
+const LONGEST_DELAY: f64 = 0.8;
 /// Largest relative standard error.
 const MOST_UNCERTAIN: f64 = 0.2;
 
@@ -185,6 +190,10 @@ pub fn evaluate(
     resolution_mm: f64,
 ) -> Result<MotorConstant, MotorConstantError> {
     let dwell = dwell(settings, 1.0 / recording.sample_time_s);
+    // The way goes with the square of the time.
+    let short = (settings.dwell_s / MotorConstantSettings::default().dwell_s).powi(2);
+    let sliding_mm = (SLIDING_COUNTS * resolution_mm)
+        .min((LEAST_COUNTS * resolution_mm).max(SLIDING_MM * short));
     let mut found: Vec<(f64, f64)> = Vec::new();
     let mut begin = 0;
     while begin < recording.len() {
@@ -205,10 +214,10 @@ pub fn evaluate(
                 .map(|window| sign * (window[dwell - 1] - window[0]))
                 .fold(f64::INFINITY, f64::min);
             let all = sign * (positions[positions.len() - 1] - positions[0]);
-            if -all > SLIDING_COUNTS * resolution_mm * 4.0 {
+            if -all > 4.0 * sliding_mm {
                 return Err(MotorConstantError::Reversed);
             }
-            if slowest > SLIDING_COUNTS * resolution_mm {
+            if slowest > sliding_mm {
                 found.push(fit_pass(&recording, begin, from, end, dwell));
             }
         }
@@ -264,7 +273,9 @@ fn fit_pass(
     let right = DVector::from_vec(second(positions));
     let path = second(&integral(positions, positions[0], step_s));
     let mut best = (f64::INFINITY, (f64::NAN, f64::NAN));
-    let longest = ((LONGEST_DELAY_S / step_s) as usize).min(from - begin);
+    // A delay of a whole level would swap the two.
+    let longest_s = LONGEST_DELAY_S.min(LONGEST_DELAY * lag as f64 * step_s);
+    let longest = ((longest_s / step_s) as usize).min(from - begin);
     for delay in (0..=longest).step_by(((DELAY_STEP_S / step_s) as usize).max(1)) {
         let push = integral(&recording.voltage_v[from - delay..end - delay], 0.0, step_s);
         // The voltage is held: the mean of its integral over a step is that at the step's middle.

@@ -84,6 +84,8 @@ const LEAST_RUNS: usize = 6;
 /// Residuals of a level that rises with the speed, over those of one that does not, from which on it is taken: a rise is easily
 /// mistaken for viscous friction.
 const RISING: f64 = 0.7;
+/// Level at rest, over that at high speed, below which a rise is no friction's.
+const LEAST_LEVEL: f64 = 0.2;
 /// An error of each mean that does not scatter within its run, over the voltage.
 const SYSTEMATIC: f64 = 2e-4;
 
@@ -200,6 +202,7 @@ fn fit_direction(
     if rising[1].start < 0.0
         && let Ok(rising) = search(&rising)
         && rising.residual_rms < RISING * fit.residual_rms
+        && rising.values[0] + rising.values[1] > LEAST_LEVEL * rising.values[0]
     {
         fit = rising;
     }

@@ -1,0 +1,213 @@
+//! `quadrant commission` on random axes: every axis from a seed, none of them the simulated stage's.
+//!
+//! The commissioned settings are judged on sines that the commissioning did not see, with noise that it did not see, against
+//! the PID that it designed. A result is one line of a CSV file, so that a campaign can be interrupted, divided and merged.
+
+pub mod command;
+mod plant;
+
+use std::time::Instant;
+
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::settings::{AxisSettings, SettingsError, StageSettings};
+use quadrant_sim::commission::bootstrap::measuring_settings;
+use quadrant_sim::commission::verify::run_sine;
+use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
+use quadrant_sim::experiment::sine_test::SineTest;
+use quadrant_sim::machine::{
+    AxisInfo, Experiment, ExperimentError, SimulatedTestAxis, TestAxis, approach,
+};
+use quadrant_sim::plant::AxisParameters;
+use quadrant_sim::record::Recording;
+use serde::{Deserialize, Serialize};
+
+pub use plant::RandomAxis;
+
+/// What became of one axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum Outcome {
+    /// Settings were handed over that beat the PID.
+    Commissioned,
+    /// Nothing was better than the PID, and its settings were kept.
+    PidAlone,
+    /// Settings were handed over that are worse than the PID on a motion that the commissioning did not see.
+    WorseThanPid,
+    /// The commissioning ended early, with a reason.
+    Refused,
+    /// It ended because the axis left its travel.
+    LeftTravel,
+}
+
+/// One line of a campaign's results.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Line {
+    pub seed: u64,
+    pub outcome: Outcome,
+    /// Largest error over that of the PID: the worst of the judging sines.
+    pub worst_ratio: Option<f64>,
+    /// Largest error over that of the PID: the geometric mean.
+    pub mean_ratio: Option<f64>,
+    /// Feedforward that was handed over.
+    pub feedforward: String,
+    /// Time for which the axis was used, min.
+    pub axis_min: f64,
+    /// Time of the computation, s.
+    pub computed_s: f64,
+    /// The axis, for a person.
+    pub axis: String,
+    /// Reason of a refusal.
+    pub reason: String,
+}
+
+/// Sines on which results are judged: none of them is a trial of the commissioning.
+const SINES: [SineTest; 3] = [
+    SineTest {
+        amplitude_mm: 4.0,
+        velocity_mm_s: 7.0,
+    },
+    SineTest {
+        amplitude_mm: 0.5,
+        velocity_mm_s: 3.0,
+    },
+    SineTest {
+        amplitude_mm: 10.0,
+        velocity_mm_s: 30.0,
+    },
+];
+/// Largest error over the PID's from which on a result is worse.
+const WORSE: f64 = 1.02;
+/// Share of the travel that a judging sine takes at most.
+const MOST_TRAVEL: f64 = 0.4;
+
+/// An axis that counts the time for which it is used.
+struct Timed {
+    test_axis: SimulatedTestAxis,
+    used_s: f64,
+}
+
+impl TestAxis for Timed {
+    fn info(&self) -> AxisInfo {
+        self.test_axis.info()
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        self.test_axis.settings()
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError> {
+        self.test_axis.apply(settings)
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let recording = self.test_axis.perform(experiment, progress)?;
+        self.used_s += recording.len() as f64 * recording.sample_time_s;
+        Ok(recording)
+    }
+}
+
+/// Commissions the axis of a seed and judges the result.
+pub fn judge(seed: u64) -> Line {
+    let began = Instant::now();
+    let random = RandomAxis::new(seed);
+    let mut base = StageSettings::simulated().axes[0].clone();
+    base.encoder.resolution_mm = random.parameters.resolution_mm;
+    base.amplifier.full_scale_v = random.parameters.full_scale_v;
+    let mut axis = Timed {
+        test_axis: SimulatedTestAxis::new(0, random.parameters.clone(), seed)
+            .with_travel_mm(random.travel_mm),
+        used_s: 0.0,
+    };
+    let found = commission(
+        &mut axis,
+        &base,
+        &CommissionSettings::default(),
+        &mut |_, _| {},
+    );
+    let mut line = Line {
+        seed,
+        outcome: Outcome::Refused,
+        worst_ratio: None,
+        mean_ratio: None,
+        feedforward: String::new(),
+        axis_min: axis.used_s / 60.0,
+        computed_s: 0.0,
+        axis: random.to_string(),
+        reason: String::new(),
+    };
+    match found {
+        Ok(found) => line.fill(&found, &random),
+        Err(error) => {
+            line.reason = quadrant_cli::explained(&error.into());
+            if line.reason.contains("left its travel") {
+                line.outcome = Outcome::LeftTravel;
+            }
+        }
+    }
+    line.computed_s = began.elapsed().as_secs_f64();
+    line
+}
+
+impl Line {
+    fn fill(&mut self, found: &Commissioned, random: &RandomAxis) {
+        let better = found
+            .verification
+            .as_ref()
+            .is_some_and(|verification| verification.is_better_than_pid());
+        self.feedforward = match found.settings.feedforward.kind {
+            FeedforwardKind::None => "none".to_owned(),
+            kind => kind.name().to_owned(),
+        };
+        if !better {
+            self.outcome = Outcome::PidAlone;
+            return;
+        }
+        let pid = measuring_settings(&found.settings);
+        let ratios: Result<Vec<f64>, String> = SINES
+            .iter()
+            .map(|sine| {
+                let reference = largest(&pid, random, sine)?;
+                Ok(largest(&found.settings, random, sine)? / reference)
+            })
+            .collect();
+        match ratios {
+            Ok(ratios) => {
+                let worst = ratios.iter().copied().fold(0.0, f64::max);
+                let logarithms: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
+                self.worst_ratio = Some(worst);
+                self.mean_ratio = Some((logarithms / ratios.len() as f64).exp());
+                self.outcome = if worst > WORSE {
+                    Outcome::WorseThanPid
+                } else {
+                    Outcome::Commissioned
+                };
+            }
+            Err(reason) => {
+                self.outcome = Outcome::WorseThanPid;
+                self.reason = reason;
+            }
+        }
+    }
+}
+
+/// Largest error on a sine, mm, of a fresh axis with other noise.
+fn largest(settings: &AxisSettings, random: &RandomAxis, sine: &SineTest) -> Result<f64, String> {
+    let parameters: AxisParameters = random.parameters.clone();
+    let mut axis =
+        SimulatedTestAxis::new(0, parameters, !random.seed).with_travel_mm(random.travel_mm);
+    axis.apply(settings).map_err(|error| error.to_string())?;
+    let amplitude_mm = sine.amplitude_mm.min(MOST_TRAVEL * random.travel_mm);
+    let fitted = SineTest {
+        amplitude_mm,
+        velocity_mm_s: sine.velocity_mm_s * amplitude_mm / sine.amplitude_mm,
+    };
+    approach(&mut axis, 0.0)
+        .and_then(|()| run_sine(&mut axis, "judging", fitted, &mut |_| {}))
+        .map(|(score, _)| score.largest_mm)
+        .map_err(|error| error.to_string())
+}
