@@ -26,6 +26,7 @@ pub mod excitation;
 pub mod fit;
 pub mod frf;
 pub mod measured_table;
+pub mod mode;
 pub mod motion;
 pub mod motor_constant;
 pub mod pages;
