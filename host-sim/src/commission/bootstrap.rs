@@ -8,6 +8,8 @@ use quadrant::control::plant_model::PlantModel;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::AxisSettings;
 
+use crate::design::{Form, Process};
+
 /// Crossover frequency of the first controller, Hz: a dead time of 5 ms still leaves it a phase margin of 30 deg.
 const CROSSOVER_HZ: f64 = 15.0;
 /// Crossover frequency over the frequency from which the derivative acts.
@@ -71,9 +73,45 @@ pub fn low_bandwidth_settings(
     plant: &PlantModel,
     rate_hz: f64,
 ) -> AxisSettings {
+    low_bandwidth_settings_by(base, plant, rate_hz, 1.0)
+}
+
+/// As [`low_bandwidth_settings`], with as much less bandwidth as structural modes demand: `process` is the axis with them and
+/// with the filters of `base`. Where none will do, the PID of `base` is kept.
+pub fn low_bandwidth_settings_on(
+    base: &AxisSettings,
+    plant: &PlantModel,
+    process: &Process,
+    rate_hz: f64,
+) -> AxisSettings {
+    let form = Form::Sampled {
+        sample_time_s: 1.0 / rate_hz,
+        computation_delay_s: 0.0,
+    };
+    (0..NARROWINGS)
+        .map(|step| low_bandwidth_settings_by(base, plant, rate_hz, NARROWING.powi(step)))
+        .find(|settings| {
+            matches!(process, Process::Model(_))
+                || process
+                    .margins(&settings.feedback.pid, form)
+                    .is_ok_and(|margins| margins.sensitivity_peak < QUIET_PEAK)
+        })
+        .unwrap_or_else(|| AxisSettings {
+            plant: None,
+            ..measuring_settings(base)
+        })
+}
+
+/// As [`low_bandwidth_settings`], at a share of the usual crossover.
+fn low_bandwidth_settings_by(
+    base: &AxisSettings,
+    plant: &PlantModel,
+    rate_hz: f64,
+    share: f64,
+) -> AxisSettings {
     let mut settings = measuring_settings(base);
     let crossover =
-        (QUIET_PHASE_RAD / plant.delay_s.max(1.0 / rate_hz)).min(TAU * QUIET_CROSSOVER_HZ);
+        share * (QUIET_PHASE_RAD / plant.delay_s.max(1.0 / rate_hz)).min(TAU * QUIET_CROSSOVER_HZ);
     let kp_v_per_mm = crossover * crossover.hypot(plant.damping_per_s)
         / (plant.gain_mm_per_v_s2 * QUIET_LEAD.hypot(1.0));
     settings.plant = None;
@@ -88,6 +126,10 @@ pub fn low_bandwidth_settings(
 
 /// The low-bandwidth controller: phase that the dead time may turn at its crossover, rad; highest crossover, Hz; crossover over the
 /// frequency from which the derivative acts; integral over proportional gain, 1/s; filter over the inverse crossover.
+/// Factor on that crossover while modes do not bear it, its repetitions, and the bound on `|S|`.
+const NARROWING: f64 = 0.85;
+const NARROWINGS: i32 = 12;
+const QUIET_PEAK: f64 = 1.8;
 const QUIET_PHASE_RAD: f64 = 0.27;
 const QUIET_CROSSOVER_HZ: f64 = 60.0;
 const QUIET_LEAD: f64 = 1.4;

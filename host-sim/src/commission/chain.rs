@@ -3,7 +3,7 @@
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::{
-    bootstrap_settings, low_bandwidth_settings, measuring_settings, zero_gain_settings,
+    bootstrap_settings, low_bandwidth_settings_on, measuring_settings, zero_gain_settings,
 };
 use super::commissioned::{CommissionSettings, Commissioned};
 use super::error::CommissionError;
@@ -64,12 +64,12 @@ pub fn commission(
     let gain = motor.gain_mm_per_v_s2;
     let response = sliding_response(test_axis, gain, &mut |share| report(step, share))?;
     let plant = models::plant(&response)?;
-    let pid = models::pid(&plant, base, request, rate_hz)?;
+    let controller = models::controller(&plant, base, request, rate_hz)?;
 
     step += 1;
     let mut settings = base.clone();
     settings.plant = Some(plant.plant);
-    settings.feedback.pid = pid;
+    controller.put_into(&mut settings);
     test_axis.apply(&measuring_settings(&settings))?;
     approach(test_axis, HOME_MM)?;
     let runs = request.friction.fitted_to(test_axis.info().travel_mm);
@@ -78,7 +78,8 @@ pub fn commission(
     })?;
 
     step += 1;
-    let quiet = low_bandwidth_settings(&settings, &plant.plant, rate_hz);
+    let process = models::process(&plant, &controller.filters);
+    let quiet = low_bandwidth_settings_on(&settings, &plant.plant, &process, rate_hz);
     test_axis.apply(&quiet)?;
     let (_, breakaway_v) = friction.mean_levels_v();
     let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
@@ -95,7 +96,7 @@ pub fn commission(
     };
     let models = Models {
         plant,
-        pid,
+        controller,
         friction,
         gms,
     };
