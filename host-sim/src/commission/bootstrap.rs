@@ -5,7 +5,9 @@ use std::f64::consts::TAU;
 use quadrant::control::feedback::LawKind;
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant::friction::PerDirection;
+use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::AxisSettings;
 
 use crate::design::{Form, Process};
@@ -41,6 +43,39 @@ pub fn bootstrap_settings(
     };
     settings
 }
+
+/// `settings` with a friction that is roughly known fed forward, so that a soft controller does not lag by it: on a short travel
+/// the lag would take a good part of the way.
+pub fn with_rough_friction(
+    mut settings: AxisSettings,
+    gain_mm_per_v_s2: f64,
+    friction_v: f64,
+) -> AxisSettings {
+    let sliding = StaticFriction {
+        curve: StribeckCurve {
+            coulomb_v: friction_v.max(1e-6),
+            breakaway_v: friction_v.max(1e-6),
+            stribeck_velocity_mm_s: 1.0,
+            exponent: 1.0,
+        },
+        viscous_v_s_per_mm: 0.0,
+    };
+    settings.friction.sliding = PerDirection {
+        positive: sliding,
+        negative: sliding,
+    };
+    settings.feedforward.kind = FeedforwardKind::Static;
+    settings.feedforward.gains = FeedforwardGains {
+        level: ROUGH_SHARE,
+        viscous: 0.0,
+        gms: 0.0,
+        inertia_v_s2_per_mm: ROUGH_SHARE / gain_mm_per_v_s2,
+    };
+    settings
+}
+
+/// Share of a roughly known friction and inertia that is fed forward.
+const ROUGH_SHARE: f64 = 0.8;
 
 /// `base` as an axis is measured with it: its PID alone, and room for the error that it makes.
 pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {

@@ -3,7 +3,8 @@
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::{
-    bootstrap_settings, low_bandwidth_settings_on, measuring_settings, zero_gain_settings,
+    bootstrap_settings, low_bandwidth_settings_on, measuring_settings, with_rough_friction,
+    zero_gain_settings,
 };
 use super::commissioned::{CommissionSettings, Commissioned};
 use super::error::CommissionError;
@@ -33,6 +34,8 @@ const STEPS: [(&str, f64); 6] = [
 const HOME_MM: f64 = 0.0;
 /// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
 const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
+/// Travel either way below which the lag of the first controller counts, mm.
+const SHORT_TRAVEL_MM: f64 = 60.0;
 /// Times that the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
 /// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
@@ -60,7 +63,11 @@ pub fn commission(
     })?;
 
     step += 1;
-    test_axis.apply(&bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz))?;
+    let mut first = bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz);
+    if test_axis.info().travel_mm < SHORT_TRAVEL_MM {
+        first = with_rough_friction(first, motor.gain_mm_per_v_s2, motor.friction_v);
+    }
+    test_axis.apply(&first)?;
     let gain = motor.gain_mm_per_v_s2;
     let response = sliding_response(test_axis, gain, &mut |share| report(step, share))?;
     let plant = models::plant(&response)?;

@@ -45,6 +45,8 @@ const KINDS: [FeedforwardKind; 5] = [
 ];
 /// Shares of the identified friction that are tried where the whole of it is worse than the PID anywhere.
 const SHARES: [f64; 3] = [0.75, 0.5, 0.25];
+/// Errors over those of the best kind up to which a kind that stands before it in [`KINDS`] is taken.
+const AS_GOOD: f64 = 1.1;
 /// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
 const NO_WORSE: f64 = 1.01;
 
@@ -189,11 +191,13 @@ pub fn verify(
         }
     }
     let mean = |law: &LawResult| law.against(&pid_alone).1;
+    let smallest = kinds
+        .iter()
+        .map(|(_, law)| mean(law))
+        .fold(f64::INFINITY, f64::min);
     let best = kinds
         .iter()
-        .enumerate()
-        .min_by(|a, b| mean(&a.1.1).total_cmp(&mean(&b.1.1)))
-        .map(|(index, _)| index);
+        .position(|(_, law)| mean(law) <= AS_GOOD * smallest);
     if let Some(index) = best {
         let (kind, mut whole) = kinds.remove(index);
         bench.finish(&mut whole);

@@ -44,7 +44,7 @@ impl HeldPlant {
 
     /// Position over voltage at a point of the z plane, mm/V.
     pub fn response(&self, z: Complex64) -> Complex64 {
-        let delayed = z.powf(-self.whole_periods);
+        let delayed = z.powi(-(self.whole_periods as i32));
         let drive =
             |row: usize| (z.inv() * self.older_input[row] + self.recent_input[row]) * delayed;
         // The first row of (z I - transition)^-1, times the input.

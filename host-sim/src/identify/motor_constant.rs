@@ -61,6 +61,8 @@ pub struct MotorConstant {
     pub standard_error: f64,
     /// B, damping over mass, 1/s; rough.
     pub damping_per_s: f64,
+    /// Friction in motion, V; rough, and zero or more.
+    pub friction_v: f64,
     /// Lower level of the voltage, V.
     pub level_v: f64,
     pub recording: Recording,
@@ -194,7 +196,7 @@ pub fn evaluate(
     let short = (settings.dwell_s / MotorConstantSettings::default().dwell_s).powi(2);
     let sliding_mm = (SLIDING_COUNTS * resolution_mm)
         .min((LEAST_COUNTS * resolution_mm).max(SLIDING_MM * short));
-    let mut found: Vec<(f64, f64)> = Vec::new();
+    let mut found: Vec<Pass> = Vec::new();
     let mut begin = 0;
     while begin < recording.len() {
         let sign = recording.voltage_v[begin].signum();
@@ -229,9 +231,9 @@ pub fn evaluate(
         });
     }
     let count = found.len() as f64;
-    let gain = found.iter().map(|(gain, _)| gain).sum::<f64>() / count;
-    let damping_per_s = found.iter().map(|(_, damping)| damping).sum::<f64>() / count;
-    let squares: f64 = found.iter().map(|(each, _)| (each - gain).powi(2)).sum();
+    let mean = |read: fn(&Pass) -> f64| found.iter().map(read).sum::<f64>() / count;
+    let gain = mean(|pass| pass.gain);
+    let squares: f64 = found.iter().map(|pass| (pass.gain - gain).powi(2)).sum();
     let standard_error = (squares / (count - 1.0) / count).sqrt();
     if gain <= 0.0 || standard_error > MOST_UNCERTAIN * gain {
         return Err(MotorConstantError::Uncertain {
@@ -242,7 +244,8 @@ pub fn evaluate(
     Ok(MotorConstant {
         gain_mm_per_v_s2: gain,
         standard_error,
-        damping_per_s,
+        damping_per_s: mean(|pass| pass.damping_per_s),
+        friction_v: mean(|pass| pass.friction_v).max(0.0),
         level_v: recording
             .voltage_v
             .iter()
@@ -252,16 +255,19 @@ pub fn evaluate(
     })
 }
 
-/// A and B of one pass, with the dead time that fits best. `begin` is where its voltage begins, `lag` the time in samples over
+/// A, B and friction of one pass.
+#[derive(Clone, Copy)]
+struct Pass {
+    gain: f64,
+    damping_per_s: f64,
+    friction_v: f64,
+}
+
+/// The parameters of one pass, with the dead time that fits best. `begin` is where its voltage begins, `lag` the time in samples over
 /// which differences are taken.
-fn fit_pass(
-    recording: &Recording,
-    begin: usize,
-    from: usize,
-    end: usize,
-    lag: usize,
-) -> (f64, f64) {
+fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: usize) -> Pass {
     let step_s = recording.sample_time_s;
+    let sign = recording.voltage_v[begin].signum();
     let positions = &recording.position_mm[from..end];
     // Second differences over a dwell keep what the steps do, and little of the screw's slow ripple and of the start.
     let second = |signal: &[f64]| -> Vec<f64> {
@@ -272,7 +278,12 @@ fn fit_pass(
     };
     let right = DVector::from_vec(second(positions));
     let path = second(&integral(positions, positions[0], step_s));
-    let mut best = (f64::INFINITY, (f64::NAN, f64::NAN));
+    let none = Pass {
+        gain: f64::NAN,
+        damping_per_s: f64::NAN,
+        friction_v: f64::NAN,
+    };
+    let mut best = (f64::INFINITY, none);
     // A delay of a whole level would swap the two.
     let longest_s = LONGEST_DELAY_S.min(LONGEST_DELAY * lag as f64 * step_s);
     let longest = ((longest_s / step_s) as usize).min(from - begin);
@@ -297,7 +308,14 @@ fn fit_pass(
         };
         let cost = (&matrix * &solution - right).norm_squared();
         if cost < best.0 {
-            best = (cost, (solution[0] / norms[0], -solution[2] / norms[2]));
+            let gain = solution[0] / norms[0];
+            let slowing = -sign * solution[1] / norms[1] / (lag as f64 * step_s).powi(2);
+            let pass = Pass {
+                gain,
+                damping_per_s: -solution[2] / norms[2],
+                friction_v: slowing / gain,
+            };
+            best = (cost, pass);
         }
     }
     best.1

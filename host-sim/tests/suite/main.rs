@@ -3,6 +3,7 @@
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
 mod circle;
+mod commission_any_axis;
 mod connected_axis;
 mod default_gains;
 mod design_npid;

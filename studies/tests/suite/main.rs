@@ -4,6 +4,7 @@ mod chapter5;
 mod command;
 mod friction_models;
 mod laws;
+mod random_axes;
 mod report_command;
 mod report_parts;
 mod robustness;

@@ -1,0 +1,84 @@
+//! Commissioning of axes unlike the simulated stage's: what was refused once, or handed over worse than the PID.
+
+use quadrant::friction::dahl::DahlParameters;
+use quadrant::friction::lugre::LugreParameters;
+use quadrant::settings::StageSettings;
+use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
+use quadrant_sim::machine::SimulatedTestAxis;
+use quadrant_sim::plant::{AxisParameters, FrictionParameters, StageParameters};
+use rayon::prelude::*;
+
+fn x() -> AxisParameters {
+    StageParameters::real().axes[0].clone()
+}
+
+fn commissioned(axis: AxisParameters, travel_mm: f64) -> Commissioned {
+    let mut test_axis = SimulatedTestAxis::new(0, axis, 1).with_travel_mm(travel_mm);
+    let base = StageSettings::simulated().axes[0].clone();
+    let request = CommissionSettings::default();
+    commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap()
+}
+
+fn lugre(mut axis: AxisParameters) -> AxisParameters {
+    axis.model = FrictionParameters::Lugre(LugreParameters {
+        stiffness_v_per_mm: 15.0,
+        damping_v_s_per_mm: 1e-3,
+    });
+    axis
+}
+
+#[test]
+fn axes_unlike_the_simulated_stages_are_commissioned_and_beat_the_best_pid_everywhere() {
+    let mut even = x();
+    for way in [&mut even.friction.positive, &mut even.friction.negative] {
+        way.curve.breakaway_v = way.curve.coulomb_v;
+    }
+    let mut asymmetric = lugre(x()).with_mass(2.0);
+    asymmetric.friction.positive.curve.coulomb_v *= 1.2;
+    asymmetric.friction.positive.curve.breakaway_v *= 1.2;
+    let mut dahl = x();
+    dahl.model = FrictionParameters::Dahl(DahlParameters {
+        stiffness_v_per_mm: 15.0,
+        exponent: 1.0,
+    });
+    [
+        ("half the mass", x().with_mass(0.5), 200.0, 0.15),
+        ("LuGre", lugre(x()), 200.0, 0.5),
+        ("asymmetric LuGre, twice the mass", asymmetric, 200.0, 0.6),
+        ("Dahl", dahl, 200.0, 0.6),
+        ("Fs = Fc", even, 200.0, 0.15),
+        ("a travel of 20 mm either way", x(), 20.0, 0.3),
+    ]
+    .into_par_iter()
+    .for_each(|(name, axis, travel_mm, most)| {
+        let found = commissioned(axis, travel_mm);
+        let verification = found.verification.as_ref().unwrap();
+        let (worst, mean) = verification.chosen().against(&verification.laws[0]);
+        println!("{name}: {mean:.3}, {worst:.3}: {:?}", found.notes());
+        assert!(
+            verification.is_better_than_pid(),
+            "{name}: {:?}",
+            found.notes()
+        );
+        assert!(worst <= 1.01 && mean < most, "{name}: {mean} {worst}");
+    });
+}
+
+#[test]
+fn feedforward_that_is_worse_than_the_pid_is_not_handed_over() {
+    // Friction that is not the one that was identified, by a wide margin: it falls to a fifth after the identification.
+    let base = StageSettings::simulated().axes[0].clone();
+    let mut settings = commissioned(x(), 200.0).settings;
+    settings.limits = base.limits;
+    let mut slippery = SimulatedTestAxis::new(0, x().with_friction(0.2), 2);
+    let verification =
+        quadrant_sim::commission::verify::verify(&mut slippery, &settings, &mut |_| {}).unwrap();
+    let whole = &verification.laws[2];
+    assert!(
+        whole.against(&verification.laws[0]).0 > 1.5,
+        "{}",
+        whole.law
+    );
+    let (worst, _) = verification.chosen().against(&verification.laws[0]);
+    assert!(worst <= 1.01, "{}", verification.chosen().law);
+}

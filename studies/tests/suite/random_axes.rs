@@ -1,0 +1,34 @@
+//! Commissioning of axes that nobody tuned it on.
+
+use quadrant_studies::random_axes::{Outcome, RandomAxis, judge};
+use rayon::prelude::*;
+
+#[test]
+fn random_axes_are_commissioned_or_refused_and_none_is_worse_than_its_pid() {
+    let lines: Vec<_> = (1..=20).into_par_iter().map(judge).collect();
+    for line in &lines {
+        println!("{line:?}");
+        assert_ne!(line.outcome, Outcome::WorseThanPid, "{line:?}");
+        assert!(
+            line.outcome != Outcome::Refused || !line.reason.is_empty(),
+            "{line:?}"
+        );
+    }
+    let rigid = lines
+        .iter()
+        .filter(|line| RandomAxis::new(line.seed).is_rigid());
+    let commissioned = rigid
+        .clone()
+        .filter(|line| line.outcome == Outcome::Commissioned);
+    let (all, commissioned) = (rigid.count(), commissioned.count());
+    assert!(5 * commissioned >= 4 * all, "{commissioned} of {all}");
+}
+
+#[test]
+fn a_seed_is_the_same_axis_every_time() {
+    for seed in 1..50 {
+        let [once, again] = [seed, seed].map(RandomAxis::new);
+        assert_eq!(once.parameters, again.parameters);
+        assert!((5.0..=250.0).contains(&once.travel_mm));
+    }
+}
