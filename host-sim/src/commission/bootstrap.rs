@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::feedback::LawKind;
+use quadrant::control::filter::{FilterList, FilterSettings};
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -23,6 +24,30 @@ const FILTER: f64 = 0.03;
 /// Tracking error allowed while the axis is measured, mm: the first controller is soft.
 const FOLLOWING_ERROR_MM: f64 = 10.0;
 
+/// Crossovers of the first controller over the usual one: less where a structural mode does not bear it.
+pub const BOOTSTRAP_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+/// Corner of the low-pass over the crossover where that is below the usual one.
+const LOW_PASS: f64 = 4.0;
+const LOW_PASS_DAMPING: f64 = 0.7;
+
+/// [`bootstrap_settings`] at a share of the usual crossover. Below one, a low-pass is behind the PID, so that the loop's gain is
+/// small at any mode from three times the crossover on.
+pub fn soft_bootstrap_settings(
+    base: &AxisSettings,
+    gain_mm_per_v_s2: f64,
+    rate_hz: f64,
+    share: f64,
+) -> AxisSettings {
+    let mut settings = bootstrap_at(base, gain_mm_per_v_s2, rate_hz, share * CROSSOVER_HZ);
+    settings.feedback.filters = (share < 1.0).then(|| {
+        FilterList::from_iter([FilterSettings::low_pass(
+            LOW_PASS * share * CROSSOVER_HZ,
+            LOW_PASS_DAMPING,
+        )])
+    });
+    settings
+}
+
 /// The settings with which an axis is measured first: `base` with a controller that needs nothing but A,
 /// `gain_mm_per_v_s2`, within a factor of two; no nonlinear gain, no feedforward, no model.
 pub fn bootstrap_settings(
@@ -30,8 +55,17 @@ pub fn bootstrap_settings(
     gain_mm_per_v_s2: f64,
     rate_hz: f64,
 ) -> AxisSettings {
+    bootstrap_at(base, gain_mm_per_v_s2, rate_hz, CROSSOVER_HZ)
+}
+
+fn bootstrap_at(
+    base: &AxisSettings,
+    gain_mm_per_v_s2: f64,
+    rate_hz: f64,
+    crossover_hz: f64,
+) -> AxisSettings {
     let mut settings = measuring_settings(base);
-    let crossover = TAU * CROSSOVER_HZ;
+    let crossover = TAU * crossover_hz;
     // |L| = A Kp sqrt(1 + lead^2) / w^2 = 1 on the double integrator that every axis is above its damping's corner.
     let kp_v_per_mm = crossover * crossover / (gain_mm_per_v_s2 * LEAD.hypot(1.0));
     settings.plant = None;
@@ -192,6 +226,25 @@ mod tests {
                     let settings =
                         bootstrap_settings(&x_axis(), wrong * plant.gain_mm_per_v_s2, 1e4);
                     let open_loop = SampledLoop::new(&plant, &settings.feedback.pid, 1e-4, 0.0);
+                    for share in BOOTSTRAP_SHARES {
+                        let gain = wrong * plant.gain_mm_per_v_s2;
+                        let soft = soft_bootstrap_settings(&x_axis(), gain, 1e4, share);
+                        let process = Process::Modelled {
+                            plant,
+                            modes: Vec::new(),
+                            filters: soft.feedback.filters.unwrap_or_default().to_vec(),
+                        };
+                        let form = Form::Sampled {
+                            sample_time_s: 1e-4,
+                            computation_delay_s: 0.0,
+                        };
+                        let margins = process.margins(&soft.feedback.pid, form);
+                        assert_ne!(
+                            margins.err(),
+                            Some(crate::design::MarginError::Unstable),
+                            "{share}: B {damping_per_s}, Td {delay_s}, A wrong by {wrong}"
+                        );
+                    }
                     // Without a delay nothing above makes it unstable, which the margins report as an error too.
                     if delay_s > 0.0 {
                         let margins = margins(&open_loop);

@@ -369,3 +369,78 @@ fn within(open: &[Complex64], factor: f64, wider: f64) -> bool {
     }
     encircled == 0
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::design::fixtures::{FILTER_S, X_PLANT};
+    use crate::design::{MarginError, best_pid};
+
+    const SAMPLED: Form = Form::Sampled {
+        sample_time_s: 1e-4,
+        computation_delay_s: 0.0,
+    };
+
+    fn on(modes: &[Mode], filters: &[FilterSettings]) -> Process {
+        Process::Modelled {
+            plant: X_PLANT,
+            modes: modes.to_vec(),
+            filters: filters.to_vec(),
+        }
+    }
+
+    #[test]
+    fn a_process_without_modes_and_filters_is_the_rigid_one() {
+        let gains = best_pid(&Process::Model(X_PLANT), SAMPLED, FILTER_S).unwrap();
+        let margins = on(&[], &[]).margins(&gains.gains, SAMPLED);
+        assert_eq!(margins, Ok(gains.margins));
+    }
+
+    #[test]
+    fn a_mode_that_the_best_rigid_pid_excites_is_borne() {
+        let rigid = best_pid(&Process::Model(X_PLANT), SAMPLED, FILTER_S).unwrap();
+        for frequency_hz in [40.0, 110.0, 230.0] {
+            let mode = Mode {
+                frequency_hz,
+                damping: 0.02,
+                anti: None,
+            };
+            let unaware = on(&[mode], &[]).margins(&rigid.gains, SAMPLED);
+            assert_eq!(unaware.unwrap_err(), MarginError::Unstable);
+            let found = modal_pid(&X_PLANT, &[mode], SAMPLED, FILTER_S).unwrap();
+            assert!(
+                found.margins.sensitivity_peak < 1.02 * SENSITIVITY_PEAK,
+                "{found:?}"
+            );
+            assert!(found.circle_bound > 1.0);
+            for shift in SHIFTS {
+                let shifted = on(&[mode.shifted(shift)], &found.filters);
+                let margins = shifted.margins(&found.gains, SAMPLED).unwrap();
+                assert!(margins.sensitivity_peak < 2.3, "{shift}: {margins:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn with_the_encoder_on_the_motor_a_mode_costs_less() {
+        let table = Mode {
+            frequency_hz: 60.0,
+            damping: 0.03,
+            anti: None,
+        };
+        let motor = Mode {
+            anti: Some((42.0, 0.02)),
+            ..table
+        };
+        let gain = |mode| {
+            let found = modal_pid(&X_PLANT, &[mode], SAMPLED, FILTER_S).unwrap();
+            found.gains.kp_v_per_mm
+        };
+        assert!(
+            gain(motor) > 2.0 * gain(table),
+            "{} {}",
+            gain(motor),
+            gain(table)
+        );
+    }
+}

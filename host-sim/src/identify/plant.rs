@@ -591,3 +591,88 @@ fn band_misfit(lines: &[ResponsePoint], model: &Model) -> BandMisfit {
         phase_deg: (phase / count).sqrt(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIGID: PlantModel = PlantModel {
+        gain_mm_per_v_s2: 60_000.0,
+        damping_per_s: 120.0,
+        stiffness_per_s2: 0.0,
+        delay_s: 1.2e-3,
+    };
+    const SLIDING: PlantFitSettings = PlantFitSettings {
+        least_coherence: 0.9,
+        band_hz: (0.0, f64::INFINITY),
+        stiffness: Stiffness::Zero,
+    };
+
+    /// Lines every 2 Hz from 4 to 400 Hz, with errors of one percent.
+    fn response(modes: &[Mode]) -> FrequencyResponse {
+        let mut state = 1u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            0.01 * 3.0_f64.sqrt() * ((state >> 33) as f64 / f64::from(1u32 << 30) - 1.0)
+        };
+        let line = |index: usize| {
+            let frequency_hz = 2.0 * index as f64;
+            let omega = TAU * frequency_hz;
+            let exact = RIGID.response(omega) * mode::response_of(modes, omega);
+            ResponsePoint {
+                frequency_hz,
+                response: exact * Complex64::new(1.0 + noise(), noise()),
+                coherence: 0.99,
+                relative_deviation: 0.01,
+            }
+        };
+        FrequencyResponse {
+            points: (2..=200).map(line).collect(),
+        }
+    }
+
+    fn check(mode: Mode) {
+        let found = fit_plant(&response(&[mode]), &SLIDING).unwrap();
+        let [fitted] = found.modes[..] else {
+            panic!("{:?} for {mode:?}", found.modes);
+        };
+        let near = |value: f64, expected: f64, tolerance: f64| {
+            assert!(
+                (value / expected - 1.0).abs() < tolerance,
+                "{fitted:?} for {mode:?}"
+            );
+        };
+        near(fitted.frequency_hz, mode.frequency_hz, 0.01);
+        near(fitted.damping, mode.damping, 0.2);
+        assert_eq!(fitted.anti.is_some(), mode.anti.is_some());
+        near(found.plant.gain_mm_per_v_s2, RIGID.gain_mm_per_v_s2, 0.02);
+        let error_hz = found.fit.standard_errors[3];
+        assert!(
+            error_hz > 0.0 && error_hz < 0.01 * mode.frequency_hz,
+            "{error_hz} Hz"
+        );
+    }
+
+    #[test]
+    fn a_mode_is_found_with_the_encoder_on_either_side() {
+        for (frequency_hz, damping) in [(35.0, 0.02), (90.0, 0.05), (250.0, 0.02)] {
+            let anti = Some((0.7 * frequency_hz, 0.7 * damping));
+            for anti in [None, anti] {
+                check(Mode {
+                    frequency_hz,
+                    damping,
+                    anti,
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_rigid_axis_has_no_mode() {
+        let found = fit_plant(&response(&[]), &SLIDING).unwrap();
+        assert_eq!(found.modes, []);
+        assert_eq!(found.fit.names, ["A", "B", "Td"]);
+    }
+}
