@@ -102,7 +102,6 @@ impl AxisSettings {
                 amplifier.reversed,
             )
             .feedback(feedback.build(period_s))
-            .filters(feedback.build_filters(period_s))
             .feedforward(
                 feedforward.kind,
                 &feedforward.gains,

@@ -143,7 +143,6 @@ impl Default for FeedbackSettings {
             cascade: None,
             sliding_mode: None,
             nctf: None,
-            filters: None,
         }
     }
 }

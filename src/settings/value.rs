@@ -8,7 +8,6 @@ use core::any::Any;
 use super::homing::HomeSwitch;
 use super::limits::LossReaction;
 use crate::law::control::feedback::LawKind;
-use crate::law::control::filter::FilterList;
 use crate::law::control::nctf::Characteristic;
 use crate::law::control::schedule::GainSchedule;
 use crate::law::feedforward::FeedforwardKind;
@@ -138,7 +137,7 @@ pub(crate) fn number(leaf: &dyn Any) -> Option<f64> {
 }
 
 // A leaf of another type is to be added to both lists, with a kind of its own that stays.
-plain!(1 GmsElements, 1 GainSchedule, 1 Characteristic, 1 FilterList, 2 bool, 4 f64, 5 u8, 7 u32);
+plain!(1 GmsElements, 1 GainSchedule, 1 Characteristic, 2 bool, 4 f64, 5 u8, 7 u32);
 name!(3 LawKind, 3 FeedforwardKind, 3 Direction, 3 HomeSwitch, 3 LossReaction);
 each!(
     f64,
@@ -152,6 +151,5 @@ each!(
     FeedforwardKind,
     GmsElements,
     GainSchedule,
-    Characteristic,
-    FilterList
+    Characteristic
 );

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeSet;
 
-use quadrant::control::filter::{FilterList, FilterSettings};
 use quadrant::settings::leaves::{LeafInfo, Range, all, find};
 use quadrant::settings::tree::{TreeError, is_part};
 use quadrant::settings::{Reason, SettingsError, StageSettings};
@@ -12,15 +11,8 @@ use crate::settings_tree::{get, paths};
 
 const ELEMENTS: usize = 8;
 
-/// The simulated stage's, with the list that it leaves out.
 fn settings() -> StageSettings {
-    let mut settings = StageSettings::simulated();
-    for axis in &mut settings.axes {
-        axis.feedback.filters = Some(FilterList::from_iter([FilterSettings::notch(
-            1000.0, 0.2, 0.5,
-        )]));
-    }
-    settings
+    StageSettings::simulated()
 }
 
 /// All leaves of the tree with the axis as `*`, and the numbers of the lists' points with the point as `*`.
@@ -214,7 +206,7 @@ fn each_list_has_the_room_that_is_said() {
             assert_eq!(too_many, !fits, "{path}: {count} points");
         }
     }
-    assert_eq!(lists, 4);
+    assert_eq!(lists, 3);
 }
 
 #[test]

@@ -12,7 +12,6 @@ pub mod integral_gain;
 pub mod loop_shape;
 pub mod margins;
 pub mod measured;
-pub mod modal;
 pub mod npid;
 pub mod pages;
 pub mod pid;
@@ -32,7 +31,6 @@ pub use integral_gain::{
 };
 pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
-pub use modal::{ModalDesign, modal_pid};
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
 pub use process::Process;
 pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};

@@ -31,7 +31,6 @@ use core::fmt;
 use self::telemetry::{AxisTelemetry, LimitedBy};
 use crate::law::command::Command;
 use crate::law::control::feedback::Feedback;
-use crate::law::control::filter::{Filters, FiltersState};
 use crate::law::control::pid::Pid;
 use crate::law::control::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::decimal::Decimal;
@@ -92,7 +91,6 @@ pub struct Axis<S: Scalar, const N: usize> {
     /// A displacement in a tick as a velocity.
     unit_mm_s: S::Gain,
     feedback: Feedback<S>,
-    filters: Filters<S>,
     feedforward: Feedforward<S, N>,
     preview_ticks: usize,
     amplifier: Amplifier<S>,
@@ -167,7 +165,6 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
         axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
         axis.feedback = Feedback::Pid(Pid::default());
-        axis.filters = Filters::NONE;
         axis.feedforward.switch_off();
         axis.preview_ticks = 0;
         axis.amplifier = Amplifier::default();
@@ -227,13 +224,6 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     #[must_use]
     pub fn feedback(self, feedback: Feedback<S>) -> Self {
         self.axis.feedback = feedback;
-        self
-    }
-
-    /// The filters behind the feedback law, built for the same control period.
-    #[must_use]
-    pub fn filters(self, filters: Filters<S>) -> Self {
-        self.axis.filters = filters;
         self
     }
 
@@ -348,7 +338,6 @@ pub struct AxisState<S: Scalar, const N: usize> {
     /// The tracking error of this tick, and the velocity of the feedback's reference for a law that needs it.
     input: FeedbackInput<S>,
     feedback: FeedbackState<S>,
-    filters: FiltersState<S>,
     friction: FeedforwardState<S, N>,
     bumpless_offset: S,
     /// Voltage that a host adds to the output in this tick, V.
@@ -376,7 +365,6 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             preview: [Position::ZERO; PREVIEW_ROOM],
             input: FeedbackInput::default(),
             feedback: FeedbackState::default(),
-            filters: FiltersState::default(),
             friction: FeedforwardState::default(),
             bumpless_offset: S::ZERO,
             injected: S::ZERO,
@@ -492,7 +480,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             unit_mm: S::Gain::default(),
             unit_mm_s: S::Gain::default(),
             feedback: Feedback::Pid(Pid::default()),
-            filters: Filters::NONE,
             feedforward: Feedforward::blank(),
             preview_ticks: 0,
             amplifier: Amplifier::default(),
@@ -766,8 +753,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             self.make_bumpless(state, input, total + state.injected);
         }
         let base = total + state.bumpless_offset + state.injected;
-        let mut feedback = self.feed_back(&mut state.feedback, input, base);
-        feedback.output = self.filters.step(&mut state.filters, feedback.output);
+        let feedback = self.feed_back(&mut state.feedback, input, base);
         let limit = self.amplifier.limit;
         let output = (feedback.output + base).limit(-limit, limit);
         state.bumpless_offset = state
@@ -838,7 +824,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         // The output under the new settings, computed on a copy, decides the offset.
         let mut trial = state.feedback.clone();
         let terms = self.feed_back(&mut trial, input, base);
-        self.filters.settle(&mut state.filters, terms.output);
         state.bumpless_offset = state.last_output - (terms.output + base);
     }
 
@@ -853,7 +838,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if state.mode() == MotionMode::OpenLoop {
             // As after enabling: the law's memory is of before, and its error is zero now.
             state.feedback = FeedbackState::default();
-            state.filters = FiltersState::default();
             state.friction = FeedforwardState::default();
             state.bumpless_offset = S::ZERO;
             self.stop(state);

@@ -2,6 +2,8 @@
 
 use std::f64::consts::TAU;
 
+use quadrant::control::plant_model::PlantModel;
+
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::pages::bode::{Curve, bode_figures};
@@ -35,7 +37,7 @@ pub fn motor_constant_table(motor: &MotorConstant, moving_mass_kg: Option<f64>) 
 }
 
 /// The measured response: its section, under feedback with the plain H1 estimate, which that biases, beside it.
-pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantFit>) -> Section {
+pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>) -> Section {
     let measured = &measurement.estimate.response;
     let modelled = model.map(|model| modelled(model, measured));
     let mut curves = Vec::new();
@@ -79,7 +81,7 @@ pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantFit>) 
 }
 
 /// A saved response and the model fitted to it.
-pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantFit) -> Section {
+pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantModel) -> Section {
     let modelled = modelled(model, response);
     let curves = [
         Curve {
@@ -146,7 +148,7 @@ fn quality_figure(response: &FrequencyResponse) -> Figure {
 }
 
 /// The response of a model at the lines of a measured one.
-fn modelled(model: &PlantFit, measured: &FrequencyResponse) -> FrequencyResponse {
+fn modelled(model: &PlantModel, measured: &FrequencyResponse) -> FrequencyResponse {
     let points = measured.points.iter().map(|point| ResponsePoint {
         response: model.response(TAU * point.frequency_hz),
         ..*point
@@ -158,14 +160,7 @@ fn modelled(model: &PlantFit, measured: &FrequencyResponse) -> FrequencyResponse
 
 /// The linear model (thesis, Table 3.1), with standard errors, correlation with A, and fit by band.
 pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
-    let unit = |name: &str| match name {
-        "A" => "mm/(V s²)",
-        "B" => "1/s",
-        "Td" => "s",
-        "C" => "1/s²",
-        frequency if frequency.starts_with('f') => "Hz",
-        _ => "",
-    };
+    let units = ["mm/(V s²)", "1/s", "s", "1/s²"];
     let rows = found
         .fit
         .names
@@ -176,7 +171,7 @@ pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
             let decimals = if *name == "Td" { 7 } else { 2 };
             vec![
                 Cell::text(*name),
-                Cell::text(unit(name)),
+                Cell::text(units[index]),
                 Cell::number(value, decimals),
                 Cell::number(found.fit.standard_errors[index], decimals),
                 Cell::number(100.0 * found.fit.standard_errors[index] / value, 3),
@@ -188,13 +183,7 @@ pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
     let parameters = Table {
         id: "linear-model".to_owned(),
         caption: format!(
-            "Linear model A exp(-s Td) / (s² + B s + C){}, fitted to {} lines; ± is one standard deviation",
-            match found.modes.len() {
-                0 => "",
-                1 => " times a mode (frequency f, damping ratio d; fa, da of the anti-resonance)",
-                _ =>
-                    " times two modes (frequency f, damping ratio d; fa, da of the anti-resonance)",
-            },
+            "Linear model A exp(-s Td) / (s² + B s + C), fitted to {} lines; ± is one standard deviation",
             found.lines
         ),
         columns: columns(&[
