@@ -9,13 +9,14 @@ use crate::common::repeatable;
 
 const PERIOD_S: f64 = 1e-4;
 
-/// Curves over the whole of the validated ranges; those whose table errs too much are refused by validation too.
+/// Curves over the whole of the validated ranges, falling and rising with the speed; those whose table errs too much are refused
+/// by validation too.
 fn accepted_curves() -> impl Strategy<Value = StribeckCurve> {
-    (-6.0f64..1.0, 0.0f64..1.0, -3.0f64..2.0, 0.3f64..=4.0)
+    (-6.0f64..1.0, 0.0f64..10.0, -3.0f64..2.0, 0.3f64..=4.0)
         .prop_map(|(log_breakaway, share, log_velocity, exponent)| {
             let breakaway_v = 10f64.powf(log_breakaway);
             StribeckCurve {
-                coulomb_v: (breakaway_v * share).max(1e-6),
+                coulomb_v: (breakaway_v * share).clamp(1e-6, 10.0),
                 breakaway_v: breakaway_v.max(1e-6),
                 stribeck_velocity_mm_s: 10f64.powf(log_velocity),
                 exponent,
@@ -28,7 +29,7 @@ fn accepted_curves() -> impl Strategy<Value = StribeckCurve> {
 
 /// The largest error of s(v) over a dense sweep of speeds, as a share of Fs.
 fn worst<S: Scalar>(curve: &StribeckCurve) -> f64 {
-    let attraction_v_s = 0.5 * curve.coulomb_v / PERIOD_S;
+    let attraction_v_s = 0.5 * curve.coulomb_v.min(curve.breakaway_v) / PERIOD_S;
     let table = SlidingTable::<S>::build(&PerDirection::both(*curve), attraction_v_s, PERIOD_S);
     let mut worst: f64 = 0.0;
     for step in 0..3000 {
@@ -57,7 +58,7 @@ proptest! {
 
     #[test]
     fn decay_belongs_to_the_level(curve in accepted_curves(), place in 0.0f64..2.0) {
-        let attraction_v_s = 0.3 * curve.coulomb_v / PERIOD_S;
+        let attraction_v_s = 0.3 * curve.coulomb_v.min(curve.breakaway_v) / PERIOD_S;
         let table = SlidingTable::<f64>::build(&PerDirection::both(curve), attraction_v_s, PERIOD_S);
         let speed = place * curve.flat_velocity_mm_s();
         let decay = table.at(speed, Direction::Negative).decay;
@@ -85,6 +86,17 @@ fn level_falls_from_breakaway_to_coulomb_by_the_formula() {
         ..CURVE
     };
     assert!((gaussian.level_v(0.5) - (0.12 + 0.03 * (-0.25f64).exp())).abs() < 1e-15);
+}
+
+#[test]
+fn a_level_may_rise_with_the_speed() {
+    let rising = StribeckCurve {
+        breakaway_v: 0.05,
+        ..CURVE
+    };
+    assert_eq!(rising.level_v(0.0), 0.05);
+    assert!((rising.level_v(1.0) - (0.12 - 0.07 / core::f64::consts::E)).abs() < 1e-15);
+    assert!(worst::<f32>(&rising) < 1e-3);
 }
 
 #[test]

@@ -246,7 +246,7 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
     (
         "friction.sliding.positive.curve.breakaway_v",
         |a| &mut a.friction.sliding.positive.curve.breakaway_v,
-        0.119,
+        0.0119,
         11.0,
     ),
     (
@@ -276,7 +276,7 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
     (
         "friction.sliding.negative.curve.breakaway_v",
         |a| &mut a.friction.sliding.negative.curve.breakaway_v,
-        0.119,
+        0.0119,
         11.0,
     ),
     (
