@@ -1,6 +1,6 @@
 //! The command `quadrant identify motion`.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -161,7 +161,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Every candidate on another record.
 fn validation(
     candidates: &[Candidate],
-    path: &PathBuf,
+    path: &Path,
     settings: &MotionFitSettings,
 ) -> anyhow::Result<Table> {
     let other = recorded::read(path)?;

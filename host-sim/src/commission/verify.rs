@@ -122,7 +122,7 @@ impl Verification {
     /// Settings of the law that is handed over, with the limits of `base`.
     pub fn settings(&self, base: &AxisSettings) -> AxisSettings {
         AxisSettings {
-            limits: base.limits.clone(),
+            limits: base.limits,
             ..self.chosen().settings.clone()
         }
     }
@@ -163,7 +163,7 @@ pub fn verify(
     };
     let full = |kind: FeedforwardKind, share: f64| {
         let mut full = npid.clone();
-        full.feedforward = settings.feedforward.clone();
+        full.feedforward = settings.feedforward;
         full.feedforward.kind = kind;
         let gains = &settings.feedforward.gains;
         full.feedforward.gains = FeedforwardGains {

@@ -183,8 +183,8 @@ fn with_the_dead_time_known_the_simulated_axes_are_found() {
             * (truth.friction.positive.curve.coulomb_v + truth.friction.negative.curve.coulomb_v);
         let level = model.friction.positive.curve.coulomb_v / mean;
         assert!((level - 1.0).abs() < 0.03, "axis {index}: Fc {level}");
-        let slipping = model.elements.iter().filter(|(_, level_v)| *level_v > 0.0);
-        let most_mm = slipping.last().unwrap().0;
+        let mut slipping = model.elements.iter().filter(|(_, level_v)| *level_v > 0.0);
+        let most_mm = slipping.next_back().unwrap().0;
         assert!((0.01..0.05).contains(&most_mm), "axis {index}: {most_mm}");
     }
 }
