@@ -11,7 +11,9 @@ use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
-use quadrant_sim::commission::{CommissionSettings, Commissioned, CrossCheck, commission};
+use quadrant_sim::commission::{
+    CommissionError, CommissionSettings, Commissioned, CrossCheck, commission,
+};
 use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
 use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
@@ -87,16 +89,8 @@ pub(super) struct Request {
 /// Results of a commissioning.
 struct Found {
     found: Commissioned,
-    checked: Option<CrossCheck>,
-    notes: Vec<String>,
-}
-
-impl Found {
-    /// False if the trials found nothing better than the PID alone.
-    fn is_better_than_pid(&self) -> bool {
-        let verification = self.found.verification.as_ref();
-        verification.is_none_or(|verification| verification.is_better_than_pid())
-    }
+    /// Nothing where cross-checks were not asked for.
+    checked: Option<Result<CrossCheck, CommissionError>>,
 }
 
 /// A commissioning of one axis of a machine.
@@ -183,7 +177,6 @@ impl Arguments {
                 file.stage.rate_hz,
             )?,
             checked: None,
-            notes: Vec::new(),
         };
         print!("{}", found.text());
         let path = match &self.into {
@@ -302,24 +295,22 @@ impl Request {
             ))
         };
         bar.finish_and_clear();
-        let mut notes = found.notes();
-        // What was found is not lost for a check that could not be made.
-        let checked = match checked.transpose() {
-            Ok(checked) => checked,
-            Err(error) => {
-                notes.push(format!("The cross-checks were not made: {error}."));
-                None
-            }
-        };
-        Ok(Found {
-            found,
-            checked,
-            notes,
-        })
+        Ok(Found { found, checked })
     }
 }
 
 impl Found {
+    /// False if the trials found nothing better than the PID alone.
+    fn is_better_than_pid(&self) -> bool {
+        let verification = self.found.verification.as_ref();
+        verification.is_none_or(|verification| verification.is_better_than_pid())
+    }
+
+    /// The cross-checks, where they were made.
+    fn checked(&self) -> Option<&CrossCheck> {
+        self.checked.as_ref()?.as_ref().ok()
+    }
+
     fn tables(&self) -> Vec<Table> {
         let found = &self.found;
         let [parameters, bands] = plant_tables(&found.plant);
@@ -333,7 +324,7 @@ impl Found {
         tables.extend(found.presliding.0.as_ref().ok().map(gms_table));
         tables.push(gains_table(found));
         tables.extend(found.verification.as_ref().map(results_table));
-        if let Some(checked) = &self.checked {
+        if let Some(checked) = self.checked() {
             tables.push(revise_table(&found.plant.plant, &checked.revisions));
         }
         tables
@@ -345,12 +336,16 @@ impl Found {
         for table in self.tables() {
             let _ = writeln!(text, "{}\n", table.to_text());
         }
-        for note in &self.notes {
+        let mut notes = self.found.notes();
+        // What was found is not lost for a check that could not be made.
+        if let Some(Err(error)) = &self.checked {
+            notes.push(format!("The cross-checks were not made: {error}."));
+        }
+        for note in notes {
             let _ = writeln!(text, "{note}\n");
         }
         let agreement = self
-            .checked
-            .as_ref()
+            .checked()
             .and_then(|checked| checked.inertia_agreement(&self.found.settings));
         if let Some(agreement) = agreement {
             let _ = writeln!(
@@ -370,7 +365,7 @@ impl Found {
         axis: AxisName,
         who: &str,
     ) -> anyhow::Result<Vec<String>> {
-        let (found, checked) = (&self.found, self.checked.as_ref());
+        let (found, checked) = (&self.found, self.checked());
         for table in self.tables() {
             output.keep_table(&table)?;
         }

@@ -30,11 +30,9 @@ pub(super) fn read(folder: &Path, resolution_mm: f64) -> anyhow::Result<Measurem
             folder.display()
         );
     }
-    let motor = evaluate(
-        Recording::read_csv(&folder.join(MOTOR_CONSTANT))?,
-        &MotorConstantSettings::default(),
-        resolution_mm,
-    )?;
+    let steps = Recording::read_csv(&folder.join(MOTOR_CONSTANT))?;
+    let settings = MotorConstantSettings::of(&steps);
+    let motor = evaluate(steps, &settings, resolution_mm)?;
     let responses = (1..)
         .map(|number| folder.join(response(number)))
         .take_while(|path| path.exists())

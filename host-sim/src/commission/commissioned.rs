@@ -84,7 +84,7 @@ const NOTED_HYSTERESIS_ERROR: f64 = 0.10;
 const NOTED_DRIFT: f64 = 0.10;
 
 impl Commissioned {
-    /// What a person should know of the result beside its tables, in sentences.
+    /// Remarks on the result beside its tables, in sentences.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
         match &self.presliding.0 {

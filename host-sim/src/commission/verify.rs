@@ -6,7 +6,7 @@ use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::bootstrap::measuring_settings;
-use crate::experiment::metrics::{Score, score};
+use crate::experiment::metrics::{Score, score, worst_and_mean};
 use crate::experiment::sine_test::SineTest;
 use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, approach};
 use crate::record::Recording;
@@ -55,12 +55,12 @@ pub fn sines(info: &AxisInfo) -> Vec<SineTest> {
     SINES
         .iter()
         .map(|sine| {
-            let amplitude_mm = sine.amplitude_mm.min(MOST_TRAVEL * info.travel_mm);
-            // As many cycles a second: half the amplitude at half the velocity.
-            let velocity_mm_s = sine.velocity_mm_s * amplitude_mm / sine.amplitude_mm;
+            let sine = sine.within(MOST_TRAVEL * info.travel_mm);
             SineTest {
-                amplitude_mm,
-                velocity_mm_s: velocity_mm_s.min(MOST_VELOCITY * info.max_velocity_mm_s),
+                velocity_mm_s: sine
+                    .velocity_mm_s
+                    .min(MOST_VELOCITY * info.max_velocity_mm_s),
+                ..sine
             }
         })
         .collect()
@@ -91,9 +91,7 @@ impl LawResult {
         let ratios: Vec<f64> = pairs
             .flat_map(|(own, pid)| [own.largest_mm / pid.largest_mm, own.rms_mm / pid.rms_mm])
             .collect();
-        let worst = ratios.iter().copied().fold(0.0, f64::max);
-        let logarithms: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
-        (worst, (logarithms / ratios.len() as f64).exp())
+        worst_and_mean(&ratios)
     }
 }
 

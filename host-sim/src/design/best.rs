@@ -25,8 +25,7 @@ const FREQUENCIES: usize = 400;
 /// # Errors
 /// As [`design_pid`]: a process that allows no such loop.
 pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
-    let mut best: Result<(PidDesign, f64), Option<DesignError>> = Err(None);
-    for integral_share in INTEGRAL_SHARES {
+    let designs = INTEGRAL_SHARES.map(|integral_share| {
         let request = PidRequest {
             target: Target::Bandwidth {
                 sensitivity_peak: SENSITIVITY_PEAK,
@@ -37,26 +36,23 @@ pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesig
             derivative_filter_s: filter_s,
             ki_v_per_mm_s: None,
         };
-        match (design_pid(process, &request), &best) {
-            (Ok(design), _) if design.gains.ki_v_per_mm_s > 0.0 => {
-                let error = load_step_error(process, &design.gains, form);
-                if best.as_ref().map_or(f64::INFINITY, |found| found.1) > error {
-                    best = Ok((design, error));
-                }
-            }
-            (Err(error), Err(None)) => best = Err(Some(error)),
-            _ => {}
-        }
+        design_pid(process, &request)
+    });
+    let best = designs
+        .iter()
+        .flatten()
+        .filter(|design| design.gains.ki_v_per_mm_s > 0.0)
+        .map(|design| (load_step_error(process, &design.gains, form), design))
+        .min_by(|a, b| a.0.total_cmp(&b.0));
+    if let Some((_, design)) = best {
+        return Ok(*design);
     }
-    match best {
-        Ok((design, _)) => Ok(design),
-        Err(Some(error)) => Err(error),
-        Err(None) => Err(DesignError::Bounds {
-            sensitivity_peak: SENSITIVITY_PEAK,
-            complementary_peak: COMPLEMENTARY_PEAK,
-            percent: 0.0,
-        }),
-    }
+    let refusal = designs.iter().find_map(|design| design.err());
+    Err(refusal.unwrap_or(DesignError::Bounds {
+        sensitivity_peak: SENSITIVITY_PEAK,
+        complementary_peak: COMPLEMENTARY_PEAK,
+        percent: 0.0,
+    }))
 }
 
 /// Square root of the integral over time of the squared error after a load step of 1 V, mm sqrt(s), by Parseval's theorem.

@@ -71,6 +71,13 @@ pub fn score(reference: &[f64], errors: &[f64], cycle: usize) -> Score {
     }
 }
 
+/// The largest of some ratios, and their geometric mean.
+pub fn worst_and_mean(ratios: &[f64]) -> (f64, f64) {
+    let worst = ratios.iter().copied().fold(0.0, f64::max);
+    let logarithms: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
+    (worst, (logarithms / ratios.len() as f64).exp())
+}
+
 /// The relative change from `before` to `after`, %.
 pub fn change_percent(before: f64, after: f64) -> f64 {
     (after / before - 1.0) * 100.0

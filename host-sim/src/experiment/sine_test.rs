@@ -35,6 +35,16 @@ const SCORED_CYCLES: usize = 2;
 const LEAD_S: f64 = 0.5;
 
 impl SineTest {
+    /// The same with as many cycles a second and at most that amplitude, mm.
+    #[must_use]
+    pub fn within(self, most_mm: f64) -> Self {
+        let amplitude_mm = self.amplitude_mm.min(most_mm);
+        Self {
+            amplitude_mm,
+            velocity_mm_s: self.velocity_mm_s * amplitude_mm / self.amplitude_mm,
+        }
+    }
+
     fn cycle_s(self) -> f64 {
         std::f64::consts::TAU * self.amplitude_mm / self.velocity_mm_s
     }

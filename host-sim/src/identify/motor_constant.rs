@@ -50,6 +50,21 @@ impl MotorConstantSettings {
             ..self
         }
     }
+
+    /// The settings of a recorded test with the usual number of levels: its first pass shows how long each lasted.
+    pub fn of(recording: &Recording) -> Self {
+        let usual = Self::default();
+        let drives = |volts: &&f64| volts.abs() > DRIVING_V;
+        let first = recording
+            .voltage_v
+            .iter()
+            .skip_while(|volts| !drives(volts));
+        let samples = first.take_while(drives).count();
+        Self {
+            dwell_s: samples as f64 * recording.sample_time_s / usual.levels as f64,
+            ..usual
+        }
+    }
 }
 
 /// Result of the test.
@@ -112,6 +127,8 @@ const UPPER: f64 = 2.5;
 const RAISE: f64 = 1.3;
 /// Levels at the beginning of a pass that do not count: the axis breaks away.
 const BREAKING_AWAY: usize = 6;
+/// Voltage from which on a sample belongs to a pass, V.
+const DRIVING_V: f64 = 0.01;
 /// Time at rest between passes, s.
 const REST_S: f64 = 0.1;
 /// Slowest sliding in a level's dwell: counts of the encoder that are enough, those that are needed, and the way that will do
@@ -200,7 +217,7 @@ pub fn evaluate(
     let mut begin = 0;
     while begin < recording.len() {
         let sign = recording.voltage_v[begin].signum();
-        let drives = |index: &usize| sign * recording.voltage_v[*index] > 0.01;
+        let drives = |index: &usize| sign * recording.voltage_v[*index] > DRIVING_V;
         if !drives(&begin) {
             begin += 1;
             continue;

@@ -56,6 +56,18 @@ fn a_saved_test_gives_what_the_fresh_one_gave() {
 }
 
 #[test]
+fn a_saved_test_on_a_short_travel_shows_its_own_dwell() {
+    let truth = StageParameters::real().axes[0].clone();
+    let settings = MotorConstantSettings::default().fitted_to(10.0);
+    let mut test_axis = SimulatedTestAxis::new(0, truth, 1).with_travel_mm(10.0);
+    let fresh = measure(&mut test_axis, &settings, &mut |_| {}).unwrap();
+    let shown = MotorConstantSettings::of(&fresh.recording);
+    assert!((shown.dwell_s / settings.dwell_s - 1.0).abs() < 0.02);
+    let saved = evaluate(fresh.recording, &shown, RESOLUTION_MM).unwrap();
+    assert!((saved.gain_mm_per_v_s2 / fresh.gain_mm_per_v_s2 - 1.0).abs() < 1e-9);
+}
+
+#[test]
 fn the_moving_mass_turns_it_into_newtons_per_volt() {
     let found = test_of(&StageParameters::real().axes[0], 0, 1);
     // 12 kg at 1 mm/s² take 12 mN.

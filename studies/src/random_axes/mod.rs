@@ -13,6 +13,7 @@ use quadrant::settings::{AxisSettings, SettingsError, StageSettings};
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::commission::verify::run_sine;
 use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
+use quadrant_sim::experiment::metrics::worst_and_mean;
 use quadrant_sim::experiment::sine_test::SineTest;
 use quadrant_sim::machine::{
     AxisInfo, Experiment, ExperimentError, SimulatedTestAxis, TestAxis, approach,
@@ -23,7 +24,7 @@ use serde::{Deserialize, Serialize};
 
 pub use plant::RandomAxis;
 
-/// What became of one axis.
+/// Result of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
 #[serde(rename_all = "kebab-case")]
 #[strum(serialize_all = "kebab-case")]
@@ -36,7 +37,7 @@ pub enum Outcome {
     WorseThanPid,
     /// The commissioning ended early, with a reason.
     Refused,
-    /// It ended because the axis left its travel.
+    /// The axis left its travel while it was commissioned, whatever became of it.
     LeftTravel,
 }
 
@@ -81,10 +82,11 @@ const WORSE: f64 = 1.02;
 /// Share of the travel that a judging sine takes at most.
 const MOST_TRAVEL: f64 = 0.4;
 
-/// An axis that counts the time for which it is used.
+/// An axis that counts the time for which it is used, and notices when it leaves its travel.
 struct Timed {
     test_axis: SimulatedTestAxis,
     used_s: f64,
+    left_travel: bool,
 }
 
 impl TestAxis for Timed {
@@ -105,7 +107,9 @@ impl TestAxis for Timed {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        let recording = self.test_axis.perform(experiment, progress)?;
+        let outcome = self.test_axis.perform(experiment, progress);
+        self.left_travel |= matches!(outcome, Err(ExperimentError::Travel { .. }));
+        let recording = outcome?;
         self.used_s += recording.len() as f64 * recording.sample_time_s;
         Ok(recording)
     }
@@ -122,6 +126,7 @@ pub fn judge(seed: u64) -> Line {
         test_axis: SimulatedTestAxis::new(0, random.parameters.clone(), seed)
             .with_travel_mm(random.travel_mm),
         used_s: 0.0,
+        left_travel: false,
     };
     let found = commission(
         &mut axis,
@@ -142,12 +147,10 @@ pub fn judge(seed: u64) -> Line {
     };
     match found {
         Ok(found) => line.fill(&found, &random),
-        Err(error) => {
-            line.reason = quadrant_cli::explained(&error.into());
-            if line.reason.contains("left its travel") {
-                line.outcome = Outcome::LeftTravel;
-            }
-        }
+        Err(error) => line.reason = quadrant_cli::explained(&error.into()),
+    }
+    if axis.left_travel {
+        line.outcome = Outcome::LeftTravel;
     }
     line.computed_s = began.elapsed().as_secs_f64();
     line
@@ -177,10 +180,9 @@ impl Line {
             .collect();
         match ratios {
             Ok(ratios) => {
-                let worst = ratios.iter().copied().fold(0.0, f64::max);
-                let logarithms: f64 = ratios.iter().map(|ratio| ratio.ln()).sum();
+                let (worst, mean) = worst_and_mean(&ratios);
                 self.worst_ratio = Some(worst);
-                self.mean_ratio = Some((logarithms / ratios.len() as f64).exp());
+                self.mean_ratio = Some(mean);
                 self.outcome = if worst > WORSE {
                     Outcome::WorseThanPid
                 } else {
@@ -201,11 +203,7 @@ fn largest(settings: &AxisSettings, random: &RandomAxis, sine: &SineTest) -> Res
     let mut axis =
         SimulatedTestAxis::new(0, parameters, !random.seed).with_travel_mm(random.travel_mm);
     axis.apply(settings).map_err(|error| error.to_string())?;
-    let amplitude_mm = sine.amplitude_mm.min(MOST_TRAVEL * random.travel_mm);
-    let fitted = SineTest {
-        amplitude_mm,
-        velocity_mm_s: sine.velocity_mm_s * amplitude_mm / sine.amplitude_mm,
-    };
+    let fitted = sine.within(MOST_TRAVEL * random.travel_mm);
     approach(&mut axis, 0.0)
         .and_then(|()| run_sine(&mut axis, "judging", fitted, &mut |_| {}))
         .map(|(score, _)| score.largest_mm)

@@ -226,7 +226,6 @@ fn candidate(
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
     Ok(Candidate {
         validation_error: withheld.as_ref().map(|found| found.error),
-        refined: false,
         ..described(signals, settings, structure, &regression, whole, others)?
     })
 }
@@ -253,7 +252,7 @@ fn described(
         .map(|(volts, a)| volts - model.inertia_v_s2_per_mm * a - model.offset_v);
     Ok(Candidate {
         validation_error: None,
-        refined: true,
+        refined: false,
         rows: Rows {
             time_s: all
                 .iter()
@@ -423,5 +422,6 @@ pub fn refined(
     for (estimate, before) in found.model.estimates.iter_mut().zip(&model.estimates) {
         estimate.standard_error = before.standard_error;
     }
+    found.refined = true;
     Ok(found)
 }

@@ -129,8 +129,6 @@ pub struct MotionModel {
     pub hold_s: f64,
     /// Knot, mm, and level, V, of each element, zero for what is left out; empty where friction turns at once.
     pub elements: Vec<(f64, f64)>,
-    /// Fs - Fc, V; below zero where the level rises with the velocity.
-    pub drop_v: f64,
     /// Change of level and offset from the middle of the record to its end.
     pub drift: Change,
     /// Change of level and offset from the middle of the travel to its upper end.

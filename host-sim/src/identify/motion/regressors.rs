@@ -71,7 +71,7 @@ pub(super) struct Regression<'a> {
     voltage_v: Vec<f64>,
     /// Velocity at the decimated samples, mm/s.
     pub(super) velocity_mm_s: Vec<f64>,
-    /// What changes are counted over.
+    /// Time and travel that changes are counted over.
     pub(super) span: Span,
 }
 

@@ -85,7 +85,8 @@ impl<'a> Moving<'a> {
         } else {
             &model.friction.positive
         };
-        let drop = model.drop_v * (-velocity.abs() / way.curve.stribeck_velocity_mm_s).exp();
+        // The elements' levels are those of fast motion.
+        let drop = way.curve.level_v(velocity) - way.curve.coulomb_v;
         let time = model.span.time_share(time_s);
         let place = model.span.travel_share(self.position_mm);
         let level = drop + time * model.drift.level_v + place * model.along_travel.level_v;

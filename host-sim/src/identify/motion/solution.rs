@@ -151,7 +151,6 @@ impl Solution {
                 negative: way(Way::Negative),
             },
             offset_v: sum(&|term| term == Term::Offset),
-            drop_v: drop,
             drift: change(&Term::Drift),
             along_travel: change(&Term::AlongTravel),
             span: regression.span,

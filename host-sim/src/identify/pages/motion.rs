@@ -52,7 +52,7 @@ pub fn candidates_table(candidates: &[Candidate], reruns: &[Reruns]) -> Table {
     }
 }
 
-/// How well models that were fitted to one record predict another.
+/// Errors of models that were fitted to one record on another.
 pub fn validation_table(errors: &[(&Candidate, f64)], record: &str) -> Table {
     Table {
         id: "motion-validation".to_owned(),

@@ -76,18 +76,15 @@ impl StaticFrictionSettings {
     #[must_use]
     pub fn fitted_to(mut self, travel_mm: f64) -> Self {
         let room_mm = TRAVEL_SHARE * travel_mm;
-        let (slowest, fastest) = &mut self.velocities_mm_s;
         if self.stretch_mm > STRETCH_SHARE * room_mm {
             self.stretch_mm = STRETCH_SHARE * room_mm;
             self.settling_s = self.settling_s.min(SHORT_SETTLING_S);
         }
-        let length_mm = |velocity: f64| {
-            let ramp_s = velocity / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
-            self.stretch_mm + velocity * (self.settling_s + 2.0 * ramp_s)
-        };
-        while length_mm(*fastest) > room_mm && *fastest > 2.0 * *slowest {
-            *fastest *= 0.9;
+        let (slowest, mut fastest) = self.velocities_mm_s;
+        while self.length_mm(fastest) > room_mm && fastest > 2.0 * slowest {
+            fastest *= 0.9;
         }
+        self.velocities_mm_s = (slowest, fastest);
         self
     }
 
