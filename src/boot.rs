@@ -2,13 +2,13 @@
 
 use core::mem::MaybeUninit;
 
-use embedded_storage::nor_flash::NorFlash;
 use quadrant::app::capture::CAPTURE_WORDS;
 use quadrant::app::crash_record::CrashCause;
-use quadrant::app::{Axis, Control, ControlEnds, Queues, Server, ServerParts};
+use quadrant::app::start_record::StartRecord;
+use quadrant::app::{Axis, Control, ControlEnds, Intake, Queues, Server, ServerParts};
 use quadrant::axes::AxisName;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::hal::ResetCause;
+use quadrant::hal::{ResetCause, SettingsFlash};
 use quadrant::link::message::{NumberType, Provenance};
 use quadrant::lockstep::Job;
 use quadrant::safety::{FaultCode, StreamLoss};
@@ -28,6 +28,7 @@ pub(crate) struct StaticStorage<S: Scalar + 'static, F: 'static> {
     buffer: [u8; BUFFER_BYTES],
     capture: [u32; CAPTURE_WORDS],
     control: MaybeUninit<Control<'static, 'static, S>>,
+    intake: MaybeUninit<Intake<'static>>,
     server: MaybeUninit<Server<'static, 'static, S, F>>,
 }
 
@@ -42,6 +43,7 @@ impl<S: Scalar, F> StaticStorage<S, F> {
             buffer: [0; BUFFER_BYTES],
             capture: [0; CAPTURE_WORDS],
             control: MaybeUninit::uninit(),
+            intake: MaybeUninit::uninit(),
             server: MaybeUninit::uninit(),
         }
     }
@@ -51,6 +53,8 @@ impl<S: Scalar, F> StaticStorage<S, F> {
 pub(crate) struct Machine<S: Scalar + 'static, F: 'static> {
     /// The fast half, of the control interrupt.
     pub(crate) control: &'static mut Control<'static, 'static, S>,
+    /// The link's bytes on their way, of the supervising task.
+    pub(crate) intake: &'static mut Intake<'static>,
     /// The slow half, of the lowest task.
     pub(crate) server: &'static mut Server<'static, 'static, S, F>,
     /// Control rate, Hz.
@@ -61,7 +65,7 @@ pub(crate) struct Machine<S: Scalar + 'static, F: 'static> {
 
 /// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
 /// timer that measures ticks.
-pub(crate) fn machine<S: Scalar, F: NorFlash>(
+pub(crate) fn machine<S: Scalar, F: SettingsFlash>(
     storage: &'static mut StaticStorage<S, F>,
     flash: F,
     crashed: Option<FaultCode>,
@@ -69,12 +73,20 @@ pub(crate) fn machine<S: Scalar, F: NorFlash>(
     number: NumberType,
 ) -> Machine<S, F> {
     let settings = defaults(&mut storage.settings);
+    let draft = defaults(&mut storage.draft);
     let Loaded {
         plan,
         provenance,
         store,
-        fault,
-    } = load(flash, settings, &mut storage.buffer);
+        invalid,
+        keep_draft,
+    } = load(
+        flash,
+        settings,
+        draft,
+        &mut storage.buffer,
+        count_start(crashed.is_some()),
+    );
     // The back buffer's content does not matter: it is built over before it is used.
     let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
     let mut axes = [x, y, z];
@@ -88,26 +100,30 @@ pub(crate) fn machine<S: Scalar, F: NorFlash>(
         .each_ref()
         .map(|axis| axis.encoder.resolution_mm);
     let streaming = settings.streaming.build();
-    let (control_ends, ends) = storage.queues.split();
+    let (control_ends, intake_ends, ends) = storage.queues.split();
     let control = place_control(&mut storage.control, axes, streaming, plan, control_ends);
-    if let Some(code) = crashed.or(fault) {
+    let invalid = invalid.then_some(FaultCode::SettingsInvalid);
+    for code in [crashed, invalid].into_iter().flatten() {
         control.start_faulted(code);
     }
     let parts = ServerParts {
         ends,
         back_buffer,
         settings,
-        draft: defaults(&mut storage.draft),
+        draft,
+        keep_draft,
         provenance,
         store,
         buffer: &mut storage.buffer,
         capture: &mut storage.capture,
         board: board::NAME,
         cycle_hz,
+        rates_hz: board::RATES_HZ,
         number,
     };
     Machine {
         control,
+        intake: storage.intake.write(Intake::new(intake_ends)),
         server: place_server(&mut storage.server, parts),
         rate_hz,
         resolution_mm,
@@ -122,21 +138,26 @@ struct Loaded<S: Scalar, F> {
     provenance: Provenance,
     /// The store that holds them.
     store: Store<F>,
-    /// The fault, if stored settings were refused.
-    fault: Option<FaultCode>,
+    /// True if stored settings were refused or are damaged.
+    invalid: bool,
+    /// True if the draft holds settings that are stored and not in force.
+    keep_draft: bool,
 }
 
 /// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults, on
-/// which the outputs are not enabled. They have been checked then.
+/// which the outputs are not enabled. They have been checked then. An older set than one that is damaged, one that the board
+/// is not up to, and one that is to be set aside go into `draft`.
 ///
 /// # Panics
 /// When a job cannot be decoded or is refused: then there is nothing that could safely be run.
 // Each step of the start has a frame of its own, gone when the next one begins.
 #[inline(never)]
-fn load<S: Scalar, F: NorFlash>(
+fn load<S: Scalar, F: SettingsFlash>(
     flash: F,
     settings: &mut StageSettings,
+    draft: &mut StageSettings,
     buffer: &mut [u8; BUFFER_BYTES],
+    set_aside: bool,
 ) -> Loaded<S, F> {
     let mut store = Store::new(flash, 0);
     let mut report = |finding: Finding<'_>| match finding {
@@ -145,9 +166,9 @@ fn load<S: Scalar, F: NorFlash>(
     };
     let found = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut report);
     let mut provenance = Provenance::new();
-    let mut fault = None;
+    let (mut invalid, mut keep_draft) = (false, false);
     let plan = match found {
-        Ok(Some(stored)) => {
+        Ok(Some(stored)) if stored.is_newest && !set_aside && is_possible(settings.rate_hz) => {
             log::settings_loaded(settings, stored.sequence, &stored.provenance);
             provenance = stored.provenance;
             take(board::job(), None)
@@ -156,9 +177,27 @@ fn load<S: Scalar, F: NorFlash>(
             match not_stored {
                 Err(error) => {
                     defmt::error!("stored settings refused: {}", defmt::Display2Format(&error));
-                    fault = Some(FaultCode::SettingsInvalid);
+                    invalid = true;
                 }
-                _ => defmt::info!("no settings are stored"),
+                Ok(Some(stored)) => {
+                    let why = if !stored.is_newest {
+                        "those stored after them are damaged"
+                    } else if set_aside {
+                        "three starts with them did not last"
+                    } else {
+                        "the board is not up to their rate_hz"
+                    };
+                    defmt::error!(
+                        "settings number {=u32} are in the draft, and not in force: {=str}",
+                        stored.sequence,
+                        why
+                    );
+                    provenance = stored.provenance;
+                    draft.copy_from(settings);
+                    settings.set_default();
+                    (invalid, keep_draft) = (true, true);
+                }
+                Ok(None) => defmt::info!("no settings are stored"),
             }
             let plan = take(board::job(), Some(settings));
             built(settings.validate(FIRMWARE_ELEMENTS));
@@ -171,8 +210,26 @@ fn load<S: Scalar, F: NorFlash>(
         plan,
         provenance,
         store,
-        fault,
+        invalid,
+        keep_draft,
     }
+}
+
+/// Counts this start; returns true if as many as allowed have not lasted.
+fn count_start(crashed: bool) -> bool {
+    let record = board::start_record::read().begin(crashed);
+    board::start_record::write(record);
+    record.is_safe_start()
+}
+
+/// Takes note that this start has lasted, or that the next is asked for.
+pub(crate) fn forget_starts() {
+    board::start_record::write(StartRecord::default());
+}
+
+/// True if the board is up to a control rate.
+fn is_possible(rate_hz: f64) -> bool {
+    (board::RATES_HZ.0..=board::RATES_HZ.1).contains(&rate_hz)
 }
 
 /// Logs the crash record of the last run; returns its fault, or that of a watchdog reset.
@@ -240,7 +297,7 @@ fn place_control<S: Scalar>(
 
 /// Makes the slow half in its place.
 #[inline(never)]
-fn place_server<S: Scalar, F: NorFlash>(
+fn place_server<S: Scalar, F: SettingsFlash>(
     place: &'static mut MaybeUninit<Server<'static, 'static, S, F>>,
     parts: ServerParts<'static, 'static, S, F>,
 ) -> &'static mut Server<'static, 'static, S, F> {

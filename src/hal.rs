@@ -2,7 +2,10 @@
 //!
 //! embedded-hal 1.0 has no encoder, no converter, no watchdog and no port that is read and written without waiting; these
 //! traits are ours, and this is their only place. They speak in raw words: what a word means is
-//! [`settings`](crate::settings). Flash for stored settings is `embedded_storage::nor_flash::NorFlash`.
+//! [`settings`](crate::settings). Flash for stored settings is an `embedded_storage::nor_flash::NorFlash` that knows the
+//! enable line ([`SettingsFlash`]).
+
+use embedded_storage::nor_flash::NorFlash;
 
 use crate::law::encoder::EncoderReading;
 use crate::law::safety;
@@ -40,6 +43,13 @@ pub trait Serial {
 
     /// Sends the beginning of `bytes`; returns how many were taken, 0 while earlier ones are on their way.
     fn write(&mut self, bytes: &[u8]) -> usize;
+}
+
+/// The flash that settings are stored in. Writing it may stop the processor for as long as an erasure takes.
+pub trait SettingsFlash: NorFlash {
+    /// True if the amplifiers' enable line is low, as the pin itself shows. Asked before every erasure and every set that is
+    /// written, whatever the tasks have agreed on.
+    fn outputs_are_off(&self) -> bool;
 }
 
 /// A watchdog that resets the processor unless it is fed.

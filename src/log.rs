@@ -5,14 +5,13 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use embedded_storage::nor_flash::NorFlash;
 use quadrant::app::glitch_monitor::GlitchEvent;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
 use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
-use quadrant::hal::ResetCause;
+use quadrant::hal::{ResetCause, SettingsFlash};
 use quadrant::motion::MotionMode;
 use quadrant::safety::Fault;
 use quadrant::scalar::{Quantity, Scalar};
@@ -73,7 +72,7 @@ pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance:
 pub(crate) fn not_commissioned(settings: &StageSettings) {
     if !settings.is_commissioned() {
         defmt::warn!(
-            "not commissioned: no axis has a law, the outputs stay off; run `quadrant commission`, or load settings and store them"
+            "not commissioned: no axis is, or one with a law is not; the outputs stay off; run `quadrant commission`, or load settings and store them"
         );
     }
 }
@@ -288,7 +287,7 @@ impl EventLogger {
     }
 
     /// Logs the changes since the last call. Once a poll of the server.
-    pub(crate) fn log<S: Scalar, F: NorFlash>(
+    pub(crate) fn log<S: Scalar, F: SettingsFlash>(
         &mut self,
         server: &Server<'_, '_, S, F>,
         seen: &Snapshot<S>,

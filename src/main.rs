@@ -5,7 +5,7 @@
 //! | task      | priority | when                          | does |
 //! |-----------|----------|-------------------------------|------|
 //! | control   | highest  | every control tick            | encoders in, law, amplifiers out, deadline check |
-//! | supervise | middle   | every tenth control tick      | passes or refuses requests, watches glitches |
+//! | supervise | middle   | every tenth control tick      | receives from the link, passes or refuses requests, watches glitches |
 //! | serve     | low      | after supervise               | answers a host's requests |
 //! | show      | low      | when supervise has something  | prints through defmt |
 //! | idle      | none     | the rest of the time          | what the board asks for |
@@ -46,17 +46,18 @@ compile_error!("choose a board: `board-mps2` or `board-nucleo-f446re` (`cargo xt
     dispatchers = [DISPATCHER_0, DISPATCHER_1, DISPATCHER_2]
 )]
 mod app {
-    use core::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+    use core::sync::atomic::{AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
     use quadrant::app::glitch_monitor::GlitchReadings;
+    use quadrant::app::start_record::LASTING_RUNS;
     use quadrant::app::supervisor::Event;
     use quadrant::app::{
-        Control, Inputs, Liveness, Poll, Server, Snapshot, Supervision, TimingStatistics,
+        Control, Inputs, Intake, Liveness, Poll, Server, Snapshot, Supervision, TimingStatistics,
     };
     use quadrant::axes::AxisName;
     use quadrant::command::Command;
-    use quadrant::hal::{Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
+    use quadrant::hal::{self, Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
     use quadrant::link::message::NumberType;
     use quadrant::safety::AxisSwitches;
 
@@ -88,10 +89,8 @@ mod app {
     static LONGEST: AtomicU32 = AtomicU32::new(0);
     /// Polls of the server.
     static POLLS: AtomicU32 = AtomicU32::new(0);
-    /// True if the host whose set points the axes follow has fallen silent.
-    static LINK_LOST: AtomicBool = AtomicBool::new(false);
-    /// Somebody has given the settings in force.
-    static COMMISSIONED: AtomicBool = AtomicBool::new(false);
+    /// Valid requests of a host so far.
+    static FRAMES: AtomicU32 = AtomicU32::new(0);
 
     defmt::timestamp!("{=u32:010}", TICK.load(Ordering::Relaxed));
 
@@ -99,7 +98,12 @@ mod app {
     struct Shared {
         /// The supervising task's latest snapshot, for the server.
         seen: Snapshot<Number>,
+        /// The link's port: the supervising task receives, the server sends.
+        port: Port,
     }
+
+    /// The link's port.
+    pub struct Port(Serial);
 
     #[local]
     struct Local {
@@ -109,7 +113,7 @@ mod app {
         encoders: Encoders,
         switches: Switches,
         operator: Operator,
-        serial: Serial,
+        intake: &'static mut Intake<'static>,
         watchdog: Watchdog,
         tick: Tick,
         idle: Idle,
@@ -145,6 +149,7 @@ mod app {
         let cycle_hz = board.tick.cycle_hz();
         let boot::Machine {
             control,
+            intake,
             server,
             rate_hz,
             resolution_mm,
@@ -158,7 +163,6 @@ mod app {
         let (lines_in, lines_out) = cx.local.lines.split();
         board.tick.start(rate_hz);
         board.watchdog.start();
-        COMMISSIONED.store(server.is_commissioned(), Ordering::Relaxed);
         let local = Local {
             control,
             server,
@@ -166,7 +170,7 @@ mod app {
             encoders: board.encoders,
             switches: board.switches,
             operator: board.operator,
-            serial: board.serial,
+            intake,
             watchdog: board.watchdog,
             tick: board.tick,
             idle: board.idle,
@@ -186,8 +190,11 @@ mod app {
             lines_out,
             event_logger: EventLogger::new(),
         };
-        let seen = Snapshot::default();
-        (Shared { seen }, local)
+        let shared = Shared {
+            seen: Snapshot::default(),
+            port: Port(board.serial),
+        };
+        (shared, local)
     }
 
     /// Reads the encoders, computes, writes the amplifiers.
@@ -209,12 +216,12 @@ mod app {
                 switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
             }
         }
+        cx.local.control.hear(FRAMES.load(Ordering::Relaxed));
         let outputs = cx.local.control.tick(&Inputs {
             readings: cx.local.encoders.read().into(),
             switches,
             command: cx.local.commands_out.dequeue(),
             deadline_missed: *cx.local.deadline_missed,
-            link_lost: LINK_LOST.load(Ordering::Relaxed),
             ..Inputs::default()
         });
         cx.local
@@ -249,16 +256,23 @@ mod app {
         }
     }
 
-    /// Passes the operator's requests to the control law or refuses them, reports events to log and server, and feeds the
-    /// watchdog while all tasks make progress.
-    #[task(priority = 2, shared = [seen], local = [
-        snapshots_out, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
+    /// Receives from the link; passes the operator's requests to the control law or refuses them, reports events to log and
+    /// server, and feeds the watchdog while all tasks make progress.
+    #[task(priority = 2, shared = [seen, port], local = [
+        intake, snapshots_out, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
+        runs: u32 = 0,
     ])]
     async fn supervise(mut cx: supervise::Context) {
+        let received = cx.shared.port.lock(|port| cx.local.intake.run(&mut port.0));
+        FRAMES.store(cx.local.intake.frames(), Ordering::Relaxed);
+        if let Some(command) = received.urgent {
+            // Before anything else, so that there is room.
+            let _ = cx.local.commands_in.enqueue(command);
+            print(cx.local.lines_in, LogEntry::Command(command));
+        }
         while let Some(snapshot) = cx.local.snapshots_out.dequeue() {
             let request = cx.local.requests_out.dequeue();
-            let commissioned = COMMISSIONED.load(Ordering::Relaxed);
-            let supervised = cx.local.supervision.run(&snapshot, request, commissioned);
+            let supervised = cx.local.supervision.run(&snapshot, request);
             if let Some(command) = supervised.command {
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
@@ -283,6 +297,10 @@ mod app {
                 let errors = snapshot.axes.map(|axis| axis.error);
                 print(cx.local.lines_in, LogEntry::Status(errors));
             }
+            *cx.local.runs = cx.local.runs.saturating_add(1);
+            if *cx.local.runs == LASTING_RUNS {
+                boot::forget_starts();
+            }
             let polls = POLLS.load(Ordering::Relaxed);
             if cx.local.liveness.check(snapshot.tick, polls) {
                 cx.local.watchdog.feed(snapshot.view.safety.drives());
@@ -296,7 +314,7 @@ mod app {
     }
 
     /// Answers a host's requests.
-    #[task(priority = 1, shared = [seen], local = [server, serial, events_out, event_logger])]
+    #[task(priority = 1, shared = [seen, port], local = [server, events_out, event_logger])]
     async fn serve(mut cx: serve::Context) {
         POLLS.store(
             POLLS.load(Ordering::Relaxed).wrapping_add(1),
@@ -310,13 +328,26 @@ mod app {
             overruns: OVERRUNS.load(Ordering::Relaxed),
             longest_tick_cycles: LONGEST.load(Ordering::Relaxed),
         };
-        let poll = cx.local.server.poll(cx.local.serial, &seen, timing);
-        LINK_LOST.store(cx.local.server.link_lost(), Ordering::Relaxed);
-        COMMISSIONED.store(cx.local.server.is_commissioned(), Ordering::Relaxed);
+        let mut port = Sender(&mut cx.shared.port);
+        let poll = cx.local.server.poll(&mut port, &seen, timing);
         cx.local.event_logger.log(cx.local.server, &seen, timing);
         if poll == Poll::Reboot {
             defmt::info!("restart, as a host has asked");
+            boot::forget_starts();
             board::restart();
+        }
+    }
+
+    /// The link's port as the server has it: it only sends.
+    struct Sender<'a, M>(&'a mut M);
+
+    impl<M: rtic::Mutex<T = Port>> hal::Serial for Sender<'_, M> {
+        fn read(&mut self, _into: &mut [u8]) -> usize {
+            0
+        }
+
+        fn write(&mut self, bytes: &[u8]) -> usize {
+            self.0.lock(|port| hal::Serial::write(&mut port.0, bytes))
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::BTreeSet;
 use std::fmt::Write;
 
 use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{Bound, LeafInfo, Range, UNSET, all};
+use quadrant::settings::leaves::{Bound, Exchange, LeafInfo, Range, UNSET, all};
 use quadrant::settings::tree::is_part;
 use serde_json::Value;
 
@@ -19,6 +19,8 @@ pub struct Row {
     pub range: String,
     /// Its default; of a list's points, of each point. Of a number that has none: that it must be given.
     pub default: String,
+    /// The state in which it changes, in words.
+    pub changes: &'static str,
     /// Its meaning.
     pub meaning: &'static str,
 }
@@ -33,6 +35,11 @@ pub fn rows(part: &str) -> Vec<Row> {
             unit: leaf.unit,
             range: range(leaf),
             default: default(&settings, leaf, &path),
+            changes: match leaf.exchange {
+                Exchange::Driven => "at any time",
+                Exchange::Disabled => "outputs off",
+                Exchange::Restart => "restart",
+            },
             meaning: leaf.meaning,
             path,
         })
@@ -132,8 +139,9 @@ fn parts() -> BTreeSet<String> {
 }
 
 /// Heading of the settings whose paths begin so.
-const SECTIONS: [(&str, &str); 8] = [
+const SECTIONS: [(&str, &str); 9] = [
     ("/rate_hz", "The stage"),
+    ("/axes/*/commissioned", "Commissioning"),
     ("/axes/*/encoder/", "Encoder"),
     ("/axes/*/amplifier/", "Amplifier"),
     ("/axes/*/limits/", "Limits"),
@@ -165,13 +173,13 @@ pub fn markdown() -> String {
 fn table(page: &mut String, heading: &str, rows: &[Row]) {
     let _ = write!(
         page,
-        "\n## {heading}\n\n| path | unit | range | default | meaning |\n|---|---|---|---|---|\n"
+        "\n## {heading}\n\n| path | unit | range | default | changes | meaning |\n|---|---|---|---|---|---|\n"
     );
     for row in rows {
         let _ = writeln!(
             page,
-            "| `{}` | {} | {} | {} | {} |",
-            row.path, row.unit, row.range, row.default, row.meaning
+            "| `{}` | {} | {} | {} | {} | {} |",
+            row.path, row.unit, row.range, row.default, row.changes, row.meaning
         );
     }
 }
@@ -191,7 +199,8 @@ The defaults are those of a board that nobody has commissioned: they hold no law
 A set of settings is checked as a whole before it takes effect. Beyond the ranges below: the law that acts and the kind of
 feedforward have their parameters; with a plant, the loop is stable at small errors and the nonlinear gain stays within its
 Popov bound, and pre-sliding springs are resolved at the control rate; the weights of the GMS sum to 1 within 1e-6; the
-points of lists rise; the Stribeck curve is smooth enough for its table. `rate_hz` and the encoders change with a restart.
+points of lists rise; the Stribeck curve is smooth enough for its table. `rate_hz` and the encoders change with a
+restart. What the safety of an axis depends on (*outputs off* below) is refused by name while the outputs are on.
 How a set is stored is in [settings-storage.md](settings-storage.md).
 
 A part that may be left out is left out by default. It reads `\"present\"` or `null` at its own path. `null` removes it;

@@ -1,14 +1,15 @@
 //! The fast half: the state and the work of the control interrupt.
 
 use super::glitch_monitor::GlitchReadings;
-use super::queues::{AxisSwap, CaptureCommand, ControlEnds, StreamItem};
+use super::host_need::HostNeed;
+use super::queues::{AxisSwap, CaptureCommand, ControlEnds, Order, StreamItem};
 use super::{Axis, Snapshot};
 use crate::app::capture::Capture;
 use crate::app::supervisor::PERIOD_TICKS;
 use crate::app::telemetry::{Observation, Sampler, SamplerState};
 use crate::law::axes::{AxisName, PerAxis};
+use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::reference::Motion;
 use crate::law::safety::{FaultCode, StreamLoss};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
@@ -24,8 +25,15 @@ pub struct Control<'q, 'a, S: Scalar> {
     capture: Option<Capture<'a>>,
     glitches: GlitchReadings,
     commanded: bool,
+    /// Some axes have new settings that others have not yet.
+    exchanging: bool,
     /// Values of the first waiting block that were taken.
     place: usize,
+    /// Orders taken so far; wraps.
+    orders: u16,
+    /// The last order to exchange the plan was carried out.
+    plan_taken: bool,
+    host: HostNeed,
     ends: ControlEnds<'q, 'a, S>,
 }
 
@@ -49,12 +57,16 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             capture: None,
             glitches: GlitchReadings::default(),
             commanded: false,
+            exchanging: false,
             place: 0,
+            orders: 0,
+            plan_taken: false,
+            host: HostNeed::default(),
             ends,
         }
     }
 
-    /// Starts with a fault latched, before the first tick: what the last run or the stored settings left.
+    /// Starts with a fault latched, before the first tick: what the last run or the stored settings left. The first stays.
     pub fn start_faulted(&mut self, code: FaultCode) {
         self.state.start_faulted(code);
     }
@@ -69,38 +81,68 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         &self.state
     }
 
+    /// Takes how many valid requests a host has made so far, as [`Intake::frames`](super::Intake::frames) has it. Once a tick.
+    #[inline(always)]
+    pub fn hear(&mut self, frames: u32) {
+        self.host.hear(frames);
+    }
+
     /// One control period: takes what the server has sent, and computes the outputs. The settings' changes are its own to
-    /// tell, and a command of the server's acts when the inputs have none.
+    /// tell, and an order of the server's acts when the inputs have no command.
     #[inline(always)]
     pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
-        let settings_changed = match self.ends.swaps.dequeue() {
-            Some(swap) => self.swap(swap),
-            None => PerAxis::splat(false),
+        let (settings_changed, unfit) = match self.ends.swaps.peek() {
+            // Settings that are not those of a commissioned stage do not drive it on.
+            Some(_) => (self.take_swap(), !self.stage().is_commissioned()),
+            None => (PerAxis::splat(false), false),
         };
-        if let Some((name, motion)) = self.ends.motions.dequeue() {
-            self.take_motion(name, motion);
-        }
         match self.ends.stream_items.peek() {
             None => {}
             Some(StreamItem::Segments(_)) => self.take_segments(),
             Some(StreamItem::Injection(_) | StreamItem::Voltages(_)) => self.take_voltage(),
         }
-        let command = inputs.command.or_else(|| self.ends.commands.dequeue());
+        let command = match inputs.command {
+            _ if unfit => Some(Command::Disable),
+            Some(command) => {
+                self.overtake(command);
+                Some(command)
+            }
+            None => match self.ends.orders.dequeue() {
+                Some(order) => self.take_order(order),
+                None => None,
+            },
+        };
+        let command = command.filter(|command| *command != Command::Enable || !self.exchanging);
         self.commanded = command.is_some();
         let axes = self.axes.each_ref().map(|axis| &**axis);
-        StageRef {
+        let stage = StageRef {
             axes: axes.into(),
             streaming: self.streaming,
-        }
-        .tick(
+        };
+        let outputs = stage.tick(
             &self.plan,
             &mut self.state,
             &Inputs {
                 command,
                 settings_changed,
+                link_lost: inputs.link_lost | self.host.is_lost(),
                 ..*inputs
             },
-        )
+        );
+        if self.host.is_needed() {
+            self.host.update(&self.state);
+        }
+        outputs
+    }
+
+    /// The stage in pieces.
+    #[inline(always)]
+    fn stage(&self) -> StageRef<'_, S> {
+        let axes = self.axes.each_ref().map(|axis| &**axis);
+        StageRef {
+            axes: axes.into(),
+            streaming: self.streaming,
+        }
     }
 
     /// Samples telemetry and capture after the outputs are written. Returns true if the supervising task's [`snapshot`] is
@@ -138,33 +180,108 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// The supervising task's view of the last tick. By itself, as an `Option` of it would be copied once more.
     #[inline(always)]
     pub fn snapshot(&self) -> Snapshot<S> {
-        Snapshot::of(&self.state)
+        Snapshot {
+            orders: self.orders,
+            plan_taken: self.plan_taken,
+            ..Snapshot::of(&self.stage(), &self.state)
+        }
+    }
+
+    /// Acts on an order of the server; returns the command that it is or brings about.
+    #[cold]
+    #[inline(never)]
+    fn take_order(&mut self, order: Order) -> Option<Command> {
+        self.orders = self.orders.wrapping_add(1);
+        let command = match order {
+            Order::Command(command) => command,
+            Order::Move(name) => {
+                let plan = self.ends.plans.dequeue()?;
+                if self.state.axes()[name].is_running() {
+                    return None;
+                }
+                self.plan[name] = plan[name].clone();
+                Command::StartMove(name)
+            }
+            Order::Plan => {
+                let plan = self.ends.plans.dequeue()?;
+                self.plan_taken = !self.state.is_running();
+                if self.plan_taken {
+                    self.plan = plan;
+                }
+                return None;
+            }
+            Order::Lock => {
+                self.state.lock();
+                return None;
+            }
+            Order::Unlock { stored } => {
+                self.state.unlock();
+                if stored {
+                    self.state.accept_settings();
+                }
+                return None;
+            }
+        };
+        self.host.start(command, &self.plan, &self.state);
+        Some(command)
+    }
+
+    /// Drops the server's orders that were waiting when a command to stop or to disable came by the shorter way: nothing
+    /// that was asked for earlier starts after it.
+    #[cold]
+    #[inline(never)]
+    fn overtake(&mut self, command: Command) {
+        if !matches!(command, Command::Stop | Command::Disable) {
+            return;
+        }
+        // As many as wait now: the server may be adding more.
+        for _ in 0..self.ends.orders.len() {
+            let Some(order) = self.ends.orders.dequeue() else {
+                return;
+            };
+            match order {
+                Order::Command(_) | Order::Move(_) => {
+                    self.orders = self.orders.wrapping_add(1);
+                    if matches!(order, Order::Move(_)) {
+                        let _ = self.ends.plans.dequeue();
+                    }
+                }
+                Order::Plan | Order::Lock | Order::Unlock { .. } => {
+                    self.take_order(order);
+                }
+            }
+        }
+    }
+
+    /// Replaces an axis, if it may be replaced now.
+    #[cold]
+    #[inline(never)]
+    fn take_swap(&mut self) -> PerAxis<bool> {
+        let driven = self.state.safety().drives();
+        match self.ends.swaps.peek() {
+            Some(swap) if swap.needs_disabled && driven => PerAxis::splat(false),
+            _ => match self.ends.swaps.dequeue() {
+                Some(swap) => self.swap(swap),
+                None => PerAxis::splat(false),
+            },
+        }
     }
 
     /// Replaces an axis; the old one goes back to the server as its back buffer.
-    #[cold]
-    #[inline(never)]
     fn swap(&mut self, swap: AxisSwap<'a, S>) -> PerAxis<bool> {
         let AxisSwap {
             name,
             axis,
             streaming,
+            needs_disabled,
+            more,
         } = swap;
+        self.exchanging = needs_disabled && more;
         // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);
         let _ = self.ends.back_buffers.enqueue(replaced);
         self.streaming = streaming;
         PerAxis::from_fn(|axis| axis == name)
-    }
-
-    /// Takes the motion that an axis will start next. One that comes while the axis follows the old one is dropped: the
-    /// server sends none then.
-    #[cold]
-    #[inline(never)]
-    fn take_motion(&mut self, name: AxisName, motion: Motion<S>) {
-        if !self.state.axes()[name].is_running() {
-            self.plan[name] = motion;
-        }
     }
 
     /// Passes the axes the next segments of a stream, if they have room.

@@ -2,17 +2,18 @@
 //!
 //! ```text
 //!   control interrupt             supervising task            lowest task
-//!   Control::tick, observe        Supervision::run            Server::poll  <-- bytes -->  a host
+//!   Control::tick, observe        Intake::run <-- bytes       Server::poll --> bytes
+//!                                 Supervision::run
 //!        |  snapshots ---------------->|  the latest ------------->|
-//!        |                             |  events ----------------->|
-//!        |<-------- commands ----------|                           |
-//!        |<-------- commands, axes, motions, segments, selections, captures ---|
+//!        |                             |  bytes, events ---------->|
+//!        |<-- commands, glitch readings, number of valid requests -|
+//!        |<-------- orders, axes, plans, segments, selections, captures ---|
 //!        |  samples, full captures, back buffers --------------------------->|
-//!        |<-------- glitch readings ---|
 //! ```
 //!
-//! Nothing is shared and nothing is locked: what passes from one half to the other is owned by one of them at a time,
-//! and goes through bounded queues ([`Queues`]) that neither side waits for. Settings are built by the slow half into the one
+//! What passes from one half to the other is owned by one of them at a time, and goes through bounded queues ([`Queues`])
+//! that neither side waits for; beside them there are counters, each with one writer. **A decision is taken on the state of
+//! now, by the one who acts on it**: the control interrupt. The others judge an older state to tell a person early. Settings are built by the slow half into the one
 //! [`Axis`](crate::law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
 //!
 //! The firmware puts each piece into an RTIC task; a host runs them one after the other in one thread
@@ -23,11 +24,14 @@ mod change_detector;
 mod control;
 pub mod crash_record;
 pub mod glitch_monitor;
+mod host_need;
+mod intake;
 mod liveness;
 mod queues;
 pub mod rate_limiter;
 mod server;
 mod snapshot;
+pub mod start_record;
 mod supervision;
 pub mod supervisor;
 pub mod telemetry;
@@ -37,8 +41,10 @@ pub use change_detector::{ChangeDetector, MAX_STATE_CHANGES, StateChange};
 pub use control::Control;
 
 pub use crate::law::stage::Inputs;
+pub use host_need::LINK_TIMEOUT_TICKS;
+pub use intake::{Intake, Received};
 pub use liveness::Liveness;
-pub use queues::{ControlEnds, Queues, ServerEnds};
+pub use queues::{ControlEnds, IntakeEnds, Queues, ServerEnds};
 pub use server::{Poll, Server, ServerParts, ServerStatistics};
 pub use snapshot::{AxisSnapshot, Snapshot, TimingStatistics};
 pub use supervision::{Supervised, Supervision};

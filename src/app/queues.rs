@@ -1,4 +1,6 @@
-//! The queues between the control interrupt and the server.
+//! The queues between the control interrupt, the supervising task and the server.
+
+use core::sync::atomic::{AtomicU32, Ordering};
 
 use heapless_queues::spsc::{Consumer, Producer, Queue};
 
@@ -8,9 +10,28 @@ use crate::app::telemetry::{Sample, Sampler};
 use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::injection::{Injection, VoltageBlock};
-use crate::law::reference::{Motion, Segment};
+use crate::law::reference::Segment;
 use crate::law::safety::StreamLoss;
 use crate::law::scalar::Scalar;
+use crate::law::stage::Plan;
+
+/// An order of the server to the control law, which takes one a tick.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Order {
+    /// Act on a command.
+    Command(Command),
+    /// Take the plan that waits, as a whole.
+    Plan,
+    /// Take one axis' motion of the plan that waits, and start it.
+    Move(AxisName),
+    /// Keep the outputs off.
+    Lock,
+    /// No longer keep the outputs off.
+    Unlock {
+        /// Valid settings were stored meanwhile.
+        stored: bool,
+    },
+}
 
 /// An axis with new settings on its way into the control law, with the stage's settings beside it.
 #[derive(Debug)]
@@ -18,6 +39,10 @@ pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) name: AxisName,
     pub(super) axis: &'a mut Axis<S>,
     pub(super) streaming: StreamLoss,
+    /// It waits until the outputs are off.
+    pub(super) needs_disabled: bool,
+    /// Another axis of the same settings follows: the outputs stay off until then.
+    pub(super) more: bool,
 }
 
 /// An item that waits for the control law: of a stream or of an injection, never of both.
@@ -44,8 +69,9 @@ pub(super) enum CaptureCommand<'a> {
 
 // Sizes of the queues: powers of two, so that their indices are cut by a mask; each has room for one less.
 const ONE: usize = 2;
-const COMMANDS: usize = 8;
-const MOTIONS: usize = 4;
+const ORDERS: usize = 8;
+/// Bytes of the link that wait for the server: two of the longest frames, as in the reference board's own ring.
+const BYTES: usize = 1024;
 const STREAM_ITEMS: usize = 16;
 /// Samples of each tick of 3 ms at 10 kHz.
 const SAMPLES: usize = 32;
@@ -55,15 +81,17 @@ pub(super) const STREAM_ITEM_ROOM: usize = STREAM_ITEMS - 1;
 
 /// The queues, each with room for one less than its size.
 pub struct Queues<'a, S: Scalar> {
-    commands: Queue<Command, COMMANDS>,
+    orders: Queue<Order, ORDERS>,
     swaps: Queue<AxisSwap<'a, S>, ONE>,
     back_buffers: Queue<&'a mut Axis<S>, ONE>,
-    motions: Queue<(AxisName, Motion<S>), MOTIONS>,
+    plans: Queue<Plan<S>, ONE>,
     stream_items: Queue<StreamItem<S>, STREAM_ITEMS>,
     samplers: Queue<Sampler, ONE>,
     samples: Queue<Sample, SAMPLES>,
     capture_commands: Queue<CaptureCommand<'a>, ONE>,
     captures: Queue<Capture<'a>, ONE>,
+    bytes: Queue<u8, BYTES>,
+    urgent: AtomicU32,
 }
 
 impl<S: Scalar> Default for Queues<'_, S> {
@@ -76,34 +104,44 @@ impl<'a, S: Scalar> Queues<'a, S> {
     /// Returns empty queues.
     pub const fn new() -> Self {
         Self {
-            commands: Queue::new(),
+            orders: Queue::new(),
             swaps: Queue::new(),
             back_buffers: Queue::new(),
-            motions: Queue::new(),
+            plans: Queue::new(),
             stream_items: Queue::new(),
             samplers: Queue::new(),
             samples: Queue::new(),
             capture_commands: Queue::new(),
             captures: Queue::new(),
+            bytes: Queue::new(),
+            urgent: AtomicU32::new(0),
         }
     }
 
-    /// Splits the queues into their two sides.
-    pub fn split<'q>(&'q mut self) -> (ControlEnds<'q, 'a, S>, ServerEnds<'q, 'a, S>) {
-        let (commands_in, commands) = self.commands.split();
+    /// Splits the queues into their three sides.
+    pub fn split<'q>(
+        &'q mut self,
+    ) -> (
+        ControlEnds<'q, 'a, S>,
+        IntakeEnds<'q>,
+        ServerEnds<'q, 'a, S>,
+    ) {
+        let (orders_in, orders) = self.orders.split();
         let (swaps_in, swaps) = self.swaps.split();
         let (back_buffers_in, back_buffers) = self.back_buffers.split();
-        let (motions_in, motions) = self.motions.split();
+        let (plans_in, plans) = self.plans.split();
         let (stream_items_in, stream_items) = self.stream_items.split();
         let (samplers_in, samplers) = self.samplers.split();
         let (samples_in, samples) = self.samples.split();
         let (capture_commands_in, capture_commands) = self.capture_commands.split();
         let (captures_in, captures) = self.captures.split();
+        let (bytes_in, bytes) = self.bytes.split();
+        let urgent = &self.urgent;
         let control = ControlEnds {
-            commands,
+            orders,
             swaps,
             back_buffers: back_buffers_in,
-            motions,
+            plans,
             stream_items,
             samplers,
             samples: samples_in,
@@ -111,26 +149,32 @@ impl<'a, S: Scalar> Queues<'a, S> {
             captures: captures_in,
         };
         let server = ServerEnds {
-            commands: commands_in,
+            orders: orders_in,
             swaps: swaps_in,
             back_buffers,
-            motions: motions_in,
+            plans: plans_in,
             stream_items: stream_items_in,
             samplers: samplers_in,
             samples,
             capture_commands: capture_commands_in,
             captures,
+            bytes,
+            urgent,
         };
-        (control, server)
+        let intake = IntakeEnds {
+            bytes: bytes_in,
+            urgent,
+        };
+        (control, intake, server)
     }
 }
 
 /// The control interrupt's side.
 pub struct ControlEnds<'q, 'a, S: Scalar> {
-    pub(super) commands: Consumer<'q, Command, COMMANDS>,
+    pub(super) orders: Consumer<'q, Order, ORDERS>,
     pub(super) swaps: Consumer<'q, AxisSwap<'a, S>, ONE>,
     pub(super) back_buffers: Producer<'q, &'a mut Axis<S>, ONE>,
-    pub(super) motions: Consumer<'q, (AxisName, Motion<S>), MOTIONS>,
+    pub(super) plans: Consumer<'q, Plan<S>, ONE>,
     pub(super) stream_items: Consumer<'q, StreamItem<S>, STREAM_ITEMS>,
     pub(super) samplers: Consumer<'q, Sampler, ONE>,
     pub(super) samples: Producer<'q, Sample, SAMPLES>,
@@ -140,13 +184,36 @@ pub struct ControlEnds<'q, 'a, S: Scalar> {
 
 /// The server's side.
 pub struct ServerEnds<'q, 'a, S: Scalar> {
-    pub(super) commands: Producer<'q, Command, COMMANDS>,
+    pub(super) orders: Producer<'q, Order, ORDERS>,
     pub(super) swaps: Producer<'q, AxisSwap<'a, S>, ONE>,
     pub(super) back_buffers: Consumer<'q, &'a mut Axis<S>, ONE>,
-    pub(super) motions: Producer<'q, (AxisName, Motion<S>), MOTIONS>,
+    pub(super) plans: Producer<'q, Plan<S>, ONE>,
     pub(super) stream_items: Producer<'q, StreamItem<S>, STREAM_ITEMS>,
     pub(super) samplers: Producer<'q, Sampler, ONE>,
     pub(super) samples: Consumer<'q, Sample, SAMPLES>,
     pub(super) capture_commands: Producer<'q, CaptureCommand<'a>, ONE>,
     pub(super) captures: Consumer<'q, Capture<'a>, ONE>,
+    pub(super) bytes: Consumer<'q, u8, BYTES>,
+    urgent: &'q AtomicU32,
+}
+
+impl<S: Scalar> ServerEnds<'_, '_, S> {
+    /// Number of urgent requests that have been received so far.
+    pub(super) fn urgent(&self) -> u32 {
+        self.urgent.load(Ordering::Acquire)
+    }
+}
+
+/// The side of the supervising task, which receives the link's bytes.
+pub struct IntakeEnds<'q> {
+    pub(super) bytes: Producer<'q, u8, BYTES>,
+    urgent: &'q AtomicU32,
+}
+
+impl IntakeEnds<'_> {
+    /// Counts an urgent request, after its last byte was passed on. Only this side writes.
+    pub(super) fn count_urgent(&mut self) {
+        let count = self.urgent.load(Ordering::Relaxed).wrapping_add(1);
+        self.urgent.store(count, Ordering::Release);
+    }
 }

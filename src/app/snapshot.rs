@@ -5,7 +5,7 @@ use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::injection::InjectionProgress;
 use crate::law::safety::monitor::FollowingState;
 use crate::law::scalar::Scalar;
-use crate::law::stage::StageState;
+use crate::law::stage::{StageRef, StageState};
 use crate::law::telemetry::LimitedBy;
 use crate::law::units::{EncoderCount, Position};
 
@@ -39,15 +39,19 @@ pub struct Snapshot<S> {
     pub axes: [AxisSnapshot<S>; 3],
     /// Progress of the injection under way, or of the last one.
     pub injection: InjectionProgress,
+    /// Orders of the server that control has taken; wraps.
+    pub orders: u16,
+    /// True if the last order to exchange the plan was carried out.
+    pub plan_taken: bool,
 }
 
 impl<S: Scalar> Snapshot<S> {
-    /// Takes a snapshot of the stage.
+    /// Takes a snapshot of the stage, which has taken no order yet.
     #[inline(always)]
-    pub fn of(state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
+    pub fn of(stage: &StageRef<'_, S>, state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
         Self {
             tick: state.tick(),
-            view: StageView::of(state),
+            view: stage.view(state),
             axes: state.axes().each_ref().map(|axis| {
                 let telemetry = axis.telemetry();
                 AxisSnapshot {
@@ -61,6 +65,8 @@ impl<S: Scalar> Snapshot<S> {
                 }
             }),
             injection: state.injection_progress(),
+            orders: 0,
+            plan_taken: false,
         }
     }
 }

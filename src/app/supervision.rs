@@ -3,7 +3,6 @@
 use super::Snapshot;
 use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
 use crate::app::supervisor::{Decision, Event, Supervisor};
-use crate::law::admission::StageView;
 use crate::law::command::Command;
 use crate::law::scalar::Scalar;
 
@@ -41,19 +40,13 @@ impl Supervision {
         }
     }
 
-    /// Judges the machine, and a request of the operator if there is one; `commissioned` as
-    /// [`Server::is_commissioned`](super::Server::is_commissioned) has it.
+    /// Judges the machine, and a request of the operator if there is one.
     pub fn run<S: Scalar>(
         &mut self,
         snapshot: &Snapshot<S>,
         request: Option<Command>,
-        commissioned: bool,
     ) -> Supervised {
-        let view = StageView {
-            commissioned,
-            ..snapshot.view
-        };
-        let Decision { command, events } = self.supervisor.step(view, request);
+        let Decision { command, events } = self.supervisor.step(snapshot.view, request);
         self.runs = self.runs.wrapping_add(1);
         Supervised {
             command,

@@ -7,12 +7,14 @@
 //! - `Board::init`, which starts the chip and hands out `encoders`, `operator`, `amplifiers`, `tick` and `idle`, and on
 //!   the reference board `switches`, `serial`, `watchdog`, `flash` and `reset_cause`: the traits are in
 //!   `quadrant::hal`;
+//! - `RATES_HZ`, the control rates that the board is up to;
 //! - `job`, what a host has left to run, if there is one;
 //! - `outputs_off`, which makes the machine safe from any context without owning anything;
 //! - `halt`, which never returns;
 //! - `board_memory.x`, the linker's map, with the stack at the bottom of RAM (`stack`).
 //!
-//! `crash_record` keeps the cause of a panic or a fault until the next start, on any board.
+//! `crash_record` keeps the cause of a panic or a fault until the next start, and `start_record` how many starts in a row
+//! have not lasted, on any board.
 //!
 //! How to add a board: `docs/porting.md`.
 
@@ -22,6 +24,7 @@ compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not bot
 pub(crate) mod crash_record;
 mod fault;
 pub(crate) mod stack;
+pub(crate) mod start_record;
 
 #[cfg(feature = "board-mps2")]
 mod mps2;

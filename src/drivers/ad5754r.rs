@@ -149,6 +149,8 @@ pub struct Ad5754r<Bus, Sync, Load, Clear, Delay> {
     turn: u8,
     /// A register that read wrong, until it reads right.
     wrong: Option<Wrong>,
+    /// /CLR holds the outputs at zero volts since a write failed.
+    cleared: bool,
 }
 
 /// A register that read wrong.
@@ -181,6 +183,7 @@ where
             codes: [0; 3],
             turn: 0,
             wrong: None,
+            cleared: false,
         }
     }
 
@@ -203,6 +206,7 @@ where
         self.codes = [0; 3];
         self.turn = 0;
         self.wrong = None;
+        self.cleared = false;
         for (address, bits, item, expected) in [
             (register::RANGE, RANGE_BITS, Item::Range, RANGE_10_V_BIPOLAR),
             (register::POWER, POWER_BITS, Item::Power, POWER_UP),
@@ -225,11 +229,26 @@ where
     /// the call before, and the power register, in turn.
     ///
     /// # Errors
-    /// The bus' error, after which the outputs hold the codes of the call before; or a mismatch, after which they hold
-    /// these. A mismatch is reported by every call until its register reads right: a chip that has lost its supply keeps
-    /// the codes that it is sent, but is no longer powered up.
+    /// The bus' error, or a mismatch. Either pulls /CLR, which needs no bus: the outputs are at zero volts, not at the last
+    /// codes that got through. It is let go of by the second call in a row that succeeds with all codes zero. A mismatch is
+    /// reported by every call until its register reads right: a chip that has lost its supply keeps the codes that it is
+    /// sent, but is no longer powered up.
     #[inline(always)]
     pub fn write(&mut self, codes: [i16; 3]) -> Result<(), Error<Bus::Error>> {
+        let before = self.codes;
+        let written = self.write_and_compare(codes);
+        if written.is_err() && !self.cleared {
+            let _ = self.pins.clear.set_low();
+            self.cleared = true;
+        } else if written.is_ok() && self.cleared && before == [0; 3] && codes == [0; 3] {
+            let _ = self.pins.clear.set_high();
+            self.cleared = false;
+        }
+        written
+    }
+
+    #[inline(always)]
+    fn write_and_compare(&mut self, codes: [i16; 3]) -> Result<(), Error<Bus::Error>> {
         let [a, b, c] = self.codes.map(i16::cast_unsigned);
         let (address, bits, item, expected) = match self.turn {
             0 => (register::DAC, ALL_BITS, Item::Code(0), a),

@@ -16,20 +16,30 @@ pub struct StageView {
     pub running: bool,
     /// The bad input that keeps the outputs from being enabled.
     pub interlock: Option<EnableInterlock>,
+    /// An axis that moves though the outputs are off.
+    pub moving: Option<AxisName>,
     /// A fault that only held the axes.
     pub held: Option<Fault>,
     /// The motion mode of each axis.
     pub modes: PerAxis<MotionMode>,
     /// The axes that know where they are.
     pub homed: PerAxis<bool>,
+    /// The axes that start no more than jogs and homing until they are homed.
+    pub awaiting_homing: PerAxis<bool>,
     /// The first segments of a stream are there, and start where the axes rest.
     pub stream_ready: bool,
     /// The first value of an injected voltage is there.
     pub injection_ready: bool,
     /// A voltage is being injected.
     pub injecting: bool,
-    /// The settings are those of a commissioning, or of a host. The law cannot tell: the application says so.
+    /// An axis is commissioned, and every axis that its law could drive is: [`StageRef::is_commissioned`].
+    ///
+    /// [`StageRef::is_commissioned`]: crate::law::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// The outputs are kept off while flash is written, or until a restart.
+    pub locked: bool,
+    /// The stored settings are damaged or were refused, and nobody has stored others since.
+    pub settings_invalid: bool,
 }
 
 /// Reason why a command is not acted on.
@@ -57,8 +67,16 @@ pub enum Refusal {
     NoInjection,
     /// A voltage is being injected.
     Injecting,
-    /// The settings are the default ones, which hold no law.
+    /// No axis is commissioned, or one that has a law is not.
     NotCommissioned,
+    /// The outputs are kept off while flash is written, or until a restart.
+    Locked,
+    /// The stored settings are damaged or were refused.
+    SettingsInvalid,
+    /// The axis moves though the outputs are off.
+    NotAtStandstill(AxisName),
+    /// The axis is not homed, and its settings ask for it.
+    NotHomed(AxisName),
 }
 
 impl Refusal {
@@ -79,7 +97,17 @@ impl Refusal {
             }
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
-                "not commissioned: no axis has a law; run `quadrant commission`, or load a settings file"
+                "not commissioned: no axis is, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
+            }
+            Self::Locked => "flash is being written, or a restart is due; ask again",
+            Self::SettingsInvalid => {
+                "the stored settings are damaged or were refused; check the draft, store it, then reset"
+            }
+            Self::NotAtStandstill(_) => {
+                "the axis moves though the outputs are off; wait until it stands, or find out what moves it"
+            }
+            Self::NotHomed(_) => {
+                "the axis is not homed: until then it jogs and homes at limits.unhomed_mm_s, and nothing else"
             }
             Self::Starting => "the stage has just started; ask again",
             Self::BadInput(interlock) => match interlock.code {
@@ -103,7 +131,9 @@ impl Refusal {
     pub const fn axis(&self) -> Option<AxisName> {
         match self {
             Self::BadInput(interlock) => interlock.axis,
-            Self::AxisBusy(axis) => Some(*axis),
+            Self::AxisBusy(axis) | Self::NotAtStandstill(axis) | Self::NotHomed(axis) => {
+                Some(*axis)
+            }
             _ => None,
         }
     }
@@ -127,6 +157,7 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::Disable | Command::Stop => None,
         Command::ResetFault if stopping => Some(Refusal::Stopping),
         Command::ResetFault if !faulted => Some(Refusal::NoFault),
+        Command::ResetFault if view.settings_invalid => Some(Refusal::SettingsInvalid),
         Command::ResetFault => None,
         _ if faulted => Some(Refusal::FaultLatched),
         _ if stopping => Some(Refusal::Stopping),
@@ -134,12 +165,25 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
             view.interlock.map(Refusal::BadInput)
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
+        Command::Enable if view.settings_invalid => Some(Refusal::SettingsInvalid),
         Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
+        Command::Enable if view.locked => Some(Refusal::Locked),
+        Command::Enable if !view.safety.is_enabled() && view.moving.is_some() => {
+            view.moving.map(Refusal::NotAtStandstill)
+        }
         Command::Enable => None,
         _ if !view.safety.is_enabled() => Some(Refusal::NotEnabled),
         Command::Run | Command::StartStream | Command::StartInjection if view.running => {
             Some(Refusal::AlreadyRunning)
         }
+        Command::Run | Command::StartStream | Command::StartInjection
+            if view.awaiting_homing.contains(&true) =>
+        {
+            let awaiting = view.awaiting_homing;
+            let first = awaiting.named().find(|(_, awaiting)| **awaiting);
+            first.map(|(axis, _)| Refusal::NotHomed(axis))
+        }
+        Command::StartMove(axis) if view.awaiting_homing[axis] => Some(Refusal::NotHomed(axis)),
         Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),
         Command::StartInjection if !view.injection_ready => Some(Refusal::NoInjection),
         Command::Run | Command::StartStream | Command::StartInjection => None,

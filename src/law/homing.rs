@@ -153,9 +153,10 @@ impl<S: Scalar> Homing<S> {
         }
     }
 
-    /// True if a pressed limit switch is one that this homing moves onto.
-    pub(crate) fn expects(&self, switches: AxisSwitches) -> bool {
-        switches.has(self.parameters.switch)
+    /// The switch that this homing moves onto.
+    #[inline(always)]
+    pub(crate) fn switch(&self) -> AxisSwitches {
+        self.parameters.switch
     }
 
     /// The reference of the next tick along `ramp`, whose state is `moving`; `parked` is the state of the last move.

@@ -39,6 +39,10 @@ pub struct ReferenceGenerator<S: Scalar> {
     homing: Option<Homing<S>>,
     stream: Stream<S>,
     wait_ticks: u32,
+    /// Ticks that a controlled stop may take at most.
+    stop_limit: Option<u32>,
+    /// Largest velocity of a jog of an axis that is not homed.
+    reduced_velocity: Option<Velocity>,
 }
 
 impl<S: Scalar> ReferenceGenerator<S> {
@@ -58,6 +62,8 @@ impl<S: Scalar> ReferenceGenerator<S> {
             homing: None,
             stream: Stream::new(scale),
             wait_ticks: 0,
+            stop_limit: None,
+            reduced_velocity: None,
         }
     }
 
@@ -83,6 +89,20 @@ impl<S: Scalar> ReferenceGenerator<S> {
         self
     }
 
+    /// Ends a controlled stop that takes longer than this many ticks with a fault (SS1-t of IEC 61800-5-2).
+    #[must_use]
+    pub fn with_stop_limit(mut self, ticks: u32) -> Self {
+        self.stop_limit = Some(ticks);
+        self
+    }
+
+    /// Jogs an axis that is not homed at no more than this.
+    #[must_use]
+    pub fn with_reduced_velocity(mut self, velocity: Option<Velocity>) -> Self {
+        self.reduced_velocity = velocity;
+        self
+    }
+
     /// The ramp of a controlled stop.
     #[inline(always)]
     pub fn stop_ramp(&self) -> &Ramp<S> {
@@ -96,6 +116,8 @@ pub(crate) struct GeneratorState<S: Scalar> {
     mode: MotionMode,
     /// Ticks until the motion begins.
     waiting: u32,
+    /// Ticks of the controlled stop under way.
+    stopping: u32,
     motion: MotionState,
     ramp: RampState,
     jog: JogState,
@@ -108,6 +130,7 @@ impl<S: Scalar> Default for GeneratorState<S> {
         Self {
             mode: MotionMode::Hold,
             waiting: 0,
+            stopping: 0,
             motion: MotionState::default(),
             ramp: RampState::default(),
             jog: JogState::default(),
@@ -166,11 +189,14 @@ impl<S: Scalar> ReferenceGenerator<S> {
         state: &mut GeneratorState<S>,
         position: Position,
         velocity: Velocity,
+        homed: bool,
     ) {
+        let reduced = self.reduced_velocity.filter(|_| !homed);
+        let most = reduced.unwrap_or(self.max_velocity);
         if state.mode != MotionMode::Jog {
             state.ramp = RampState::at_rest(position);
         }
-        state.jog = JogState::new(velocity.max(-self.max_velocity).min(self.max_velocity));
+        state.jog = JogState::new(velocity.max(-most).min(most));
         state.mode = MotionMode::Jog;
     }
 
@@ -205,6 +231,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
         state.ramp = self
             .stop_ramp
             .take_over(from.position, from.displacement, from.before);
+        state.stopping = 0;
         state.mode = MotionMode::Stopping;
     }
 }
@@ -271,10 +298,8 @@ impl<S: Scalar> ReferenceGenerator<S> {
                 }
                 StreamStep::Underrun => {
                     self.stop(state, from);
-                    (
-                        self.advance_stop(state),
-                        GeneratorEvent::Fault(FaultCode::StreamUnderrun),
-                    )
+                    let (sample, _) = self.advance_stop(state);
+                    (sample, GeneratorEvent::Fault(FaultCode::StreamUnderrun))
                 }
             },
             (MotionMode::OpenLoop, _) => {
@@ -287,18 +312,24 @@ impl<S: Scalar> ReferenceGenerator<S> {
             // Homing whose settings have gone ends in a stop as well.
             (MotionMode::Home, None) => {
                 self.stop(state, from);
-                (self.advance_stop(state), GeneratorEvent::None)
+                self.advance_stop(state)
             }
-            _ => (self.advance_stop(state), GeneratorEvent::None),
+            _ => self.advance_stop(state),
         }
     }
 
-    fn advance_stop(&self, state: &mut GeneratorState<S>) -> ReferenceSample<S> {
+    fn advance_stop(&self, state: &mut GeneratorState<S>) -> (ReferenceSample<S>, GeneratorEvent) {
         let sample = self.stop_ramp.step(&mut state.ramp, Velocity::ZERO);
         if state.ramp.is_at_rest() {
             state.mode = MotionMode::Hold;
         }
-        sample
+        state.stopping = state.stopping.saturating_add(1);
+        let event = if self.stop_limit.is_some_and(|most| state.stopping > most) {
+            GeneratorEvent::Fault(FaultCode::StopOverrun)
+        } else {
+            GeneratorEvent::None
+        };
+        (sample, event)
     }
 
     fn advance_home(
@@ -326,13 +357,12 @@ impl<S: Scalar> ReferenceGenerator<S> {
         (sample, event)
     }
 
-    /// True if a pressed limit switch is one that the axis is meant to move onto.
+    /// The switch that the axis is meant to move onto, if there is one.
     #[inline(always)]
-    pub(crate) fn expects(&self, state: &GeneratorState<S>, switches: AxisSwitches) -> bool {
-        state.mode == MotionMode::Home
-            && self
-                .homing
-                .as_ref()
-                .is_some_and(|homing| homing.expects(switches))
+    pub(crate) fn expected(&self, state: &GeneratorState<S>) -> AxisSwitches {
+        match &self.homing {
+            Some(homing) if state.mode == MotionMode::Home => homing.switch(),
+            _ => AxisSwitches::default(),
+        }
     }
 }

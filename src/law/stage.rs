@@ -17,7 +17,7 @@
 
 use crate::law::admission::{self, StageView};
 use crate::law::axes::{AxisName, PerAxis};
-use crate::law::axis::{Axis, AxisState};
+use crate::law::axis::{Axis, AxisState, Commissioning};
 use crate::law::command::Command;
 use crate::law::encoder::EncoderReading;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
@@ -25,6 +25,7 @@ use crate::law::injection::{
     Coupling, InjectedValue, Injection, InjectionProgress, InjectionState, InjectionStep,
 };
 use crate::law::reference::{Motion, Segment};
+use crate::law::safety::plausibility::is_due;
 use crate::law::safety::{
     EnableInterlock, Fault, FaultCode, Reaction, SafetyState, StreamLoss, Switches,
 };
@@ -104,10 +105,18 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     safety: SafetyState,
     tick: u32,
     interlock: Option<EnableInterlock>,
+    /// An axis that moves though the outputs are off.
+    moving: Option<AxisName>,
+    /// The axes that start no more than jogs and homing until they are homed.
+    awaiting_homing: PerAxis<bool>,
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
     injection: InjectionState<S>,
+    /// The outputs are kept off: [`StageState::lock`].
+    locked: bool,
+    /// The stored settings are damaged or were refused.
+    settings_invalid: bool,
 }
 
 /// The fault that each axis found in a tick, if any.
@@ -120,9 +129,13 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             safety: SafetyState::default(),
             tick: 0,
             interlock: None,
+            moving: None,
+            awaiting_homing: PerAxis::splat(false),
             held: None,
             settled: 0,
             injection: InjectionState::default(),
+            locked: false,
+            settings_invalid: false,
         }
     }
 }
@@ -135,13 +148,36 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         state
     }
 
-    /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet.
+    /// As [`with_fault`](Self::with_fault), for a stage that has not ticked yet. [`FaultCode::SettingsInvalid`] stays until
+    /// [`accept_settings`](Self::accept_settings), whatever other fault is latched first.
     pub fn start_faulted(&mut self, code: FaultCode) {
+        self.settings_invalid |= code == FaultCode::SettingsInvalid;
+        if matches!(self.safety, SafetyState::Faulted(_)) {
+            return;
+        }
         self.safety = SafetyState::Faulted(Fault {
             code,
             axis: None,
             tick: 0,
         });
+    }
+
+    /// Keeps the outputs off until [`unlock`](Self::unlock), if they are off now: for what may not happen while they are
+    /// on, such as the erasure of flash. Returns true if they are kept off.
+    pub fn lock(&mut self) -> bool {
+        self.locked |= !self.safety.drives();
+        self.locked
+    }
+
+    /// Ends [`lock`](Self::lock).
+    pub fn unlock(&mut self) {
+        self.locked = false;
+    }
+
+    /// Takes note that valid settings were stored, or the stored ones erased: a reset clears
+    /// [`FaultCode::SettingsInvalid`] from now on.
+    pub fn accept_settings(&mut self) {
+        self.settings_invalid = false;
     }
 
     /// The memories of x, y and z.
@@ -162,6 +198,11 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     /// The bad input that keeps the outputs from being enabled at present, if there is one.
     pub fn interlock(&self) -> Option<EnableInterlock> {
         self.interlock
+    }
+
+    /// An axis that moves while the outputs are off: they are not enabled until it stands.
+    pub fn moving(&self) -> Option<AxisName> {
+        self.moving
     }
 
     /// The last fault that only held the axes ([`Reaction::Hold`]), until the next motion.
@@ -221,27 +262,56 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         self.injection.is_running()
     }
 
+    /// The relation of the injection that waits or is under way to the loop and to the plan.
+    pub(crate) fn injection_coupling(&self) -> Option<Coupling> {
+        self.injection.injection().map(Injection::coupling)
+    }
+
     /// Progress of the injection under way, or else of the last one.
     pub fn injection_progress(&self) -> InjectionProgress {
         self.injection.progress()
     }
 }
 
-impl StageView {
-    /// The view of a stage as its last tick left it.
-    pub fn of<S: Scalar, const N: usize>(state: &StageState<S, N>) -> Self {
-        Self {
+impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
+    /// The view of the stage as its last tick left it.
+    #[inline(always)]
+    pub fn view(&self, state: &StageState<S, N>) -> StageView {
+        StageView {
             safety: state.safety(),
             running: state.is_running(),
             interlock: state.interlock(),
+            moving: state.moving(),
+            awaiting_homing: state.awaiting_homing,
             held: state.held(),
             modes: state.axes.by_ref().map(AxisState::mode),
             homed: state.axes.by_ref().map(AxisState::is_homed),
             stream_ready: state.axes.iter().all(AxisState::is_stream_ready),
-            injection_ready: state.is_injection_ready(),
+            injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
-            commissioned: true,
+            commissioned: self.is_commissioned(),
+            locked: state.locked,
+            settings_invalid: state.settings_invalid,
         }
+    }
+
+    /// True if the axis of the injection that waits, should there be one, was commissioned.
+    fn may_inject(&self, state: &StageState<S, N>) -> bool {
+        let injection = state.injection.injection();
+        injection.is_none_or(|injection| {
+            self.axes[injection.axis()].commissioning() == Commissioning::Done
+        })
+    }
+
+    /// True if an axis was commissioned, and no other has a law that could drive it.
+    #[inline(always)]
+    pub fn is_commissioned(&self) -> bool {
+        let has = |standing| {
+            self.axes
+                .iter()
+                .any(|axis| axis.commissioning() == standing)
+        };
+        has(Commissioning::Done) && !has(Commissioning::Missing)
     }
 }
 
@@ -289,14 +359,15 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         let driven = state.safety.drives();
         let mut good = inputs.switches.are_good();
         let mut findings = Findings::splat(Ok(()));
-        for (((axis, memory), reading), finding) in self
+        for ((((axis, memory), reading), finding), index) in self
             .axes
             .into_iter()
             .zip(&mut state.axes)
             .zip(&inputs.readings)
             .zip(&mut findings)
+            .zip(0..)
         {
-            *finding = axis.read_encoder(memory, reading);
+            *finding = axis.read_encoder(memory, reading, is_due(tick, index));
             good &= finding.is_ok();
         }
         state.interlock = None;
@@ -312,6 +383,15 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if state.safety == SafetyState::Start && state.interlock.is_none() {
             state.safety = SafetyState::Disabled;
         }
+        for ((axis, memory), awaiting) in self
+            .axes
+            .into_iter()
+            .zip(&state.axes)
+            .zip(&mut state.awaiting_homing)
+        {
+            *awaiting = axis.awaits_homing(memory);
+        }
+        state.moving = if driven { None } else { self.moving(state) };
         if let Some(command) = inputs.command {
             self.handle_command(state, command, driven, tick);
         }
@@ -342,6 +422,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             *code = axis.drive(memory, changed);
         }
         outputs
+    }
+
+    /// The first axis that does not stand.
+    fn moving(&self, state: &StageState<S, N>) -> Option<AxisName> {
+        self.axes
+            .into_iter()
+            .zip(&state.axes)
+            .zip(AxisName::ALL)
+            .find(|((axis, memory), _)| !axis.stands(memory))
+            .map(|(_, name)| name)
     }
 
     /// Advances the references of driven axes.
@@ -461,14 +551,17 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if driven && command == Command::ResetFault {
             return;
         }
-        if state.safety.apply(command, state.interlock.is_some()) {
+        // Whoever has let it through looked at an older state.
+        if admission::refusal(self.view(state), command).is_some() {
+            return;
+        }
+        if state.safety.apply(command) {
+            state.moving = None;
             state.held = None;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
                 axis.enable(memory);
             }
-        } else if state.safety.is_enabled()
-            && admission::refusal(StageView::of(state), command).is_none()
-        {
+        } else if state.safety.is_enabled() {
             self.start(state, command, tick);
         }
     }

@@ -31,6 +31,9 @@ pub struct AxisSettings {
     pub homing: Option<HomingSettings>,
     /// The linear model of the axis, if known: with it, the nonlinear gain is held to the Popov bound.
     pub plant: Option<PlantModel>,
+    /// True if the axis was commissioned: by the tool, or by the person who entered its settings.
+    #[serde(default)]
+    pub commissioned: bool,
 }
 
 /// An incremental encoder and its hardware counter.

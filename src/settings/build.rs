@@ -2,16 +2,46 @@
 
 use super::{AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings};
 use crate::law::axes::{AxisName, PerAxis};
-use crate::law::axis::{Axis, AxisBuilder};
+use crate::law::axis::{Axis, AxisBuilder, Commissioning};
+use crate::law::control::feedback::LawKind;
 use crate::law::encoder::Encoder;
+use crate::law::feedforward::FeedforwardKind;
 use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
+use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
-use crate::law::units::Position;
+use crate::law::units::{DacCode, Position};
+
+/// Counts that an axis shows for certain: those of one dead line, and noise.
+const HELD_COUNTS: f64 = 5.0;
+/// Stiffness before sliding, and breakaway, over those of the settings, at most.
+const HELD_ERROR: f64 = 1.25;
+const FRICTION_ERROR: f64 = 1.5;
+/// Least voltage that must show as motion, as a share of the output limit.
+const HELD_SHARE: f64 = 0.01;
+/// Largest load, as a share of the output limit; and before the axis has moved so far after enabling, mm.
+const LOAD_SHARE: f64 = 0.3;
+const FIRST_LOAD_SHARE: f64 = 0.1;
+const PROVING_MM: f64 = 1.0;
+/// Distance of the model without motion of the encoder that is a fault, mm, and in counts.
+const MODEL_DISTANCE_MM: f64 = 0.05;
+const MODEL_COUNTS: f64 = 20.0;
+/// What is added to that distance for the error of the dead time, over the way that the largest output brings within it.
+const DELAY_ERROR: f64 = 0.1;
+/// Speed that no load explains, mm/s, and in counts per tick.
+const MODEL_VELOCITY_MM_S: f64 = 80.0;
+const MODEL_STEP_COUNTS: f64 = 8.0;
+/// Measured speed below which an axis stands, beyond what quantisation adds, mm/s.
+const STANDSTILL_MM_S: f64 = 1.0;
+/// Ticks that are added to the longest stop, for rounding.
+const STOP_MARGIN_TICKS: u32 = 10;
+/// The budget of the open loop on an axis without a model, V s, beyond a share of the output limit.
+const OPEN_BUDGET_V_S: f64 = 8e-3;
+const OPEN_SHARE: f64 = 0.02;
 
 impl StageSettings {
     /// Checks the settings and builds the stage, with room for `N` GMS elements. Slow: tables are filled and the
@@ -64,6 +94,26 @@ impl StageSettings {
 }
 
 impl AxisSettings {
+    /// The standing of the axis.
+    pub(super) fn commissioning(&self) -> Commissioning {
+        let (pid, gains) = (&self.feedback.pid, &self.feedforward.gains);
+        let numbers = [
+            pid.kp_v_per_mm,
+            pid.ki_v_per_mm_s,
+            pid.kd_v_s_per_mm,
+            gains.inertia_v_s2_per_mm,
+            self.amplifier.offset_v,
+        ];
+        let is_inert = self.feedback.law == LawKind::Pid
+            && self.feedforward.kind == FeedforwardKind::None
+            && numbers == [0.0; 5];
+        match (self.commissioned, is_inert) {
+            (true, _) => Commissioning::Done,
+            (false, true) => Commissioning::Inert,
+            (false, false) => Commissioning::Missing,
+        }
+    }
+
     /// The preview in whole ticks.
     #[inline(never)]
     fn preview_ticks(&self, period_s: f64) -> usize {
@@ -119,18 +169,71 @@ impl AxisSettings {
                 limits.silent_share * amplifier.output_limit_v,
                 rounding::round(limits.silent_s / period_s) as u32,
             ))
+            .plausibility(self.build_plausibility(period_s))
             .index_spacing(IndexSpacing::new(
                 encoder.counts_per_index,
                 encoder.index_tolerance_counts,
             ))
             .travel(limits.build_travel(scale, &stop_ramp))
+            .standstill(STANDSTILL_MM_S * period_s / encoder.resolution_mm)
+            .reduced_speed(limits.unhomed_mm_s.map(|reduced_mm_s| {
+                limits.overspeed_ratio * reduced_mm_s * period_s / encoder.resolution_mm
+            }))
             .generator(self.build_generator(
                 stop_ramp,
                 (longest_preview_ticks - preview_ticks) as u32,
                 scale,
             ))
+            .commissioning(self.commissioning())
             .try_build();
         debug_assert_eq!(built, Ok(()), "validation accepted what an axis refuses");
+    }
+
+    #[inline(never)]
+    fn build_plausibility(&self, period_s: f64) -> Plausibility {
+        let (limit_v, resolution_mm) = (self.amplifier.output_limit_v, self.encoder.resolution_mm);
+        let amplifier = &self.amplifier;
+        let per_volt = DacCode::FULL_SCALE / amplifier.full_scale_v;
+        let words = Words {
+            per_volt: if amplifier.reversed {
+                -per_volt
+            } else {
+                per_volt
+            },
+            offset: rounding::round(amplifier.offset_v * per_volt) as i32,
+        };
+        let Some(plant) = self.plant else {
+            let breakaway_v = OPEN_SHARE * limit_v;
+            return Plausibility::without_model(OPEN_BUDGET_V_S, breakaway_v, words, period_s);
+        };
+        let sliding = &self.friction.sliding;
+        let breakaway_v = sliding
+            .positive
+            .curve
+            .breakaway_v
+            .max(sliding.negative.curve.breakaway_v);
+        // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
+        let seen_mm = HELD_COUNTS * resolution_mm;
+        let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
+        let delay_s = plant.delay_s;
+        let model = PlausibilityModel {
+            gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
+            damping_per_s: plant.damping_per_s,
+            delay_s,
+            limit_v,
+            // Beyond it, a step of the encoder is a jump.
+            largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
+            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v),
+            breakaway_v: (FRICTION_ERROR * breakaway_v).max(HELD_SHARE * limit_v),
+            load_v: LOAD_SHARE * limit_v,
+            first_load_v: FIRST_LOAD_SHARE * limit_v,
+            proving_mm: PROVING_MM,
+            distance_mm: (MODEL_DISTANCE_MM
+                + DELAY_ERROR * plant.gain_mm_per_v_s2 * limit_v * delay_s * delay_s)
+                .max(MODEL_COUNTS * resolution_mm),
+            velocity_mm_s: MODEL_VELOCITY_MM_S.max(MODEL_STEP_COUNTS * resolution_mm / period_s),
+        };
+        Plausibility::new(&model, words, resolution_mm, period_s)
     }
 
     #[inline(never)]
@@ -155,11 +258,26 @@ impl AxisSettings {
                 .map(|travel| (position(travel.negative), position(travel.positive))),
         )
         .with_homing(self.build_homing(scale))
+        .with_stop_limit(limits.stop_ticks(scale.rate_hz))
+        .with_reduced_velocity(
+            limits
+                .unhomed_mm_s
+                .map(|reduced_mm_s| Velocity::from_mm_s(reduced_mm_s, scale)),
+        )
         .with_wait(wait_ticks)
     }
 }
 
 impl LimitSettings {
+    /// The longest that a controlled stop may take: from overspeed, along the braking ramp with the time in which its
+    /// deceleration builds up and goes, and a quarter more.
+    fn stop_ticks(&self, rate_hz: f64) -> u32 {
+        let fastest = self.overspeed_ratio * self.max_velocity_mm_s;
+        let building_up_s = 2.0 * self.braking_mm_s2 / self.braking_jerk_mm_s3;
+        let longest_s = fastest / self.braking_mm_s2 + building_up_s;
+        rounding::ceil(1.25 * longest_s * rate_hz) as u32 + STOP_MARGIN_TICKS
+    }
+
     fn build_travel<S: Scalar>(&self, scale: MotionScale, braking: &Ramp<S>) -> Travel {
         let Some(travel) = self.travel_mm else {
             return Travel::UNLIMITED;

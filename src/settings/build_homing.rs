@@ -18,7 +18,10 @@ impl AxisSettings {
     pub(super) fn build_homing<S: Scalar>(&self, scale: MotionScale) -> Option<Homing<S>> {
         let homing = self.homing.as_ref()?;
         let resolution_mm = scale.resolution_mm;
-        let search_mm_s = homing.search_mm_s.min(self.limits.max_velocity_mm_s);
+        let search_mm_s = homing
+            .search_mm_s
+            .min(self.limits.max_velocity_mm_s)
+            .min(self.limits.unhomed_mm_s.unwrap_or(f64::INFINITY));
         let park_mm = match &self.limits.travel_mm {
             Some(travel) => homing.park_mm.max(travel.negative).min(travel.positive),
             None => homing.park_mm,

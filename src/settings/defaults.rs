@@ -5,10 +5,9 @@ use heapless::Vec;
 use super::axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardSettings};
 use super::feedback::FeedbackSettings;
 use super::leaves::default;
-use super::leaves::rules::OF_AN_AXIS;
 use super::limits::{LimitSettings, LossReaction, StreamingSettings};
 use super::stage::StageSettings;
-use super::tree::number_at;
+use crate::law::axis::Commissioning;
 use crate::law::control::feedback::LawKind;
 use crate::law::control::pid::PidGains;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -45,23 +44,15 @@ impl StageSettings {
         }
     }
 
-    /// True if somebody has given at least one axis numbers of its own. The default settings hold no law: outputs are not
-    /// enabled on them.
+    /// True if an axis was commissioned, and no other has a law that could drive it: the control law enables the outputs
+    /// only then.
     pub fn is_commissioned(&self) -> bool {
-        self.axes.iter().any(AxisSettings::differs_from_default)
-    }
-}
-
-impl AxisSettings {
-    /// True if a number is another than its default.
-    fn differs_from_default(&self) -> bool {
-        OF_AN_AXIS.iter().any(|rule| {
-            let number = match rule.point {
-                Some(read) => read(self, 0),
-                None => number_at(self, rule.field),
-            };
-            number.is_some_and(|number| number != rule.default)
-        })
+        let has = |standing| {
+            self.axes
+                .iter()
+                .any(|axis| axis.commissioning() == standing)
+        };
+        has(Commissioning::Done) && !has(Commissioning::Missing)
     }
 }
 
@@ -98,6 +89,7 @@ impl Default for AxisSettings {
             limits: LimitSettings::default(),
             homing: None,
             plant: None,
+            commissioned: false,
         }
     }
 }
@@ -228,6 +220,7 @@ impl Default for LimitSettings {
             silent_s: default!("limits.silent_s"),
             silent_share: default!("limits.silent_share"),
             travel_mm: None,
+            unhomed_mm_s: None,
         }
     }
 }

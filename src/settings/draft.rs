@@ -7,8 +7,9 @@
 use core::fmt;
 
 use super::error::SettingsError;
+use super::leaves::rules::{SAFETY_OF_AN_AXIS, SAFETY_OF_THE_STAGE};
 use super::stage::StageSettings;
-use super::tree::TreeError;
+use super::tree::{TreeError, same_in};
 use crate::law::axes::AxisName;
 
 /// A set of settings that is edited leaf by leaf, and the one in force.
@@ -49,6 +50,51 @@ impl From<SettingsError> for ApplyError {
     }
 }
 
+/// A setting on which the safety of an axis depends: it changes only while the outputs are off.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SafetyLeaf {
+    /// Its axis; none for the stage's.
+    pub axis: Option<AxisName>,
+    /// Its name below the axis, or below the stage.
+    pub field: &'static str,
+}
+
+impl fmt::Display for SafetyLeaf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if let Some(axis) = self.axis {
+            write!(f, "{axis}.")?;
+        }
+        write!(
+            f,
+            "{} changes only while the outputs are off: disable them first",
+            self.field
+        )
+    }
+}
+
+impl StageSettings {
+    /// The first setting that differs and on which safety depends, if there is one.
+    #[inline(never)]
+    pub fn safety_change(&self, other: &Self) -> Option<SafetyLeaf> {
+        let of_stage = SAFETY_OF_THE_STAGE
+            .iter()
+            .find(|field| !self.same_in(other, field))
+            .map(|field| SafetyLeaf { axis: None, field });
+        of_stage.or_else(|| {
+            AxisName::ALL.into_iter().find_map(|name| {
+                let (one, other) = (self.axis(name), other.axis(name));
+                SAFETY_OF_AN_AXIS
+                    .iter()
+                    .find(|field| !same_in(one, other, field))
+                    .map(|field| SafetyLeaf {
+                        axis: Some(name),
+                        field,
+                    })
+            })
+        })
+    }
+}
+
 impl<'a> Draft<'a> {
     /// A draft of the settings that the stage was built from, in the place of `settings`.
     pub fn new(in_force: &'a mut StageSettings, settings: &'a mut StageSettings) -> Self {
@@ -57,6 +103,15 @@ impl<'a> Draft<'a> {
             settings,
             in_force,
             touched: [false; 3],
+        }
+    }
+
+    /// A draft that holds other settings than those in force, edited already.
+    pub fn edited(in_force: &'a mut StageSettings, settings: &'a mut StageSettings) -> Self {
+        Self {
+            settings,
+            in_force,
+            touched: [true; 3],
         }
     }
 
@@ -112,6 +167,11 @@ impl<'a> Draft<'a> {
     /// True if something was written since the draft last took effect.
     pub fn is_edited(&self) -> bool {
         self.touched.contains(&true)
+    }
+
+    /// The first setting by which the draft differs and on which safety depends: the outputs have to be off for it.
+    pub fn safety_change(&self) -> Option<SafetyLeaf> {
+        self.settings.safety_change(self.in_force)
     }
 
     /// Checks the draft as a whole, with `elements` the room for GMS elements, and says of each axis whether it has to be

@@ -45,6 +45,9 @@ pub struct LimitSettings {
     /// The travel, in force once the axis is homed; none: no soft limits.
     #[serde(default)]
     pub travel_mm: Option<TravelSettings>,
+    /// Largest velocity until the axis is homed, mm/s (safely-limited speed, SLS); none: as of a homed axis.
+    #[serde(default)]
+    pub unhomed_mm_s: Option<f64>,
 }
 
 /// Soft limits of an axis. The measured position and the end of a stop may lie beyond by half of `following_error_mm`, so

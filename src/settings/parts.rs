@@ -40,7 +40,7 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub(crate) static PARTS: [Part; 11] = [
+pub(crate) static PARTS: [Part; 12] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
@@ -120,6 +120,11 @@ pub(crate) static PARTS: [Part; 11] = [
             negative: default!("limits.travel_mm.negative"),
             positive: default!("limits.travel_mm.positive"),
         }
+    ),
+    part!(
+        "/limits/unhomed_mm_s",
+        limits.unhomed_mm_s,
+        default!("limits.unhomed_mm_s")
     ),
     part!(
         "/homing",

@@ -162,6 +162,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             travel_mm: 410.0,
         }),
         plant: Some(parameters.plant),
+        commissioned: true,
     }
 }
 

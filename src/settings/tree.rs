@@ -141,6 +141,35 @@ impl StageSettings {
     }
 }
 
+/// True if two leaves have the same value, or both are left out.
+fn same(one: Result<&dyn Any, ValueError>, other: Result<&dyn Any, ValueError>) -> bool {
+    let (Ok(one), Ok(other)) = (&one, &other) else {
+        return one.is_err() == other.is_err();
+    };
+    // Numbers, flags and names: none is longer.
+    let (mut left, mut right) = ([0; 32], [0; 32]);
+    to_bytes(*one, &mut left) == to_bytes(*other, &mut right) && left == right
+}
+
+/// True if the field (as the table names it) has the same value in both axes.
+pub(crate) fn same_in(one: &AxisSettings, other: &AxisSettings, field: &str) -> bool {
+    let mut keys = [(); 2].map(|()| ConstPathIter::<'.'>::new(Some(field)));
+    let [first, second] = &mut keys;
+    same(axis_leaf_by(one, first), axis_leaf_by(other, second))
+}
+
+impl StageSettings {
+    /// True if the field of the stage has the same value in both.
+    pub(crate) fn same_in(&self, other: &Self, field: &str) -> bool {
+        let mut keys = [(); 2].map(|()| ConstPathIter::<'.'>::new(Some(field)));
+        let [first, second] = &mut keys;
+        same(
+            self.ref_any_by_key(first as &mut dyn Keys),
+            other.ref_any_by_key(second as &mut dyn Keys),
+        )
+    }
+}
+
 /// The leaf at a path below an axis, to be written.
 pub(crate) fn axis_leaf_mut<'a>(
     axis: &'a mut AxisSettings,

@@ -6,16 +6,17 @@
 //! So no operation, wherever it is cut, touches the newest item; and cells that a cut erasure left in doubt are erased
 //! again before they are trusted. A new item counts only once it has been read back.
 
+use core::cell::Cell;
 use core::fmt;
 use core::ops::Range;
 
 use embassy_futures::block_on;
-use embedded_storage::nor_flash::NorFlash;
 use sequential_storage::Error;
 use sequential_storage::cache::{Cache, Uncached};
 use sequential_storage::queue::{QueueConfig, QueueStorage};
 
 use super::sector::{Access, Sector, SectorError};
+use crate::hal::SettingsFlash;
 
 /// Bytes of the sequence number at the start of an item.
 pub(super) const SEQUENCE_BYTES: usize = 4;
@@ -27,6 +28,10 @@ pub enum LogError<E> {
     Flash(E),
     /// The bytes just written, or read, cannot be read back: the flash is worn out or broken.
     NotKept,
+    /// The amplifiers' enable line is high.
+    OutputsOn,
+    /// Neither sector holds a set that can be read, and they are not blank.
+    Damaged,
 }
 
 impl<E: fmt::Debug> fmt::Display for LogError<E> {
@@ -36,6 +41,8 @@ impl<E: fmt::Debug> fmt::Display for LogError<E> {
             Self::NotKept => f.write_str(
                 "the flash does not keep what is written: it is worn out or broken, replace the board",
             ),
+            Self::OutputsOn => f.write_str("the outputs are on; disable them before flash is written"),
+            Self::Damaged => f.write_str("what is stored is damaged: nothing of it can be read"),
         }
     }
 }
@@ -46,6 +53,16 @@ pub(super) struct Place {
     sector: u32,
     pub(super) sequence: u32,
     pub(super) length: usize,
+    /// The end of the item, in its sector.
+    end: u32,
+}
+
+/// The newest item that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct Newest {
+    pub(super) place: Place,
+    /// Nothing is stored that could be the remains of a newer one.
+    pub(super) is_certain: bool,
 }
 
 type Queue<'f, F> = QueueStorage<Sector<'f, F>, Cache<Uncached, Uncached, Uncached>>;
@@ -57,23 +74,36 @@ pub(super) struct Log<F> {
     start: u32,
 }
 
-impl<F: NorFlash> Log<F> {
+impl<F: SettingsFlash> Log<F> {
     const SECTOR: Range<u32> = 0..F::ERASE_SIZE as u32;
 
     pub(super) fn new(flash: F, start: u32) -> Self {
         Self { flash, start }
     }
 
-    fn sector(&mut self, sector: u32, access: Access) -> Queue<'_, F> {
+    fn sector<'f>(
+        &'f mut self,
+        sector: u32,
+        access: Access,
+        read_to: &'f Cell<u32>,
+    ) -> Sector<'f, F> {
         let start = self.start + sector * Self::SECTOR.end;
-        let flash = &mut self.flash;
-        let sector = Sector {
-            flash,
+        Sector {
+            flash: &mut self.flash,
             start,
             access,
-        };
+            read_to,
+        }
+    }
+
+    fn queue<'f>(
+        &'f mut self,
+        sector: u32,
+        access: Access,
+        read_to: &'f Cell<u32>,
+    ) -> Queue<'f, F> {
         QueueStorage::new(
-            sector,
+            self.sector(sector, access, read_to),
             const { QueueConfig::new(Self::SECTOR) },
             Cache::new_uncached(),
         )
@@ -88,7 +118,8 @@ impl<F: NorFlash> Log<F> {
         stop: Option<u32>,
     ) -> Result<Option<Place>, LogError<F::Error>> {
         let mut newest: Option<Place> = None;
-        let mut queue = self.sector(sector, Access::Read);
+        let read_to = Cell::new(0);
+        let mut queue = self.queue(sector, Access::Read, &read_to);
         let scanned = block_on(async {
             let mut items = queue.iter().await?;
             while let Some(item) = items.next(buffer).await? {
@@ -100,6 +131,7 @@ impl<F: NorFlash> Log<F> {
                         sector,
                         sequence,
                         length: item.len(),
+                        end: read_to.get(),
                     });
                 }
                 if stop == Some(sequence) {
@@ -118,25 +150,49 @@ impl<F: NorFlash> Log<F> {
         }
     }
 
-    /// The newest item's place.
-    fn newest(&mut self, buffer: &mut [u8]) -> Result<Option<Place>, LogError<F::Error>> {
+    /// The newest item's place; of the other sector, true if an item can be read there.
+    fn newest(&mut self, buffer: &mut [u8]) -> Result<Option<(Place, bool)>, LogError<F::Error>> {
         let first = self.scan(0, buffer, None)?;
         let second = self.scan(1, buffer, None)?;
         Ok(match (first, second) {
-            (Some(first), Some(second)) if second.sequence > first.sequence => Some(second),
-            (None, second) => second,
-            (first, _) => first,
+            (Some(first), Some(second)) if second.sequence > first.sequence => Some((second, true)),
+            (Some(first), second) => Some((first, second.is_some())),
+            (None, second) => second.map(|second| (second, false)),
         })
     }
 
-    /// Reads the newest item into the buffer, its sequence number first.
-    pub(super) fn read(&mut self, buffer: &mut [u8]) -> Result<Option<Place>, LogError<F::Error>> {
-        let Some(place) = self.newest(buffer)? else {
-            return Ok(None);
+    /// True if a sector reads as erased from an offset on, but for the library's mark that it is full.
+    fn is_blank_from(&mut self, sector: u32, from: u32) -> Result<bool, LogError<F::Error>> {
+        let from = from.next_multiple_of(F::WRITE_SIZE as u32);
+        let end = Self::SECTOR.end - F::WRITE_SIZE as u32;
+        let read_to = Cell::new(0);
+        let blank = self
+            .sector(sector, Access::Read, &read_to)
+            .is_blank(from, end.saturating_sub(from) as usize);
+        match blank {
+            Err(SectorError::Flash(error)) => Err(LogError::Flash(error)),
+            Err(SectorError::Forbidden) => Ok(false),
+            Ok(blank) => Ok(blank),
+        }
+    }
+
+    /// Reads the newest item into the buffer, its sequence number first; nothing, if the flash is blank.
+    ///
+    /// Items are written one behind the other, and a sector is erased only when the other one is full. So whatever stands
+    /// behind the newest item, or in the other sector where no item can be read, may be the remains of a newer one.
+    pub(super) fn read(&mut self, buffer: &mut [u8]) -> Result<Option<Newest>, LogError<F::Error>> {
+        let Some((place, other_is_read)) = self.newest(buffer)? else {
+            return if self.is_blank_from(0, 0)? && self.is_blank_from(1, 0)? {
+                Ok(None)
+            } else {
+                Err(LogError::Damaged)
+            };
         };
+        let is_certain = self.is_blank_from(place.sector, place.end)?
+            && (other_is_read || self.is_blank_from(1 - place.sector, 0)?);
         let again = self.scan(place.sector, buffer, Some(place.sequence))?;
         if again == Some(place) {
-            Ok(again)
+            Ok(Some(Newest { place, is_certain }))
         } else {
             Err(LogError::NotKept)
         }
@@ -149,8 +205,11 @@ impl<F: NorFlash> Log<F> {
         buffer: &mut [u8],
         mut fill: impl FnMut(&mut [u8], u32) -> Result<usize, X>,
     ) -> Result<Result<Stored, LogError<F::Error>>, X> {
+        if !self.flash.outputs_are_off() {
+            return Ok(Err(LogError::OutputsOn));
+        }
         let newest = match self.newest(buffer) {
-            Ok(newest) => newest,
+            Ok(newest) => newest.map(|(place, _)| place),
             Err(error) => return Ok(Err(error)),
         };
         let sequence = newest.map_or(1, |newest| newest.sequence.wrapping_add(1));
@@ -163,6 +222,9 @@ impl<F: NorFlash> Log<F> {
             let written = self.write_to(sector, erase, buffer, length, sequence);
             match written {
                 Ok(true) => {
+                    if let Err(error) = self.clear_remains(1 - sector, buffer) {
+                        return Ok(Err(error));
+                    }
                     return Ok(Ok(Stored {
                         sequence,
                         erased: erase,
@@ -176,6 +238,25 @@ impl<F: NorFlash> Log<F> {
         Ok(Err(LogError::NotKept))
     }
 
+    /// Erases a sector that holds no item that can be read, unless it is blank: what is there could be taken for the remains
+    /// of a newer one.
+    fn clear_remains(&mut self, sector: u32, buffer: &mut [u8]) -> Result<(), LogError<F::Error>> {
+        if self.scan(sector, buffer, None)?.is_some() || self.is_blank_from(sector, 0)? {
+            return Ok(());
+        }
+        self.erase(sector)
+    }
+
+    fn erase(&mut self, sector: u32) -> Result<(), LogError<F::Error>> {
+        if !self.flash.outputs_are_off() {
+            return Err(LogError::OutputsOn);
+        }
+        let start = self.start + sector * Self::SECTOR.end;
+        self.flash
+            .erase(start, start + Self::SECTOR.end)
+            .map_err(LogError::Flash)
+    }
+
     /// Writes an item to one sector; false if it is not there afterwards.
     fn write_to(
         &mut self,
@@ -186,13 +267,11 @@ impl<F: NorFlash> Log<F> {
         sequence: u32,
     ) -> Result<bool, LogError<F::Error>> {
         if erase {
-            let start = self.start + sector * Self::SECTOR.end;
-            self.flash
-                .erase(start, start + Self::SECTOR.end)
-                .map_err(LogError::Flash)?;
+            self.erase(sector)?;
         }
         let item = buffer.get(..length).unwrap_or_default();
-        let mut queue = self.sector(sector, Access::Append);
+        let read_to = Cell::new(0);
+        let mut queue = self.queue(sector, Access::Append, &read_to);
         match block_on(queue.push(item, false)) {
             Ok(()) => {}
             Err(Error::Storage {

@@ -26,10 +26,9 @@ pub use provenance::{PROVENANCE_BYTES, Provenance};
 
 use core::fmt;
 
-use embedded_storage::nor_flash::NorFlash;
-
+use crate::hal::SettingsFlash;
 use crate::settings::{SettingsError, StageSettings};
-use log::{Log, SEQUENCE_BYTES};
+use log::{Log, Newest, SEQUENCE_BYTES};
 
 /// Room for one set while it is written or read; a test fills it with the longest.
 pub const BUFFER_BYTES: usize = 7 * 1024;
@@ -83,6 +82,9 @@ pub struct Loaded {
     pub sequence: u32,
     /// Its origin.
     pub provenance: Provenance,
+    /// True if nothing is stored that could be a newer set, damaged or cut short: only then may this one be put in force
+    /// unasked.
+    pub is_newest: bool,
 }
 
 /// The settings in two sectors of a flash, each of the flash's erase size.
@@ -91,7 +93,7 @@ pub struct Store<F> {
     log: Log<F>,
 }
 
-impl<F: NorFlash> Store<F> {
+impl<F: SettingsFlash> Store<F> {
     /// The two sectors from offset `start` on, a multiple of the erase size.
     pub fn new(flash: F, start: u32) -> Self {
         Self {
@@ -134,11 +136,12 @@ impl<F: NorFlash> Store<F> {
         }
     }
 
-    /// Reads the settings that were stored last; `None`, and the default ones, if there are none. `report` is told what of
-    /// them this firmware does not know, and what they lack.
+    /// Reads the newest settings that can be read; `None`, and the default ones, if the flash is blank. `report` is told what
+    /// of them this firmware does not know, and what they lack. See [`Loaded::is_newest`].
     ///
     /// # Errors
-    /// A stored set that is refused, or a flash that fails; `settings` are the default ones then.
+    /// A stored set that is refused, a flash that is not blank and of which nothing can be read, or one that fails;
+    /// `settings` are the default ones then.
     pub fn load(
         &mut self,
         settings: &mut StageSettings,
@@ -146,8 +149,8 @@ impl<F: NorFlash> Store<F> {
         buffer: &mut [u8; BUFFER_BYTES],
         report: &mut dyn FnMut(Finding<'_>),
     ) -> Result<Option<Loaded>, LoadError<F::Error>> {
-        let place = match self.log.read(buffer) {
-            Ok(Some(place)) => place,
+        let Newest { place, is_certain } = match self.log.read(buffer) {
+            Ok(Some(newest)) => newest,
             none => {
                 settings.set_default();
                 return none.map(|_| None).map_err(LoadError::Log);
@@ -158,6 +161,7 @@ impl<F: NorFlash> Store<F> {
         Ok(Some(Loaded {
             sequence: place.sequence,
             provenance,
+            is_newest: is_certain,
         }))
     }
 }

@@ -1,5 +1,7 @@
 //! One sector of the flash, as sequential-storage sees it: nothing but this sector, and only what is allowed.
 
+use core::cell::Cell;
+
 use embedded_storage::nor_flash::NorFlash;
 use embedded_storage_async::nor_flash::{
     ErrorType, NorFlash as AsyncNorFlash, NorFlashError, NorFlashErrorKind,
@@ -21,6 +23,8 @@ pub(super) struct Sector<'f, F> {
     /// Its first address, in the flash's own offsets.
     pub(super) start: u32,
     pub(super) access: Access,
+    /// The end of what was read last, in the sector.
+    pub(super) read_to: &'f Cell<u32>,
 }
 
 /// Reason why an operation on a sector failed.
@@ -49,6 +53,7 @@ impl<F: NorFlash> AsyncReadNorFlash for Sector<'_, F> {
     const READ_SIZE: usize = F::READ_SIZE;
 
     async fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), Self::Error> {
+        self.read_to.set(offset + bytes.len() as u32);
         let read = self.flash.read(self.start + offset, bytes);
         read.map_err(SectorError::Flash)
     }
@@ -59,7 +64,12 @@ impl<F: NorFlash> AsyncReadNorFlash for Sector<'_, F> {
 }
 
 impl<F: NorFlash> Sector<'_, F> {
-    fn is_blank(&mut self, offset: u32, length: usize) -> Result<bool, SectorError<F::Error>> {
+    /// True if a stretch of the sector reads as erased.
+    pub(super) fn is_blank(
+        &mut self,
+        offset: u32,
+        length: usize,
+    ) -> Result<bool, SectorError<F::Error>> {
         const CHUNK: usize = 32;
         let mut chunk = [0; CHUNK];
         let mut done = 0;

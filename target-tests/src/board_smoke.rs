@@ -4,6 +4,7 @@
 //! those read as zero. Two things are done for it from the debugger's port: flags that the clock set-up waits for read as
 //! ones, and the control interrupt is made pending as TIM7 would.
 
+use std::fs;
 use std::process::{Child, Stdio};
 use std::time::{Duration, Instant};
 
@@ -40,12 +41,18 @@ const EXPECTED: [&str; 6] = [
     "the converter answers 0x0000 instead of 0x0004",
     "quadrant ",
     "no settings are stored",
-    "not commissioned: no axis has a law",
+    "not commissioned: no axis is, or one with a law is not",
     "10000 control ticks per second, outputs off",
     "hard fault, outputs are off: the stack is full",
 ];
 /// Lines that it must not have: the button reads as pressed here, but was never seen up.
 const FORBIDDEN: [&str; 2] = ["outputs enabled", "request refused"];
+
+/// The sectors of the settings, which are to be found erased: QEMU's flash is all zeros, and that is damaged.
+const SETTINGS: (u32, usize) = (0x0800_4000, 32 * 1024);
+const ERASED: u8 = 0xFF;
+/// File with what erased flash reads as.
+const ERASED_FILE: &str = "target/xtask/erased-flash.bin";
 
 /// QEMU, ended when dropped.
 struct Machine(Child);
@@ -66,6 +73,14 @@ fn start(image: &Image) -> Result<(Machine, Debugger)> {
     let port = Port::new();
     port.add_to(&mut qemu);
     qemu.arg("-kernel").arg(&image.path);
+    let erased = command::root().join(ERASED_FILE);
+    fs::create_dir_all(erased.parent().context("the file has a folder")?)?;
+    fs::write(&erased, [ERASED].repeat(SETTINGS.1))?;
+    qemu.arg("-device").arg(format!(
+        "loader,file={},addr={:#x},force-raw=on",
+        erased.display(),
+        SETTINGS.0
+    ));
     let child = qemu
         .stdout(Stdio::null())
         .spawn()

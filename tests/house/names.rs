@@ -145,7 +145,8 @@ fn settings_paths() -> Vec<Vec<String>> {
 
 /// A settings path in one of its written forms, from its first segment; none if the text is no such path.
 fn as_settings_path(span: &str) -> Option<Vec<String>> {
-    const PARTS: [&str; 9] = [
+    const PARTS: [&str; 10] = [
+        "commissioned",
         "encoder",
         "amplifier",
         "limits",

@@ -96,8 +96,28 @@ pub(crate) struct Rig<S: Scalar> {
     pub(crate) inputs: Inputs,
 }
 
+/// The stage of settings whose plant is only a bound of other settings: the tests put the encoders where no axis could
+/// be, and the plant would tell.
+pub(crate) fn without_plant<S: Scalar>(settings: &StageSettings) -> Stage<S, 4> {
+    settings.validate(4).expect("valid settings");
+    let mut settings = settings.clone();
+    for axis in &mut settings.axes {
+        axis.plant = None;
+    }
+    settings.build().expect("valid settings")
+}
+
 impl<S: Scalar> Rig<S> {
+    /// Encoders that the test puts somewhere: nothing holds them against the plant.
     pub(crate) fn new(settings: &StageSettings, plan: &PlanSettings) -> Self {
+        Self {
+            stage: without_plant(settings),
+            ..Self::with_plant(settings, plan)
+        }
+    }
+
+    /// Encoders of axes that move as the outputs make them.
+    pub(crate) fn with_plant(settings: &StageSettings, plan: &PlanSettings) -> Self {
         Self {
             stage: settings.build().expect("valid settings"),
             plan: plan.build(settings).expect("valid plan"),
@@ -131,9 +151,16 @@ impl<S: Scalar> Rig<S> {
         self.command(Command::Run);
     }
 
+    /// Lets the axes stand for so long that they may be enabled.
+    pub(crate) fn stand(&mut self) {
+        for _ in 0..100 {
+            self.tick();
+        }
+    }
+
     /// Goes over to other settings at the next tick.
     pub(crate) fn exchange(&mut self, settings: &StageSettings) {
-        self.stage = settings.build().expect("valid settings");
+        self.stage = without_plant(settings);
         self.inputs.settings_changed = PerAxis::splat(true);
     }
 }

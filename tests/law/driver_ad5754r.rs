@@ -255,6 +255,8 @@ fn every_wrong_bit_of_every_register_is_reported_and_the_codes_are_written_all_t
             script = script.write(*question, wrong(turn, bit), codes);
         }
     }
+    // Pulled once, and held as long as nothing else is written.
+    script.clear.push(Level::set(State::Low));
     script.run(|converter| {
         assert_eq!(converter.start(), STARTED);
         for _ in 0..4 {
@@ -293,6 +295,9 @@ fn a_chip_that_lost_its_supply_is_reported_by_every_write_until_it_is_powered_up
             script = script.write(question, answer, codes);
         }
     }
+    script
+        .clear
+        .extend([Level::set(State::Low), Level::set(State::High)]);
     script.run(|converter| {
         assert_eq!(converter.start(), STARTED);
         let off = Err(Error::Mismatch {
@@ -312,7 +317,38 @@ fn a_chip_that_lost_its_supply_is_reported_by_every_write_until_it_is_powered_up
 }
 
 #[test]
-fn a_bus_that_fails_is_reported_and_loads_nothing() {
+fn a_mismatch_clears_the_outputs_until_two_writes_of_zero_succeed() {
+    let mut script = Script::started()
+        .write(0x80, 0, [7, 0, 0])
+        .write(0x81, 1, [7, 0, 0])
+        .write(0x82, 0, [0; 3])
+        .write(0x90, 0x1F, [0; 3])
+        .write(0x80, 0, [0; 3])
+        .write(0x81, 0, [0; 3])
+        .write(0x82, 0, [1, 2, 3]);
+    script
+        .clear
+        .extend([Level::set(State::Low), Level::set(State::High)]);
+    script.run(|converter| {
+        assert_eq!(converter.start(), STARTED);
+        assert_eq!(converter.write([7, 0, 0]), STARTED);
+        let found = Err(Error::Mismatch {
+            item: Item::Code(1),
+            expected: 0,
+            answered: 1,
+        });
+        assert_eq!(converter.write([7, 0, 0]), found);
+        for _ in 0..3 {
+            assert_eq!(converter.write([0; 3]), found);
+        }
+        assert_eq!(converter.write([0; 3]), STARTED);
+        assert_eq!(converter.write([1, 2, 3]), STARTED);
+    });
+}
+
+/// The second channel: it needs no bus.
+#[test]
+fn a_bus_that_fails_is_reported_clears_the_outputs_and_loads_nothing() {
     let mut spi = Spi::new(&[]);
     let mut sync = Pin::new(&[
         Level::set(State::High),
@@ -320,7 +356,7 @@ fn a_bus_that_fails_is_reported_and_loads_nothing() {
         Level::set(State::High),
     ]);
     let mut load = Pin::new(&[Level::set(State::High)]);
-    let mut clear = Pin::new(&[Level::set(State::Low)]);
+    let mut clear = Pin::new(&[Level::set(State::Low), Level::set(State::Low)]);
     let bus = Bus {
         spi: spi.clone(),
         clocks: Rc::default(),

@@ -5,6 +5,8 @@ use embedded_storage::nor_flash::{
     check_write,
 };
 
+use quadrant::hal::SettingsFlash;
+
 use crate::common::Noise;
 
 /// Bytes of a sector, as on the reference board.
@@ -68,6 +70,8 @@ pub(crate) struct Flash {
     pub(crate) cut: Option<(u64, Damage)>,
     /// Words whose bits do not change any more.
     pub(crate) worn: Option<std::ops::Range<usize>>,
+    /// The amplifiers' enable line is high.
+    pub(crate) outputs_on: bool,
 }
 
 impl Default for Flash {
@@ -79,6 +83,7 @@ impl Default for Flash {
             erasures: [0; 2],
             cut: None,
             worn: None,
+            outputs_on: false,
         }
     }
 }
@@ -145,6 +150,12 @@ impl ReadNorFlash for Flash {
 
     fn capacity(&self) -> usize {
         self.bytes.len()
+    }
+}
+
+impl SettingsFlash for Flash {
+    fn outputs_are_off(&self) -> bool {
+        !self.outputs_on
     }
 }
 

@@ -349,3 +349,24 @@ fn an_encoder_that_may_have_lost_counts_costs_the_origin() {
         assert!(!machine.rig.state.axes()[0].is_homed());
     }
 }
+
+#[test]
+fn an_axis_that_is_found_beyond_its_travel_comes_back() {
+    let mut machine = Machine::new(0, |x| {
+        let travel = x.limits.travel_mm.as_mut().expect("by default");
+        (travel.negative, travel.positive) = (-50.0, 50.0);
+        // The mark is where the travel does not reach.
+        x.homing.as_mut().expect("given").mark_mm = -70.0;
+    });
+    // It was within the travel when it was homed before.
+    machine.rig.state.set_homed(AxisName::X, true);
+    for _ in 0..10 {
+        machine.tick(None);
+    }
+    machine.home();
+    assert_eq!(machine.fault(), None);
+    assert_eq!(
+        machine.rig.state.axes()[0].reference(),
+        Position::from_mm(-30.0, 5e-4)
+    );
+}

@@ -197,7 +197,7 @@ fn nothing_else_begins_meanwhile_and_it_begins_only_at_rest() {
     let mut bench = bench();
     bench.begin(&request(false), &[0; 500]);
     bench.tick();
-    let view = StageView::of(&bench.rig.state);
+    let view = bench.rig.stage.as_ref().view(&bench.rig.state);
     assert!(view.injecting && view.running);
     let jog = Command::Jog(
         AxisName::Y,

@@ -1,7 +1,6 @@
 //! The motion modes of the axes: stops, single moves and streams through the whole tick.
 
 use quadrant::admission::Refusal;
-use quadrant::admission::StageView;
 use quadrant::app::supervisor::{Event, Supervisor};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
@@ -232,9 +231,9 @@ fn an_underrun_brakes_and_latches_a_fault_or_holds_as_the_settings_say() {
 fn a_stop_forgets_a_stream_that_has_not_begun() {
     let mut rig = enabled(&StageSettings::simulated(), &PlanSettings::default());
     Feed::new(stream(500)).serve(&mut rig);
-    assert!(StageView::of(&rig.state).stream_ready);
+    assert!(rig.stage.as_ref().view(&rig.state).stream_ready);
     rig.command(Command::Stop);
-    assert!(!StageView::of(&rig.state).stream_ready);
+    assert!(!rig.stage.as_ref().view(&rig.state).stream_ready);
     assert!(rig.state.axes().iter().all(|axis| axis.wants_segment()));
 }
 
@@ -242,7 +241,8 @@ fn a_stop_forgets_a_stream_that_has_not_begun() {
 fn a_request_that_cannot_be_followed_is_refused_with_its_reason() {
     let mut rig = enabled(&StageSettings::simulated(), &sines());
     let refused = |rig: &Rig<f32>, command| {
-        let decision = Supervisor::default().step(StageView::of(&rig.state), Some(command));
+        let decision =
+            Supervisor::default().step(rig.stage.as_ref().view(&rig.state), Some(command));
         decision
             .events
             .into_iter()

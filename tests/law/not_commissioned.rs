@@ -9,7 +9,7 @@ use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::safety::SafetyState;
-use quadrant::settings::StageSettings;
+use quadrant::settings::{AxisSettings, StageSettings};
 
 use crate::common::Rig;
 
@@ -17,6 +17,8 @@ const READY: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
     interlock: None,
+    moving: None,
+    awaiting_homing: PerAxis::splat(false),
     held: None,
     modes: PerAxis::splat(quadrant::motion::MotionMode::Hold),
     homed: PerAxis::splat(false),
@@ -24,6 +26,8 @@ const READY: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: false,
+    locked: false,
+    settings_invalid: false,
 };
 
 #[test]
@@ -44,13 +48,14 @@ fn the_default_settings_hold_no_law_and_are_valid() {
 }
 
 #[test]
-fn the_default_settings_move_nothing_even_if_the_law_is_enabled() {
+fn the_law_itself_enables_nothing_on_the_default_settings() {
     let mut rig = Rig::<f32>::new(&StageSettings::default(), &Default::default());
     rig.start();
     for count in 0..500 {
         rig.inputs.readings[0].count = count;
         let outputs = rig.tick();
         assert_eq!(outputs.codes.map(|code| code.0), [0; 3]);
+        assert!(!outputs.enabled);
     }
 }
 
@@ -84,15 +89,41 @@ fn nothing_but_enabling_is_refused_for_it() {
 }
 
 #[test]
-fn one_axis_that_somebody_has_set_up_is_enough() {
+fn a_changed_number_is_no_commissioning() {
     for axis in 0..3 {
         let mut settings = StageSettings::default();
-        settings.axes[axis].feedback.pid.kp_v_per_mm = 1.0;
-        assert!(settings.is_commissioned());
-        // For a measurement in open loop: no gain, but more room for the tracking error.
-        let mut settings = StageSettings::default();
         settings.axes[axis].limits.following_error_mm = 10.0;
+        assert!(!settings.is_commissioned());
+        settings.axes[axis].feedback.pid.kp_v_per_mm = 1.0;
+        assert!(!settings.is_commissioned());
+        settings.axes[axis].commissioned = true;
         assert!(settings.is_commissioned());
     }
     assert!(StageSettings::simulated().is_commissioned());
+}
+
+/// Each way in which a law of an axis that nobody has commissioned could drive it.
+#[test]
+fn one_axis_with_a_law_that_was_not_commissioned_keeps_the_outputs_off() {
+    let drive: [fn(&mut AxisSettings); 6] = [
+        |axis| axis.feedback.pid.kp_v_per_mm = 1.0,
+        |axis| axis.feedback.pid.ki_v_per_mm_s = 1.0,
+        |axis| axis.feedback.pid.kd_v_s_per_mm = 0.01,
+        |axis| axis.feedforward.kind = FeedforwardKind::Static,
+        |axis| axis.feedforward.gains.inertia_v_s2_per_mm = 1e-4,
+        |axis| axis.amplifier.offset_v = 0.1,
+    ];
+    for drive in drive {
+        let mut settings = StageSettings::default();
+        settings.axes[0].commissioned = true;
+        drive(&mut settings.axes[0]);
+        let mut rig = Rig::<f32>::new(&settings, &Default::default());
+        rig.tick();
+        assert!(rig.command(Command::Enable).enabled);
+        drive(&mut settings.axes[2]);
+        let mut rig = Rig::<f32>::new(&settings, &Default::default());
+        rig.tick();
+        assert!(!rig.command(Command::Enable).enabled);
+        assert!(!rig.tick().enabled);
+    }
 }

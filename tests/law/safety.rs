@@ -57,6 +57,7 @@ fn enabling_holds_the_present_position_with_no_output() {
     rig.inputs.set_counts([1_000_000, 5, 0xFFFF_0000]);
     rig.tick();
     rig.inputs.set_counts([1_000_100, 95, 0xFFFF_0010]);
+    rig.stand();
     let outputs = rig.command(Command::Enable);
     assert!(outputs.enabled);
     assert_eq!(outputs.codes, [DacCode::ZERO; 3]);
@@ -177,6 +178,7 @@ fn a_fault_outlasts_every_command_but_a_reset() {
     }
     assert_eq!(rig.command(Command::ResetFault), off());
     assert_eq!(rig.state.safety(), SafetyState::Disabled);
+    rig.stand();
     assert!(rig.command(Command::Enable).enabled);
 }
 

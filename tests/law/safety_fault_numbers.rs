@@ -35,11 +35,13 @@ fn numbers_and_names_are_stable() {
             "index-near-switch",
             "injection-underrun",
             "injection-bounds",
+            "encoder-implausible",
+            "stop-overrun",
         ]
     );
     for code in FaultCode::ALL {
         assert_eq!(FaultCode::from_number(code.number()), Some(code));
     }
     assert_eq!(FaultCode::from_number(0), None);
-    assert_eq!(FaultCode::from_number(28), None);
+    assert_eq!(FaultCode::from_number(30), None);
 }

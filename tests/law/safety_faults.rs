@@ -75,12 +75,12 @@ pub(crate) fn standing(settings: &StageSettings) -> Rig<f32> {
 /// A flaw of an axis from a tick on; the tick counts from zero.
 type Cause = fn(&mut Rig<f32>, AxisName, u32);
 
-struct Case {
-    code: FaultCode,
+pub(crate) struct Case {
+    pub(crate) code: FaultCode,
     /// Along the sines, or at rest.
     moves: bool,
     /// On each axis, or on the stage.
-    of_axes: bool,
+    pub(crate) of_axes: bool,
     /// Ticks from the cause to the fault: 1 is the tick of the cause.
     ticks: u32,
     cause: Cause,
@@ -99,7 +99,7 @@ fn press(rig: &mut Rig<f32>, axis: AxisName, switch: AxisSwitches) {
     rig.inputs.switches = Switches::NONE.with_axis(axis, switch);
 }
 
-const CASES: [Case; 16] = [
+pub(crate) const CASES: [Case; 16] = [
     Case {
         code: FaultCode::FollowingError,
         moves: false,
@@ -251,8 +251,20 @@ fn settings(code: FaultCode) -> StageSettings {
     settings
 }
 
-/// The ticks to the fault, the outputs in its tick, and the ticks from there until the outputs are off.
-fn provoke(case: &Case, axis: AxisName) -> (u32, Outputs, u32) {
+/// The end of a case.
+pub(crate) struct End {
+    /// Ticks to the fault.
+    pub(crate) ticks: u32,
+    /// The outputs in its tick.
+    pub(crate) outputs: Outputs,
+    /// Ticks from there until the outputs are off.
+    pub(crate) until_off: u32,
+    /// The stage in the tick after.
+    pub(crate) rig: Rig<f32>,
+}
+
+/// Provokes a fault, and waits until the outputs are off.
+pub(crate) fn provoke(case: &Case, axis: AxisName) -> End {
     let settings = settings(case.code);
     let mut rig = if case.moves {
         let mut rig = moving(&settings);
@@ -295,7 +307,12 @@ fn provoke(case: &Case, axis: AxisName) -> (u32, Outputs, u32) {
         }
         assert_eq!(last, Outputs::default());
         assert_eq!(rig.state.safety(), SafetyState::Faulted(found));
-        return (tick + 1, outputs, until_off);
+        return End {
+            ticks: tick + 1,
+            outputs,
+            until_off,
+            rig,
+        };
     }
     panic!("{:?} on {axis} is not found", case.code);
 }
@@ -307,7 +324,12 @@ fn every_fault_is_found_in_its_tick_with_the_outputs_of_its_reaction() {
     );
     for case in &CASES {
         for axis in AxisName::ALL {
-            let (ticks, outputs, until_off) = provoke(case, axis);
+            let End {
+                ticks,
+                outputs,
+                until_off,
+                ..
+            } = provoke(case, axis);
             let code = case.code;
             let where_ = if case.of_axes { axis.as_str() } else { "-" };
             let words = outputs.codes.map(|code| code.0);
@@ -334,13 +356,17 @@ fn every_fault_is_found_in_its_tick_with_the_outputs_of_its_reaction() {
     }
 }
 
-/// Those that the tick cannot find by itself.
-pub(crate) const OF_OTHERS: [FaultCode; 7] = [
+/// Those of other tests, and then those that the tick cannot find by itself.
+pub(crate) const OF_OTHERS: [FaultCode; 9] = [
     // Of a stream: see the tests of streaming.
     FaultCode::StreamUnderrun,
     // Of an injected voltage: see its tests.
     FaultCode::InjectionUnderrun,
     FaultCode::InjectionBounds,
+    // Of an axis that moves as its output makes it: see `encoder_dead`.
+    FaultCode::EncoderImplausible,
+    // Of a stop without an end: see `stops`.
+    FaultCode::StopOverrun,
     FaultCode::WatchdogReset,
     FaultCode::Panic,
     FaultCode::HardFault,

@@ -92,9 +92,16 @@ fn promises<S: Scalar>(
         rig.state.set_homed(axis, homed);
     }
     let mut enabled = 0;
-    for flaws in sequence {
+    for (tick, flaws) in sequence.iter().enumerate() {
         let before = rig.state.safety();
-        rig.inputs = inputs(&rig.inputs, *flaws);
+        let mut flaws = *flaws;
+        if tick % 64 < 40 {
+            // The axes stand, so that they may be enabled.
+            for reading in &mut flaws.0 {
+                reading.0 = 0;
+            }
+        }
+        rig.inputs = inputs(&rig.inputs, flaws);
         let given = rig.inputs;
         let outputs = rig.tick();
         let after = rig.state.safety();

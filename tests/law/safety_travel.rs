@@ -4,9 +4,11 @@ use proptest::prelude::*;
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
-use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant::reference::{MotionSettings, PointToPointSettings, Ramp, Velocity};
+use quadrant::safety::travel::{Travel, TravelState};
 use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant::settings::{LossReaction, PlanSettings, StageSettings, TravelSettings};
+use quadrant::units::Position;
 
 use crate::common::{Rig, repeatable, with_x};
 use crate::safety_faults::{follow, moving, sines};
@@ -299,4 +301,61 @@ fn a_lost_link_is_nothing_to_an_axis_that_stands() {
     rig.inputs.link_lost = true;
     assert!(rig.tick().enabled);
     assert_eq!(rig.state.safety(), SafetyState::Enabled);
+}
+
+/// A travel of +-10 mm for references of up to 100 mm/s that grow by up to 2000 mm/s^2, and the ramp of its stops.
+fn ten_mm() -> (Travel, Ramp<f32>, Position) {
+    let scale = StageSettings::simulated().motion_scale(0);
+    let ramp = Ramp::new(4000.0, 1e6, scale);
+    let mm = |value| Position::from_mm(value, scale.resolution_mm);
+    let growth = mm(2000.0 * 1e-8);
+    (
+        Travel::new(mm(-10.0), mm(10.0), mm(100.0 * 1e-4), growth, &ramp),
+        ramp,
+        growth,
+    )
+}
+
+#[test]
+fn the_measured_position_counts_wherever_the_reference_is() {
+    let (travel, ramp, _) = ten_mm();
+    let mm = |value| Position::from_mm(value, 5e-4);
+    for side in [1.0, -1.0] {
+        let mut state = TravelState::default();
+        let mut step =
+            |measured| travel.step(&mut state, &ramp, Position::ZERO, Position::ZERO, measured);
+        assert_eq!(step(mm(side * 9.9)), Ok(()));
+        // The reference stands in the middle.
+        assert_eq!(step(mm(side * 10.1)), Err(FaultCode::TravelExceeded));
+    }
+}
+
+#[test]
+fn the_stop_begins_at_the_speed_that_the_next_tick_may_have() {
+    let (travel, ramp, growth) = ten_mm();
+    let end = Position::from_mm(10.0, 5e-4);
+    let speed = Position::from_mm(50.0 * 1e-4, 5e-4);
+    let stop = |speed: Position| ramp.stopping_distance(Velocity::from_displacement(speed)) + speed;
+    let (short, long) = (stop(speed), stop(speed + growth));
+    assert!(long > short);
+    for (distance, expected) in [
+        (long, Ok(())),
+        (long - Position(1), Err(FaultCode::PredictedSoftLimit)),
+        (short, Err(FaultCode::PredictedSoftLimit)),
+    ] {
+        for side in [1, -1] {
+            let (reference, moved) = (
+                Position(side * (end - distance).0),
+                Position(side * speed.0),
+            );
+            let found = travel.step(
+                &mut TravelState::default(),
+                &ramp,
+                reference,
+                moved,
+                reference,
+            );
+            assert_eq!(found, expected, "{distance:?} {side}");
+        }
+    }
 }

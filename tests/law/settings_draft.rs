@@ -4,6 +4,7 @@ use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::StageSettings;
 use quadrant::settings::draft::{ApplyError, Draft};
+use quadrant::settings::leaves::{Exchange, all};
 use quadrant::stage::Stage;
 
 fn draft_of(settings: StageSettings) -> Draft<'static> {
@@ -161,5 +162,65 @@ fn an_axis_built_in_the_place_of_another_is_the_same() {
         let mut place = settings.build_axis::<f32, 8>(AxisName::Z);
         settings.build_axis_into(AxisName::X, &mut place);
         assert_eq!(place, settings.build_axis(AxisName::X), "{kind:?}");
+    }
+}
+
+#[test]
+fn a_setting_on_which_safety_depends_is_named() {
+    let text = |change: &dyn Fn(&mut Draft)| {
+        let mut draft = draft();
+        change(&mut draft);
+        draft.safety_change().map(|leaf| leaf.to_string())
+    };
+    assert_eq!(text(&|_| {}), None);
+    for (path, json, said) in [
+        ("/axes/x/amplifier/reversed", "true", "x.amplifier.reversed"),
+        (
+            "/axes/y/amplifier/output_limit_v",
+            "9.0",
+            "y.amplifier.output_limit_v",
+        ),
+        (
+            "/axes/z/limits/braking_mm_s2",
+            "5000",
+            "z.limits.braking_mm_s2",
+        ),
+        (
+            "/axes/z/limits/travel_mm",
+            "null",
+            "z.limits.travel_mm.negative",
+        ),
+        ("/axes/y/homing/switch", "\"limit\"", "y.homing.switch"),
+        ("/axes/x/plant", "null", "x.plant.gain_mm_per_v_s2"),
+        ("/streaming/link_lost", "\"hold\"", "streaming.link_lost"),
+    ] {
+        let found = text(&|draft| set(draft, path, json)).expect(path);
+        assert!(found.starts_with(said), "{found}");
+    }
+    // A law may be tuned while it acts.
+    for (path, json) in [
+        ("/axes/x/feedback/pid/kp_v_per_mm", "1.0"),
+        ("/axes/x/feedback/law", "\"pid\""),
+        ("/axes/y/friction/gms/attraction_v_s", "4.0"),
+        ("/axes/z/feedforward/kind", "\"static\""),
+    ] {
+        assert_eq!(text(&|draft| set(draft, path, json)), None, "{path}");
+    }
+}
+
+/// A row that is added to the table must not forget its column.
+#[test]
+fn every_leaf_of_amplifier_limits_homing_plant_and_commissioning_needs_the_outputs_off() {
+    for leaf in all() {
+        let group = leaf.field.split('.').next().expect("a name");
+        let expected = match group {
+            "rate_hz" | "encoder" => Exchange::Restart,
+            "streaming" | "amplifier" | "limits" | "homing" | "plant" | "commissioned" => {
+                Exchange::Disabled
+            }
+            "feedback" | "friction" | "feedforward" => Exchange::Driven,
+            other => panic!("{other} is no group"),
+        };
+        assert_eq!(leaf.exchange, expected, "{}", leaf.field);
     }
 }

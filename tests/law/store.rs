@@ -2,7 +2,9 @@
 
 use quadrant::friction::gms::GmsElement;
 use quadrant::settings::{Reason, StageSettings};
-use quadrant::store::{BUFFER_BYTES, DecodeError, Finding, LoadError, Provenance, Store};
+use quadrant::store::{
+    BUFFER_BYTES, DecodeError, Finding, LoadError, LogError, Provenance, SaveError, Store,
+};
 
 use crate::common::Noise;
 use crate::flash::{Flash, FlashError, SECTOR};
@@ -19,6 +21,14 @@ fn save(flash: Flash, settings: &StageSettings, elements: usize) -> Flash {
 }
 
 type Stored = Result<Option<(u32, StageSettings)>, LoadError<FlashError>>;
+
+/// True if what is loaded may be put in force unasked.
+fn is_newest(flash: &Flash) -> bool {
+    let mut settings = StageSettings::default();
+    Store::new(flash.clone(), 0)
+        .load(&mut settings, ELEMENTS, &mut [0; BUFFER_BYTES], &mut |_| {})
+        .is_ok_and(|loaded| loaded.is_some_and(|loaded| loaded.is_newest))
+}
 
 fn load(flash: &Flash) -> Stored {
     let mut settings = StageSettings {
@@ -60,9 +70,10 @@ fn a_flash_full_of_something_else_takes_settings() {
     for bytes in [random, vec![0; 2 * SECTOR], b"Quadrant".repeat(SECTOR / 4)] {
         let mut flash = Flash::default();
         flash.bytes = bytes;
-        assert_eq!(load(&flash), Ok(None));
+        assert_eq!(load(&flash), Err(LoadError::Log(LogError::Damaged)));
         let flash = save(flash, &numbered(1), ELEMENTS);
         assert_eq!(load(&flash), Ok(Some((1, numbered(1)))));
+        assert!(is_newest(&flash), "what was there before is still doubted");
     }
 }
 
@@ -113,9 +124,63 @@ fn a_flipped_bit_never_makes_other_settings() {
         if at < ends[2] {
             assert_eq!(sequence, 3, "a flip at {at}, before the newest set");
         }
+        // A set that is not the newest is never put in force in silence.
+        assert_eq!(is_newest(&flipped), sequence == 3, "a flip at {at}");
         kept += u32::from(sequence == 3);
         older += u32::from(sequence == 2);
     }
     println!("{kept} flips kept the newest set, {older} fell back to the one before it");
     assert!(kept > 800 && older > 400, "{kept}, {older}");
+}
+
+/// A set damaged anywhere, behind as many others as a sector takes and more.
+#[test]
+fn a_damaged_newest_set_is_noticed_wherever_it_lies() {
+    let mut flash = Flash::default();
+    for number in 0..12 {
+        let before = flash.clone();
+        flash = save(flash, &numbered(number), ELEMENTS);
+        assert!(is_newest(&flash), "after store {number}");
+        // But for the library's own marks at both ends of a sector, which bear a flipped bit.
+        let changed: Vec<usize> = (0..flash.bytes.len())
+            .filter(|&at| flash.bytes[at] != before.bytes[at] && flash.bytes[at] != 0xFF)
+            .filter(|&at| (4..SECTOR - 4).contains(&(at % SECTOR)))
+            .collect();
+        for &at in changed.iter().step_by(331) {
+            let mut flipped = flash.clone();
+            flipped.bytes[at] ^= 0x10;
+            match load(&flipped) {
+                Ok(Some((sequence, _))) if sequence == number + 1 => {
+                    panic!("byte {at} of set {number} does not matter")
+                }
+                Ok(Some(_)) => assert!(!is_newest(&flipped), "byte {at} of set {number}"),
+                Ok(None) => panic!("byte {at} of set {number}: taken for a blank flash"),
+                Err(error) => assert_eq!(error, LoadError::Log(LogError::Damaged)),
+            }
+            let mended = save(flipped, &numbered(50), ELEMENTS);
+            assert!(is_newest(&mended), "stored again after byte {at}");
+        }
+    }
+}
+
+#[test]
+fn nothing_is_written_or_erased_while_the_enable_line_is_high() {
+    let mut flash = Flash::default();
+    for number in 0..12 {
+        flash.outputs_on = true;
+        let before = flash.operations;
+        let mut store = Store::new(flash, 0);
+        let saved = store.save(
+            &numbered(number),
+            ELEMENTS,
+            &Provenance::new(),
+            &mut [0; BUFFER_BYTES],
+        );
+        assert_eq!(saved, Err(SaveError::Log(LogError::OutputsOn)));
+        flash = store.into_flash();
+        assert_eq!(flash.operations, before);
+        flash.outputs_on = false;
+        flash = save(flash, &numbered(number), ELEMENTS);
+    }
+    assert!(flash.erasures.iter().all(|&erasures| erasures > 0));
 }

@@ -2,7 +2,7 @@
 
 use quadrant::control::feedback::LawKind;
 use quadrant::settings::StageSettings;
-use quadrant::store::{BUFFER_BYTES, LogError, Provenance, SaveError, Store, Stored};
+use quadrant::store::{BUFFER_BYTES, LoadError, LogError, Provenance, SaveError, Store, Stored};
 
 use crate::common::Noise;
 use crate::flash::{Damage, Flash, FlashError};
@@ -35,9 +35,11 @@ fn save(flash: Flash, number: u32) -> (Flash, Result<Stored, SaveError<FlashErro
 fn after_reboot(flash: Flash) -> (Flash, Option<u32>) {
     let mut store = Store::new(flash.reboot(), 0);
     let mut settings = StageSettings::simulated();
-    let loaded = store
-        .load(&mut settings, ELEMENTS, &mut [0; BUFFER_BYTES], &mut |_| {})
-        .expect("what was stored is valid");
+    let loaded = match store.load(&mut settings, ELEMENTS, &mut [0; BUFFER_BYTES], &mut |_| {}) {
+        // The remains of the first set, with none before it.
+        Err(LoadError::Log(LogError::Damaged)) => None,
+        loaded => loaded.expect("what was stored is valid"),
+    };
     let number = loaded.map(|_| {
         let gain = settings.axes[0].feedback.pid.kp_v_per_mm;
         let number = ((gain - 1.0) * 1e4).round() as u32;

@@ -127,10 +127,11 @@ fn varied(seed: u64) -> StageSettings {
             Some(Range::Flag) => (chance & 1 == 0).to_string(),
             Some(Range::Name(names)) => format!("{:?}", names[chance as usize % names.len()]),
             Some(Range::Number(least, most)) if !is_whole(&path) => {
-                let number: f64 = get(&settings, &path)
-                    .expect("a leaf")
-                    .parse()
-                    .expect("a number");
+                let json = get(&settings, &path).expect("a leaf");
+                if json == "null" {
+                    continue;
+                }
+                let number: f64 = json.parse().expect("a number");
                 let other = number * (1.0 + 1e-5 * ((chance % 1000) as f64 - 500.0));
                 let range = (least.value(&settings, axis), most.value(&settings, axis));
                 other.clamp(range.0, range.1).to_string()

@@ -19,6 +19,8 @@ const DISABLED: StageView = StageView {
     safety: SafetyState::Disabled,
     running: false,
     interlock: None,
+    moving: None,
+    awaiting_homing: PerAxis::splat(false),
     held: None,
     modes: PerAxis::splat(MotionMode::Hold),
     homed: PerAxis::splat(false),
@@ -26,6 +28,8 @@ const DISABLED: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: true,
+    locked: false,
+    settings_invalid: false,
 };
 const ENABLED: StageView = StageView {
     safety: SafetyState::Enabled,

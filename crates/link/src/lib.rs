@@ -5,7 +5,8 @@
 //!
 //! - [`message`]: requests, responses and notices;
 //! - [`frame`]: a message as bytes on the line, and the receiver that finds frames in a stream of bytes;
-//! - [`server`]: the server's end, which answers every request once.
+//! - [`server`]: the server's end, which answers every request once;
+//! - [`watch`]: the recognition of `Stop` and `Disable` where no other request can delay them.
 //!
 //! ```
 //! use quadrant_link::frame::{self, FRAME_BYTES};
@@ -37,6 +38,7 @@
 pub mod frame;
 pub mod message;
 pub mod server;
+pub mod watch;
 
 pub use heapless;
 

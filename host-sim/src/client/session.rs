@@ -82,8 +82,8 @@ impl Client {
         self.transport.simulated_io()
     }
 
-    /// Asks, and waits for the answer. A request that may be made twice is made again if none comes; one that is refused
-    /// because the machine is busy is made again for two seconds.
+    /// Asks, and waits for the answer. A request that may be made twice is made again if none comes, and for two seconds if the
+    /// machine is busy. What enables the outputs or starts a motion is asked once.
     ///
     /// # Errors
     /// No answer, a refusal, or a machine that has restarted.
@@ -94,7 +94,11 @@ impl Client {
         loop {
             match self.ask(&body)? {
                 Ok(reply) => return Ok(reply),
-                Err(LinkError::Busy(_)) if self.now() < busy_until => self.wait(BUSY_PAUSE)?,
+                Err(LinkError::Busy(_))
+                    if idempotency != Idempotency::NotIdempotent && self.now() < busy_until =>
+                {
+                    self.wait(BUSY_PAUSE)?;
+                }
                 Err(LinkError::NoHello) if !matches!(body, Body::Hello) => {
                     self.greet()?;
                     if idempotency != Idempotency::Query {

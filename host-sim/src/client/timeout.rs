@@ -12,6 +12,10 @@ pub(super) const ANSWER: Duration = Duration::from_millis(150);
 /// Time for an answer after which flash has been written, a sector of it erased.
 const STORED: Duration = Duration::from_secs(6);
 
+/// Time for an answer after which settings that were applied before have been built, in software where the processor knows
+/// no double precision.
+const BUILT: Duration = Duration::from_secs(2);
+
 /// Time for which, and pause after which, a request is repeated that the machine is too busy for.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
 pub(super) const BUSY_PAUSE: Duration = Duration::from_millis(5);
@@ -23,8 +27,9 @@ pub(super) enum Idempotency {
     Query,
     /// The same as of one: it says what should be, or has a number.
     Idempotent,
-    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and a second
-    /// motion is refused while the first is under way.
+    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and whatever
+    /// enables the outputs or starts a motion is asked for by a person, each time: somebody at the machine may have switched
+    /// off in between.
     NotIdempotent,
 }
 
@@ -40,17 +45,18 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Capture(CaptureRequest::State | CaptureRequest::Read { .. }) => Idempotency::Query,
         // A later selection outdates an earlier one, whose blocks have another generation.
         Body::Telemetry(_)
-        | Body::Enable
         | Body::Disable
         | Body::Stop
-        | Body::Jog { .. }
         | Body::SetPlan(_)
         | Body::Stream(StreamRequest::Points { .. } | StreamRequest::Close)
         | Body::Inject(InjectRequest::Values { .. } | InjectRequest::Close)
         | Body::Settings(
             SettingsRequest::Set { .. } | SettingsRequest::Revert | SettingsRequest::Defaults,
         ) => Idempotency::Idempotent,
-        Body::ResetFault
+        Body::Jog { velocity_mm_s, .. } if *velocity_mm_s == 0.0 => Idempotency::Idempotent,
+        Body::Enable
+        | Body::Jog { .. }
+        | Body::ResetFault
         | Body::Run
         | Body::Home(_)
         | Body::Move { .. }
@@ -66,6 +72,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
 pub(super) const fn answer_timeout(body: &Body) -> Duration {
     match body {
         Body::Settings(SettingsRequest::Store(_)) => STORED,
+        Body::Enable => BUILT,
         _ => ANSWER,
     }
 }

@@ -78,6 +78,8 @@ const ROUGH_SHARE: f64 = 0.8;
 /// `base` as an axis is measured with it: its PID alone, and room for the error that it makes.
 pub fn measuring_settings(base: &AxisSettings) -> AxisSettings {
     let mut settings = base.clone();
+    // Whoever measures the axis watches it.
+    settings.commissioned = true;
     settings.feedback.law = LawKind::Pid;
     settings.feedforward.kind = FeedforwardKind::None;
     settings.limits.following_error_mm = FOLLOWING_ERROR_MM;

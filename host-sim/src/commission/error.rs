@@ -11,7 +11,7 @@ use crate::identify::plant::PlantError;
 use crate::identify::revise::ReviseError;
 use crate::identify::static_friction::{FrictionFitError, StaticFrictionError};
 use crate::identify::virgin_curve::VirginCurveError;
-use crate::machine::ExperimentError;
+use crate::machine::{ExperimentError, MachineError};
 
 /// Reason why a commissioning ends early.
 #[derive(Debug, thiserror::Error)]
@@ -19,6 +19,9 @@ pub enum CommissionError {
     /// Settings that the firmware refuses.
     #[error("settings refused: {0}")]
     Settings(#[from] SettingsError),
+    /// The machine refused settings, or the connection failed.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
     /// The open-loop test failed.
     #[error("motor constant: {0}")]
     Motor(#[from] MotorConstantError),

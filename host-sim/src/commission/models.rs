@@ -172,6 +172,7 @@ impl Models {
             },
         );
         let mut settings = base.clone();
+        settings.commissioned = true;
         settings.plant = Some(plant.plant);
         settings.feedback = FeedbackSettings {
             integral_limit_v: base.feedback.integral_limit_v,

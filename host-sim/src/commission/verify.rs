@@ -3,12 +3,14 @@
 
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::settings::{AxisSettings, SettingsError};
+use quadrant::settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
 use crate::experiment::metrics::{Score, score, worst_and_mean};
 use crate::experiment::sine_test::SineTest;
-use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, approach};
+use crate::machine::{
+    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, approach,
+};
 use crate::record::Recording;
 
 /// The sines on an axis with room: the middle velocity of the thesis first, then short, slow and fast.
@@ -129,9 +131,9 @@ impl Verification {
 /// Reason why the trials cannot be run.
 #[derive(Debug, thiserror::Error)]
 pub enum VerifyError {
-    /// The settings are refused.
+    /// The machine did not take the settings.
     #[error(transparent)]
-    Settings(#[from] SettingsError),
+    Machine(#[from] MachineError),
     /// The PID alone was stopped.
     #[error(transparent)]
     TestAxis(#[from] ExperimentError),
@@ -250,7 +252,7 @@ impl Bench<'_> {
         law: &str,
         settings: &AxisSettings,
         count: usize,
-    ) -> Result<(LawResult, Option<ExperimentError>), SettingsError> {
+    ) -> Result<(LawResult, Option<ExperimentError>), MachineError> {
         let mut settings = settings.clone();
         // Room for the error that a poor law makes, as for the PID.
         let measuring = measuring_settings(&settings);

@@ -18,7 +18,7 @@ use rayon::prelude::*;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};
 use super::response::FrequencyResponse;
-use crate::machine::{Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
+use crate::machine::{Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis};
 use crate::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 use crate::record::Recording;
 
@@ -108,6 +108,9 @@ pub enum ReviseError {
     /// The settings are refused.
     #[error(transparent)]
     Settings(#[from] SettingsError),
+    /// The machine refused settings, or the connection failed.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
     #[error(transparent)]
     Fit(#[from] FitError),
 }

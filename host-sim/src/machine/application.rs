@@ -4,7 +4,7 @@
 use std::collections::VecDeque;
 
 use quadrant::app::{
-    Axis, Control, Inputs, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
+    Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
     TimingStatistics,
 };
 use quadrant::command::Command;
@@ -22,19 +22,22 @@ use super::memory_flash::MemoryFlash;
 
 /// Words of the capture, as on the reference board.
 const CAPTURE_WORDS: usize = quadrant::app::capture::CAPTURE_WORDS;
+/// Control rates of the simulated machine, Hz: all that settings allow.
+const RATES_HZ: (f64, f64) = (1e3, 1e5);
 /// Requests of the operator at the machine that may wait, as in the firmware.
 const REQUESTS: usize = 3;
 
 /// The application, as it runs between two starts.
 pub struct Running<S: Scalar> {
     control: Control<'static, 'static, S>,
+    intake: Intake<'static>,
     supervision: Supervision,
     server: Server<'static, 'static, S, MemoryFlash>,
     seen: Snapshot<S>,
     /// Requests of the operator at the machine.
     requests: VecDeque<Command>,
-    /// Command that the supervising task let through.
-    command: Option<Command>,
+    /// Commands of the supervising task: urgent ones, and those of the operator that it let through.
+    commands: VecDeque<Command>,
 }
 
 /// Start conditions of the application.
@@ -61,7 +64,7 @@ impl<S: Scalar> Running<S> {
     /// The first of the settings for an empty flash that is refused.
     pub fn start(start: Start<'_>, flash: MemoryFlash) -> Result<Self, SettingsError> {
         let Start { defaults, .. } = start;
-        let mut fault = None;
+        let (mut invalid, mut keep_draft) = (None, false);
         let mut store = Store::new(flash, 0);
         // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
         let buffer: &'static mut [u8; BUFFER_BYTES] = Box::leak(Box::new([0; BUFFER_BYTES]));
@@ -69,14 +72,24 @@ impl<S: Scalar> Running<S> {
         let draft: &'static mut StageSettings = Box::leak(Box::new(defaults.clone()));
         let loaded = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut |_| {});
         let provenance = match loaded {
-            Ok(Some(Loaded { provenance, .. })) => provenance,
+            Ok(Some(Loaded {
+                provenance,
+                is_newest: true,
+                ..
+            })) => provenance,
+            Ok(Some(older)) => {
+                draft.copy_from(settings);
+                settings.copy_from(defaults);
+                (invalid, keep_draft) = (Some(FaultCode::SettingsInvalid), true);
+                older.provenance
+            }
             Ok(None) => {
                 settings.copy_from(defaults);
                 Default::default()
             }
             Err(LoadError::Decode(_) | LoadError::Log(_)) => {
                 settings.copy_from(defaults);
-                fault = Some(FaultCode::SettingsInvalid);
+                invalid = Some(FaultCode::SettingsInvalid);
                 Default::default()
             }
         };
@@ -90,40 +103,44 @@ impl<S: Scalar> Running<S> {
         let back_buffer: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
         let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
-        let (control_ends, ends) = queues.split();
+        let (control_ends, intake_ends, ends) = queues.split();
         let mut control = Control::new(axes, streaming, plan, control_ends);
-        if let Some(code) = start.fault.or(fault) {
+        for code in [start.fault, invalid].into_iter().flatten() {
             control.start_faulted(code);
         }
         Ok(Self {
             control,
+            intake: Intake::new(intake_ends),
             supervision: Supervision::new(resolution_mm),
             server: Server::new(ServerParts {
                 ends,
                 back_buffer,
                 settings,
                 draft,
+                keep_draft,
                 provenance,
                 store,
                 buffer,
                 capture: Box::leak(vec![0; CAPTURE_WORDS].into_boxed_slice()),
                 board: start.board,
                 cycle_hz: start.cycle_hz,
+                rates_hz: RATES_HZ,
                 number: start.number,
             }),
             seen: Snapshot::default(),
             requests: VecDeque::new(),
-            command: None,
+            commands: VecDeque::new(),
         })
     }
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
     pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
+        self.control.hear(self.intake.frames());
         let outputs = self.control.tick(&Inputs {
-            command: self.command.take(),
-            link_lost: self.server.link_lost(),
+            command: self.commands.pop_front(),
             ..inputs.inputs()
         });
+        self.server.flash().set_outputs_off(!outputs.enabled);
         if self.requests.len() < REQUESTS {
             self.requests.extend(inputs.request);
         }
@@ -132,12 +149,10 @@ impl<S: Scalar> Running<S> {
         }
         let seen = self.control.snapshot();
         self.seen = seen;
-        let supervised = self.supervision.run(
-            &seen,
-            self.requests.pop_front(),
-            self.server.is_commissioned(),
-        );
-        self.command = supervised.command;
+        let received = self.intake.run(serial);
+        self.commands.extend(received.urgent);
+        let supervised = self.supervision.run(&seen, self.requests.pop_front());
+        self.commands.extend(supervised.command);
         self.control
             .show_glitches(self.supervision.glitch_readings());
         for event in supervised.events.into_iter().flatten() {

@@ -1,10 +1,9 @@
 //! A machine whose axes can be measured.
 
-use std::error::Error;
-
 use quadrant::axes::AxisName;
-use quadrant::settings::{SettingsError, StageSettings};
+use quadrant::settings::StageSettings;
 
+use super::error::MachineError;
 use super::test_axis::TestAxis;
 
 /// A machine with three axes: the one start of identification and commissioning.
@@ -48,18 +47,4 @@ pub trait Machine {
     /// # Errors
     /// A machine without a flash, or a flash that failed.
     fn store(&mut self, provenance: &str) -> Result<(), MachineError>;
-}
-
-/// Reason why a machine cannot be measured.
-#[derive(Debug, thiserror::Error)]
-pub enum MachineError {
-    /// Settings that are refused.
-    #[error(transparent)]
-    Settings(#[from] SettingsError),
-    /// The control law alone has no flash.
-    #[error("the control law alone has no flash to store settings in: take another --machine")]
-    NoFlash,
-    /// The connection failed, or the machine refused.
-    #[error(transparent)]
-    Connection(Box<dyn Error + Send + Sync>),
 }

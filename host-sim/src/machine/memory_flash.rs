@@ -1,9 +1,12 @@
 //! A flash in memory: bits are written from one to zero, and erased a sector at a time.
 
+use std::cell::Cell;
+
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash, check_erase, check_read,
     check_write,
 };
+use quadrant::hal::SettingsFlash;
 
 /// Size of a sector, as on the reference board.
 const SECTOR_BYTES: usize = 16 * 1024;
@@ -12,28 +15,43 @@ const BYTES: usize = 2 * SECTOR_BYTES;
 
 /// Two sectors of 16 KiB.
 #[derive(Clone, Debug)]
-pub struct MemoryFlash(Vec<u8>);
+pub struct MemoryFlash {
+    bytes: Vec<u8>,
+    /// The amplifiers' enable line is low.
+    outputs_off: Cell<bool>,
+}
 
 impl MemoryFlash {
     /// A flash that holds `bytes`, if they are as many as it has.
     pub fn of(bytes: Vec<u8>) -> Option<Self> {
-        (bytes.len() == BYTES).then_some(Self(bytes))
+        (bytes.len() == BYTES).then_some(Self {
+            bytes,
+            outputs_off: Cell::new(true),
+        })
     }
 
     /// Returns the bytes that it holds.
     pub fn bytes(&self) -> &[u8] {
-        &self.0
+        &self.bytes
+    }
+
+    /// Sets what the enable line shows.
+    pub fn set_outputs_off(&self, off: bool) {
+        self.outputs_off.set(off);
     }
 
     /// The same, to be damaged.
     pub fn bytes_mut(&mut self) -> &mut [u8] {
-        &mut self.0
+        &mut self.bytes
     }
 }
 
 impl Default for MemoryFlash {
     fn default() -> Self {
-        Self(vec![0xFF; BYTES])
+        Self {
+            bytes: vec![0xFF; BYTES],
+            outputs_off: Cell::new(true),
+        }
     }
 }
 
@@ -56,12 +74,18 @@ impl ReadNorFlash for MemoryFlash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         check_read(self, offset, bytes.len()).map_err(FlashError)?;
-        bytes.copy_from_slice(&self.0[offset as usize..][..bytes.len()]);
+        bytes.copy_from_slice(&self.bytes[offset as usize..][..bytes.len()]);
         Ok(())
     }
 
     fn capacity(&self) -> usize {
-        self.0.len()
+        self.bytes.len()
+    }
+}
+
+impl SettingsFlash for MemoryFlash {
+    fn outputs_are_off(&self) -> bool {
+        self.outputs_off.get()
     }
 }
 
@@ -71,13 +95,13 @@ impl NorFlash for MemoryFlash {
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         check_erase(self, from, to).map_err(FlashError)?;
-        self.0[from as usize..to as usize].fill(0xFF);
+        self.bytes[from as usize..to as usize].fill(0xFF);
         Ok(())
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         check_write(self, offset, bytes.len()).map_err(FlashError)?;
-        for (cell, byte) in self.0[offset as usize..].iter_mut().zip(bytes) {
+        for (cell, byte) in self.bytes[offset as usize..].iter_mut().zip(bytes) {
             *cell &= byte;
         }
         Ok(())

@@ -32,6 +32,7 @@ pub mod emulated;
 mod emulated_link;
 #[cfg(all(unix, feature = "emulated"))]
 pub mod emulator;
+mod error;
 mod flash_file;
 mod interface;
 pub mod law;
@@ -50,7 +51,8 @@ mod transport;
 pub use approach::approach;
 #[cfg(all(unix, feature = "emulated"))]
 pub use emulated_link::EmulatedLink;
-pub use interface::{Machine, MachineError};
+pub use error::MachineError;
+pub use interface::Machine;
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
 pub use loopback::{Loopback, SimulatedPeer};
 pub use serial::{BAUD, SerialTransport};

@@ -7,6 +7,7 @@ use quadrant::reference::MotionSettings;
 use quadrant::safety::Fault;
 use quadrant::settings::{AxisSettings, SettingsError};
 
+use super::error::MachineError;
 use crate::record::Recording;
 
 /// Source of the amplifier's voltage besides the injected one.
@@ -63,8 +64,8 @@ pub trait TestAxis {
     /// Puts settings in force for the experiments that follow.
     ///
     /// # Errors
-    /// Settings that are refused; the old ones stay in force.
-    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError>;
+    /// Settings that are refused, here or by the machine, or a connection that is broken; the old ones stay in force.
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError>;
 
     /// Runs an experiment from where the axis stands, and records it. `progress` is told the share that is done,
     /// 0 to 1, a few times a second.

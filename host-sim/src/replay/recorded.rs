@@ -166,6 +166,7 @@ fn emps_axis() -> Result<Axis, ShapingError> {
     settings.amplifier.offset_v = emps::OFFSET_N * per_newton;
     settings.plant = Some(plant);
     settings.limits.max_acceleration_mm_s2 = 5000.0;
+    settings.limits.braking_mm_s2 = settings.limits.max_acceleration_mm_s2;
     let truth = AxisParameters {
         gain_mm_per_v_s2: gain,
         // All viscous friction is in the friction model, as published.

@@ -70,7 +70,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         if let SafetyState::Faulted(fault) = machine.state().safety() {
             assert!(!outputs.enabled);
             assert_eq!(outputs.codes.map(|code| code.0), [0; 3]);
-            assert_eq!(fault.code, FaultCode::FollowingError);
+            assert_eq!(fault.code, FaultCode::EncoderImplausible);
             break;
         }
     }

@@ -175,7 +175,8 @@ fn a_session_homes_moves_streams_changes_a_gain_and_survives_a_restart() {
         axis: AxisName::X,
         velocity_mm_s: 10.0,
     });
-    session.run(5000);
+    // A jog needs its host, who is silent for half a second at most.
+    session.run(4000);
     session.set("/axes/0/feedback/pid/kp_v_per_mm", "0.9");
     session.done(Body::Settings(SettingsRequest::Apply));
     let mut before = session.machine.outputs().codes[0].0;
@@ -194,6 +195,7 @@ fn a_session_homes_moves_streams_changes_a_gain_and_survives_a_restart() {
     );
     session.done(Body::Stop);
     session.until_rest();
+    assert_eq!(session.status().fault, None);
 
     session.done(Body::Move {
         axis: AxisName::X,
@@ -227,7 +229,8 @@ fn an_emergency_stop_is_latched_with_its_trace_until_it_is_released_and_reset() 
         axis: AxisName::Y,
         velocity_mm_s: 10.0,
     });
-    session.run(5000);
+    // A jog needs its host, who is silent for half a second at most.
+    session.run(4000);
     session.machine.press(Switches::EMERGENCY_STOP);
     session.run(1);
     assert!(!session.machine.outputs().enabled);

@@ -1,11 +1,10 @@
 //! A voltage that a host adds to an axis' output.
 
-use embedded_storage::nor_flash::NorFlash;
-
 use super::opened::OpenInjection;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::app::supervisor::PERIOD_TICKS;
+use crate::hal::SettingsFlash;
 use crate::law::command::Command;
 use crate::law::injection::{BLOCK_VALUES, VoltageBlock};
 use crate::law::scalar::Scalar;
@@ -17,7 +16,7 @@ const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;
 /// Ticks after which a command that was sent shows in the snapshot.
 const ARRIVAL_TICKS: u32 = 3 * PERIOD_TICKS;
 
-impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     pub(super) fn serve_inject(&mut self, request: InjectRequest) -> Result<Reply, LinkError> {
         match request {
             InjectRequest::Open {

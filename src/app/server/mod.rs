@@ -2,9 +2,16 @@
 //!
 //! [`Server::poll`] runs in the lowest task, about once a millisecond. Every request gets one answer, and the next one is
 //! not read before that answer is on its way: a host that asks too fast waits, and nothing grows. A request that takes
-//! long (settings are built, flash is written) holds up the link alone.
+//! long (settings are built, flash is written) holds up the link alone, and neither `Stop` nor `Disable`, which the
+//! [`Intake`](super::Intake) finds by itself.
+//!
+//! No request is served before control has taken every order that came of the ones before it and a snapshot says so: each
+//! is judged on a state that knows of them all. What must not be overtaken by anything else either, such as the operator's
+//! button, is decided by control, and answered when it has ([`Deferred`]).
 
+mod deferred;
 mod inject;
+mod maintenance;
 mod motion;
 mod observe;
 mod opened;
@@ -15,18 +22,17 @@ mod status;
 mod stream;
 mod transmit_buffer;
 
-use embedded_storage::nor_flash::NorFlash;
 use heapless::String;
 
+use self::deferred::{Deferred, Work};
 use self::opened::{OpenInjection, OpenStream};
 use self::recorder::Recorder;
 use self::transmit_buffer::TransmitBuffer;
 use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};
 use crate::app::telemetry::Packer;
-use crate::hal::Serial;
+use crate::hal::{Serial, SettingsFlash};
 use crate::law::axes::AxisName;
-use crate::law::motion::MotionMode;
 use crate::law::scalar::Scalar;
 use crate::settings::StageSettings;
 use crate::settings::draft::Draft;
@@ -39,14 +45,10 @@ use quadrant_link::server::LinkServer;
 
 pub use self::statistics::ServerStatistics;
 
-/// Bytes that are taken from the port at a time.
-const RECEIVE_BYTES: usize = 64;
 /// Messages that one poll prepares at most.
 const MESSAGES_PER_POLL: usize = 4;
 /// Events that wait for the host.
 const EVENT_ROOM: usize = 8;
-/// Ticks without a good frame after which a host that streams counts as lost: 0.5 s at 10 kHz.
-const LINK_TIMEOUT_TICKS: u32 = 5_000;
 
 /// The parts of a server.
 pub struct ServerParts<'q, 'a, S: Scalar, F> {
@@ -56,8 +58,11 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     pub back_buffer: &'a mut Axis<S>,
     /// The settings in force.
     pub settings: &'a mut StageSettings,
-    /// Memory for settings that are being edited; its content does not matter.
+    /// Memory for settings that are being edited.
     pub draft: &'a mut StageSettings,
+    /// True if `draft` holds settings to look at, and not to be in force unasked: a set older than one that is damaged.
+    /// Otherwise its content does not matter.
+    pub keep_draft: bool,
     /// The origin of the settings in force.
     pub provenance: Provenance,
     /// The memory for settings.
@@ -70,6 +75,8 @@ pub struct ServerParts<'q, 'a, S: Scalar, F> {
     pub board: &'static str,
     /// Rate of the timer that measures ticks, Hz.
     pub cycle_hz: u32,
+    /// Control rates that the board is up to, Hz: the lowest and the highest.
+    pub rates_hz: (f64, f64),
     /// The number type of the control law.
     pub number: NumberType,
 }
@@ -89,16 +96,15 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     link: LinkServer,
     /// Counts of the link before the byte that is being served.
     frames: FrameCounters,
-    received: heapless::Deque<u8, RECEIVE_BYTES>,
     transmit: TransmitBuffer,
     seen: Snapshot<S>,
     timing: TimingStatistics,
     /// Axes whose new settings are not built yet.
     pending: AxisSet,
+    /// Safety depends on a setting in which they differ.
+    needs_disabled: bool,
     back_buffer: Option<&'a mut Axis<S>>,
     draft: Draft<'a>,
-    /// Somebody has given the settings in force.
-    commissioned: bool,
     provenance: Provenance,
     store: Store<F>,
     buffer: &'a mut [u8; BUFFER_BYTES],
@@ -115,11 +121,21 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     stored: u16,
     board: &'static str,
     cycle_hz: u32,
+    rates_hz: (f64, f64),
     number: NumberType,
     reboot: bool,
+    /// Orders sent to control so far; wraps.
+    orders: u16,
+    /// Urgent requests served so far, as far as is known; wraps.
+    urgent: u32,
+    deferred: Option<Deferred>,
+    /// Control keeps the outputs off for this server.
+    locked: bool,
+    /// Valid settings were stored, which control has not been told yet.
+    accepted: bool,
 }
 
-impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
+impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
     /// Returns a server without a client.
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
@@ -128,14 +144,17 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             ends: parts.ends,
             link: LinkServer::new(),
             frames: FrameCounters::default(),
-            received: heapless::Deque::new(),
             transmit: TransmitBuffer::new(),
             seen: Snapshot::default(),
             timing: TimingStatistics::default(),
             pending: AxisSet::NONE,
+            needs_disabled: false,
             back_buffer: Some(parts.back_buffer),
-            commissioned: parts.settings.is_commissioned(),
-            draft: Draft::new(parts.settings, parts.draft),
+            draft: if parts.keep_draft {
+                Draft::edited(parts.settings, parts.draft)
+            } else {
+                Draft::new(parts.settings, parts.draft)
+            },
             provenance: parts.provenance,
             store: parts.store,
             buffer: parts.buffer,
@@ -152,8 +171,14 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             stored: 0,
             board: parts.board,
             cycle_hz: parts.cycle_hz,
+            rates_hz: parts.rates_hz,
             number: parts.number,
             reboot: false,
+            orders: 0,
+            urgent: 0,
+            deferred: None,
+            locked: false,
+            accepted: false,
         };
         let mut version = String::<32>::new();
         let _ = version.push_str(env!("CARGO_PKG_VERSION"));
@@ -166,11 +191,6 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         self.store.flash()
     }
 
-    /// True if the settings in force are not the default ones, on which the outputs are not enabled.
-    pub const fn is_commissioned(&self) -> bool {
-        self.commissioned
-    }
-
     /// Queues an event of a tick for the host; counts it as dropped if the queue is full.
     pub fn push_event(&mut self, tick: u32, event: impl Into<Event>) {
         if self.events.push_back((tick, event.into())).is_err() {
@@ -178,15 +198,8 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         }
     }
 
-    /// True if the axes depend on a host (set points, a jog, an injected voltage) that has fallen silent.
-    pub fn link_lost(&self) -> bool {
-        let needed = self.stream.is_some()
-            || self.is_injecting()
-            || self.seen.view.modes.contains(&MotionMode::Jog);
-        needed && self.seen.tick.wrapping_sub(self.heard_tick) > LINK_TIMEOUT_TICKS
-    }
-
-    /// Takes and sends what the port allows, and goes on with what takes longer. `seen` is the latest snapshot.
+    /// Takes what the intake has received, sends what the port allows, and goes on with what takes longer. `seen` is the
+    /// latest snapshot.
     pub fn poll(
         &mut self,
         serial: &mut impl Serial,
@@ -195,8 +208,8 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     ) -> Poll {
         self.report_homed(seen);
         self.seen = *seen;
-        self.seen.view.commissioned = self.commissioned;
         self.timing = timing;
+        self.release();
         self.arm_at_start();
         self.build_pending();
         self.collect_capture();
@@ -209,7 +222,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             if self.reboot {
                 return Poll::Reboot;
             }
-            if !(self.answer(serial) || self.notify()) {
+            if !(self.conclude() || self.answer() || self.notify()) {
                 break;
             }
         }
@@ -226,30 +239,38 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         }
     }
 
-    /// Reads until a request is complete, and prepares its answer; returns true if there is one.
-    fn answer(&mut self, serial: &mut impl Serial) -> bool {
-        loop {
-            if self.received.is_empty() {
-                let mut bytes = [0; RECEIVE_BYTES];
-                let count = serial.read(&mut bytes);
-                self.received.extend(bytes.iter().take(count).copied());
-            }
-            while let Some(byte) = self.received.pop_front() {
-                // The link is taken out while it passes the request on, so that the server can serve it.
-                let mut link = core::mem::take(&mut self.link);
-                self.frames = link.counters();
-                let response = link.push(byte, |body| self.serve(body));
-                self.link = link;
-                if let Some(response) = response {
-                    self.heard_tick = self.seen.tick;
-                    self.transmit.fill(&Message::Response(response));
-                    return true;
-                }
-            }
-            if self.received.is_empty() {
+    /// Reads until a request is complete, and prepares its answer; returns true if there is one. Reads nothing while an
+    /// earlier request waits for control.
+    fn answer(&mut self) -> bool {
+        while self.deferred.is_none() && !self.locked && self.is_settled() {
+            let urgent = self.ends.urgent();
+            let Some(byte) = self.ends.bytes.dequeue() else {
+                // All that came before the last of them is served.
+                self.urgent = urgent;
+                return false;
+            };
+            // The link is taken out while it passes the request on, so that the server can serve it.
+            let mut link = core::mem::take(&mut self.link);
+            self.frames = link.counters();
+            let response = link.push(byte, |body| self.serve(body));
+            self.link = link;
+            let Some(response) = response else {
+                continue;
+            };
+            self.heard_tick = self.seen.tick;
+            if let Some(deferred) = &mut self.deferred {
+                deferred.id = response.id;
                 return false;
             }
+            self.transmit.fill(&Message::Response(response));
+            return true;
         }
+        false
+    }
+
+    /// True if control has taken every order, and the snapshot knows what came of them.
+    fn is_settled(&self) -> bool {
+        self.seen.orders == self.orders
     }
 
     /// Prepares a notice; returns true if there is one.
@@ -279,6 +300,11 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
     /// Serves a request.
     #[inline(never)]
     fn serve(&mut self, body: Body) -> Result<Reply, LinkError> {
+        if matches!(body, Body::Stop | Body::Disable) {
+            self.urgent = self.urgent.wrapping_add(1);
+        } else if body.may_move() {
+            self.check_not_stopped()?;
+        }
         match body {
             Body::Hello => Ok(Reply::Identity(self.identity())),
             Body::Status => Ok(Reply::Status(self.status())),
@@ -288,7 +314,7 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
             Body::Settings(request) => self.serve_settings(request),
             Body::Telemetry(request) => self.serve_telemetry(request),
             Body::Capture(request) => self.serve_capture(request),
-            Body::Reboot => self.restart(),
+            Body::Reboot => self.defer(Work::Restart),
             Body::SetPlan(plan) => self.set_plan(plan),
             Body::Move {
                 axis,
@@ -299,15 +325,14 @@ impl<'q, 'a, S: Scalar, F: NorFlash> Server<'q, 'a, S, F> {
         }
     }
 
-    /// Prepares a restart, unless the outputs are on.
-    fn restart(&mut self) -> Result<Reply, LinkError> {
-        if self.seen.view.safety.drives() {
-            return Err(refused(format_args!(
-                "the outputs are on; disable them before a restart"
-            )));
+    /// Checks that nobody has asked to stop or to disable since the request that is being served.
+    fn check_not_stopped(&self) -> Result<(), LinkError> {
+        if self.urgent == self.ends.urgent() {
+            return Ok(());
         }
-        self.reboot = true;
-        Ok(Reply::Done)
+        Err(refused(format_args!(
+            "a later request to stop or to disable has been acted on; ask again"
+        )))
     }
 }
 

@@ -1,25 +1,27 @@
 //! Requests that switch outputs and start motions.
 
-use embedded_storage::nor_flash::NorFlash;
-
+use super::deferred::Work;
 use super::{Server, busy, index, invalid, refused};
+use crate::app::queues::Order;
 use crate::app::supervisor;
-use crate::law::axes::AxisName;
+use crate::hal::SettingsFlash;
+use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::reference::{Motion, MotionSettings};
 use crate::law::scalar::Scalar;
 use crate::settings::PlanSettings;
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
 
-impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Requests that are commands of the control law.
     #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
-            Body::Enable => {
-                self.command(Command::Enable)?;
-                self.arm_for_faults();
+            Body::Enable if self.must_wait_to_enable() => {
+                self.check(Command::Enable)?;
+                return self.defer(Work::Enable);
             }
+            Body::Enable => return self.enable(),
             Body::Disable => self.command(Command::Disable)?,
             Body::ResetFault => self.command(Command::ResetFault)?,
             Body::Stop => {
@@ -60,6 +62,18 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         Ok(Reply::Done)
     }
 
+    /// True while settings that safety depends on are being built: control does not enable before it has them all.
+    pub(super) fn must_wait_to_enable(&self) -> bool {
+        self.needs_disabled && !self.pending.is_empty()
+    }
+
+    /// Enables the outputs.
+    pub(super) fn enable(&mut self) -> Result<Reply, LinkError> {
+        self.command(Command::Enable)?;
+        self.arm_for_faults();
+        Ok(Reply::Done)
+    }
+
     /// Checks that the control law would take a command, as far as the last snapshot tells.
     pub(super) fn check(&self, command: Command) -> Result<(), LinkError> {
         match supervisor::refusal(self.seen.view, command) {
@@ -71,11 +85,18 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
     /// Sends a command to the control law, unless it would not take it.
     pub(super) fn command(&mut self, command: Command) -> Result<(), LinkError> {
         self.check(command)?;
-        self.ends.commands.enqueue(command).map_err(|_| {
+        self.order(Order::Command(command))
+    }
+
+    /// Sends an order to the control law.
+    pub(super) fn order(&mut self, order: Order) -> Result<(), LinkError> {
+        self.ends.orders.enqueue(order).map_err(|_| {
             busy(format_args!(
-                "the control law has commands waiting; ask again"
+                "the control law has orders waiting; ask again"
             ))
-        })
+        })?;
+        self.orders = self.orders.wrapping_add(1);
+        Ok(())
     }
 
     /// Moves one axis to a position.
@@ -96,12 +117,14 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .in_force()
             .move_to(axis, ahead, homed, target_mm, velocity_mm_s)
             .map_err(|error| invalid(format_args!("{error}")))?;
-        self.hand_over(axis, &MotionSettings::PointToPoint(motion))?;
-        self.command(Command::StartMove(axis))?;
+        let mut motions = [MotionSettings::Hold; 3];
+        motions[index(axis)] = MotionSettings::PointToPoint(motion);
+        self.hand_over(&PlanSettings { motions })?;
+        self.order(Order::Move(axis))?;
         Ok(Reply::Done)
     }
 
-    /// Replaces the plan.
+    /// Replaces the plan, as a whole or not at all.
     #[inline(never)]
     pub(super) fn set_plan(&mut self, plan: Plan) -> Result<Reply, LinkError> {
         if self.seen.view.running {
@@ -112,16 +135,18 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         let plan = PlanSettings::from(plan);
         plan.validate(self.draft.in_force())
             .map_err(|error| invalid(format_args!("{error}")))?;
-        for (axis, motion) in AxisName::ALL.into_iter().zip(&plan.motions) {
-            self.hand_over(axis, motion)?;
-        }
-        Ok(Reply::Done)
+        self.hand_over(&plan)?;
+        self.defer(Work::Plan)
     }
 
+    /// Lays motions where control takes them from when it is ordered to.
     #[inline(never)]
-    fn hand_over(&mut self, axis: AxisName, motion: &MotionSettings) -> Result<(), LinkError> {
-        let motion = Motion::build(motion, self.draft.in_force().scale_of(axis));
-        self.ends.motions.enqueue((axis, motion)).map_err(|_| {
+    fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
+        let settings = self.draft.in_force();
+        let plan = PerAxis::from_fn(|axis| {
+            Motion::build(&plan.motions[index(axis)], settings.scale_of(axis))
+        });
+        self.ends.plans.enqueue(plan).map_err(|_| {
             busy(format_args!(
                 "the control law has motions waiting; ask again"
             ))

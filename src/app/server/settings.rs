@@ -1,10 +1,11 @@
 //! Requests about settings: a draft is edited leaf by leaf, and takes effect as a whole.
 
-use embedded_storage::nor_flash::NorFlash;
-
+use super::deferred::Work;
 use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::AxisSwap;
+use crate::hal::SettingsFlash;
 use crate::law::axes::AxisName;
+use crate::law::decimal::Decimal;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::scalar::Scalar;
 use crate::settings::MAX_VALUE_BYTES;
@@ -14,7 +15,7 @@ use quadrant_link::message::{
     Value, text,
 };
 
-impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
         match request {
@@ -45,7 +46,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 self.draft.settings_mut().set_default();
                 Ok(Reply::Done)
             }
-            SettingsRequest::Store(provenance) => self.save(provenance),
+            SettingsRequest::Store(provenance) => self.defer(Work::Store(provenance)),
             SettingsRequest::Provenance => Ok(Reply::Provenance(self.provenance.clone())),
         }
     }
@@ -78,6 +79,13 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 "the settings applied last are still being built; ask again"
             )));
         }
+        self.check_rate()?;
+        let safety = self.draft.safety_change();
+        if let Some(leaf) = safety
+            && self.seen.view.safety.drives()
+        {
+            return Err(refused(format_args!("{leaf}")));
+        }
         let changed = match self.draft.apply(FIRMWARE_ELEMENTS) {
             Ok(changed) => changed,
             Err(ApplyError::Refused(error)) => return Err(invalid(format_args!("{error}"))),
@@ -94,12 +102,27 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             .filter(|&axis| changed[index(axis)])
             .map(Into::into)
             .collect();
-        self.commissioned = self.draft.in_force().is_commissioned();
         self.pending = changed;
+        self.needs_disabled = safety.is_some();
         Ok(Reply::Applied(Applied {
             changed,
             restart_needed: false,
         }))
+    }
+
+    /// Checks that the board is up to the draft's control rate.
+    fn check_rate(&self) -> Result<(), LinkError> {
+        let (lowest, highest) = self.rates_hz;
+        let rate_hz = self.draft.settings().rate_hz;
+        if (lowest..=highest).contains(&rate_hz) {
+            return Ok(());
+        }
+        Err(invalid(format_args!(
+            "rate_hz = {}: this board is up to {} to {}",
+            Decimal(rate_hz),
+            Decimal(lowest),
+            Decimal(highest)
+        )))
     }
 
     /// Builds the next axis whose settings have changed into the back buffer, and hands it over.
@@ -120,6 +143,8 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
             name,
             axis,
             streaming: settings.streaming.build(),
+            needs_disabled: self.needs_disabled,
+            more: self.pending.iter().nth(1).is_some(),
         };
         match self.ends.swaps.enqueue(swap) {
             Ok(()) => {
@@ -138,14 +163,10 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
         }
     }
 
-    /// Stores the draft: the settings in force, unless it was edited since or needs a restart.
+    /// Stores the draft: the settings in force, unless it was edited since or needs a restart. Control keeps the outputs off.
     #[inline(never)]
-    fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
-        if self.seen.view.safety.drives() {
-            return Err(refused(format_args!(
-                "the outputs are on, and writing flash stops the processor; disable them first"
-            )));
-        }
+    pub(super) fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
+        self.check_rate()?;
         self.store
             .save(
                 self.draft.settings(),
@@ -154,6 +175,7 @@ impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
                 self.buffer,
             )
             .map_err(|error| LinkError::Storage(text(format_args!("{error}"))))?;
+        self.accepted = true;
         self.provenance = provenance;
         self.stored = self.stored.wrapping_add(1);
         self.push_event(self.seen.tick, Event::SettingsStored);

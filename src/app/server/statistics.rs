@@ -1,8 +1,7 @@
 //! Statistics of the server, for the board's own log.
 
-use embedded_storage::nor_flash::NorFlash;
-
 use super::Server;
+use crate::hal::SettingsFlash;
 use crate::law::scalar::Scalar;
 use quadrant_link::message::Provenance;
 
@@ -27,7 +26,7 @@ pub struct ServerStatistics {
     pub captures: u16,
 }
 
-impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Returns the statistics.
     pub fn statistics(&self) -> ServerStatistics {
         let frames = self.link.counters();

@@ -1,8 +1,7 @@
 //! Identity and status of the machine.
 
-use embedded_storage::nor_flash::NorFlash;
-
 use super::Server;
+use crate::hal::SettingsFlash;
 use crate::law::axes::AxisName;
 use crate::law::motion::MotionMode;
 use crate::law::safety::SafetyState;
@@ -13,7 +12,7 @@ use quadrant_link::message::{
     AxisSet, AxisStatus, FaultReport, Identity, MachineState, Status, text,
 };
 
-impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     pub(super) fn identity(&self) -> Identity {
         Identity {
             protocol: PROTOCOL_VERSION,

@@ -1,10 +1,9 @@
 //! Set points that a host streams.
 
-use embedded_storage::nor_flash::NorFlash;
-
 use super::opened::OpenStream;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
+use crate::hal::SettingsFlash;
 use crate::law::command::Command;
 use crate::law::reference::{
     AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
@@ -17,7 +16,7 @@ use quadrant_link::message::{self, LinkError, Reply, StreamRequest, StreamStatus
 /// Segments that must wait before the axes start: the host is that far ahead.
 const START_SEGMENTS: usize = STREAM_ITEM_ROOM / 2;
 
-impl<S: Scalar, F: NorFlash> Server<'_, '_, S, F> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_stream(&mut self, request: StreamRequest) -> Result<Reply, LinkError> {
         match request {

@@ -5,6 +5,7 @@
 use embedded_storage::nor_flash::{
     ErrorType, NorFlash, NorFlashErrorKind, ReadNorFlash, check_erase, check_read, check_write,
 };
+use quadrant::hal;
 use quadrant::lockstep::{FLASH, FLASH_BYTES};
 
 use super::mailbox;
@@ -35,12 +36,22 @@ impl ReadNorFlash for SettingsFlash {
     }
 }
 
+impl hal::SettingsFlash for SettingsFlash {
+    /// As the host was shown it last.
+    fn outputs_are_off(&self) -> bool {
+        !mailbox::is_enabled()
+    }
+}
+
 impl NorFlash for SettingsFlash {
     const WRITE_SIZE: usize = 4;
     const ERASE_SIZE: usize = SECTOR_BYTES;
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), NorFlashErrorKind> {
         check_erase(self, from, to)?;
+        if !hal::SettingsFlash::outputs_are_off(self) {
+            return Err(NorFlashErrorKind::Other);
+        }
         for at in from..to {
             mailbox::set_byte(FLASH + at as usize, 0);
         }

@@ -2,7 +2,9 @@
 
 use core::sync::atomic::{Ordering, fence};
 
-use quadrant::lockstep::{BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, RECORDED_TICKS, RESET, Reset};
+use quadrant::lockstep::{
+    BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, OUTPUT, RECORDED_TICKS, RESET, Reset,
+};
 
 /// Base address of the PSRAM, which the host backs by a shared file.
 const BASE: usize = 0x2100_0000;
@@ -33,6 +35,11 @@ pub(super) fn write(offset: usize, word: u32) {
     debug_assert!(offset.is_multiple_of(4) && offset < MEMORY_BYTES);
     // SAFETY: as in `read`.
     unsafe { core::ptr::write_volatile((BASE + offset) as *mut u32, word) }
+}
+
+/// True if the outputs that the host was told last are enabled.
+pub(super) fn is_enabled() -> bool {
+    read(OUTPUT + 4) >> 16 & 1 == 1
 }
 
 /// Reads a byte.

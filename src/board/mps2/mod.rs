@@ -67,6 +67,9 @@ pub(crate) struct Board {
     pub(crate) reset_cause: ResetCause,
 }
 
+/// Control rates, Hz: all that settings allow.
+pub(crate) const RATES_HZ: (f64, f64) = (1e3, 1e5);
+
 /// The board's name.
 pub(crate) const NAME: &str = "mps2";
 

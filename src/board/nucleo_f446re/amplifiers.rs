@@ -10,13 +10,12 @@ use stm32f4xx_hal::rcc::Rcc;
 
 use super::CORE_HZ;
 use super::converter_bus::{ConverterBus, READING_HZ, WRITING_HZ};
+use super::pins::ENABLE;
 
 /// Numbers of /SYNC, /LDAC and /CLR in port B.
 const SYNC: u8 = 12;
 const LOAD: u8 = 1;
 const CLEAR: u8 = 2;
-/// Number of the enable pin in port C.
-const ENABLE: u8 = 9;
 /// Largest number of polls of the bus before giving up, in the emergency path: far more than one byte takes.
 const PATIENCE: u32 = 10_000;
 

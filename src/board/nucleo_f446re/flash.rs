@@ -3,7 +3,7 @@
 //! The chip has one bank: while it erases or programs, nothing can be read from flash, and a processor that fetches from
 //! it stands still. Programming a word takes 16 us (100 us at most), erasing a sector 250 ms (500 ms at most): **only
 //! while the amplifiers are disabled**. An erase runs from RAM with interrupts off, feeds the watchdog and follows the
-//! encoders meanwhile; what the serial port receives for longer than its ring lasts is lost.
+//! encoders meanwhile; it does not begin while the enable line is high. What the serial port receives for longer than its ring lasts is lost.
 
 use core::ptr::{read_volatile, write_volatile};
 
@@ -11,9 +11,11 @@ use embedded_storage::nor_flash::{
     ErrorType, MultiwriteNorFlash, NorFlash, NorFlashError, NorFlashErrorKind, ReadNorFlash,
     check_erase, check_read, check_write,
 };
-use stm32f4xx_hal::pac::{FLASH, IWDG};
+use quadrant::hal;
+use stm32f4xx_hal::pac::{FLASH, GPIOC, IWDG};
 
 use super::encoders::keep_up;
+use super::pins::ENABLE;
 use super::watchdog::KEY_RELOAD;
 
 /// Address of the two sectors; the linker's map leaves them out.
@@ -57,6 +59,8 @@ pub(crate) enum FlashError {
     Stuck,
     /// It reads back differently: the cells are worn.
     Verify,
+    /// The amplifiers' enable line is high.
+    OutputsOn,
 }
 
 impl NorFlashError for FlashError {
@@ -64,7 +68,9 @@ impl NorFlashError for FlashError {
         match self {
             Self::OutOfBounds => NorFlashErrorKind::OutOfBounds,
             Self::NotAligned => NorFlashErrorKind::NotAligned,
-            Self::Controller(_) | Self::Stuck | Self::Verify => NorFlashErrorKind::Other,
+            Self::Controller(_) | Self::Stuck | Self::Verify | Self::OutputsOn => {
+                NorFlashErrorKind::Other
+            }
         }
     }
 }
@@ -76,6 +82,13 @@ impl From<NorFlashErrorKind> for FlashError {
             _ => Self::OutOfBounds,
         }
     }
+}
+
+/// True if the amplifiers' enable line is low: the pin's input, which shows what is on the line.
+fn enable_line_is_low() -> bool {
+    // SAFETY: a read of a port's inputs changes nothing.
+    let port = unsafe { GPIOC::steal() };
+    port.idr().read().bits() & 1 << ENABLE == 0
 }
 
 /// The two sectors.
@@ -140,18 +153,23 @@ impl SettingsFlash {
     fn erase_sector(&mut self, sector: u32) -> Result<(), FlashError> {
         self.unlocked(|this| {
             let select = ERASE | BY_WORDS | (FIRST_SECTOR + sector) << NUMBER;
-            // SAFETY: the value is the manual's; the sector is one of the two. The second write starts the erase, so
-            // that nothing is fetched from flash until it is over.
-            unsafe {
-                this.flash.cr().write(|w| w.bits(select));
-                cortex_m::interrupt::free(|_| {
+            // With interrupts off, so that nothing enables them between the look and the erase.
+            cortex_m::interrupt::free(|_| {
+                if !enable_line_is_low() {
+                    return Err(FlashError::OutputsOn);
+                }
+                // SAFETY: the value is the manual's; the sector is one of the two. The second write starts the erase, so
+                // that nothing is fetched from flash until it is over.
+                unsafe {
+                    this.flash.cr().write(|w| w.bits(select));
                     erase_from_ram(
                         this.flash.cr().as_ptr(),
                         this.flash.sr().as_ptr(),
                         select | START_ERASE,
                     );
-                });
-            }
+                }
+                Ok(())
+            })?;
             this.outcome()
         })
     }
@@ -220,6 +238,12 @@ impl ReadNorFlash for SettingsFlash {
 
     fn capacity(&self) -> usize {
         (SECTORS * SECTOR) as usize
+    }
+}
+
+impl hal::SettingsFlash for SettingsFlash {
+    fn outputs_are_off(&self) -> bool {
+        enable_line_is_low()
     }
 }
 

@@ -32,6 +32,7 @@ mod converter_bus;
 pub(crate) mod device;
 mod encoders;
 mod flash;
+mod pins;
 mod serial;
 mod switches;
 mod tick;
@@ -157,6 +158,10 @@ impl Board {
         }
     }
 }
+
+/// Control rates, Hz: slower, the supervising task would feed the watchdog too late, which may bite after 6.8 ms; faster,
+/// the tick's 3200 instructions and the converter's 10 us leave too little to the other tasks.
+pub(crate) const RATES_HZ: (f64, f64) = (2.5e3, 1.5e4);
 
 /// The board's name.
 pub(crate) const NAME: &str = "nucleo-f446re";

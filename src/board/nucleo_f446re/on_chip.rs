@@ -10,8 +10,8 @@ use stm32f4xx_hal::gpio::{Output, PA4, PA5, PC9};
 use stm32f4xx_hal::pac::{self, DAC};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-/// Number of the enable pin in port C.
-const ENABLE: u8 = 9;
+use super::pins::ENABLE;
+
 /// The word in the middle: zero volts.
 const ZERO: u32 = 2048;
 /// DAC_CR (RM0390, 14.5.1): both channels on (EN1, EN2), buffered, without triggers.

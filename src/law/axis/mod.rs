@@ -48,8 +48,9 @@ use crate::law::reference::{Motion, Segment};
 use crate::law::rounding;
 use crate::law::safety::monitor::{
     Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
-    SignalLossState,
+    SignalLossState, speed_limit,
 };
+use crate::law::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
 use crate::law::safety::travel::{Travel, TravelState};
 use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::{Quantity, Scalar};
@@ -97,10 +98,29 @@ pub struct Axis<S: Scalar, const N: usize> {
     bumpless_decay: S,
     overspeed: Overspeed,
     signal_loss: SignalLoss<S>,
+    plausibility: Plausibility,
     index_spacing: IndexSpacing,
     following: Following<S>,
     travel: Travel,
+    /// Measured speed above which the axis does not stand, 2^-8 counts per tick.
+    standstill: u32,
+    /// Limit of the measured speed until the axis is homed, 2^-8 counts per tick.
+    reduced_speed: Option<u32>,
     generator: ReferenceGenerator<S>,
+    commissioning: Commissioning,
+}
+
+/// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
+/// [`Done`](Self::Done).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Commissioning {
+    /// Nobody has commissioned the axis, and its law puts out nothing, whatever is measured.
+    #[default]
+    Inert,
+    /// Nobody has commissioned the axis, but its law would drive it.
+    Missing,
+    /// The axis was commissioned.
+    Done,
 }
 
 /// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
@@ -171,10 +191,14 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.bumpless_decay = S::ZERO;
         axis.overspeed = Overspeed::UNLIMITED;
         axis.signal_loss = SignalLoss::off();
+        axis.plausibility = Plausibility::off();
         axis.index_spacing = IndexSpacing::default();
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
+        axis.standstill = u32::MAX;
+        axis.reduced_speed = None;
         axis.generator = ReferenceGenerator::default();
+        axis.commissioning = Commissioning::Done;
         let builder = Self {
             axis,
             period_s,
@@ -268,6 +292,13 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
+    /// The comparison of the encoder with the plant.
+    #[must_use]
+    pub fn plausibility(self, plausibility: Plausibility) -> Self {
+        self.axis.plausibility = plausibility;
+        self
+    }
+
     /// The distance of the encoder's index pulses.
     #[must_use]
     pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
@@ -289,10 +320,32 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
+    /// The measured speed below which the axis stands, counts per tick; half a count is added for the quantisation.
+    #[must_use]
+    pub fn standstill(self, counts_per_tick: f64) -> Self {
+        self.axis.standstill = speed_limit(counts_per_tick);
+        self
+    }
+
+    /// The limit of the measured speed until the axis is homed, counts per tick; half a count is added for the
+    /// quantisation. With it, the axis starts no motion but jogs and homing until then.
+    #[must_use]
+    pub fn reduced_speed(self, counts_per_tick: Option<f64>) -> Self {
+        self.axis.reduced_speed = counts_per_tick.map(speed_limit);
+        self
+    }
+
     /// The reference generator, for motions beside the plan's.
     #[must_use]
     pub fn generator(self, generator: ReferenceGenerator<S>) -> Self {
         self.axis.generator = generator;
+        self
+    }
+
+    /// The standing of the settings; [`Commissioning::Done`] unless given.
+    #[must_use]
+    pub fn commissioning(self, commissioning: Commissioning) -> Self {
+        self.axis.commissioning = commissioning;
         self
     }
 
@@ -324,6 +377,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     homed: bool,
     overspeed: OverspeedState,
     signal_loss: SignalLossState,
+    plausibility: PlausibilityState,
     index: IndexState,
     following: FollowingState<S>,
     travel: TravelState,
@@ -355,6 +409,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             homed: false,
             overspeed: OverspeedState::default(),
             signal_loss: SignalLossState::default(),
+            plausibility: PlausibilityState::default(),
             index: IndexState::default(),
             following: FollowingState::default(),
             travel: TravelState::default(),
@@ -406,6 +461,17 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     #[inline(always)]
     pub(crate) fn speed(&self) -> i32 {
         self.overspeed.speed()
+    }
+
+    /// What the axis shows of its motion and output.
+    #[inline(always)]
+    fn shown(&self) -> Shown {
+        Shown {
+            count: self.encoder.count().0 as i32,
+            speed: self.speed(),
+            words: self.telemetry.code_sum,
+            open: self.mode() == MotionMode::OpenLoop,
+        }
     }
 
     /// Sets what is added to the output from this tick on, V.
@@ -486,11 +552,20 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             bumpless_decay: S::ZERO,
             overspeed: Overspeed::default(),
             signal_loss: SignalLoss::default(),
+            plausibility: Plausibility::off(),
             index_spacing: IndexSpacing::default(),
             following: Following::default(),
             travel: Travel::UNLIMITED,
+            standstill: u32::MAX,
+            reduced_speed: None,
             generator: ReferenceGenerator::default(),
+            commissioning: Commissioning::Inert,
         }
+    }
+
+    /// The standing of the axis' settings.
+    pub const fn commissioning(&self) -> Commissioning {
+        self.commissioning
     }
 
     /// One control period of an axis that is driven by itself, without a stage: reads the encoder, advances the
@@ -505,24 +580,34 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         reading: &EncoderReading,
         tick: u32,
     ) -> Result<DacCode, FaultCode> {
-        self.read_encoder(state, reading)?;
+        self.read_encoder(state, reading, is_due(tick, 0))?;
         self.update_reference(state, motion, AxisSwitches::default(), tick)?;
         Ok(self.drive(state, false))
     }
 
-    /// Takes the encoder's reading and checks it.
+    /// Takes the encoder's reading and checks it. `due`: it is compared with the plant in this tick.
     #[inline(always)]
     pub(crate) fn read_encoder(
         &self,
         state: &mut AxisState<S, N>,
         reading: &EncoderReading,
+        due: bool,
     ) -> Result<(), FaultCode> {
         let step = self.encoder.update(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
         let slow = self.overspeed.step(&mut state.overspeed, step.counts);
+        let slow = slow
+            & match self.reduced_speed {
+                Some(most) if !state.homed => state.speed().unsigned_abs() <= most,
+                _ => true,
+            };
         let alive = self
             .signal_loss
             .step(&mut state.signal_loss, step.counts, state.last_output);
+        let plausible = !due || {
+            let shown = state.shown();
+            self.plausibility.step(&mut state.plausibility, shown)
+        };
         let indexed = match reading.index {
             Some(raw) => {
                 let at = self.encoder.count_at(&state.encoder, raw);
@@ -531,11 +616,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             }
             None => true,
         };
-        if reading.fresh & reading.valid & step.plausible & slow & alive & indexed {
+        if reading.fresh & reading.valid & step.plausible & slow & alive & plausible & indexed {
             return Ok(());
         }
         // Where counts may be lost, so is the origin.
-        if !reading.valid | !step.plausible | !indexed {
+        if !reading.valid | !step.plausible | !indexed | !plausible {
             state.homed = false;
         }
         // The first that explains the others.
@@ -549,16 +634,35 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             FaultCode::IndexMismatch
         } else if !slow {
             FaultCode::Overspeed
+        } else if !plausible {
+            FaultCode::EncoderImplausible
         } else {
             FaultCode::EncoderSignalLoss
         })
     }
 
+    /// True if the axis has to be homed before it may start more than jogs and homing.
+    #[inline(always)]
+    pub(crate) fn awaits_homing(&self, state: &AxisState<S, N>) -> bool {
+        self.reduced_speed.is_some() & !state.homed
+    }
+
+    /// True if the measured speed is that of an axis that stands.
+    #[inline(always)]
+    pub(crate) fn stands(&self, state: &AxisState<S, N>) -> bool {
+        state.speed().unsigned_abs() <= self.standstill
+    }
+
     /// Prepares to hold the measured position.
     pub fn enable(&self, state: &mut AxisState<S, N>) {
         let here = state.encoder.position();
+        let shown = Shown {
+            speed: 0,
+            ..state.shown()
+        };
         *state = AxisState {
             encoder: state.encoder.clone(),
+            plausibility: self.plausibility.start(shown),
             homed: state.homed,
             index: state.index,
             following: self.following.start(),
@@ -575,7 +679,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let (generator, here) = (&mut state.generator, state.look_ahead);
         match command {
             Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
-            Command::Jog(_, velocity) => self.generator.start_jog(generator, here, velocity),
+            Command::Jog(_, velocity) => {
+                self.generator
+                    .start_jog(generator, here, velocity, state.homed);
+            }
             Command::StartStream => self.generator.start_stream(generator),
             Command::Stop => self.stop(state),
             Command::Home(_) => {
@@ -601,6 +708,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     fn shift(state: &mut AxisState<S, N>, offset: Position) {
         state.encoder.shift(offset);
         state.telemetry.measured = state.encoder.count();
+        state.plausibility.recount(state.encoder.count().0 as i32);
         state.look_ahead = state.look_ahead + offset;
         for position in &mut state.preview {
             *position = *position + offset;
@@ -618,7 +726,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state: &mut AxisState<S, N>,
         switches: AxisSwitches,
     ) -> Result<(), FaultCode> {
-        if switches.at_limit() && !self.generator.expects(&state.generator, switches) {
+        let switches = switches.without(self.generator.expected(&state.generator));
+        if switches.at_limit() {
             // Away from a pressed switch the axis may go.
             let forward = state.displacement > Position::ZERO;
             let backward = state.displacement < Position::ZERO;
@@ -829,6 +938,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
 
     /// Opens the loop of an axis at rest.
     pub(crate) fn open_loop(&self, state: &mut AxisState<S, N>) {
+        state.plausibility.forget_standstill();
         self.generator.open_loop(&mut state.generator);
     }
 
@@ -851,6 +961,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.generator.hold();
         state.injected = S::ZERO;
         state.last_output = S::ZERO;
+        state.plausibility = self.plausibility.start(state.shown());
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),
             measured,

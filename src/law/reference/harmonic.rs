@@ -245,6 +245,11 @@ impl<S: Scalar> Harmonic<S> {
         }
     }
 
+    /// True if the motion has an end.
+    pub(super) const fn ends(&self) -> bool {
+        self.end_tick.is_some()
+    }
+
     #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
         self.end_tick.is_some_and(|end| state.elapsed >= end)

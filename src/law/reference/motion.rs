@@ -97,6 +97,14 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
+    /// True if the motion has an end.
+    pub fn ends(&self) -> bool {
+        match self {
+            Self::Harmonic(harmonic) => harmonic.ends(),
+            Self::Hold | Self::PointToPoint(_) | Self::Recorded(_) => true,
+        }
+    }
+
     /// True if the motion has come to its end and stays there.
     #[inline(always)]
     pub fn finished(&self, state: &MotionState) -> bool {

@@ -76,13 +76,17 @@ pub enum FaultCode {
     InjectionUnderrun = 26,
     /// The axis left the travel, or exceeded the velocity, that was given with its injected voltage.
     InjectionBounds = 27,
+    /// The encoder does not show the motion that the output must have caused.
+    EncoderImplausible = 28,
+    /// A controlled stop lasted longer than its limits allow.
+    StopOverrun = 29,
 }
 
 impl FaultCode {
     /// All faults, in order of their numbers.
     pub const ALL: [Self; Self::COUNT] = *Self::VARIANTS.first_chunk().unwrap();
 
-    /// The stable number, 1 to 27.
+    /// The stable number, 1 to 29.
     pub const fn number(self) -> u8 {
         self as u8
     }
@@ -214,8 +218,8 @@ impl FaultCode {
                 "read the registers that it left; check the supply; report it with the firmware's version",
             ],
             Self::SettingsInvalid => [
-                "the stored settings were refused; the defaults are in force",
-                "read which field was refused, correct it, apply and store; then reset",
+                "the stored settings are damaged or were refused; the defaults are in force",
+                "connect and check the draft, which may hold an older set, or load a settings file; apply, store, then reset",
             ],
             Self::HomeSwitchMissing => [
                 "homing went homing.travel_mm without meeting its switch",
@@ -240,6 +244,15 @@ impl FaultCode {
             Self::InjectionBounds => [
                 "the axis left the travel, or exceeded the velocity, that was given with its injected voltage",
                 "lower the voltage or its duration, or raise its lowest frequency; or allow more travel",
+            ],
+            Self::EncoderImplausible => [
+                "the encoder does not show the motion that the output must have caused",
+                "check the encoder's cable and both its lines, the signs of encoder and amplifier, the plant's model, \
+                 and for a blocked axis; then home again",
+            ],
+            Self::StopOverrun => [
+                "a controlled stop lasted longer than braking_mm_s2 and braking_jerk_mm_s3 allow",
+                "report it with the firmware's version and the settings",
             ],
         }
     }

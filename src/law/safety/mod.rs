@@ -14,12 +14,14 @@
 //! | looks at | monitor | finds |
 //! |----------|---------|-------|
 //! | every reading | [`encoder`](crate::law::encoder), [`monitor`] | jump, both lines at once, stale, overspeed, silent, index |
+//! | every output and reading | [`plausibility`] | encoder dead, or of the wrong sign |
 //! | every error | [`monitor`] | following error |
 //! | every reference | [`travel`], [`Switches`] | braking distance, limit switches |
 //! | the board's inputs | [`Switches`] | emergency stop, amplifier fault, output mismatch |
 
 mod fault;
 pub mod monitor;
+pub mod plausibility;
 mod state;
 mod switches;
 pub mod travel;

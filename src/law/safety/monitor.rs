@@ -3,10 +3,12 @@
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
+/// Counts within which an encoder with one dead line dithers.
+pub(super) const DITHER_COUNTS: u32 = 2;
 /// Fraction bits of a filtered speed.
-const SPEED_FRACTION_BITS: u32 = 8;
+pub(super) const SPEED_FRACTION_BITS: u32 = 8;
 /// The speed is filtered over 2^3 ticks: at one count a tick, a single reading says little.
-const SPEED_FILTER_BITS: u32 = 3;
+pub(super) const SPEED_FILTER_BITS: u32 = 3;
 /// No axis moves further in a tick, counts; an encoder that does so is faulty, and its filter shall not wrap.
 const LARGEST_STEP: i32 = 1 << 16;
 /// Addition of quantisation and noise to a filtered speed, counts per tick.
@@ -33,15 +35,20 @@ impl OverspeedState {
     }
 }
 
+/// A limit of the filtered speed, 2^-8 counts per tick, with half a count for the quantisation. Settings time only.
+pub(crate) fn speed_limit(counts_per_tick: f64) -> u32 {
+    let limit = (counts_per_tick + SPEED_NOISE_COUNTS) * f64::from(1 << SPEED_FRACTION_BITS);
+    rounding::round(limit) as u32
+}
+
 impl Overspeed {
     /// A limit that no speed exceeds.
     pub const UNLIMITED: Self = Self { limit: u32::MAX };
 
     /// A limit in counts per tick, at most 2^16; half a count is added for the quantisation. Settings time only.
     pub fn new(counts_per_tick: f64) -> Self {
-        let limit = (counts_per_tick + SPEED_NOISE_COUNTS) * f64::from(1 << SPEED_FRACTION_BITS);
         Self {
-            limit: rounding::round(limit) as u32,
+            limit: speed_limit(counts_per_tick),
         }
     }
 
@@ -53,9 +60,6 @@ impl Overspeed {
         state.filtered.unsigned_abs() <= self.limit
     }
 }
-
-/// Counts within which an encoder with one dead line dithers.
-const DITHER_COUNTS: u32 = 2;
 
 /// Watches for an encoder that shows no motion while the output is high. An encoder of which one line is dead dithers by
 /// a count; that is no motion.

@@ -54,11 +54,12 @@ impl SafetyState {
         }
     }
 
-    /// Takes a command; says whether the outputs have just been enabled. `obstructed`: an input is bad.
+    /// Takes a command that [`admission`](crate::law::admission) has let through; returns true if the outputs have just
+    /// been enabled.
     #[inline(always)]
-    pub fn apply(&mut self, command: Command, obstructed: bool) -> bool {
+    pub fn apply(&mut self, command: Command) -> bool {
         match (command, *self) {
-            (Command::Enable, Self::Disabled) if !obstructed => {
+            (Command::Enable, Self::Disabled) => {
                 *self = Self::Enabled;
                 return true;
             }

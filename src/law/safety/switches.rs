@@ -51,6 +51,13 @@ impl AxisSwitches {
     pub const fn with(self, others: Self) -> Self {
         Self(self.0 | others.0)
     }
+
+    /// These but for `others`.
+    #[must_use]
+    #[inline(always)]
+    pub const fn without(self, others: Self) -> Self {
+        Self(self.0 & !others.0)
+    }
 }
 
 impl Switches {

@@ -2,7 +2,9 @@
 
 use strum::VariantNames;
 
-use super::row::{LeafInfo, UNSET, at, at_most, flag, name, number, period_s, times};
+use super::row::{
+    Exchange, LeafInfo, UNSET, at, at_most, exchanged, flag, name, number, period_s, times,
+};
 use crate::law::friction::Direction;
 use crate::settings::axis::AxisSettings;
 use crate::settings::homing::HomeSwitch;
@@ -30,6 +32,20 @@ fn most_acceleration_mm_s2(axis: &AxisSettings, period_s: f64) -> f64 {
     MOST_COUNTS_PER_TICK_SQUARED * axis.encoder.resolution_mm / (period_s * period_s)
 }
 
+/// The longest that braking from the largest velocity, or building it up, may take, s.
+const LONGEST_BRAKING_S: f64 = 1.0;
+
+fn least_braking_mm_s2(axis: &AxisSettings, _: f64) -> f64 {
+    let limits = &axis.limits;
+    limits
+        .max_acceleration_mm_s2
+        .max(limits.max_velocity_mm_s / LONGEST_BRAKING_S)
+}
+
+fn least_braking_jerk_mm_s3(axis: &AxisSettings, _: f64) -> f64 {
+    (axis.limits.braking_mm_s2 / LONGEST_BRAKING_S).max(1.0)
+}
+
 fn most_error_mm(axis: &AxisSettings, _: f64) -> f64 {
     MOST_ERROR_COUNTS * axis.encoder.resolution_mm
 }
@@ -45,7 +61,7 @@ fn search_mm_s(axis: &AxisSettings, _: f64) -> f64 {
 }
 
 #[rustfmt::skip]
-pub(super) const LEAVES: &[LeafInfo] = &[
+pub(super) const LEAVES: &[LeafInfo] = &exchanged(Exchange::Disabled, [
     number("limits.max_velocity_mm_s", "mm/s",
         at(1e-3), at_most(1e3, "what the encoder's counter can follow", fastest_mm_s), 50.0,
         "Largest velocity of any reference; at twice this the encoder counts as faulty."),
@@ -65,9 +81,11 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("limits.overspeed_ratio", "", at(1.05), at(2.0), 1.2,
         "Measured speed that is a fault, as a multiple of the largest velocity."),
     number("limits.braking_mm_s2", "mm/s²",
-        at(1e-3), at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
-        "Deceleration of a stop after a fault; above the largest acceleration."),
-    number("limits.braking_jerk_mm_s3", "mm/s³", at(1.0), at(1e9), 1e6,
+        times(1.0, "the largest acceleration, and what ends the largest velocity in a second", least_braking_mm_s2),
+        at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
+        "Deceleration of a stop after a fault."),
+    number("limits.braking_jerk_mm_s3", "mm/s³",
+        times(1.0, "what builds the braking up in a second", least_braking_jerk_mm_s3), at(1e9), 1e6,
         "Jerk of that stop."),
     number("limits.silent_s", "s", times(1.0, "the control period", period_s), at(10.0), 0.1,
         "Longest time without encoder motion while the output is above the share below; then the encoder counts as faulty."),
@@ -78,6 +96,9 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("limits.travel_mm.positive", "mm",
         times(1.0, "the smallest and one count", least_positive_mm), at(LONGEST_TRAVEL_MM), UNSET,
         "The largest position of a homed axis."),
+    number("limits.unhomed_mm_s", "mm/s",
+        at(1e-3), times(1.0, "the largest velocity", |axis, _| axis.limits.max_velocity_mm_s), 10.0,
+        "Largest velocity until the axis is homed; nothing but jogs and homing starts until then. Left out: it moves as a homed one."),
     name("homing.direction", Direction::VARIANTS,
         "End of the travel towards which the switch is searched."),
     name("homing.switch", HomeSwitch::VARIANTS,
@@ -96,4 +117,4 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "Position to which the axis moves in the end; held to the travel."),
     number("homing.travel_mm", "mm", times(1.0, "one count", resolution_mm), at(2.0 * LONGEST_TRAVEL_MM), UNSET,
         "Longest way to the switch, and off it, before homing fails."),
-];
+]);

@@ -16,6 +16,6 @@ pub(super) mod rules;
 mod stage;
 mod table;
 
-pub use row::{Bound, LeafInfo, Range, UNSET};
+pub use row::{Bound, Exchange, LeafInfo, Range, UNSET};
 pub use table::{all, find};
 pub(super) use table::{default, default_of};

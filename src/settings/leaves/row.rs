@@ -17,8 +17,21 @@ pub struct LeafInfo {
     pub default: f64,
     /// Its meaning, in one sentence.
     pub meaning: &'static str,
+    /// The state of the machine in which it may be exchanged.
+    pub exchange: Exchange,
     /// Its place.
     pub(super) place: Place,
+}
+
+/// The state of the machine in which a leaf may be exchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exchange {
+    /// Any: the output goes over without a jump.
+    Driven,
+    /// The outputs are off: it decides on the safety of the axis.
+    Disabled,
+    /// None: it changes with a restart.
+    Restart,
 }
 
 /// The place of a leaf.
@@ -112,6 +125,7 @@ pub(super) const fn number(
         range: Range::Number(least, most),
         default,
         meaning,
+        exchange: Exchange::Driven,
         place: Place::Axis,
     }
 }
@@ -140,6 +154,7 @@ const fn other(field: &'static str, range: Range, meaning: &'static str) -> Leaf
         range,
         default: f64::NAN,
         meaning,
+        exchange: Exchange::Driven,
         place: Place::Axis,
     }
 }
@@ -165,6 +180,19 @@ pub(super) const fn of_stage(leaf: LeafInfo) -> LeafInfo {
         place: Place::Stage,
         ..leaf
     }
+}
+
+/// The same rows, to be exchanged in another state.
+pub(super) const fn exchanged<const N: usize>(
+    exchange: Exchange,
+    mut rows: [LeafInfo; N],
+) -> [LeafInfo; N] {
+    let mut row = 0;
+    while row < N {
+        rows[row].exchange = exchange;
+        row += 1;
+    }
+    rows
 }
 
 impl LeafInfo {

@@ -1,6 +1,7 @@
-//! The part of the table that the firmware carries: fields and ranges of all numbers.
+//! The part of the table that the firmware carries: fields and ranges of all numbers, and the fields that change only
+//! while the outputs are off.
 
-use super::row::{LeafInfo, Limit, Place, PointNumber, Range};
+use super::row::{Exchange, LeafInfo, Limit, Place, PointNumber, Range};
 use super::stage;
 use super::table::OF_AXIS;
 
@@ -13,8 +14,6 @@ pub(in crate::settings) struct Rule {
     pub(in crate::settings) least: Limit,
     /// Largest allowed value.
     pub(in crate::settings) most: Limit,
-    /// Default.
-    pub(in crate::settings) default: f64,
     /// Reads the number of a list's point; `None` for a leaf.
     pub(in crate::settings) point: Option<PointNumber>,
 }
@@ -46,7 +45,6 @@ const fn rules<const N: usize>(groups: &[&[LeafInfo]]) -> [Rule; N] {
         field: "",
         least: Limit::At(0.0),
         most: Limit::At(0.0),
-        default: 0.0,
         point: None,
     };
     let mut rules = [blank; N];
@@ -60,7 +58,6 @@ const fn rules<const N: usize>(groups: &[&[LeafInfo]]) -> [Rule; N] {
                     field: leaf.field,
                     least: least.limit(),
                     most: most.limit(),
-                    default: leaf.default,
                     point: match leaf.place {
                         Place::Points(read) => Some(read),
                         Place::Stage | Place::Axis => None,
@@ -73,4 +70,44 @@ const fn rules<const N: usize>(groups: &[&[LeafInfo]]) -> [Rule; N] {
         group += 1;
     }
     rules
+}
+
+/// The fields of the stage that change only while the outputs are off.
+pub(in crate::settings) static SAFETY_OF_THE_STAGE: [&str; safety(&[stage::OF_STAGE])] =
+    safety_fields(&[stage::OF_STAGE]);
+
+/// The fields of an axis that change only while the outputs are off.
+pub(in crate::settings) static SAFETY_OF_AN_AXIS: [&str; safety(&OF_AXIS)] =
+    safety_fields(&OF_AXIS);
+
+const fn safety(groups: &[&[LeafInfo]]) -> usize {
+    let (mut count, mut group) = (0, 0);
+    while group < groups.len() {
+        let mut row = 0;
+        while row < groups[group].len() {
+            if matches!(groups[group][row].exchange, Exchange::Disabled) {
+                count += 1;
+            }
+            row += 1;
+        }
+        group += 1;
+    }
+    count
+}
+
+const fn safety_fields<const N: usize>(groups: &[&[LeafInfo]]) -> [&'static str; N] {
+    let mut fields = [""; N];
+    let (mut count, mut group) = (0, 0);
+    while group < groups.len() {
+        let mut row = 0;
+        while row < groups[group].len() {
+            if matches!(groups[group][row].exchange, Exchange::Disabled) {
+                fields[count] = groups[group][row].field;
+                count += 1;
+            }
+            row += 1;
+        }
+        group += 1;
+    }
+    fields
 }

@@ -2,7 +2,7 @@
 
 use strum::VariantNames;
 
-use super::row::{LeafInfo, UNSET, at, flag, name, number, of_stage, times};
+use super::row::{Exchange, LeafInfo, UNSET, at, exchanged, flag, name, number, of_stage, times};
 use crate::settings::axis::AxisSettings;
 use crate::settings::limits::LossReaction;
 
@@ -19,16 +19,28 @@ fn most_index_tolerance(axis: &AxisSettings, _: f64) -> f64 {
 
 #[rustfmt::skip]
 pub(super) const OF_STAGE: &[LeafInfo] = &[
-    of_stage(number("rate_hz", "Hz", at(1e3), at(1e5), 10e3,
-        "Control rate. Changes with a restart.")),
+    RATE,
+    STREAMING[0],
+    STREAMING[1],
+];
+
+#[rustfmt::skip]
+const RATE: LeafInfo = LeafInfo {
+    exchange: Exchange::Restart,
+    ..of_stage(number("rate_hz", "Hz", at(1e3), at(1e5), 10e3,
+        "Control rate. Changes with a restart."))
+};
+
+#[rustfmt::skip]
+const STREAMING: [LeafInfo; 2] = exchanged(Exchange::Disabled, [
     of_stage(name("streaming.link_lost", LossReaction::VARIANTS,
         "Reaction when the host that streams set points falls silent: stop (brake, switch off, latch a fault) or hold (brake and hold).")),
     of_stage(name("streaming.underrun", LossReaction::VARIANTS,
         "Reaction when the next set point is late: stop or hold.")),
-];
+]);
 
 #[rustfmt::skip]
-pub(super) const OF_AXIS: &[LeafInfo] = &[
+pub(super) const ENCODER: &[LeafInfo] = &exchanged(Exchange::Restart, [
     number("encoder.resolution_mm", "mm", at(1e-6), at(1.0), 5e-4,
         "Length of one count of the encoder. Changes with a restart, as all of the encoder."),
     number("encoder.counter_bits", "bit", at(8.0), at(32.0), 32.0,
@@ -40,6 +52,10 @@ pub(super) const OF_AXIS: &[LeafInfo] = &[
     number("encoder.index_tolerance_counts", "counts",
         at(0.0), times(1.0, "a quarter of the index spacing", most_index_tolerance), 4.0,
         "Distance, either way, by which an index pulse may miss its place."),
+]);
+
+#[rustfmt::skip]
+pub(super) const AMPLIFIER_AND_PLANT: &[LeafInfo] = &exchanged(Exchange::Disabled, [
     number("amplifier.full_scale_v", "V", at(0.1), at(20.0), 10.0,
         "Voltage of the converter's largest code."),
     number("amplifier.output_limit_v", "V",
@@ -50,6 +66,9 @@ pub(super) const OF_AXIS: &[LeafInfo] = &[
         "Voltage at which the motor gives no force; it is added to every output."),
     flag("amplifier.reversed",
         "True if a positive voltage moves the axis to smaller positions."),
+    flag("commissioned",
+        "True if the axis was commissioned, by the tool or by a person; outputs are enabled only if one was, and every other \
+         has no gains, feedforward or offset."),
     number("plant.gain_mm_per_v_s2", "mm/(V s²)", at(1e-3), at(1e9), UNSET,
         "A, acceleration per volt at the amplifier's input. With a plant the feedback law is held to stability."),
     number("plant.damping_per_s", "1/s", at(0.0), at(1e6), 0.0,
@@ -58,4 +77,4 @@ pub(super) const OF_AXIS: &[LeafInfo] = &[
         "C, stiffness over mass; zero is a stage without a spring to ground."),
     number("plant.delay_s", "s", at(0.0), at(0.1), 0.0,
         "Td, dead time of amplifier, drive and encoder, without the controller's own."),
-];
+]);

@@ -4,8 +4,9 @@ use super::row::{LeafInfo, Range};
 use super::{feedback, friction, limits, stage};
 
 /// The rows of an axis, by group.
-pub(super) const OF_AXIS: [&[LeafInfo]; 4] = [
-    stage::OF_AXIS,
+pub(super) const OF_AXIS: [&[LeafInfo]; 5] = [
+    stage::ENCODER,
+    stage::AMPLIFIER_AND_PLANT,
     limits::LEAVES,
     feedback::LEAVES,
     friction::LEAVES,
@@ -14,7 +15,7 @@ pub(super) const OF_AXIS: [&[LeafInfo]; 4] = [
 /// Every leaf: stage, encoder, amplifier and plant; limits and homing; feedback; friction and feedforward.
 pub fn all() -> impl Iterator<Item = &'static LeafInfo> {
     const STAGE: &[LeafInfo] = stage::OF_STAGE;
-    const AXIS: [&[LeafInfo]; 4] = OF_AXIS;
+    const AXIS: [&[LeafInfo]; 5] = OF_AXIS;
     STAGE.iter().chain(AXIS.into_iter().flatten())
 }
 

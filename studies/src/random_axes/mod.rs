@@ -9,14 +9,14 @@ mod plant;
 use std::time::Instant;
 
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::{AxisSettings, SettingsError, StageSettings};
+use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::commission::verify::run_sine;
 use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
 use quadrant_sim::experiment::metrics::worst_and_mean;
 use quadrant_sim::experiment::sine_test::SineTest;
 use quadrant_sim::machine::{
-    AxisInfo, Experiment, ExperimentError, SimulatedTestAxis, TestAxis, approach,
+    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach,
 };
 use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::record::Recording;
@@ -98,7 +98,7 @@ impl TestAxis for Timed {
         self.test_axis.settings()
     }
 
-    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError> {
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
         self.test_axis.apply(settings)
     }
 

@@ -11,7 +11,7 @@ use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::identify::virgin_curve;
 use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveError, VirginCurveSettings};
-use quadrant_sim::machine::{ExperimentError, SimulatedTestAxis, TestAxis, approach};
+use quadrant_sim::machine::{ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::Imperfections;
 use rayon::prelude::*;
 
@@ -143,6 +143,9 @@ pub enum StudyError {
     /// Settings that the axis refuses.
     #[error("GMS elements: settings refused: {0}")]
     Settings(#[from] SettingsError),
+    /// The machine refused settings, or the connection failed.
+    #[error(transparent)]
+    Machine(#[from] MachineError),
     /// The run of the slow sine.
     #[error("GMS elements: {0}")]
     Rig(#[from] ExperimentError),

@@ -70,7 +70,15 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
         bring,
     };
     Some(match code {
-        FaultCode::FollowingError => case("encoder of x stands still, 30 mm/s", |fixture| {
+        FaultCode::FollowingError => Case {
+            how: "encoder of x stands still, 30 mm/s, no model of the plant",
+            adjust: |configuration| each(configuration, forget_plant),
+            bring: |fixture| {
+                moving(fixture, 1.0)?;
+                Ok(broken(fixture, frozen(false)))
+            },
+        },
+        FaultCode::EncoderImplausible => case("encoder of x stands still, 30 mm/s", |fixture| {
             moving(fixture, 1.0)?;
             Ok(broken(fixture, frozen(false)))
         }),
@@ -110,7 +118,10 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
         },
         FaultCode::Overspeed => Case {
             how: "100 counts a tick (500 mm/s) at rest",
-            adjust: |configuration| each(configuration, far_from_following_error),
+            adjust: |configuration| {
+                each(configuration, far_from_following_error);
+                each(configuration, forget_plant);
+            },
             bring: |fixture| {
                 enabled(fixture)?;
                 Ok(broken(fixture, drifting(|ticks| 100 * (ticks + 1))))
@@ -128,6 +139,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
             adjust: |configuration| {
                 each(configuration, |axis| {
                     far_from_following_error(axis);
+                    forget_plant(axis);
                     axis.amplifier.output_limit_v = 1.0;
                     let integral = &mut axis.feedback.integral_limit_v;
                     *integral = integral.min(1.0);
@@ -227,6 +239,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
         | FaultCode::WatchdogReset
         | FaultCode::Panic
         | FaultCode::HardFault
+        | FaultCode::StopOverrun
         | FaultCode::SettingsInvalid => return None,
     })
 }
@@ -239,6 +252,11 @@ fn travel(axis: &mut AxisSettings, most_mm: f64) {
     if let Some(travel) = &mut axis.limits.travel_mm {
         (travel.negative, travel.positive) = (-most_mm, most_mm);
     }
+}
+
+/// Leaves the comparison of encoder and plant out.
+fn forget_plant(axis: &mut AxisSettings) {
+    axis.plant = None;
 }
 
 fn far_from_following_error(axis: &mut AxisSettings) {

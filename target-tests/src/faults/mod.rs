@@ -61,6 +61,10 @@ pub(crate) fn run(
     let mut table = Table::default();
     let mut compared = (0, 0);
     for code in codes {
+        // The ramp of a stop ends within its bound by itself: only the law's own tests reach beyond.
+        if code == FaultCode::StopOverrun {
+            continue;
+        }
         let findings =
             inject(&image, code).with_context(|| format!("{} was injected", code.name()))?;
         // A fault that nothing injects must not look like one that was found.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
 use quadrant::reference::MotionSettings;
-use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 
 use super::injection::Injection;
 use super::recording::Shape;
@@ -15,7 +15,7 @@ use crate::client::samples::{TelemetryRecorder, least_decimation};
 use crate::client::session::Client;
 use crate::client::settings;
 use crate::client::settle;
-use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis};
 use crate::record::Recording;
 
 /// Time from one look at the telemetry to the next.
@@ -38,8 +38,6 @@ pub struct ConnectedAxis<'a> {
     stage: StageSettings,
     travel_mm: f64,
     origin_mm: f64,
-    /// Refusal of the settings that are to be in force.
-    refused: Option<String>,
 }
 
 impl<'a> ConnectedAxis<'a> {
@@ -61,7 +59,6 @@ impl<'a> ConnectedAxis<'a> {
             stage,
             travel_mm,
             origin_mm,
-            refused: None,
         })
     }
 
@@ -146,6 +143,20 @@ impl<'a> ConnectedAxis<'a> {
         shape.recording(&samples).ok_or(Stop::Short)
     }
 
+    /// Waits for rest and switches the outputs off, if settings are to change on which safety depends.
+    fn disabled_for(&mut self, stage: &StageSettings) -> Result<(), settings::ExchangeError> {
+        if stage.safety_change(&self.stage).is_none() {
+            return Ok(());
+        }
+        let status = settle::rest(self.client, BEFORE)?;
+        if status.state == MachineState::Enabled {
+            self.client.order(Body::Disable)?;
+            let due = self.client.now() + ENABLING;
+            while self.client.status()?.state == MachineState::Enabled && self.client.now() < due {}
+        }
+        Ok(())
+    }
+
     /// Waits for rest, with the outputs on; says where the axis is.
     fn enabled(&mut self) -> Result<f64, ClientError> {
         let mut status = settle::rest(self.client, BEFORE)?;
@@ -177,19 +188,15 @@ impl TestAxis for ConnectedAxis<'_> {
         &self.stage.axes[self.axis as usize]
     }
 
-    /// Checks the settings here and loads them into the machine. What the machine says against them is told by the next
-    /// experiment, which is not run.
-    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError> {
+    /// Checks the settings here and loads them into the machine.
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
         let mut stage = self.stage.clone();
         stage.axes[self.axis as usize] = settings.clone();
         stage.validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)?;
-        match settings::load(self.client, &stage) {
-            Ok(_) => {
-                self.stage = stage;
-                self.refused = None;
-            }
-            Err(error) => self.refused = Some(error.to_string()),
-        }
+        self.disabled_for(&stage)
+            .and_then(|()| settings::load(self.client, &stage))
+            .map_err(|error| MachineError::Connection(Box::new(error)))?;
+        self.stage = stage;
         Ok(())
     }
 
@@ -198,12 +205,6 @@ impl TestAxis for ConnectedAxis<'_> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        if let Some(refused) = &self.refused {
-            return Err(ExperimentError::Impossible {
-                experiment: experiment.name.clone(),
-                reason: format!("its settings did not take effect: {refused}"),
-            });
-        }
         self.run(experiment, progress)
             .map_err(|stop| stop.into_error(experiment))
     }

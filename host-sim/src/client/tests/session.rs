@@ -46,9 +46,31 @@ fn answers_are_found_between_garbage_and_broken_frames() {
 fn a_request_that_may_be_repeated_survives_lost_answers() {
     let (mut client, bench) = connected();
     bench.borrow_mut().lose_answers = 3;
-    client.order(Body::Enable).unwrap();
-    assert_eq!(count(&bench.borrow().requests, "enable"), 4);
-    assert_eq!(client.status().unwrap().state, MachineState::Enabled);
+    client.order(Body::Disable).unwrap();
+    assert_eq!(count(&bench.borrow().requests, "disable"), 4);
+}
+
+/// Somebody at the machine may have switched off meanwhile.
+#[test]
+fn what_enables_or_moves_is_asked_once() {
+    let jog = |velocity_mm_s| Body::Jog {
+        axis: AxisName::X,
+        velocity_mm_s,
+    };
+    for body in [Body::Enable, Body::Run, jog(1.0)] {
+        let (mut client, bench) = connected();
+        bench.borrow_mut().lose_answers = 1;
+        let error = client.order(body.clone()).unwrap_err();
+        assert!(matches!(error, ClientError::Unsure { .. }), "{error}");
+        assert_eq!(count(&bench.borrow().requests, body.name()), 1);
+        bench.borrow_mut().busy = 1;
+        assert!(client.order(body.clone()).is_err());
+        assert_eq!(count(&bench.borrow().requests, body.name()), 2);
+    }
+    let (mut client, bench) = connected();
+    bench.borrow_mut().lose_answers = 1;
+    let _ = client.order(jog(0.0));
+    assert_eq!(count(&bench.borrow().requests, "jog"), 2);
 }
 
 #[test]
@@ -87,8 +109,8 @@ fn a_late_answer_is_an_answer_and_a_second_one_none() {
 fn a_busy_machine_is_asked_again() {
     let (mut client, bench) = connected();
     bench.borrow_mut().busy = 5;
-    client.order(Body::Enable).unwrap();
-    assert_eq!(count(&bench.borrow().requests, "enable"), 6);
+    client.order(Body::Stop).unwrap();
+    assert_eq!(count(&bench.borrow().requests, "stop"), 6);
     bench.borrow_mut().busy = u32::MAX;
     let error = client.order(Body::Disable).unwrap_err();
     assert!(error.to_string().contains("another change"), "{error}");

@@ -5,12 +5,13 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant::lockstep::InputRecord;
 use quadrant::reference::MotionSettings;
 use quadrant::safety::SafetyState;
-use quadrant::settings::{AxisSettings, PlanSettings, SettingsError, StageSettings};
+use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant::units::DacCode;
 
 use super::controller::{LawMachine, Operator};
 use super::recorder::{Period, Recorder};
 use super::watch::Watch;
+use crate::machine::error::MachineError;
 use crate::machine::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
 use crate::plant::{AxisParameters, SimulatedAxis};
 use crate::record::Recording;
@@ -222,7 +223,7 @@ impl TestAxis for SimulatedTestAxis {
         &self.stage.axes[0]
     }
 
-    fn apply(&mut self, settings: &AxisSettings) -> Result<(), SettingsError> {
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
         let mut stage = self.stage.clone();
         stage.axes[0] = settings.clone();
         stage.validate(ELEMENTS)?;

@@ -2,7 +2,6 @@
 
 use std::collections::VecDeque;
 
-use quadrant::admission::StageView;
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
@@ -108,7 +107,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     }
 
     fn supervise(&mut self) {
-        let view = StageView::of(&self.state);
+        let view = self.stage.as_ref().view(&self.state);
         let decision = self.supervisor.step(view, self.requests.pop_front());
         self.command = decision.command;
         let tick = self.state.tick();

@@ -5,7 +5,8 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::StageSettings;
 
 use super::axis::{SimulatedTestAxis, TRAVEL_MM};
-use crate::machine::interface::{Machine, MachineError};
+use crate::machine::error::MachineError;
+use crate::machine::interface::Machine;
 use crate::machine::test_axis::TestAxis;
 use crate::plant::StageParameters;
 

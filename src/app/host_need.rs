@@ -1,0 +1,101 @@
+//! The host that a motion needs: one that has no end of its own, or that the host feeds.
+
+use crate::law::axes::AxisName;
+use crate::law::command::Command;
+use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use crate::law::injection::Coupling;
+use crate::law::motion::MotionMode;
+use crate::law::scalar::Scalar;
+use crate::law::stage::{Plan, StageState};
+
+/// Ticks without a valid request after which a host counts as lost: 0.5 s at 10 kHz.
+pub const LINK_TIMEOUT_TICKS: u32 = 5_000;
+
+/// Bit of an injected voltage, above those of the axes.
+const INJECTION: u8 = 1 << 3;
+
+/// The motions that need their host, and how long it has been silent. Kept by the control interrupt, so that no other task
+/// can keep it from ending them.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct HostNeed {
+    /// A bit for each axis, and [`INJECTION`].
+    motions: u8,
+    /// Valid requests so far.
+    frames: u32,
+    /// Ticks since the last one.
+    silent: u32,
+}
+
+impl HostNeed {
+    /// Takes the number of valid requests so far.
+    #[inline(always)]
+    pub(super) fn hear(&mut self, frames: u32) {
+        self.silent = if self.frames == frames {
+            self.silent.saturating_add(1)
+        } else {
+            0
+        };
+        self.frames = frames;
+    }
+
+    /// True if a motion needs its host.
+    #[inline(always)]
+    pub(super) const fn is_needed(&self) -> bool {
+        self.motions != 0
+    }
+
+    /// True if a motion needs its host, and it is silent.
+    #[inline(always)]
+    pub(super) const fn is_lost(&self) -> bool {
+        self.is_needed() && self.silent > LINK_TIMEOUT_TICKS
+    }
+
+    /// Takes note of a command of the host.
+    pub(super) fn start<S: Scalar>(
+        &mut self,
+        command: Command,
+        plan: &Plan<S>,
+        state: &StageState<S, FIRMWARE_ELEMENTS>,
+    ) {
+        let endless = || {
+            AxisName::ALL
+                .into_iter()
+                .filter(|&axis| !plan[axis].ends())
+                .fold(0, |bits, axis| bits | bit(axis))
+        };
+        self.motions |= match command {
+            Command::Jog(axis, _) => bit(axis),
+            Command::Run => endless(),
+            Command::StartMove(axis) => endless() & bit(axis),
+            Command::StartStream => INJECTION - 1,
+            Command::StartInjection => match state.injection_coupling() {
+                Some(Coupling::WithPlan) => INJECTION | endless(),
+                _ => INJECTION,
+            },
+            _ => 0,
+        };
+    }
+
+    /// Forgets the motions that have ended, after a tick.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn update<S: Scalar>(&mut self, state: &StageState<S, FIRMWARE_ELEMENTS>) {
+        for (name, axis) in state.axes().named() {
+            let moves = matches!(
+                axis.mode(),
+                MotionMode::Jog | MotionMode::Plan | MotionMode::Stream
+            );
+            if !moves {
+                self.motions &= !bit(name);
+            }
+        }
+        if !state.is_injecting() {
+            self.motions &= !INJECTION;
+        }
+    }
+}
+
+/// Bit of an axis.
+const fn bit(axis: AxisName) -> u8 {
+    1 << axis as u8
+}

@@ -1,0 +1,33 @@
+//! Requests that wait for control.
+
+use quadrant_link::message::Provenance;
+
+/// The work of a request that waits for control.
+// Nothing here can be boxed: there is no heap.
+#[allow(clippy::large_enum_variant)]
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Work {
+    /// Store the draft, with its origin, while the outputs are kept off.
+    Store(Provenance),
+    /// Restart, while the outputs are kept off.
+    Restart,
+    /// Only say what became of the plan.
+    Plan,
+    /// Enable the outputs, once control has the settings that were applied before.
+    Enable,
+}
+
+/// A request that is answered when control has taken the order that it came to, or that waits for settings to be built.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Deferred {
+    /// The request's number.
+    pub(super) id: u16,
+    pub(super) work: Work,
+}
+
+impl Deferred {
+    /// True if the outputs are to be enabled.
+    pub(super) fn enables(&self) -> bool {
+        self.work == Work::Enable
+    }
+}

@@ -1,0 +1,73 @@
+//! Requests that control decides on: what is done while it keeps the outputs off, and the exchange of the plan.
+
+use super::deferred::{Deferred, Work};
+use super::{Server, refused};
+use crate::app::queues::Order;
+use crate::hal::SettingsFlash;
+use crate::law::scalar::Scalar;
+use quadrant_link::message::{LinkError, Message, Reply, Response};
+
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+    /// Asks control for what the work needs, and puts the answer off. The reply returned is not sent.
+    pub(super) fn defer(&mut self, work: Work) -> Result<Reply, LinkError> {
+        match work {
+            Work::Store(_) | Work::Restart => {
+                if self.seen.view.safety.drives() {
+                    return Err(outputs_on());
+                }
+                self.order(Order::Lock)?;
+                self.locked = true;
+            }
+            Work::Plan => self.order(Order::Plan)?,
+            Work::Enable => {}
+        }
+        self.deferred = Some(Deferred { id: 0, work });
+        Ok(Reply::Done)
+    }
+
+    /// Does the work that was put off, once control has taken the order; returns true if its answer is prepared.
+    pub(super) fn conclude(&mut self) -> bool {
+        if !self.is_settled() {
+            return false;
+        }
+        let waiting = &self.deferred;
+        if self.must_wait_to_enable() && waiting.as_ref().is_some_and(Deferred::enables) {
+            return false;
+        }
+        let Some(Deferred { id, work }) = self.deferred.take() else {
+            return false;
+        };
+        let result = match work {
+            Work::Plan if self.seen.plan_taken => Ok(Reply::Done),
+            Work::Plan => Err(refused(format_args!(
+                "a motion is under way; stop it before the plan is exchanged"
+            ))),
+            Work::Enable => self.check_not_stopped().and_then(|()| self.enable()),
+            _ if !self.seen.view.locked => Err(outputs_on()),
+            Work::Store(provenance) => self.save(provenance),
+            Work::Restart => {
+                self.reboot = true;
+                Ok(Reply::Done)
+            }
+        };
+        self.transmit
+            .fill(&Message::Response(Response { id, result }));
+        true
+    }
+
+    /// Lets control enable the outputs again, once nothing needs them off.
+    pub(super) fn release(&mut self) {
+        let stored = self.accepted;
+        if self.locked
+            && self.deferred.is_none()
+            && !self.reboot
+            && self.order(Order::Unlock { stored }).is_ok()
+        {
+            (self.locked, self.accepted) = (false, false);
+        }
+    }
+}
+
+fn outputs_on() -> LinkError {
+    refused(format_args!("the outputs are on; disable them first"))
+}

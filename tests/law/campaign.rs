@@ -1,0 +1,389 @@
+//! Random faults at random activities, over control, supervision, server and store as the target runs them, with an x axis
+//! that moves as its output makes it. One seed is one campaign of a second.
+//!
+//! 200 seeds run in every build. `QUADRANT_CAMPAIGN=0..100000 cargo test --release --test law campaign -- --nocapture` runs
+//! any others, and a shard of them is a smaller range; it prints the campaigns that went farthest, each of which its seed
+//! replays.
+
+use std::ops::Range;
+
+use quadrant::command::Command;
+use quadrant::link::message::{
+    AxisName, AxisSet, Body, Harmonic, InjectRequest, Motion, Plan, PointToPoint, Provenance,
+    SettingsRequest, Voltages,
+};
+use quadrant::safety::{SafetyState, Switches};
+use quadrant::settings::StageSettings;
+
+use crate::common::Noise;
+use crate::plant::{Death, Encoder, MODEL, Plant};
+use crate::tasks::{Moved, Tasks};
+
+/// Largest word: 10 V of 10 V.
+const LARGEST_WORD: i16 = 32_767;
+/// Ticks from a fault that stops to outputs that are off: 105 ms of braking, 200 ticks of rest.
+const STOP_TICKS: u32 = 1050 + 200;
+/// Way of the x axis that its reference does not ask for until the outputs are off, mm: 2 mm, and what the slowest jog took
+/// beyond in 20 000 campaigns.
+const UNPLANNED_MM: f64 = 2.1;
+/// Speed below which an axis comes to rest, mm/s: if its encoder dies then, the voltage that it has may be that of a load.
+const COMING_TO_REST_MM_S: f64 = 30.0;
+/// What coasts at a speed, mm per mm/s: 1 / B of the plant; and what the largest output adds that is on its way, A V Td / B, mm.
+const COASTING_S: f64 = 1.0 / 144.8;
+const COASTING_MM: f64 = 69_390.0 * 10.0 * 1.2e-3 / 144.8;
+/// Ticks of a campaign, and the last one in which something happens.
+const TICKS: u32 = 10_000;
+const LAST_EVENT: u32 = 8_000;
+/// Campaigns of every build.
+const IN_EVERY_BUILD: Range<u64> = 0..200;
+/// Campaigns that are listed.
+const LISTED: usize = 5;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Activity {
+    Rest,
+    Jog(f32),
+    Sine,
+    Move,
+    Home,
+    OpenLoop,
+    ClosedLoop,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Event {
+    Dies(Death),
+    Load(f64),
+    HostSilent,
+    Garbage,
+    Settings,
+    Button(Command),
+    Store,
+    EmergencyStop,
+    Stop,
+}
+
+/// One campaign, drawn from its seed.
+#[derive(Debug)]
+struct Campaign {
+    seed: u64,
+    activity: Activity,
+    events: Vec<(u32, Event)>,
+}
+
+impl Campaign {
+    fn draw(seed: u64) -> Self {
+        let mut noise = Noise::new(seed + 1);
+        // The first numbers of neighbouring seeds are alike.
+        for _ in 0..8 {
+            noise.bits();
+        }
+        let mut pick = |from: u64| (noise.bits() >> 20) % from;
+        let activity = match pick(7) {
+            0 => Activity::Rest,
+            1 => Activity::Jog([1.0, 10.0, -50.0, 200.0][pick(4) as usize]),
+            2 => Activity::Sine,
+            3 => Activity::Move,
+            4 => Activity::Home,
+            5 => Activity::OpenLoop,
+            _ => Activity::ClosedLoop,
+        };
+        let deaths = [
+            Death::Frozen,
+            Death::OneLine,
+            Death::Dithering,
+            Death::Intermittent,
+            Death::Reversed,
+        ];
+        let buttons = [Command::Enable, Command::Disable, Command::Run];
+        let mut events: Vec<_> = (0..1 + pick(3))
+            .map(|_| {
+                let tick = 500 + pick(u64::from(LAST_EVENT) - 500) as u32;
+                let event = match pick(9) {
+                    0..=2 => Event::Dies(deaths[pick(5) as usize]),
+                    3 => Event::Load(0.25 * (pick(9) as f64 - 4.0)),
+                    4 => Event::HostSilent,
+                    5 => [Event::Garbage, Event::Settings][pick(2) as usize],
+                    6 => Event::Button(buttons[pick(3) as usize]),
+                    7 => Event::Store,
+                    _ => [Event::EmergencyStop, Event::Stop][pick(2) as usize],
+                };
+                (tick, event)
+            })
+            .collect();
+        events.sort_by_key(|(tick, _)| *tick);
+        Self {
+            seed,
+            activity,
+            events,
+        }
+    }
+
+    fn bodies(&self) -> Vec<Body> {
+        let on_x = |motion| {
+            let mut motions = [Motion::Hold; 3];
+            motions[0] = motion;
+            vec![Body::SetPlan(Plan { motions }), Body::Run]
+        };
+        let injection = |open_loop| {
+            vec![Body::Inject(InjectRequest::Open {
+                axis: AxisName::X,
+                open_loop,
+                with_plan: false,
+                limit_v: 1.0,
+                travel_mm: 20.0,
+                max_velocity_mm_s: 200.0,
+            })]
+        };
+        match self.activity {
+            Activity::Rest => vec![],
+            Activity::Jog(velocity_mm_s) => vec![Body::Jog {
+                axis: AxisName::X,
+                velocity_mm_s: velocity_mm_s.into(),
+            }],
+            Activity::Sine => on_x(Motion::Harmonic(Harmonic {
+                amplitude_mm: 5.0,
+                frequency_hz: 1.0,
+                phase_rad: 0.0,
+                cycles: None,
+                lead_s: 0.1,
+            })),
+            Activity::Move => on_x(Motion::PointToPoint(PointToPoint {
+                distance_mm: 80.0,
+                max_velocity_mm_s: 200.0,
+                max_acceleration_mm_s2: 2000.0,
+                max_jerk_mm_s3: 1e5,
+            })),
+            Activity::Home => vec![Body::Home([AxisName::X].into_iter().collect::<AxisSet>())],
+            Activity::OpenLoop => injection(true),
+            Activity::ClosedLoop => injection(false),
+        }
+    }
+
+    fn has_load(&self) -> bool {
+        let is_load = |(_, event): &(u32, Event)| matches!(event, Event::Load(_));
+        self.events.iter().any(is_load)
+    }
+
+    /// True if nothing that the law sees tells that an encoder died at this speed: `docs/safety.md`, "Not found".
+    fn is_unseen(&self, death: Death, speed_mm_s: f64) -> bool {
+        let goes_on = matches!(self.activity, Activity::Jog(_) | Activity::Home);
+        match death {
+            Death::Healthy => false,
+            Death::Intermittent => true,
+            Death::Reversed => self.activity == Activity::OpenLoop,
+            _ => self.has_load() || !goes_on && speed_mm_s.abs() < COMING_TO_REST_MM_S,
+        }
+    }
+}
+
+/// The invariants, watched tick by tick.
+#[derive(Debug, Default)]
+struct Watch {
+    /// Somebody has asked to enable since the outputs were last off.
+    asked: bool,
+    /// The first fault, and the ticks for which it has not switched off.
+    fault: Option<(u8, u32)>,
+    /// The largest way that was not planned, mm, and the speed when the outputs went off, mm/s.
+    unplanned_mm: f64,
+    coasts_at: f64,
+    off_at: Option<f64>,
+    /// A load moves a disabled axis.
+    loaded: bool,
+}
+
+impl Watch {
+    fn look(&mut self, tasks: &Tasks, pressed: bool) -> Result<(), String> {
+        let upper = tasks.upper.borrow();
+        let (outputs, state) = (upper.outputs, upper.state());
+        let words = outputs.codes.map(|code| code.0);
+        if !outputs.enabled && words != [0; 3] {
+            return Err(format!("off, and puts out {words:?}"));
+        }
+        if words
+            .iter()
+            .any(|word| word.unsigned_abs() > LARGEST_WORD as u16)
+        {
+            return Err(format!("puts out {words:?}"));
+        }
+        if outputs.enabled && !self.asked {
+            return Err("enabled, and nobody has asked".into());
+        }
+        if outputs.enabled && pressed {
+            return Err("enabled while the emergency stop is pressed".into());
+        }
+        if upper.driven_while_busy > 0 {
+            return Err("enabled while flash is written".into());
+        }
+        match (state.safety(), &mut self.fault) {
+            (SafetyState::Stopping(now) | SafetyState::Faulted(now), Some((first, _)))
+                if now.code.number() != *first =>
+            {
+                return Err(format!("{first} became {}", now.code.name()));
+            }
+            (SafetyState::Stopping(now) | SafetyState::Faulted(now), None) => {
+                self.fault = Some((now.code.number(), 0));
+            }
+            _ => {}
+        }
+        if let Some((first, ticks)) = &mut self.fault
+            && outputs.enabled
+        {
+            *ticks += 1;
+            if *ticks > STOP_TICKS {
+                return Err(format!("enabled {ticks} ticks after fault {first}"));
+            }
+        }
+        let x = upper.x.as_ref().expect("given");
+        let reference = state.axes()[0].reference().to_mm(5e-4);
+        if outputs.enabled {
+            let open = state.axes()[0].mode() == quadrant::motion::MotionMode::OpenLoop;
+            let planned = if open { x.plant.position_mm } else { reference };
+            self.unplanned_mm = self.unplanned_mm.max((x.plant.position_mm - planned).abs());
+            (self.coasts_at, self.off_at) = (x.plant.velocity_mm_s, Some(x.plant.position_mm));
+        } else if let Some(at) = self.off_at
+            && !self.loaded
+        {
+            let coasted = (x.plant.position_mm - at).abs();
+            let may = self.coasts_at.abs() * COASTING_S + COASTING_MM;
+            if coasted > may {
+                return Err(format!("coasted {coasted:.2} mm, {may:.2} mm were due"));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Runs a campaign; returns the largest way that was not planned, mm.
+fn run(campaign: &Campaign) -> Result<f64, String> {
+    let mut tasks = Tasks::new(&StageSettings::simulated(), campaign.seed);
+    tasks.upper.borrow_mut().x = Some(Moved {
+        plant: Plant::new(&MODEL),
+        encoder: Encoder::new(Death::Healthy, campaign.seed),
+        dead: None,
+    });
+    let mut watch = Watch {
+        loaded: campaign.has_load(),
+        ..Watch::default()
+    };
+    let (mut unseen, mut speed_mm_s) = (false, 0.0);
+    let mut noise = Noise::new(campaign.seed ^ 0x5A5A);
+    let (mut silent, mut pressed) = (false, false);
+    let mut words = 0;
+    let begin = tasks.tick();
+    let mut events = campaign.events.iter().peekable();
+    while tasks.tick() - begin < TICKS {
+        let at = tasks.tick() - begin;
+        while let Some((_, event)) = events.next_if(|(tick, _)| *tick <= at) {
+            match *event {
+                Event::Dies(death) => {
+                    let mut upper = tasks.upper.borrow_mut();
+                    let x = upper.x.as_mut().expect("given");
+                    // It dies once.
+                    if x.dead.is_none() {
+                        speed_mm_s = x.plant.velocity_mm_s;
+                        unseen = campaign.is_unseen(death, speed_mm_s);
+                        (x.encoder.death, x.dead) = (death, Some(0));
+                    }
+                }
+                Event::Load(volts) => {
+                    tasks
+                        .upper
+                        .borrow_mut()
+                        .x
+                        .as_mut()
+                        .expect("given")
+                        .plant
+                        .load_v = volts;
+                }
+                Event::HostSilent => silent = true,
+                Event::Garbage => {
+                    let bytes: Vec<u8> = (0..64).map(|_| (noise.bits() >> 16) as u8).collect();
+                    tasks.upper.borrow_mut().receive(&bytes);
+                }
+                Event::Settings => {
+                    tasks.send(&[Body::Settings(SettingsRequest::Apply)]);
+                }
+                Event::Button(command) => {
+                    watch.asked |= command == Command::Enable;
+                    tasks.upper.borrow_mut().operate(command);
+                }
+                Event::Store => {
+                    tasks.send(&[Body::Settings(SettingsRequest::Store(Provenance::new()))]);
+                }
+                Event::EmergencyStop => {
+                    tasks.upper.borrow_mut().inputs.switches = Switches::EMERGENCY_STOP;
+                    pressed = true;
+                }
+                Event::Stop => {
+                    tasks.send(&[Body::Stop]);
+                }
+            }
+        }
+        if at == 20 {
+            watch.asked = true;
+            tasks.send(&[Body::Enable]);
+        } else if at == 120 {
+            tasks.send(&campaign.bodies());
+        } else if !silent && at % 1000 == 500 {
+            tasks.send(&[Body::Status]);
+        }
+        let injects = matches!(campaign.activity, Activity::OpenLoop | Activity::ClosedLoop);
+        if injects && !silent && at > 150 && at.is_multiple_of(20) {
+            let values = Voltages::new((0..20).map(|place| {
+                let turn = core::f64::consts::TAU * 20.0 * 1e-4 * f64::from(words + place);
+                (0.8 * turn.sin() / 10.0 * 32767.0) as i16
+            }));
+            let sequence = words;
+            words += 20;
+            tasks.send(&[Body::Inject(InjectRequest::Values {
+                sequence,
+                values,
+                last: false,
+            })]);
+        }
+        tasks.step();
+        watch.look(&tasks, pressed)?;
+    }
+    if watch.unplanned_mm > UNPLANNED_MM && !unseen {
+        return Err(format!(
+            "{:.2} mm were not planned, dead at {speed_mm_s:.0} mm/s",
+            watch.unplanned_mm
+        ));
+    }
+    Ok(watch.unplanned_mm)
+}
+
+/// The seeds to run: `from..to`.
+fn seeds() -> Range<u64> {
+    let Ok(range) = std::env::var("QUADRANT_CAMPAIGN") else {
+        return IN_EVERY_BUILD;
+    };
+    let number = |text: &str| text.parse().expect("QUADRANT_CAMPAIGN: from..to");
+    let (from, to) = range.split_once("..").expect("QUADRANT_CAMPAIGN: from..to");
+    number(from)..number(to)
+}
+
+#[test]
+fn no_campaign_breaks_an_invariant() {
+    let mut farthest = Vec::new();
+    let mut broken = Vec::new();
+    for seed in seeds() {
+        let campaign = Campaign::draw(seed);
+        match run(&campaign) {
+            Ok(unplanned_mm) => farthest.push((unplanned_mm, campaign)),
+            Err(why) => broken.push(format!("{why}: {campaign:?}")),
+        }
+        farthest.sort_by(|a, b| b.0.total_cmp(&a.0));
+        farthest.truncate(LISTED);
+    }
+    for (unplanned_mm, campaign) in &farthest {
+        println!("{unplanned_mm:.2} mm: {campaign:?}");
+    }
+    assert!(
+        broken.is_empty(),
+        "{}:\n{}",
+        broken.len(),
+        broken.join("\n")
+    );
+}
