@@ -35,8 +35,8 @@ const DELAY_ERROR: f64 = 0.1;
 /// Speed that no load explains, mm/s, and in counts per tick.
 const MODEL_VELOCITY_MM_S: f64 = 80.0;
 const MODEL_STEP_COUNTS: f64 = 8.0;
-/// Measured speed below which an axis stands, beyond what quantisation adds, mm/s.
-const STANDSTILL_MM_S: f64 = 1.0;
+/// Measured speed below which an axis stands, beyond what quantisation adds, mm/s: noise of some counts stays below.
+const STANDSTILL_MM_S: f64 = 5.0;
 /// Ticks that are added to the longest stop, for rounding.
 const STOP_MARGIN_TICKS: u32 = 10;
 /// The budget of the open loop on an axis without a model, V s, beyond a share of the output limit.

@@ -10,7 +10,7 @@ use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
-use quadrant_sim::machine::{LawMachine, Operator};
+use quadrant_sim::machine::{LawMachine, Operator, SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::record::Record;
 use quadrant_sim::replay::recorded::{RecordedAxis, replay};
@@ -46,6 +46,18 @@ fn combined_feedforward_makes_the_circle_rounder() {
     let circles = run_circles(&Configuration::EXTREMES, &setup, 1).unwrap();
     assert!(circles[1].circular_deviation_mm < 0.2 * circles[0].circular_deviation_mm);
     assert!(circles[1].reversal_spike_mm < 0.3 * circles[0].reversal_spike_mm);
+}
+
+#[test]
+fn an_experiment_on_an_axis_that_nobody_commissioned_ends_with_the_reason() {
+    let truth = StageParameters::real().axes[0].clone();
+    let mut test_axis = SimulatedTestAxis::new(0, truth, 1);
+    let mut settings = test_axis.settings().clone();
+    settings.commissioned = false;
+    test_axis.apply(&settings).unwrap();
+    let target_mm = 1.0;
+    let error = approach(&mut test_axis, target_mm).unwrap_err();
+    assert!(error.to_string().contains("not commissioned"), "{error}");
 }
 
 #[test]

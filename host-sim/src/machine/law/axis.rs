@@ -1,5 +1,7 @@
 //! One axis of the simulated stage as a test_axis: its truth is on the other side of encoder and converter.
 
+use quadrant::app::supervisor::Event;
+use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::lockstep::InputRecord;
@@ -20,6 +22,8 @@ use crate::record::Recording;
 const ELEMENTS: usize = quadrant::friction::gms::MAX_ELEMENTS;
 /// Travel either way, mm.
 pub(super) const TRAVEL_MM: f64 = 200.0;
+/// Control periods within which the law has enabled the outputs, or does not.
+const ENABLE_TICKS: usize = 1000;
 /// Control periods between two reports of progress.
 const PROGRESS_TICKS: usize = 20_000;
 /// Names of the axes.
@@ -90,10 +94,15 @@ impl SimulatedTestAxis {
         let mut watch = Watch::new(experiment, self.info());
         let mut recorder = Recorder::new(experiment.decimation, self.stage.rate_hz);
         let expected = experiment.injection_v.len().max(1);
+        let mut waited = 0;
         loop {
             let raw = self.plant.read_counter();
             let position_mm = f64::from(raw as i32) * self.resolution_mm;
             let Some(step) = law.step(raw, experiment)? else {
+                if waited == ENABLE_TICKS {
+                    return Err(law.not_enabled(experiment));
+                }
+                waited += 1;
                 self.plant.step(DacCode::ZERO, false);
                 continue;
             };
@@ -170,6 +179,25 @@ struct Step {
 }
 
 impl Law {
+    /// The law's reason to keep the outputs off.
+    fn not_enabled(&self, experiment: &Experiment) -> ExperimentError {
+        let events = match self {
+            Self::OpenLoop => &[],
+            Self::ClosedLoop { machine, .. } => machine.events(),
+        };
+        let refusal = events.iter().find_map(|(_, event)| match event {
+            Event::Refused(Command::Enable, refusal) => Some(refusal.as_str()),
+            _ => None,
+        });
+        ExperimentError::Impossible {
+            experiment: experiment.name.clone(),
+            reason: format!(
+                "the outputs were not enabled: {}",
+                refusal.unwrap_or("no reason was given")
+            ),
+        }
+    }
+
     /// One control period; nothing while the outputs are off.
     fn step(&mut self, raw: u32, experiment: &Experiment) -> Result<Option<Step>, ExperimentError> {
         let Self::ClosedLoop {
