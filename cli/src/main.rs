@@ -18,7 +18,7 @@ mod subject;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use quadrant_cli::explained;
+use quadrant_cli::{explained, terminal, warn};
 
 /// Servo control that removes friction's quadrant glitches: identify, design, commission, test and talk to a machine.
 ///
@@ -73,10 +73,10 @@ fn run() -> anyhow::Result<()> {
 }
 
 fn main() -> ExitCode {
-    match run() {
+    match run().and_then(|()| terminal::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", explained(&error));
+            warn!("error: {}", explained(&error));
             ExitCode::FAILURE
         }
     }

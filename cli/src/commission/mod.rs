@@ -28,6 +28,7 @@ use super::endpoint::Endpoint;
 use super::subject::{travel, travel_mm};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::{say, terminal};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]
@@ -148,13 +149,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let done = job.run(&mut *machine)?;
     if machine.is_simulated() {
-        println!(
+        say!(
             "Simulated, not measured: {} axis, seed {}\n",
             axis.name(),
             output.seed
         );
     }
-    print!("{}", done.text);
+    terminal::print(format_args!("{}", done.text));
     if !done.better {
         bail!(
             "nothing was better than the PID alone on every sine; its settings are in {PID_ALONE}, and the page shows what was tried"
@@ -167,6 +168,7 @@ impl Arguments {
     /// Identifies the recordings of an earlier commissioning anew.
     fn run_saved(&self, folder: &Path, start: Option<SettingsFile>) -> anyhow::Result<()> {
         let Self { output, .. } = self;
+        output.ready()?;
         let axis = AxisName::from(self.axis);
         let mut file = start.unwrap_or_else(|| SettingsFile::new(StageSettings::simulated()));
         let base = file.stage.axes[axis as usize].clone();
@@ -178,14 +180,14 @@ impl Arguments {
             )?,
             checked: None,
         };
-        print!("{}", found.text());
+        terminal::print(format_args!("{}", found.text()));
         let path = match &self.into {
             Some(path) => path.clone(),
             None => output.file("settings.toml")?,
         };
         let who = format!("the {axis} axis, recorded in {}", folder.display());
         for line in found.keep(output, &mut file, &path, axis, &who)? {
-            println!("{line}");
+            say!("{line}");
         }
         Ok(())
     }
@@ -196,6 +198,7 @@ impl Job<'_> {
     /// new ones are to act, whatever came of it.
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
+        output.ready()?;
         let travel_mm = travel_mm(machine, axis, self.travel_mm, None)?;
         let before = machine.settings()?;
         let mut file = match self.start {
