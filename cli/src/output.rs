@@ -39,6 +39,15 @@ impl Output {
     const SEED: u64 = 1;
     const FORMATS: [Format; 2] = [Format::Html, Format::Csv];
 
+    /// The same in a folder below.
+    #[must_use]
+    pub fn below(&self, name: &str) -> Self {
+        Self {
+            out: self.out.join(name),
+            ..self.clone()
+        }
+    }
+
     /// The path of a file in the folder, which is made.
     pub fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
         std::fs::create_dir_all(&self.out)

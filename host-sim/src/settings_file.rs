@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+use quadrant::axes::AxisName;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::{SettingsError, StageSettings};
 use serde::{Deserialize, Serialize};
@@ -111,6 +112,27 @@ impl SettingsFile {
             records,
             sets: sets.iter().map(|&part| part.to_owned()).collect(),
         });
+    }
+
+    /// Takes the other axes than `axis` over from an earlier file, if a command has set them.
+    ///
+    /// # Errors
+    /// The first axis whose encoder or amplifier is another one there: the file is of another machine.
+    pub fn keep_other_axes(&mut self, earlier: &Self, axis: AxisName) -> Result<(), AxisName> {
+        for other in AxisName::ALL {
+            let set = |origin: &&Provenance| origin.axis == other.as_str();
+            if other == axis || !earlier.provenance.iter().any(|origin| set(&origin)) {
+                continue;
+            }
+            let [theirs, ours] = [earlier, &*self].map(|file| &file.stage.axes[other as usize]);
+            if theirs.encoder != ours.encoder || theirs.amplifier != ours.amplifier {
+                return Err(other);
+            }
+            self.stage.axes[other as usize] = theirs.clone();
+            self.provenance
+                .extend(earlier.provenance.iter().filter(set).cloned());
+        }
+        Ok(())
     }
 
     /// Reads and checks a file.
