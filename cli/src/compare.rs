@@ -25,16 +25,6 @@ pub(super) struct Arguments {
     output: Output,
 }
 
-impl Default for Arguments {
-    fn default() -> Self {
-        Self {
-            settings: LawSettings::default(),
-            seeds: 1,
-            output: Output::default(),
-        }
-    }
-}
-
 /// Control ticks between two lines of a trace's CSV file.
 const TRACE_TICKS: usize = 10;
 /// Control period of the traces, s.

@@ -24,16 +24,6 @@ pub struct Output {
     format: Vec<Format>,
 }
 
-impl Default for Output {
-    fn default() -> Self {
-        Self {
-            out: Self::FOLDER.into(),
-            seed: Self::SEED,
-            format: Self::FORMATS.into(),
-        }
-    }
-}
-
 impl Output {
     const FOLDER: &str = "quadrant-out";
     const SEED: u64 = 1;
