@@ -5,6 +5,7 @@ use anyhow::{Context, ensure};
 use clap::Args;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, progress};
+use quadrant_cli::say;
 use quadrant_sim::circle::page::{circle_page, circle_tables};
 use quadrant_sim::circle::{CircleRequest, run_circle_tests};
 use quadrant_sim::experiment::configuration::Configuration;
@@ -37,6 +38,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
+    output.ready()?;
     for (option, values) in [
         ("--radius-mm", &arguments.radius_mm),
         ("--feed-mm-min", &arguments.feed_mm_min),
@@ -67,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let bar = progress(request.cases().len() as u64, "running circles");
     let results = run_circle_tests(&request, &setup, &|| bar.inc(1));
     bar.finish_and_clear();
-    println!(
+    say!(
         "Simulated, not measured. 10 kHz, f32; seed {}\n",
         output.seed
     );

@@ -3,6 +3,7 @@
 use clap::Args;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, share};
+use quadrant_cli::say;
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::comparison::{Comparison, Request};
 use quadrant_sim::compare::page::{comparison_page, comparison_tables};
@@ -24,16 +25,6 @@ pub(super) struct Arguments {
     output: Output,
 }
 
-impl Default for Arguments {
-    fn default() -> Self {
-        Self {
-            settings: LawSettings::default(),
-            seeds: 1,
-            output: Output::default(),
-        }
-    }
-}
-
 /// Control ticks between two lines of a trace's CSV file.
 const TRACE_TICKS: usize = 10;
 /// Control period of the traces, s.
@@ -43,6 +34,7 @@ const STEPS: u64 = 1_000_000;
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, seeds, .. } = arguments;
+    output.ready()?;
     let settings = arguments.settings.read()?;
     let setups = RunConfiguration::both(&settings.stage);
     let configurations = Configuration::all();
@@ -59,7 +51,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let [_, identified] = &setups;
     let circles = run_circles(&configurations, identified, output.seed)?;
     bar.finish_and_clear();
-    println!(
+    say!(
         "Simulated, not measured. x axis, sine of 30 mm; 10 kHz, f32; seed {}\n",
         output.seed
     );

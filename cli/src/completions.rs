@@ -2,6 +2,7 @@
 
 use clap::{Args, Command};
 use clap_complete::Shell;
+use quadrant_cli::terminal;
 
 /// Options of `quadrant completions`.
 #[derive(Clone, Debug, Args)]
@@ -12,11 +13,8 @@ pub(super) struct Arguments {
 
 /// Prints the completions of a command line.
 pub(super) fn run(arguments: &Arguments, mut command: Command) -> anyhow::Result<()> {
-    clap_complete::generate(
-        arguments.shell,
-        &mut command,
-        "quadrant",
-        &mut std::io::stdout(),
-    );
+    let mut text = Vec::new();
+    clap_complete::generate(arguments.shell, &mut command, "quadrant", &mut text);
+    terminal::print(format_args!("{}", String::from_utf8_lossy(&text)));
     Ok(())
 }

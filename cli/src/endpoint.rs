@@ -4,7 +4,8 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Context;
-use quadrant_sim::client::Client;
+use quadrant_cli::warn;
+use quadrant_sim::client::{Client, Interrupt};
 use quadrant_sim::machine::{LawStage, Machine, SerialTransport, SimulatedLink, TcpTransport};
 
 /// Image that `cargo xtask build --board mps2` leaves, from the workspace's folder.
@@ -68,6 +69,12 @@ impl Endpoint {
 impl LinkEndpoint {
     /// Opens a session; `seed` decides the noise of a simulated stage, and a file keeps the flash of its machine.
     pub(super) fn connect(&self, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
+        let client = self.open(seed, flash)?;
+        heed_signals(client.interrupt())?;
+        Ok(client)
+    }
+
+    fn open(&self, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
         let client = match self {
             Self::Simulated => Client::open(SimulatedLink::start(seed, flash)?),
             Self::Emulated(image) => return emulated(image, seed, flash),
@@ -91,6 +98,22 @@ impl LinkEndpoint {
         };
         Ok(client?)
     }
+}
+
+/// Signals after which this program ends, heeded or not: the machine stops what its host has started when that is gone.
+const SIGNALS: u32 = 3;
+
+/// Stops the axes on Ctrl-C, and when this program is to end.
+fn heed_signals(interrupt: Interrupt) -> anyhow::Result<()> {
+    ctrlc::set_handler(move || match interrupt.request() {
+        1 => warn!("stopping the axes; once more disables the outputs"),
+        SIGNALS.. => {
+            warn!("ended, unheeded by the machine");
+            std::process::exit(130);
+        }
+        _ => warn!("disabling the outputs"),
+    })
+    .context("cannot take Ctrl-C")
 }
 
 #[cfg(all(unix, feature = "emulated"))]

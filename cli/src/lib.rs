@@ -6,6 +6,7 @@
 pub mod axis;
 pub mod law_settings;
 pub mod output;
+pub mod terminal;
 
 /// Returns an error with its causes; most messages contain their cause's already.
 pub fn explained(error: &anyhow::Error) -> String {

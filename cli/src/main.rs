@@ -18,16 +18,23 @@ mod subject;
 use std::process::ExitCode;
 
 use clap::{CommandFactory, Parser, Subcommand};
-use quadrant_cli::explained;
+use quadrant_cli::{explained, terminal, warn};
 
 /// Servo control that removes friction's quadrant glitches: identify, design, commission, test and talk to a machine.
 ///
-/// Without a command, `compare` runs.
+/// Without a command, `compare` runs, and takes its options.
 #[derive(Debug, Parser)]
-#[command(version, about)]
+#[command(
+    name = "quadrant",
+    version,
+    about,
+    args_conflicts_with_subcommands = true
+)]
 struct Arguments {
     #[command(subcommand)]
     command: Option<Command>,
+    #[command(flatten)]
+    compare: compare::Arguments,
 }
 
 #[derive(Debug, Subcommand)]
@@ -58,8 +65,9 @@ enum Command {
 
 /// Does what the command line asks for.
 fn run() -> anyhow::Result<()> {
-    match Arguments::parse().command {
-        None => compare::run(&compare::Arguments::default()),
+    let Arguments { command, compare } = Arguments::parse();
+    match command {
+        None => compare::run(&compare),
         Some(Command::Circle(arguments)) => circle::run(&arguments),
         Some(Command::Commission(arguments)) => commission::run(&arguments),
         Some(Command::Compare(arguments)) => compare::run(&arguments),
@@ -73,10 +81,10 @@ fn run() -> anyhow::Result<()> {
 }
 
 fn main() -> ExitCode {
-    match run() {
+    match run().and_then(|()| terminal::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", explained(&error));
+            warn!("error: {}", explained(&error));
             ExitCode::FAILURE
         }
     }

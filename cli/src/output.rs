@@ -6,6 +6,7 @@ use anyhow::Context;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
+use crate::say;
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, Format, Page, Section, Table};
 
@@ -23,20 +24,19 @@ pub struct Output {
     format: Vec<Format>,
 }
 
-impl Default for Output {
-    fn default() -> Self {
-        Self {
-            out: Self::FOLDER.into(),
-            seed: Self::SEED,
-            format: Self::FORMATS.into(),
-        }
-    }
-}
-
 impl Output {
     const FOLDER: &str = "quadrant-out";
     const SEED: u64 = 1;
     const FORMATS: [Format; 2] = [Format::Html, Format::Csv];
+
+    /// The same in a folder below.
+    #[must_use]
+    pub fn below(&self, name: &str) -> Self {
+        Self {
+            out: self.out.join(name),
+            ..self.clone()
+        }
+    }
 
     /// The path of a file in the folder, which is made.
     pub fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
@@ -45,10 +45,22 @@ impl Output {
         Ok(self.out.join(name))
     }
 
-    /// Prints a table and, where CSV is wanted, writes it.
+    /// Makes the folder, and finds out whether it can be written to: before anything is measured or computed.
+    ///
+    /// # Errors
+    /// A folder that cannot be made or written to.
+    pub fn ready(&self) -> anyhow::Result<()> {
+        let probe = self.file(".quadrant-probe")?;
+        std::fs::write(&probe, [])
+            .and_then(|()| std::fs::remove_file(&probe))
+            .with_context(|| format!("cannot write to the folder {}", self.out.display()))
+    }
+
+    /// Writes a table where CSV is wanted, and prints it.
     pub fn table(&self, table: &Table) -> anyhow::Result<()> {
-        println!("{}\n", table.to_text());
-        self.keep_table(table)
+        self.keep_table(table)?;
+        say!("{}\n", table.to_text());
+        Ok(())
     }
 
     /// Writes a table where CSV is wanted.
@@ -62,7 +74,7 @@ impl Output {
     /// Writes a page in the formats that are wanted, under the stem of `name`.
     pub fn page(&self, page: &Page, name: &str) -> anyhow::Result<()> {
         for line in self.keep_page(page, name)? {
-            println!("{line}");
+            say!("{line}");
         }
         Ok(())
     }

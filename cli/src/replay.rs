@@ -14,6 +14,7 @@ use quadrant_sim::replay::recorded::RecordedAxis;
 use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
 
 use super::replay_program::{self, ProgramOptions};
+use quadrant_cli::warn;
 
 /// Options of `quadrant replay`.
 #[derive(Clone, Debug, Args)]
@@ -52,6 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         settings,
         output,
     } = arguments;
+    output.ready()?;
     ensure!(
         settings.path.is_none() || *axis != Some(RecordedAxis::Emps),
         "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
@@ -67,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let record = Record::read(reference, &axis.limits())?;
     for doubt in &record.doubts {
-        eprintln!("note: {doubt}");
+        warn!("note: {doubt}");
     }
     let bar = progress(recorded::RUNS, "following the record");
     let outcomes = recorded::replay(&record, *axis, &setup, output.seed, &|| bar.inc(1))?;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use quadrant_cli::output::{Output, command_line, progress};
+use quadrant_cli::{say, warn};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::gcode::{Limits, Program, Trajectory};
@@ -45,9 +46,7 @@ pub(super) fn run(
 ) -> anyhow::Result<()> {
     let program = Program::read(path)?;
     for (line, word) in &program.ignored {
-        eprintln!(
-            "note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools"
-        );
+        warn!("note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools");
     }
     let default = Limits::of(&setup.stage);
     let limits = Limits {
@@ -75,7 +74,7 @@ pub(super) fn run(
         &|| bar.inc(1),
     )?;
     bar.finish_and_clear();
-    println!(
+    say!(
         "Simulated, not measured. 10 kHz, f32; seed {}\n",
         output.seed
     );

@@ -1,6 +1,7 @@
 //! `quadrant settings`.
 
 use clap::Args;
+use quadrant_cli::{say, terminal};
 use quadrant_sim::settings_reference::{markdown, rows};
 
 /// Options of `quadrant settings`.
@@ -16,7 +17,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if arguments.markdown {
-        print!("{}", markdown());
+        terminal::print(format_args!("{}", markdown()));
         return Ok(());
     }
     let rows = rows(&arguments.part);
@@ -27,10 +28,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     for row in rows {
         let unit = if row.unit.is_empty() { "" } else { " " };
-        println!("{}\n    {}", row.path, row.meaning);
-        println!(
+        say!("{}\n    {}", row.path, row.meaning);
+        say!(
             "    {}{unit}{}; default {}",
-            row.range, row.unit, row.default
+            row.range,
+            row.unit,
+            row.default
         );
     }
     Ok(())

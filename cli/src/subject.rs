@@ -12,6 +12,7 @@ use quadrant_sim::settings_file::SettingsFile;
 use super::endpoint::Endpoint;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::command_line;
+use quadrant_cli::say;
 
 /// Options that name the axis, the machine and the settings to start from.
 #[derive(Clone, Debug, Args)]
@@ -136,7 +137,7 @@ impl Subject {
         let stage = machine.settings()?;
         let found = on_axis(&mut *machine, axis, travel_mm, start, measure)?;
         if machine.is_simulated() {
-            println!("Simulated, not measured.");
+            say!("Simulated, not measured.");
         }
         Ok(Measured {
             found,
@@ -172,7 +173,7 @@ impl Destination {
             .collect();
         file.add_provenance(&command_line(), axis.name(), records, sets);
         file.write(path)?;
-        println!(
+        say!(
             "{}: the settings with this {} of {}",
             path.display(),
             sets.join(" and "),

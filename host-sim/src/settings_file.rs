@@ -5,6 +5,7 @@
 
 use std::path::{Path, PathBuf};
 
+use quadrant::axes::AxisName;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::{SettingsError, StageSettings};
 use serde::{Deserialize, Serialize};
@@ -76,6 +77,14 @@ pub enum SettingsFileError {
         /// Form that the file names.
         form: u32,
     },
+    /// It has more axes than a stage.
+    #[error("{}: {count} times [[stage.axes]]; a stage has x, y and z", path.display())]
+    Axes {
+        /// Path of the file.
+        path: PathBuf,
+        /// Number of axes that the file has.
+        count: usize,
+    },
     /// A value is refused.
     #[error("{}: {source}", path.display())]
     Refused {
@@ -113,6 +122,27 @@ impl SettingsFile {
         });
     }
 
+    /// Takes the other axes than `axis` over from an earlier file, if a command has set them.
+    ///
+    /// # Errors
+    /// The first axis whose encoder or amplifier is another one there: the file is of another machine.
+    pub fn keep_other_axes(&mut self, earlier: &Self, axis: AxisName) -> Result<(), AxisName> {
+        for other in AxisName::ALL {
+            let set = |origin: &&Provenance| origin.axis == other.as_str();
+            if other == axis || !earlier.provenance.iter().any(|origin| set(&origin)) {
+                continue;
+            }
+            let [theirs, ours] = [earlier, &*self].map(|file| &file.stage.axes[other as usize]);
+            if theirs.encoder != ours.encoder || theirs.amplifier != ours.amplifier {
+                return Err(other);
+            }
+            self.stage.axes[other as usize] = theirs.clone();
+            self.provenance
+                .extend(earlier.provenance.iter().filter(set).cloned());
+        }
+        Ok(())
+    }
+
     /// Reads and checks a file.
     ///
     /// # Errors
@@ -134,6 +164,16 @@ impl SettingsFile {
             path: path.to_owned(),
             source: Box::new(source),
         })?;
+        // What is too many for an array is passed over in silence.
+        let axes = toml::from_str::<toml::Table>(text)
+            .ok()
+            .and_then(|table| table.get("stage")?.get("axes")?.as_array().map(Vec::len));
+        if let Some(count) = axes.filter(|count| *count > AxisName::ALL.len()) {
+            return Err(SettingsFileError::Axes {
+                path: path.to_owned(),
+                count,
+            });
+        }
         if file.form != FORM {
             return Err(SettingsFileError::Form {
                 path: path.to_owned(),
@@ -190,6 +230,40 @@ mod tests {
 
     fn parse(text: &str) -> Result<SettingsFile, SettingsFileError> {
         SettingsFile::parse(text, Path::new("stage.toml"))
+    }
+
+    #[test]
+    fn a_fourth_axis_is_refused() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stage.toml");
+        file().write(&path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let at = text.rfind("[[stage.axes]]").unwrap();
+        let error = parse(&format!("{text}\n{}", &text[at..])).unwrap_err();
+        assert!(
+            error.to_string().contains("4 times [[stage.axes]]"),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn other_axes_are_kept_unless_they_are_of_another_machine() {
+        let mut earlier = file();
+        earlier.stage.axes[0].feedback.pid.kp_v_per_mm *= 1.5;
+        let mut later = SettingsFile::new(StageSettings::simulated());
+        later.keep_other_axes(&earlier, AxisName::Y).unwrap();
+        assert_eq!(later.stage.axes[0], earlier.stage.axes[0]);
+        assert_eq!(later.provenance, earlier.provenance);
+
+        let mut again = SettingsFile::new(StageSettings::simulated());
+        again.keep_other_axes(&earlier, AxisName::X).unwrap();
+        assert_eq!(again, SettingsFile::new(StageSettings::simulated()));
+
+        earlier.stage.axes[0].encoder.resolution_mm *= 2.0;
+        assert_eq!(
+            again.keep_other_axes(&earlier, AxisName::Y),
+            Err(AxisName::X)
+        );
     }
 
     #[test]

@@ -4,7 +4,7 @@
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
-use quadrant_cli::explained;
+use quadrant_cli::{explained, terminal, warn};
 use quadrant_studies::{
     friction_models, identification, laws, numerics, outputs, random_axes, report, robustness,
 };
@@ -51,10 +51,10 @@ fn main() -> ExitCode {
         Command::Report(arguments) => report::command::run(&arguments),
         Command::Robustness(arguments) => robustness::command::run(&arguments),
     };
-    match done {
+    match done.and_then(|()| terminal::finish()) {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
-            eprintln!("error: {}", explained(&error));
+            warn!("error: {}", explained(&error));
             ExitCode::FAILURE
         }
     }

@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
@@ -18,7 +18,7 @@ use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
 use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
-use quadrant_sim::machine::{Machine, TestAxis};
+use quadrant_sim::machine::{Journal, Machine, TestAxis};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
@@ -28,6 +28,7 @@ use super::endpoint::Endpoint;
 use super::subject::{travel, travel_mm};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
+use quadrant_cli::{say, terminal};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]
@@ -52,10 +53,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MM", value_parser = travel, conflicts_with = "record")]
     travel: Option<f64>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
-    /// Without them those of --into if it is there, else those that the machine has.
+    /// Without them those of --into if it is there, else those that the machine has, and the axes that were commissioned
+    /// into the folder for results before.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
-    /// Write the settings into this file; without it, into settings.toml in the folder for results.
+    /// Write the settings into this file; without it, into settings.toml in the folder for results. Everything else is
+    /// written into a folder of the axis below it.
     #[arg(long, value_name = "FILE")]
     into: Option<PathBuf>,
     /// Let the settings that were found act on the machine. Without it the machine keeps those that it had.
@@ -84,6 +87,10 @@ pub(super) struct Request {
     /// motion.
     #[arg(long)]
     quick: bool,
+    /// Go on where an interrupted commissioning stood: its experiments are not run again. The axis must stand as free as at the
+    /// beginning.
+    #[arg(long)]
+    resume: bool,
 }
 
 /// Results of a commissioning.
@@ -118,6 +125,10 @@ pub(super) struct Done {
     pub(super) better: bool,
 }
 
+/// The file for the settings of the stage.
+const SETTINGS: &str = "settings.toml";
+/// The folder for experiments of a commissioning that has not ended.
+const EXPERIMENTS: &str = "experiments";
 /// The file for settings of a PID that nothing was better than.
 const PID_ALONE: &str = "settings-pid-alone.toml";
 
@@ -148,13 +159,13 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let done = job.run(&mut *machine)?;
     if machine.is_simulated() {
-        println!(
+        say!(
             "Simulated, not measured: {} axis, seed {}\n",
             axis.name(),
             output.seed
         );
     }
-    print!("{}", done.text);
+    terminal::print(format_args!("{}", done.text));
     if !done.better {
         bail!(
             "nothing was better than the PID alone on every sine; its settings are in {PID_ALONE}, and the page shows what was tried"
@@ -167,6 +178,7 @@ impl Arguments {
     /// Identifies the recordings of an earlier commissioning anew.
     fn run_saved(&self, folder: &Path, start: Option<SettingsFile>) -> anyhow::Result<()> {
         let Self { output, .. } = self;
+        output.ready()?;
         let axis = AxisName::from(self.axis);
         let mut file = start.unwrap_or_else(|| SettingsFile::new(StageSettings::simulated()));
         let base = file.stage.axes[axis as usize].clone();
@@ -178,17 +190,38 @@ impl Arguments {
             )?,
             checked: None,
         };
-        print!("{}", found.text());
+        terminal::print(format_args!("{}", found.text()));
         let path = match &self.into {
             Some(path) => path.clone(),
-            None => output.file("settings.toml")?,
+            None => output.file(SETTINGS)?,
         };
         let who = format!("the {axis} axis, recorded in {}", folder.display());
+        let output = &output.below(axis.as_str());
         for line in found.keep(output, &mut file, &path, axis, &who)? {
-            println!("{line}");
+            say!("{line}");
         }
         Ok(())
     }
+}
+
+/// The machine's settings, and those of the other axes that were commissioned into `path` before.
+fn beside_others(
+    machine: StageSettings,
+    axis: AxisName,
+    path: &Path,
+) -> anyhow::Result<SettingsFile> {
+    let mut file = SettingsFile::new(machine);
+    if path.exists() {
+        file.keep_other_axes(&SettingsFile::read(path)?, axis)
+            .map_err(|other| {
+                anyhow!(
+                    "{}: the {other} axis has another encoder or amplifier there than the machine's; give another --out, or \
+                     --settings",
+                    path.display()
+                )
+            })?;
+    }
+    Ok(file)
 }
 
 impl Job<'_> {
@@ -196,34 +229,45 @@ impl Job<'_> {
     /// new ones are to act, whatever came of it.
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
+        output.ready()?;
         let travel_mm = travel_mm(machine, axis, self.travel_mm, None)?;
         let before = machine.settings()?;
         let mut file = match self.start {
             Some(file) => file,
-            None => SettingsFile::new(before.clone()),
+            None => beside_others(before.clone(), axis, &output.file(SETTINGS)?)?,
         };
         let base = file.stage.axes[axis as usize].clone();
+        let folder = output.below(axis.as_str());
+        let experiments = folder.file(EXPERIMENTS)?;
         let outcome = {
             let mut test_axis = machine.test_axis(axis, travel_mm)?;
-            self.request.run(&mut *test_axis, &base, output.seed)
+            let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
+                .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
+            self.request.run(&mut journal, &base, output.seed)
         };
         machine
             .load(&before)
             .context("the machine did not take its old settings back")?;
-        let found = outcome?;
+        let found = outcome.with_context(|| {
+            format!(
+                "the commissioning has ended early; with --resume it goes on with what is in {}",
+                experiments.display()
+            )
+        })?;
 
         let who = format!("the {axis} axis of {}", machine.description());
         let better = found.is_better_than_pid();
         let path = match self.into {
             Some(path) if better => path.to_owned(),
-            None if better => output.file("settings.toml")?,
-            _ => output.file(PID_ALONE)?,
+            None if better => output.file(SETTINGS)?,
+            _ => folder.file(PID_ALONE)?,
         };
         let mut text = found.text();
-        for line in found.keep(output, &mut file, &path, axis, &who)? {
+        for line in found.keep(&folder, &mut file, &path, axis, &who)? {
             text.push_str(&line);
             text.push('\n');
         }
+        Journal::remove(&experiments)?;
         if self.apply && better {
             machine
                 .load(&file.stage)
@@ -366,11 +410,13 @@ impl Found {
         who: &str,
     ) -> anyhow::Result<Vec<String>> {
         let (found, checked) = (&self.found, self.checked());
-        for table in self.tables() {
-            output.keep_table(&table)?;
-        }
         let command = command_line();
+        // Seen from the settings' file.
         let records = saved::write(output, found, checked)?;
+        let records = records
+            .iter()
+            .map(|name| format!("{axis}/{name}"))
+            .collect();
         file.stage.axes[axis as usize] = found.settings.clone();
         file.add_provenance(
             &command,
@@ -379,6 +425,9 @@ impl Found {
             &["feedback", "friction", "feedforward", "plant"],
         );
         file.write(path)?;
+        for table in self.tables() {
+            output.keep_table(&table)?;
+        }
         let page = commission_page(who, found, checked, provenance(&command, output.seed));
         let mut lines = vec![format!("{}: the settings of the stage", path.display())];
         lines.extend(output.keep_page(&page, "commission.html")?);

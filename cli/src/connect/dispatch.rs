@@ -11,6 +11,7 @@ use super::{commission, identify, machine, observe, program, scope, settings, si
 
 /// Gives a command and prints its result; returns true if it succeeded. `source` is its line, for messages.
 pub(super) fn run(session: &mut Session, command: &Command, source: &str) -> bool {
+    session.client.resume();
     match answer(session, command) {
         Ok(Answer { text, data }) => {
             session.printer.result(command.name(), &text, &data);

@@ -28,6 +28,7 @@ pub(super) enum Said {
 /// # Errors
 /// A command that there is not, or one that lacks something.
 pub(super) fn parse(line: &str) -> Result<Said, String> {
+    let line = if line.trim() == "?" { "help" } else { line };
     let Some(words) = shlex::split(line) else {
         return Err("a quotation mark is not closed".to_owned());
     };
@@ -46,8 +47,11 @@ pub(super) fn parse(line: &str) -> Result<Said, String> {
             _ => {
                 let text = error.to_string();
                 let text = text.strip_prefix("error: ").unwrap_or(&text);
-                // The first paragraph; a script's reader wants no usage.
-                Err(text.split("\n\n").next().unwrap_or(text).trim().to_owned())
+                // The first paragraph and a tip; a script's reader wants no usage.
+                let mut paragraphs = text.split("\n\n").map(str::trim);
+                let what = paragraphs.next().unwrap_or(text);
+                let tip = paragraphs.find_map(|paragraph| paragraph.strip_prefix("tip: "));
+                Err(tip.map_or(what.to_owned(), |tip| format!("{what}; {tip}")))
             }
         },
     }
@@ -87,6 +91,7 @@ mod tests {
     fn what_is_not_understood_is_named_in_a_line() {
         for (line, part) in [
             ("fly", "fly"),
+            ("enabel", "'enable'"),
             ("move q 1", "q"),
             ("move x", "TARGET_MM"),
             ("get 'x", "quotation"),
@@ -101,6 +106,7 @@ mod tests {
 
     #[test]
     fn help_is_text_and_no_error() {
+        assert!(matches!(parse("?"), Ok(Said::Show(_))));
         assert!(matches!(parse("help"), Ok(Said::Show(text)) if text.contains("record")));
         assert!(matches!(parse("move --help"), Ok(Said::Show(text)) if text.contains("mm/s")));
     }

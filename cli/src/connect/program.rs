@@ -16,6 +16,7 @@ use serde_json::json;
 
 use super::answer::Answer;
 use super::command::{CircleOptions, StreamOptions};
+use quadrant_cli::warn;
 
 pub(super) fn plan(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let text =
@@ -70,9 +71,7 @@ pub(super) fn stream_program(
     let program =
         Program::read(&options.file).with_context(|| options.file.display().to_string())?;
     for (line, word) in &program.ignored {
-        eprintln!(
-            "note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools"
-        );
+        warn!("note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools");
     }
     let stage = settings::dump(client)?;
     let status = settle::rest(client, Duration::from_secs(60))?;

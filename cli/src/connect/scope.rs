@@ -1,6 +1,6 @@
 //! `scope`: channels in the terminal while they are sampled.
 
-use std::io::{IsTerminal, Write, stdout};
+use std::io::{IsTerminal, stdout};
 use std::path::Path;
 use std::time::Duration;
 
@@ -14,6 +14,7 @@ use serde_json::json;
 use super::answer::{Answer, seconds};
 use super::command::ScopeOptions;
 use super::session::Session;
+use quadrant_cli::terminal;
 
 /// Time from one picture to the next.
 const PICTURE: Duration = Duration::from_millis(100);
@@ -62,8 +63,7 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
                 [width, height],
                 &resolutions_mm,
             );
-            print!("{CLEAR}{picture}");
-            stdout().flush().context("cannot write to the terminal")?;
+            terminal::print(format_args!("{CLEAR}{picture}"));
         }
     }
     let samples = recording.finish(client)?;

@@ -6,6 +6,8 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::Context;
+use quadrant::link::message::{Body, MachineState};
+use quadrant_sim::client::settle;
 use rustyline::DefaultEditor;
 use rustyline::error::ReadlineError;
 
@@ -13,6 +15,7 @@ use super::command::Command;
 use super::dispatch;
 use super::line::{Said, parse};
 use super::session::Session;
+use quadrant_cli::say;
 
 /// Time of waiting for input after which the machine is told that its host is there.
 const ATTENTION: Duration = Duration::from_millis(100);
@@ -35,15 +38,15 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
     });
     for index in 0.. {
         let Some(line) = attended(session, &read) else {
-            break;
+            return Ok(all && !session.client.is_interrupted());
         };
         let line = line.context("cannot read standard input")?;
         if echo {
-            println!("> {line}");
+            say!("> {line}");
         }
         let succeeded = one(session, &line, &format!("line {}", index + 1));
         all &= succeeded;
-        if !(succeeded || keep_going) {
+        if session.client.is_interrupted() || !(succeeded || keep_going) {
             break;
         }
     }
@@ -54,7 +57,7 @@ fn one(session: &mut Session, line: &str, source: &str) -> bool {
     match parse(line) {
         Ok(Said::Nothing) => true,
         Ok(Said::Show(text)) => {
-            println!("{text}");
+            say!("{text}");
             true
         }
         Ok(Said::Ask(command)) => dispatch::run(session, &command, source),
@@ -65,7 +68,7 @@ fn one(session: &mut Session, line: &str, source: &str) -> bool {
     }
 }
 
-/// The next of what another thread reads, or nothing when that has ended; meanwhile the machine knows that its host is there.
+/// The next of what another thread reads, or nothing when that has ended or this program is to end; meanwhile the machine knows that its host is there.
 fn attended<T>(session: &mut Session, read: &Receiver<T>) -> Option<T> {
     loop {
         match read.recv_timeout(ATTENTION) {
@@ -74,9 +77,33 @@ fn attended<T>(session: &mut Session, read: &Receiver<T>) -> Option<T> {
             // A connection that is broken shows with the next command.
             Err(RecvTimeoutError::Timeout) => {
                 let _ = session.client.keep_alive();
+                if session.client.is_interrupted() {
+                    return None;
+                }
             }
         }
     }
+}
+
+/// Time in which the axes come to rest when a person leaves.
+const LEAVING: Duration = Duration::from_secs(10);
+
+/// Leaves no outputs on.
+fn leave(session: &mut Session) -> anyhow::Result<()> {
+    let client = &mut session.client;
+    let state = client.status()?.state;
+    if matches!(
+        state,
+        MachineState::Start | MachineState::Disabled | MachineState::Fault
+    ) {
+        return Ok(());
+    }
+    say!("the outputs are on: the axes stop, and the outputs go off");
+    client.order(Body::Stop)?;
+    // What does not come to rest is switched off all the same.
+    let _ = settle::rest(client, LEAVING);
+    client.order(Body::Disable)?;
+    Ok(())
 }
 
 /// A person: errors end nothing, Ctrl-C stops the axes, Ctrl-D ends.
@@ -95,10 +122,11 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
             }
         }
     });
-    println!(
+    say!(
         "{}; `help` lists the commands, Ctrl-C stops the axes, Ctrl-D ends",
         session.greeting()
     );
+    let mut interrupts = 0;
     loop {
         let line = match wanted.send(()) {
             Ok(()) => attended(session, &read),
@@ -106,12 +134,26 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
         };
         match line {
             Some(Ok(line)) => {
+                interrupts = 0;
+                if matches!(line.trim(), "quit" | "exit") {
+                    return leave(session);
+                }
                 one(session, &line, "");
             }
             Some(Err(ReadlineError::Interrupted)) => {
-                dispatch::run(session, &Command::Stop, "");
+                interrupts += 1;
+                let (said, command) = if interrupts == 1 {
+                    (
+                        "stop; once more disables the outputs, Ctrl-D ends",
+                        Command::Stop,
+                    )
+                } else {
+                    ("disable", Command::Disable)
+                };
+                say!("{said}");
+                dispatch::run(session, &command, "");
             }
-            Some(Err(ReadlineError::Eof)) | None => return Ok(()),
+            Some(Err(ReadlineError::Eof)) | None => return leave(session),
             Some(Err(error)) => return Err(error).context("cannot read the terminal"),
         }
     }

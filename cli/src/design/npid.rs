@@ -14,6 +14,7 @@ use quadrant_sim::design::{Form, Process};
 use quadrant_sim::pages::provenance;
 
 use super::process::Model;
+use quadrant_cli::say;
 
 /// Options of `quadrant design npid`.
 #[derive(Clone, Debug, Args)]
@@ -133,7 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         robustness,
         steps: steps.collect(),
     };
-    println!("{}\n", page.subject);
+    say!("{}\n", page.subject);
     for table in page.tables() {
         output.table(&table)?;
     }

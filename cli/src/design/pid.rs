@@ -13,6 +13,7 @@ use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::pages::provenance;
 
 use super::process::Model;
+use quadrant_cli::say;
 
 /// Options of `quadrant design pid`.
 #[derive(Clone, Debug, Args)]
@@ -195,7 +196,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         forms: forms.into(),
         step,
     };
-    println!("{}\n", page.subject);
+    say!("{}\n", page.subject);
     for table in page.tables() {
         output.table(&table)?;
     }

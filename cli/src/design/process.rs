@@ -11,6 +11,7 @@ use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::SettingsFile;
 
 use quadrant_cli::axis::Axis;
+use quadrant_cli::say;
 
 /// Options that name a model of an axis: numbers, or settings that hold one.
 #[derive(Clone, Debug, Args)]
@@ -129,7 +130,7 @@ impl Model {
         file.add_provenance(command, self.axis.name(), records, &[sets]);
         let path = output.file("settings.toml")?;
         file.write(&path)?;
-        println!(
+        say!(
             "{}: the settings of the stage with this {sets}",
             path.display()
         );

@@ -15,6 +15,7 @@ use quadrant_sim::machine::TestAxis;
 use super::recorded;
 use crate::subject::{Measured, Subject};
 use quadrant_cli::output::{Output, with_bar};
+use quadrant_cli::{say, warn};
 
 /// The settling time of a fresh measurement, s.
 const SETTLING_S: f64 = 0.7;
@@ -175,6 +176,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
         ..
     } = arguments;
+    output.ready()?;
     let (found, title) = if record.is_empty() {
         let start = subject.start_axis(None)?;
         let measured = arguments.measurement.run(subject, start.as_ref(), output)?;
@@ -184,7 +186,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     };
     let points = &found.estimate.response.points;
     let coherent = points.iter().filter(|point| point.coherence > 0.95).count();
-    println!(
+    say!(
         "{} lines from {:.1} to {:.1} Hz, {coherent} of them with a coherence above 0.95; resolution {} Hz, {} blocks, {} loop",
         points.len(),
         points.first().map_or(f64::NAN, |point| point.frequency_hz),
@@ -194,7 +196,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         if found.closed_loop { "closed" } else { "open" }
     );
     if 10 * coherent < points.len() {
-        eprintln!(
+        warn!(
             "note: hardly a line is coherent: the position does not follow the voltage. Are columns swapped, is the period right, is the \
              excitation lost in noise or friction?"
         );

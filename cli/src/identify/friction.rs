@@ -69,6 +69,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
         ..
     } = arguments;
+    output.ready()?;
     let exponent = arguments.exponent.map_or(Exponent::Free, Exponent::Fixed);
     let (map, title, stage) = match &arguments.record {
         None => {

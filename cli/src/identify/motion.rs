@@ -77,6 +77,7 @@ const LIMIT_V: f64 = 10.0;
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
+    output.ready()?;
     if let Some(force) = arguments.force_per_volt
         && !(force > 0.0 && force.is_finite())
     {

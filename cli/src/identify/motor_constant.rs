@@ -64,6 +64,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
         ..
     } = arguments;
+    output.ready()?;
     let settings = MotorConstantSettings {
         dwell_s: arguments.dwell_s,
         ..MotorConstantSettings::default()

@@ -57,6 +57,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
         ..
     } = arguments;
+    output.ready()?;
     let start = subject
         .start(destination.into.as_deref())?
         .map(|file| file.stage);

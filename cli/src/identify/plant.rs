@@ -39,6 +39,7 @@ pub(crate) struct Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
+    output.ready()?;
     let settings = PlantFitSettings {
         least_coherence: arguments.least_coherence,
         stiffness: arguments.stiffness,

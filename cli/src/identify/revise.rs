@@ -55,6 +55,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         subject, output, ..
     } = arguments;
+    output.ready()?;
     arguments.check()?;
     let bar = share("commissioning");
     let (measured, settings, title) = match &arguments.record {

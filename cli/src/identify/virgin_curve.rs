@@ -15,6 +15,7 @@ use quadrant_sim::record::Recording;
 use super::recorded;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::output::{Output, with_bar};
+use quadrant_cli::say;
 
 /// Options of `quadrant identify virgin-curve`.
 #[derive(Clone, Debug, Args)]
@@ -93,6 +94,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         output,
         ..
     } = arguments;
+    output.ready()?;
     let start = subject.start_axis(destination.into.as_deref())?;
     let (recording, title, stage) = match &arguments.record {
         Some(path) => {
@@ -113,7 +115,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             )?;
             let (recording, sine) = measured.found;
             recording.write_csv(&output.file("virgin-curve-recording.csv")?)?;
-            println!(
+            say!(
                 "Sine of {:.0} um at {} Hz",
                 1e3 * sine.amplitude_mm,
                 sine.frequency_hz

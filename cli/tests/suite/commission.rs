@@ -42,7 +42,7 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
         assert!(at.join("x").join(record).exists(), "{record}");
     }
 
-    let rms = verdict(&at.join("x/verdict.csv"), "RMS");
+    let rms = verdict(&at.join("x/x/verdict.csv"), "RMS");
     let [(pid, alone), (_, nonlinear), (full, best), ..] = &rms[..] else {
         panic!("{rms:?}");
     };
@@ -53,6 +53,13 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
     assert!(*nonlinear < 0.95 * alone && *best < 0.1 * alone, "{rms:?}");
     assert!(shown.contains("Chosen: N-PID + static + GMS"), "{shown}");
 
+    // Another axis into the same folder leaves the first as it is.
+    succeed(at, &["commission", "--axis", "y", "--quick", "--out", "x"]);
+    let both = SettingsFile::read(&at.join("x/settings.toml")).unwrap();
+    assert_eq!(&both.stage.axes[0], axis);
+    assert_eq!(both.provenance.len(), 2);
+    assert!(at.join("x/y/commission.html").exists());
+
     let again = succeed(
         at,
         &[
@@ -60,7 +67,7 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
             "--axis",
             "x",
             "--record",
-            "x",
+            "x/x",
             "--into",
             "again.toml",
             "--out",
@@ -88,8 +95,8 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
         elements.map(|element| element.stiffness_v_per_mm).sum()
     };
     close(stiffness(found), stiffness(known), 1e-3);
-    assert!(!at.join("again/verdict.csv").exists());
-    assert!(at.join("again/commission.html").exists());
+    assert!(!at.join("again/x/verdict.csv").exists());
+    assert!(at.join("again/x/commission.html").exists());
 
     let mut reference = "t_s,reference_mm\n".to_owned();
     for index in 0..1500 {

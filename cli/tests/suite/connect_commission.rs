@@ -72,7 +72,7 @@ fn a_connected_axis_is_commissioned_as_well_as_the_axis_itself() {
     close(of_link.delay_s, itself.delay_s, 0.01);
 
     let [found, known] =
-        ["connected", "direct"].map(|name| verdict(&at.join(name).join("verdict.csv")));
+        ["connected", "direct"].map(|name| verdict(&at.join(name).join("x/verdict.csv")));
     println!("RMS, um: {found:?} connected, {known:?} directly; A {of_link:?} {itself:?}");
     for law in 0..2 {
         close(found[law], known[law], 0.1);

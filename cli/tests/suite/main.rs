@@ -9,6 +9,7 @@ mod connect;
 mod connect_commission;
 mod design_commands;
 mod identify_commands;
+mod interrupted;
 mod part_program;
 mod record_bad_input;
 #[cfg(target_os = "linux")]

@@ -60,6 +60,12 @@ pub enum ClientError {
         /// Protocol version of the machine.
         theirs: u8,
     },
+    /// Somebody asked to stop: see [`Interrupt`](super::Interrupt).
+    #[error("interrupted: {done}")]
+    Interrupted {
+        /// What was done about it, for the message.
+        done: &'static str,
+    },
     /// The machine has restarted since the session was opened.
     #[error(
         "{what}: the machine has restarted, so this was not done; the session is open again, but outputs are off and home \

@@ -18,6 +18,7 @@
 pub mod columns;
 mod connected;
 mod error;
+mod interrupt;
 pub mod plot;
 pub mod samples;
 mod session;
@@ -31,4 +32,5 @@ mod timeout;
 mod tests;
 
 pub use error::{ClientError, with_reset};
+pub use interrupt::Interrupt;
 pub use session::Client;

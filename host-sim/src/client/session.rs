@@ -11,14 +11,19 @@ use quadrant::link::message::{
 use quadrant::link::message::{MachineState, TelemetryBlock};
 
 use super::error::ClientError;
+use super::interrupt::Interrupt;
 use super::timeout::{ANSWER, BUSY, BUSY_PAUSE, Idempotency, answer_timeout, idempotency};
 use crate::machine::{SimulatedIo, Transport};
 
 /// Notices that are kept until someone asks for them; of more, the oldest are dropped.
 const MOST_NOTICES: usize = 1 << 14;
 
-/// Longest silence of a host that jogs an axis: less than half of the machine's time-out.
+/// Longest silence of a host that has started a motion: less than half of the machine's time-out.
 const ALIVE: Duration = Duration::from_millis(200);
+
+/// Time in which the axes come to rest after an interruption, before the outputs are disabled, and time between two looks.
+const STOPPING: Duration = Duration::from_secs(10);
+const STOPPING_LOOK: Duration = Duration::from_millis(20);
 
 /// Times that a request which may be repeated is made before the machine counts as silent.
 const ATTEMPTS: u32 = 4;
@@ -31,8 +36,13 @@ pub struct Client {
     next_id: u16,
     /// Time of the last request.
     asked: Duration,
-    /// A jog may be under way, which the machine ends when its host falls silent.
-    jogs: bool,
+    /// A motion may be under way, which the machine ends when its host falls silent.
+    moves: bool,
+    interrupt: Interrupt,
+    /// What was done about an interruption: nothing starts until [`Client::resume`].
+    interrupted: Option<&'static str>,
+    /// The interruption is being heeded.
+    stopping: bool,
     notices: VecDeque<Notice>,
     dropped_notices: u64,
 }
@@ -49,7 +59,10 @@ impl Client {
             identity: None,
             next_id: 1,
             asked: Duration::ZERO,
-            jogs: false,
+            moves: false,
+            interrupt: Interrupt::default(),
+            interrupted: None,
+            stopping: false,
             notices: VecDeque::new(),
             dropped_notices: 0,
         };
@@ -82,6 +95,23 @@ impl Client {
         self.transport.simulated_io()
     }
 
+    /// The handle by which the session is interrupted, such as by a signal's handler. Wherever it waits for the machine next,
+    /// the axes stop, what was under way ends with [`ClientError::Interrupted`], and nothing is started until
+    /// [`resume`](Self::resume).
+    pub fn interrupt(&self) -> Interrupt {
+        self.interrupt.clone()
+    }
+
+    /// True if an interruption was heeded since the last [`resume`](Self::resume).
+    pub const fn is_interrupted(&self) -> bool {
+        self.interrupted.is_some()
+    }
+
+    /// Forgets an interruption: a person has given another command.
+    pub const fn resume(&mut self) {
+        self.interrupted = None;
+    }
+
     /// Asks, and waits for the answer. A request that may be made twice is made again if none comes, and for two seconds if the
     /// machine is busy. What enables the outputs or starts a motion is asked once.
     ///
@@ -90,6 +120,11 @@ impl Client {
     pub fn request(&mut self, body: Body) -> Result<Reply, ClientError> {
         let what = body.name();
         let idempotency = idempotency(&body);
+        if let Some(done) = self.interrupted
+            && idempotency == Idempotency::NotIdempotent
+        {
+            return Err(ClientError::Interrupted { done });
+        }
         let busy_until = self.now() + BUSY;
         loop {
             match self.ask(&body)? {
@@ -194,16 +229,54 @@ impl Client {
         Ok(())
     }
 
-    /// Lets the machine know that its host is there, if an axis jogs and nothing was asked for a while: it stops a jog whose
-    /// host has fallen silent. Whoever lets time pass without [`wait`](Self::wait) calls this a few times a second.
+    /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
+    /// its host has started when that falls silent. Whoever lets time pass without [`wait`](Self::wait) calls this a few
+    /// times a second.
     ///
     /// # Errors
     /// As [`request`](Self::request).
     pub fn keep_alive(&mut self) -> Result<(), ClientError> {
-        if self.jogs && self.now().saturating_sub(self.asked) >= ALIVE {
-            self.status()?;
+        self.heed_interrupt()?;
+        if self.moves && self.now().saturating_sub(self.asked) >= ALIVE {
+            let status = self.status()?;
+            self.moves = !is_at_rest(&status);
         }
         Ok(())
+    }
+
+    /// Stops the axes if somebody asked for it: once, and the outputs go off when it was asked for again before they are at
+    /// rest.
+    fn heed_interrupt(&mut self) -> Result<(), ClientError> {
+        if self.stopping {
+            return Ok(());
+        }
+        let requests = self.interrupt.take();
+        if requests == 0 {
+            return Ok(());
+        }
+        self.interrupted = Some("the machine may still move");
+        self.stopping = true;
+        let done = self.stop_for(requests);
+        self.stopping = false;
+        let done = done?;
+        self.interrupted = Some(done);
+        Err(ClientError::Interrupted { done })
+    }
+
+    fn stop_for(&mut self, mut requests: u32) -> Result<&'static str, ClientError> {
+        self.order(Body::Stop)?;
+        let due = self.now() + STOPPING;
+        loop {
+            requests += self.interrupt.take();
+            if requests > 1 || self.now() >= due {
+                self.order(Body::Disable)?;
+                return Ok("the outputs are off");
+            }
+            self.wait(STOPPING_LOOK)?;
+            if is_at_rest(&self.status()?) {
+                return Ok("the axes have stopped");
+            }
+        }
     }
 
     /// An error if a fault is latched: what ended `what`.
@@ -269,8 +342,13 @@ impl Client {
             Idempotency::Query | Idempotency::Idempotent => ATTEMPTS,
         };
         match body {
-            Body::Jog { velocity_mm_s, .. } => self.jogs = *velocity_mm_s != 0.0,
-            Body::Stop | Body::Disable => self.jogs = false,
+            Body::Jog { .. }
+            | Body::Run
+            | Body::Home(_)
+            | Body::Move { .. }
+            | Body::Stream(_)
+            | Body::Inject(_) => self.moves = true,
+            Body::Stop | Body::Disable => self.moves = false,
             _ => {}
         }
         let began = self.now();
@@ -322,6 +400,7 @@ impl Client {
         id: u16,
         due: Duration,
     ) -> Result<Option<Result<Reply, LinkError>>, ClientError> {
+        self.heed_interrupt()?;
         let mut buffer = [0; FRAME_BYTES];
         let timeout = due.saturating_sub(self.now()).min(ANSWER);
         let count = self
@@ -370,6 +449,11 @@ impl Client {
             theirs,
         }
     }
+}
+
+/// True if no motion is under way.
+pub(super) fn is_at_rest(status: &Status) -> bool {
+    !status.running && status.state != MachineState::Homing
 }
 
 /// Returns the name of a reply.

@@ -2,11 +2,10 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::MachineState;
 use quadrant::link::message::{AxisMode, AxisSet, Status};
 
 use super::error::ClientError;
-use super::session::Client;
+use super::session::{Client, is_at_rest};
 
 /// Time in which an order that was acknowledged has reached the control law.
 const ARRIVAL: Duration = Duration::from_millis(20);
@@ -23,7 +22,7 @@ pub fn rest(client: &mut Client, timeout: Duration) -> Result<Status, ClientErro
         "wait rest",
         timeout,
         "the motion has not ended; `stop` ends it",
-        |status| !status.running && status.state != MachineState::Homing,
+        is_at_rest,
     )
 }
 

@@ -11,14 +11,23 @@ pub(super) struct FlashFile {
 }
 
 impl FlashFile {
-    /// Reads a file; one that is not there is an erased flash of `bytes` bytes.
+    /// Reads a file; one that is not there becomes an erased flash of `bytes` bytes.
     ///
     /// # Errors
-    /// A file that cannot be read, or of another size.
+    /// A file that cannot be read or written, or of another size.
     pub(super) fn open(path: &Path, bytes: usize) -> io::Result<Self> {
         let kept = match std::fs::read(path) {
             Ok(kept) => kept,
-            Err(error) if error.kind() == io::ErrorKind::NotFound => vec![0xFF; bytes],
+            Err(error) if error.kind() == io::ErrorKind::NotFound => {
+                let erased = vec![0xFF; bytes];
+                let mut file = Self {
+                    path: path.to_owned(),
+                    kept: Vec::new(),
+                };
+                // Before anything is to be stored, rather than then.
+                file.keep(&erased)?;
+                return Ok(file);
+            }
             Err(error) => return Err(told(path, "cannot be read", &error)),
         };
         if kept.len() != bytes {

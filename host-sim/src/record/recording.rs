@@ -2,6 +2,8 @@
 
 use std::path::Path;
 
+use serde::{Deserialize, Serialize};
+
 use super::columns::{self, Columns, Purpose};
 use super::error::{RecordError, UnusableSignal};
 use super::trace::{TraceError, write_trace};
@@ -14,7 +16,7 @@ const LIMIT_V: f64 = 10.0;
 const MOST_SATURATED: f64 = 0.01;
 
 /// The signals of one experiment on one axis, sampled evenly. All columns have one length.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Recording {
     /// Time from one sample to the next, s.
     pub sample_time_s: f64,

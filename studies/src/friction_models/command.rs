@@ -10,6 +10,7 @@ use crate::friction_models::page::{
     friction_models_page, friction_models_table, friction_parameters_table, tracking_table,
 };
 use crate::friction_models::{Model, Parameters, compare, tracking};
+use quadrant_cli::say;
 
 /// Options of `quadrant-studies friction`.
 #[derive(Clone, Debug, Args)]
@@ -58,7 +59,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let bar = progress(tracking::RUNS, "tracking with each feedforward");
     let tracked = tracking::track(&axis_settings, axis.index(), output.seed, &bar)?;
     bar.finish_and_clear();
-    println!("Simulated, not measured. {} axis\n", axis.name());
+    say!("Simulated, not measured. {} axis\n", axis.name());
     output.table(&friction_parameters_table(&parameters))?;
     output.table(&friction_models_table(&behaviours))?;
     output.table(&tracking_table(&tracked))?;

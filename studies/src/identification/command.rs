@@ -5,6 +5,7 @@ use quadrant_cli::output::{Output, progress};
 
 use crate::identification::page::validation_table;
 use crate::identification::{NOISE_LEVELS, validate};
+use quadrant_cli::say;
 
 /// Options of `quadrant-studies identification`.
 #[derive(Clone, Debug, Args)]
@@ -25,7 +26,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let bar = progress(runs, "commissioning axes whose truth is hidden");
     let judgements = validate(arguments.seeds, &bar)?;
     bar.finish_and_clear();
-    println!("Simulated, not measured.\n");
+    say!("Simulated, not measured.\n");
     arguments.output.tables(
         "Identification judged by the truth",
         "Axes of the simulated stage, whose truth was hidden from identification; simulated, not measured",

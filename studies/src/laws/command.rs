@@ -10,6 +10,7 @@ use quadrant_sim::report::{Block, Page};
 use crate::laws::page::laws_section;
 use crate::laws::study::run_study;
 use crate::wrong_model::page::wrong_model_section;
+use quadrant_cli::say;
 
 /// Options of `quadrant-studies laws`.
 #[derive(Clone, Debug, Args)]
@@ -46,7 +47,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &|done| bar.inc((done * STEPS as f64) as u64),
     )?;
     bar.finish_and_clear();
-    println!(
+    say!(
         "Simulated, not measured. {} axis, 10 kHz, f32; seeds from {}\n",
         axis.name(),
         output.seed

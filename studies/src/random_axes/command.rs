@@ -12,6 +12,7 @@ use quadrant_cli::output::progress;
 use rayon::prelude::*;
 
 use super::{Line, Outcome, RandomAxis, judge};
+use quadrant_cli::say;
 
 /// Options of `quadrant-studies axes`.
 #[derive(Clone, Debug, Args)]
@@ -158,7 +159,7 @@ const LISTED: usize = 10;
 
 /// Prints the counts, the errors, and the worst axes, each with its seed.
 fn summary(lines: &BTreeMap<u64, Line>) {
-    println!("Simulated, not measured: {} random axes\n", lines.len());
+    say!("Simulated, not measured: {} random axes\n", lines.len());
     for outcome in [
         Outcome::Commissioned,
         Outcome::PidAlone,
@@ -171,19 +172,19 @@ fn summary(lines: &BTreeMap<u64, Line>) {
             .filter(|line| line.outcome == outcome)
             .count();
         let percent = 100.0 * count as f64 / lines.len() as f64;
-        println!("{outcome:<16} {count:>6} {percent:>6.1} %");
+        say!("{outcome:<16} {count:>6} {percent:>6.1} %");
     }
     let mut ratios: Vec<f64> = lines.values().filter_map(|line| line.mean_ratio).collect();
     ratios.sort_by(f64::total_cmp);
     if let Some(median) = ratios.get(ratios.len() / 2) {
-        println!(
+        say!(
             "\nLargest error against the PID, median over what was commissioned: {:+.1} %",
             100.0 * (median - 1.0)
         );
     }
     let mut minutes: Vec<f64> = lines.values().map(|line| line.axis_min).collect();
     minutes.sort_by(f64::total_cmp);
-    println!("Axis time, median: {:.1} min", minutes[minutes.len() / 2]);
+    say!("Axis time, median: {:.1} min", minutes[minutes.len() / 2]);
     let mut reasons: BTreeMap<String, Vec<u64>> = BTreeMap::new();
     for line in lines.values().filter(|line| !line.reason.is_empty()) {
         let reason = line.reason.split(':').next().unwrap_or_default();
@@ -193,7 +194,7 @@ fn summary(lines: &BTreeMap<u64, Line>) {
             .push(line.seed);
     }
     for (reason, seeds) in &reasons {
-        println!(
+        say!(
             "{reason}: {} axes, seeds {:?}",
             seeds.len(),
             &seeds[..seeds.len().min(LISTED)]
@@ -208,9 +209,9 @@ fn summary(lines: &BTreeMap<u64, Line>) {
             .unwrap_or(0.0)
             .total_cmp(&a.worst_ratio.unwrap_or(0.0))
     });
-    println!("\nWorst, to be replayed with --seeds SEED+1 --results FILE:");
+    say!("\nWorst, to be replayed with --seeds SEED+1 --results FILE:");
     for line in worst.iter().take(LISTED) {
-        println!(
+        say!(
             "{:>6}  {:>6.1} % of the PID's largest error, {}: {}",
             line.seed,
             100.0 * line.worst_ratio.unwrap_or(f64::NAN),

@@ -7,6 +7,7 @@ use quadrant_cli::output::{Output, share};
 use quadrant_sim::report::{Block, Page, Table};
 
 use crate::report::{Context, Done, PARTS, Part, Request, compute};
+use quadrant_cli::{say, warn};
 
 /// Options of `quadrant-studies report`.
 #[derive(Clone, Debug, Args)]
@@ -47,11 +48,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 0.0
             };
             let seconds = shared_s + (part.expected_s)(&context);
-            println!("{:<12} {seconds:>5.0} s  {}", part.id, part.title);
+            say!("{:<12} {seconds:>5.0} s  {}", part.id, part.title);
         }
         let sharing = PARTS.iter().filter(|part| part.needs_comparison);
         let sharing: Vec<&str> = sharing.map(|part| part.id).collect();
-        println!(
+        say!(
             "On two cores. {:.0} s of {} are the same runs, which one report does once.",
             context.comparison_s(),
             sharing.join(", ")
@@ -70,12 +71,13 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             fresh: arguments.fresh,
         },
         &bar,
-        &mut |line| bar.suspend(|| eprintln!("{line}")),
+        &mut |line| bar.suspend(|| warn!("{line}")),
     )?;
     bar.finish_and_clear();
-    println!(
+    say!(
         "Simulated, not measured; seed {}, {} seeds\n",
-        output.seed, arguments.seeds
+        output.seed,
+        arguments.seeds
     );
     for Done { part, sections } in &done {
         let shown = part.id == SHOWN || !only.is_empty();

@@ -14,6 +14,7 @@ use quadrant_sim::report::Page;
 
 use crate::robustness::page::{robustness_full_table, robustness_sections, robustness_tables};
 use crate::robustness::study::{StudyRequest, run_study, runs};
+use quadrant_cli::say;
 
 /// Options of `quadrant-studies robustness`.
 #[derive(Clone, Debug, Args)]
@@ -69,7 +70,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let bar = progress(runs(&request), "running the scenarios");
     let report = run_study(&request, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    println!(
+    say!(
         "Simulated, not measured: {} axis; runs of each: {}, seeds from {} on\n",
         axis.name(),
         arguments.seeds,

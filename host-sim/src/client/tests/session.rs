@@ -275,3 +275,53 @@ fn cobs(bytes: &[u8]) -> Vec<u8> {
         .flat_map(|part| std::iter::once(part.len() as u8 + 1).chain(part.iter().copied()))
         .collect()
 }
+
+#[test]
+fn an_interruption_stops_what_is_under_way_and_starts_nothing_until_a_person_goes_on() {
+    let (mut client, bench) = connected();
+    client.order(Body::Enable).unwrap();
+    let jog = Body::Jog {
+        axis: AxisName::X,
+        velocity_mm_s: 1.0,
+    };
+    client.order(jog.clone()).unwrap();
+    client.interrupt().request();
+    let error = settle::rest(&mut client, Duration::from_secs(1000)).unwrap_err();
+    assert_eq!(error.to_string(), "interrupted: the axes have stopped");
+    let status = client.status().unwrap();
+    assert!(!status.running);
+    assert_eq!(status.state, MachineState::Enabled);
+    let error = client.order(jog.clone()).unwrap_err();
+    assert!(matches!(error, ClientError::Interrupted { .. }), "{error}");
+    assert_eq!(count(&bench.borrow().requests, "jog"), 1);
+    client.resume();
+    client.order(jog).unwrap();
+}
+
+#[test]
+fn a_second_interruption_disables_the_outputs() {
+    let (mut client, bench) = connected();
+    client.order(Body::Enable).unwrap();
+    client.interrupt().request();
+    client.interrupt().request();
+    let error = client.wait(Duration::from_secs(1)).unwrap_err();
+    assert_eq!(error.to_string(), "interrupted: the outputs are off");
+    assert_eq!(count(&bench.borrow().requests, "stop"), 1);
+    assert_eq!(client.status().unwrap().state, MachineState::Disabled);
+}
+
+#[test]
+fn a_host_that_has_started_a_motion_shows_that_it_is_there() {
+    let (mut client, bench) = connected();
+    client.order(Body::Enable).unwrap();
+    client.wait(Duration::from_secs(2)).unwrap();
+    assert_eq!(count(&bench.borrow().requests, "status"), 0);
+    client
+        .order(Body::Jog {
+            axis: AxisName::X,
+            velocity_mm_s: 1.0,
+        })
+        .unwrap();
+    client.wait(Duration::from_secs(2)).unwrap();
+    assert!(count(&bench.borrow().requests, "status") >= 5);
+}

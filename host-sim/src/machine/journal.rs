@@ -1,0 +1,198 @@
+//! A journal of experiments: each is kept when it has ended, so that a series that was interrupted goes on where it stood.
+
+use std::fs;
+use std::hash::{DefaultHasher, Hash, Hasher};
+use std::io;
+use std::path::{Path, PathBuf};
+
+use quadrant::settings::AxisSettings;
+use serde::{Deserialize, Serialize};
+
+use super::error::MachineError;
+use super::test_axis::{AxisInfo, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
+
+/// A test axis whose experiments are kept in a folder. Those that are there already are not run again, as long as they are the
+/// same experiments under the same settings in the same order; settings act only once an experiment is run.
+pub struct Journal<'a> {
+    axis: &'a mut dyn TestAxis,
+    folder: PathBuf,
+    /// Number of the next experiment.
+    next: usize,
+    /// The next experiment may be in the folder.
+    known: bool,
+    settings: AxisSettings,
+    /// The settings are not in force yet.
+    pending: bool,
+}
+
+/// An experiment that has ended.
+#[derive(Serialize, Deserialize)]
+struct Entry {
+    name: String,
+    /// Tells the experiment and its settings from others.
+    key: u64,
+    recording: Recording,
+}
+
+impl<'a> Journal<'a> {
+    /// A journal in a folder, which is made. Without `resume`, what is there is deleted.
+    ///
+    /// # Errors
+    /// A folder that cannot be made or emptied.
+    pub fn open(axis: &'a mut dyn TestAxis, folder: &Path, resume: bool) -> io::Result<Self> {
+        if !resume {
+            Self::remove(folder)?;
+        }
+        fs::create_dir_all(folder)?;
+        Ok(Self {
+            settings: axis.settings().clone(),
+            axis,
+            folder: folder.to_owned(),
+            next: 0,
+            known: resume,
+            pending: false,
+        })
+    }
+
+    /// Deletes the journal in a folder: nothing is to be resumed.
+    ///
+    /// # Errors
+    /// A folder that cannot be deleted.
+    pub fn remove(folder: &Path) -> io::Result<()> {
+        match fs::remove_dir_all(folder) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        }
+    }
+
+    fn key(&self, experiment: &Experiment) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        format!("{experiment:?} {:?}", self.settings).hash(&mut hasher);
+        hasher.finish()
+    }
+
+    fn kept(&self, path: &Path, key: u64) -> Option<Recording> {
+        let bytes = fs::read(path).ok()?;
+        let entry: Entry = serde_json::from_slice(&bytes).ok()?;
+        (entry.key == key).then_some(entry.recording)
+    }
+}
+
+/// Writes a file whole or not at all.
+fn keep(path: &Path, entry: &Entry) -> io::Result<()> {
+    let unfinished = path.with_extension("unfinished");
+    fs::write(&unfinished, serde_json::to_vec(entry)?)?;
+    fs::rename(unfinished, path)
+}
+
+impl TestAxis for Journal<'_> {
+    fn info(&self) -> AxisInfo {
+        self.axis.info()
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        &self.settings
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+        if !self.known {
+            self.axis.apply(settings)?;
+        }
+        self.pending = self.known;
+        self.settings = settings.clone();
+        Ok(())
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let path = self.folder.join(format!("{:03}.json", self.next));
+        self.next += 1;
+        let key = self.key(experiment);
+        if self.known
+            && let Some(recording) = self.kept(&path, key)
+        {
+            progress(1.0);
+            return Ok(recording);
+        }
+        let impossible = |reason: String| ExperimentError::Impossible {
+            experiment: experiment.name.clone(),
+            reason,
+        };
+        self.known = false;
+        if self.pending {
+            let settings = self.settings.clone();
+            self.axis
+                .apply(&settings)
+                .map_err(|error| impossible(error.to_string()))?;
+            self.pending = false;
+        }
+        let entry = Entry {
+            name: experiment.name.clone(),
+            key,
+            recording: self.axis.perform(experiment, progress)?,
+        };
+        keep(&path, &entry).map_err(|error| {
+            impossible(format!("cannot be kept in {}: {error}", path.display()))
+        })?;
+        Ok(entry.recording)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::machine::{Drive, SimulatedTestAxis, approach};
+    use crate::plant::StageParameters;
+
+    fn hold(ticks: usize) -> Experiment {
+        Experiment {
+            name: format!("{ticks} ticks"),
+            drive: Drive::OpenLoop,
+            injection_v: vec![0.3; ticks],
+            decimation: 1,
+            time_limit_s: 1.0,
+        }
+    }
+
+    fn axis() -> SimulatedTestAxis {
+        SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1)
+    }
+
+    #[test]
+    fn what_was_run_before_is_not_run_again_and_what_has_changed_is() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path().join("experiments");
+        let (mut first, mut again, mut other) = (axis(), axis(), axis());
+        let mut journal = Journal::open(&mut first, &at, false).unwrap();
+        let before = [50, 60].map(|ticks| journal.perform(&hold(ticks), &mut |_| {}).unwrap());
+
+        let mut journal = Journal::open(&mut again, &at, true).unwrap();
+        let after = [50, 60].map(|ticks| journal.perform(&hold(ticks), &mut |_| {}).unwrap());
+        assert_eq!(before, after);
+        assert_eq!(again.plant().position_mm(), axis().plant().position_mm());
+
+        let mut journal = Journal::open(&mut other, &at, true).unwrap();
+        journal.perform(&hold(50), &mut |_| {}).unwrap();
+        let mut settings = journal.settings().clone();
+        settings.feedback.pid.kp_v_per_mm *= 0.5;
+        journal.apply(&settings).unwrap();
+        journal.perform(&hold(60), &mut |_| {}).unwrap();
+        assert_eq!(other.settings(), &settings);
+        assert_ne!(other.plant().position_mm(), axis().plant().position_mm());
+    }
+
+    #[test]
+    fn a_series_that_is_begun_anew_forgets_the_old_one() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut first, mut again) = (axis(), axis());
+        let mut journal = Journal::open(&mut first, folder.path(), false).unwrap();
+        approach(&mut journal, 1.0).unwrap();
+        assert!(folder.path().read_dir().unwrap().count() > 0);
+        Journal::open(&mut again, folder.path(), false).unwrap();
+        assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    }
+}
