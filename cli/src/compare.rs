@@ -15,6 +15,8 @@ use quadrant_sim::record::write_trace;
 
 /// Options of `quadrant compare`.
 #[derive(Clone, Debug, Args)]
+// Beside the group of the program without a command.
+#[group(id = "comparison")]
 pub(super) struct Arguments {
     #[command(flatten)]
     settings: LawSettings,
