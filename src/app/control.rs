@@ -10,7 +10,7 @@ use crate::app::telemetry::{Observation, Sampler, SamplerState};
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::safety::{FaultCode, StreamLoss};
+use crate::law::safety::{FaultCode, StreamLoss, Switches};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
 
@@ -25,6 +25,8 @@ pub struct Control<'q, 'a, S: Scalar> {
     capture: Option<Capture<'a>>,
     glitches: GlitchReadings,
     commanded: bool,
+    /// The inputs of the last tick.
+    switches: Switches,
     /// Some axes have new settings that others have not yet.
     exchanging: bool,
     /// Values of the first waiting block that were taken.
@@ -57,6 +59,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             capture: None,
             glitches: GlitchReadings::default(),
             commanded: false,
+            switches: Switches::NONE,
             exchanging: false,
             place: 0,
             orders: 0,
@@ -114,6 +117,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         };
         let command = command.filter(|command| *command != Command::Enable || !self.exchanging);
         self.commanded = command.is_some();
+        self.switches = inputs.switches;
         let axes = self.axes.each_ref().map(|axis| &**axis);
         let stage = StageRef {
             axes: axes.into(),
@@ -181,6 +185,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     #[inline(always)]
     pub fn snapshot(&self) -> Snapshot<S> {
         Snapshot {
+            switches: self.switches,
             orders: self.orders,
             plan_taken: self.plan_taken,
             ..Snapshot::of(&self.stage(), &self.state)

@@ -1,8 +1,11 @@
 //! The slow half's view of the fast one, taken once every [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS).
 
 use crate::law::admission::StageView;
+use crate::law::axes::PerAxis;
+use crate::law::axis::AxisState;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::injection::InjectionProgress;
+use crate::law::safety::Switches;
 use crate::law::safety::monitor::FollowingState;
 use crate::law::scalar::Scalar;
 use crate::law::stage::{StageRef, StageState};
@@ -35,6 +38,10 @@ pub struct Snapshot<S> {
     pub tick: u32,
     /// The supervisor's view.
     pub view: StageView,
+    /// The digital inputs.
+    pub switches: Switches,
+    /// The axes whose encoder has shown an index pulse.
+    pub indexed: PerAxis<bool>,
     /// The axes in order: x, y, z.
     pub axes: [AxisSnapshot<S>; 3],
     /// Progress of the injection under way, or of the last one.
@@ -46,12 +53,14 @@ pub struct Snapshot<S> {
 }
 
 impl<S: Scalar> Snapshot<S> {
-    /// Takes a snapshot of the stage, which has taken no order yet.
+    /// Takes a snapshot of the stage, which has taken no order yet and whose inputs are not known.
     #[inline(always)]
     pub fn of(stage: &StageRef<'_, S>, state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
         Self {
             tick: state.tick(),
             view: stage.view(state),
+            switches: Switches::NONE,
+            indexed: state.axes().by_ref().map(AxisState::is_indexed),
             axes: state.axes().each_ref().map(|axis| {
                 let telemetry = axis.telemetry();
                 AxisSnapshot {

@@ -59,6 +59,7 @@ fn requests() -> Vec<(Body, &'static str)> {
         (Body::Hello, "00"),
         (Body::Status, "01"),
         (Body::Fault, "02"),
+        (Body::Inputs, "12"),
         (Body::ResetFault, "03"),
         (Body::Enable, "04"),
         (Body::Disable, "05"),

@@ -141,6 +141,16 @@ fn replies() -> Vec<(Result<Reply, LinkError>, &'static str)> {
             })),
             "0cac02a00b0180010701",
         ),
+        (
+            Ok(Reply::Inputs(Inputs {
+                tick: 300,
+                switches: 0x8001,
+                indexed: AxisSet::ALL,
+                refusal: Some(short("r")),
+            })),
+            "0dac02818002070101\
+             72",
+        ),
         (Err(LinkError::Version { yours: 9, mine: 1 }), "000901"),
         (Err(LinkError::Undecodable), "01"),
         (Err(LinkError::NoHello), "02"),

@@ -168,7 +168,7 @@ impl Noise {
 
     /// Any request, all its numbers finite.
     pub(crate) fn body(&mut self) -> Body {
-        match self.below(18) {
+        match self.below(19) {
             0 => Body::Hello,
             1 => Body::Status,
             2 => Body::Fault,
@@ -204,6 +204,7 @@ impl Noise {
             }),
             15 => Body::Capture(self.capture()),
             16 => Body::Inject(self.injection()),
+            17 => Body::Inputs,
             _ => Body::Reboot,
         }
     }

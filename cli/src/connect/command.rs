@@ -20,6 +20,12 @@ pub(super) enum Command {
     Hello,
     /// Say how the machine is: state, fault, and of each axis position, error and output.
     Status,
+    /// Say which of the digital inputs are active, and what keeps the outputs from being enabled: press each switch, and look.
+    Inputs {
+        /// Look for this long, and say what changes, s.
+        #[arg(default_value_t = 0.0)]
+        seconds: f64,
+    },
     /// Say which fault is latched, its cause, and what to do about it.
     Fault,
     /// Clear the latched fault; the outputs stay off.
@@ -59,12 +65,12 @@ pub(super) enum Command {
     },
     /// Start the plan: the motions of `plan` or `circle`, from where the axes stand. `wait rest` waits for their end.
     Run,
-    /// SimulatedPeer the plan for that of a TOML file: `motions`, one for each axis.
+    /// Exchange the plan for that of a TOML file: `motions`, one for each axis.
     Plan {
         /// The file: TOML.
         file: PathBuf,
     },
-    /// SimulatedPeer the plan for a circle from where the axes stand; `run` starts it.
+    /// Exchange the plan for a circle from where the axes stand; `run` starts it.
     Circle(CircleOptions),
     /// Follow a part program in G-code from where the axes stand, and wait for its end.
     Stream(StreamOptions),
@@ -118,6 +124,9 @@ pub(super) enum Command {
     Capture(CaptureCommand),
     /// Draw channels in the terminal while they are sampled; with --svg, --png or --csv, keep what was drawn.
     Scope(ScopeOptions),
+    /// Watch the machine live in the terminal: states, inputs, strip charts of channels, gains that are nudged meanwhile. `?` shows
+    /// the keys.
+    Watch(WatchOptions),
     /// Show events as the link tells them: states, faults, motions, settings.
     Events {
         /// Duration, s; 0 shows only those that have come already.
@@ -306,6 +315,27 @@ pub(super) struct ScopeOptions {
     pub(super) csv: Option<PathBuf>,
 }
 
+/// Options of the command `watch`.
+#[derive(Clone, Debug, Args)]
+pub(super) struct WatchOptions {
+    /// Channels of the charts, at most 8.
+    #[arg(
+        value_delimiter = ',',
+        value_name = "CHANNEL,...",
+        default_value = "x.error,y.error,z.error"
+    )]
+    pub(super) channels: Vec<Channel>,
+    /// Time across a chart, s, 0.1 to 60.
+    #[arg(long, default_value_t = 4.0, value_name = "S")]
+    pub(super) window: f64,
+    /// Settings that are nudged, each a number; without any, the PID's gains of the charts' axes.
+    #[arg(long, value_name = "PATH")]
+    pub(super) gain: Vec<String>,
+    /// The file for what is written by `w`: CSV.
+    #[arg(long, value_name = "FILE", default_value = "watch.csv")]
+    pub(super) csv: PathBuf,
+}
+
 /// Event that a capture waits for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 pub(super) enum TriggerEvent {
@@ -418,6 +448,7 @@ impl Command {
         match self {
             Self::Hello => "hello",
             Self::Status => "status",
+            Self::Inputs { .. } => "inputs",
             Self::Fault => "fault",
             Self::Reset => "reset",
             Self::Enable => "enable",
@@ -443,6 +474,7 @@ impl Command {
             Self::Record(_) => "record",
             Self::Capture(_) => "capture",
             Self::Scope(_) => "scope",
+            Self::Watch(_) => "watch",
             Self::Events { .. } => "events",
             Self::Log(_) => "log",
             Self::Press { .. } => "press",

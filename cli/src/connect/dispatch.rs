@@ -7,7 +7,9 @@ use super::answer::Answer;
 use super::command::{Command, RecordOptions};
 use super::line::{self, Said};
 use super::session::Session;
-use super::{commission, identify, machine, observe, program, scope, settings, simulated_io};
+use super::{
+    commission, identify, inputs, machine, observe, program, scope, settings, simulated_io, watch,
+};
 
 /// Gives a command and prints its result; returns true if it succeeded. `source` is its line, for messages.
 pub(super) fn run(session: &mut Session, command: &Command, source: &str) -> bool {
@@ -30,6 +32,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
     match command {
         Command::Hello => machine::hello(client),
         Command::Status => machine::status(client),
+        Command::Inputs { seconds } => inputs::run(session, *seconds),
         Command::Fault => machine::fault(client),
         Command::Reset
         | Command::Enable
@@ -60,6 +63,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         Command::Record(options) => record(session, options),
         Command::Capture(command) => observe::capture(client, command),
         Command::Scope(options) => scope::run(session, options),
+        Command::Watch(options) => watch::run(&mut session.client, options),
         Command::Events { seconds } => observe::events(session, *seconds),
         Command::Log(options) => simulated_io::log(session, options),
         Command::Press { inputs } => simulated_io::press(session, inputs),

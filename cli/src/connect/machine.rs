@@ -10,6 +10,7 @@ use serde_json::json;
 
 use super::answer::{Answer, name, seconds};
 use super::command::Command;
+use super::inputs;
 use quadrant_cli::axis::Axis;
 
 pub(super) fn hello(client: &mut Client) -> anyhow::Result<Answer> {
@@ -30,12 +31,23 @@ pub(super) fn hello(client: &mut Client) -> anyhow::Result<Answer> {
 
 pub(super) fn status(client: &mut Client) -> anyhow::Result<Answer> {
     let status = client.status()?;
-    let text = status_text(
+    let inputs = client.inputs()?;
+    let mut text = status_text(
         &status,
         client.identity().rate_hz,
         client.identity().cycle_hz,
     );
-    Ok(Answer::new(text, json!(status)))
+    let active = inputs::active(&inputs);
+    if !active.is_empty() {
+        let _ = write!(text, "\nactive inputs: {}", active.join(", "));
+    }
+    if let Some(refusal) = inputs::refusal(&inputs) {
+        let _ = write!(text, "\n{refusal}");
+    }
+    let mut data = json!(status);
+    data["inputs"] = json!(active);
+    data["refusal"] = json!(inputs.refusal);
+    Ok(Answer::new(text, data))
 }
 
 fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {

@@ -6,6 +6,7 @@ mod commission;
 mod dispatch;
 mod flash;
 mod identify;
+mod inputs;
 mod line;
 mod machine;
 mod observe;
@@ -16,6 +17,7 @@ mod script;
 mod session;
 mod settings;
 mod simulated_io;
+mod watch;
 
 use std::path::PathBuf;
 

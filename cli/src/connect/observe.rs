@@ -212,7 +212,7 @@ pub(super) fn events(session: &mut Session, time_s: f64) -> anyhow::Result<Answe
 }
 
 /// A notice as a line.
-fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
+pub(super) fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
     match notice {
         Notice::Event {
             sequence,

@@ -398,3 +398,22 @@ fn what_a_place_lacks_is_named_with_a_remedy() {
         assert!(no_image.contains(part), "{no_image}");
     }
 }
+
+#[test]
+fn inputs_are_seen_and_what_they_prevent() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = succeeds(
+        folder.path(),
+        &[],
+        "press x.home y.negative-limit\ninputs\nrelease\npress emergency-stop\nstatus\nrelease\ninputs\n",
+    );
+    assert!(said.contains("x.home            ACTIVE"), "{said}");
+    assert!(said.contains("y.negative-limit  ACTIVE"), "{said}");
+    assert!(said.contains("active inputs: emergency-stop"), "{said}");
+    assert!(
+        said.contains("`enable` would be refused: the emergency stop is pressed"),
+        "{said}"
+    );
+    let last = said.rsplit("emergency-stop ").next().unwrap();
+    assert!(last.contains("nothing keeps the outputs off"), "{said}");
+}

@@ -54,6 +54,14 @@ pub const fn unit(channel: Channel) -> &'static str {
     }
 }
 
+/// The unit in which people read a channel, and how many of them its column's unit is: errors are told in um.
+pub const fn shown_unit(channel: Channel) -> (&'static str, f64) {
+    match channel {
+        Channel::Axis(_, AxisSignal::Error) => ("um", 1e3),
+        other => (unit(other), 1.0),
+    }
+}
+
 /// A channel's values in its column's unit: positions in mm, by the length of a count of each axis.
 pub fn values_mm(samples: &Samples, index: usize, resolution_mm: &[f64; 3]) -> Vec<f64> {
     let mut values = samples.values(index);

@@ -91,6 +91,30 @@ impl Samples {
         }
     }
 
+    /// The samples from the one of index `first` on.
+    #[must_use]
+    pub fn from(&self, first: usize) -> Self {
+        let mut part = self.clone();
+        part.keep_last(self.len().saturating_sub(first));
+        part
+    }
+
+    /// Keeps at most the last `most` samples.
+    fn keep_last(&mut self, most: usize) {
+        let surplus = self.len().saturating_sub(most);
+        if surplus == 0 {
+            return;
+        }
+        let passed = self.numbers[surplus] - self.numbers[0];
+        self.first_tick = self
+            .first_tick
+            .wrapping_add(passed.wrapping_mul(self.decimation.into()));
+        self.numbers.drain(..surplus);
+        for words in &mut self.words {
+            words.drain(..surplus);
+        }
+    }
+
     fn new(client: &Client, channels: &[Channel], decimation: u16) -> Self {
         Self {
             channels: channels.to_vec(),
@@ -171,6 +195,11 @@ impl TelemetryRecorder {
             self.take(&block);
         }
         Ok(())
+    }
+
+    /// Forgets all but the last `most` samples.
+    pub fn keep_last(&mut self, most: usize) {
+        self.samples.keep_last(most);
     }
 
     /// The samples so far.

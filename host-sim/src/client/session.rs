@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
-    Body, FaultReport, Identity, LinkError, Message, Notice, Reply, Request, Status,
+    Body, FaultReport, Identity, Inputs, LinkError, Message, Notice, Reply, Request, Status,
 };
 use quadrant::link::message::{MachineState, TelemetryBlock};
 
@@ -90,7 +90,7 @@ impl Client {
         self.transport.endpoint()
     }
 
-    /// SimulatedIo at the machine, if it is not a real one.
+    /// Inputs, supply and log of the machine, if it is not a real one.
     pub fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
         self.transport.simulated_io()
     }
@@ -166,6 +166,17 @@ impl Client {
         match self.request(Body::Status)? {
             Reply::Status(status) => Ok(status),
             other => Err(self.unexpected("status", &other)),
+        }
+    }
+
+    /// Reads the machine's digital inputs.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn inputs(&mut self) -> Result<Inputs, ClientError> {
+        match self.request(Body::Inputs)? {
+            Reply::Inputs(inputs) => Ok(inputs),
+            other => Err(self.unexpected("inputs", &other)),
         }
     }
 
@@ -472,5 +483,6 @@ const fn reply_name(reply: &Reply) -> &'static str {
         Reply::Capture(_) => "the state of a capture",
         Reply::Words(_) => "words of a capture",
         Reply::Inject(_) => "the state of an injection",
+        Reply::Inputs(_) => "the digital inputs",
     }
 }

@@ -39,6 +39,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         Body::Hello
         | Body::Status
         | Body::Fault
+        | Body::Inputs
         | Body::Settings(
             SettingsRequest::Get(_) | SettingsRequest::List { .. } | SettingsRequest::Provenance,
         )

@@ -5,7 +5,7 @@ use std::io;
 use quadrant::axes::AxisName;
 use quadrant::safety::{AxisSwitches, Switches};
 
-/// SimulatedIo at a machine that is not a real one.
+/// Inputs, supply and log of a machine that is not a real one.
 pub trait SimulatedIo {
     /// Holds these inputs pressed, beside those that the stage presses itself, and no others.
     fn press(&mut self, switches: Switches);
@@ -23,7 +23,7 @@ pub trait SimulatedIo {
     fn log(&mut self) -> io::Result<Option<Vec<String>>>;
 }
 
-/// Inputs that can be pressed, by name.
+/// Digital inputs of a machine, by name; a simulated one's can be pressed.
 pub const INPUTS: [(&str, Switches); 13] = [
     ("emergency-stop", Switches::EMERGENCY_STOP),
     (

@@ -29,7 +29,7 @@ pub trait Transport {
     /// Returns the remedy if the other end is silent.
     fn remedy(&self) -> &'static str;
 
-    /// SimulatedIo at the machine, where a program can have any: at a simulated one.
+    /// Inputs, supply and log of the machine, where a program can have them: of a simulated one.
     fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
         None
     }

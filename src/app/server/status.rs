@@ -2,14 +2,16 @@
 
 use super::Server;
 use crate::hal::SettingsFlash;
+use crate::law::admission;
 use crate::law::axes::AxisName;
+use crate::law::command::Command;
 use crate::law::motion::MotionMode;
 use crate::law::safety::SafetyState;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
 use quadrant_link::PROTOCOL_VERSION;
 use quadrant_link::message::{
-    AxisSet, AxisStatus, FaultReport, Identity, MachineState, Status, text,
+    AxisSet, AxisStatus, FaultReport, Identity, Inputs, MachineState, Status, text,
 };
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
@@ -55,6 +57,23 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             frames: self.frames,
             dropped_samples: self.packer.dropped(),
             dropped_events: self.dropped_events,
+        }
+    }
+
+    pub(super) fn inputs(&self) -> Inputs {
+        let view = self.seen.view;
+        let indexed = AxisName::ALL.into_iter().zip(self.seen.indexed);
+        let refusal = admission::refusal(view, Command::Enable);
+        Inputs {
+            tick: self.seen.tick,
+            switches: self.seen.switches.bits(),
+            indexed: indexed
+                .filter_map(|(axis, indexed)| indexed.then_some(axis.into()))
+                .collect::<AxisSet>(),
+            refusal: refusal.map(|refusal| match refusal.axis() {
+                Some(axis) => text(format_args!("{axis}: {}", refusal.as_str())),
+                None => text(format_args!("{}", refusal.as_str())),
+            }),
         }
     }
 

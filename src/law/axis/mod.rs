@@ -507,6 +507,11 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.homed
     }
 
+    /// True if the encoder has shown an index pulse since the axis was enabled or homed last.
+    pub(crate) fn is_indexed(&self) -> bool {
+        self.index.is_seen()
+    }
+
     #[inline(always)]
     fn reference_state(&self) -> ReferenceState {
         ReferenceState {

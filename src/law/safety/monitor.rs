@@ -133,6 +133,13 @@ pub struct IndexState {
     last: Option<u32>,
 }
 
+impl IndexState {
+    /// True if a pulse was seen.
+    pub(crate) const fn is_seen(&self) -> bool {
+        self.last.is_some()
+    }
+}
+
 impl IndexSpacing {
     /// Pulses `counts` apart (2 or more), each of which may be off by `tolerance` counts: a pulse has a width, and is
     /// met from both sides. None: there is no index, or its spacing is not known. Settings time only.

@@ -142,6 +142,20 @@ pub struct Status {
     pub dropped_events: u32,
 }
 
+/// The digital inputs.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Inputs {
+    /// The control tick at which this was true.
+    pub tick: u32,
+    /// The inputs that are active: five bits an axis (negative limit, positive limit, home, amplifier fault, output mismatch),
+    /// x lowest, and the emergency stop in bit 15.
+    pub switches: u16,
+    /// The axes whose encoder has shown an index pulse since they were enabled or homed last.
+    pub indexed: AxisSet,
+    /// The reason for which the outputs would not be enabled now, with its axis if it is one axis'.
+    pub refusal: Option<String<256>>,
+}
+
 /// A latched fault.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FaultReport {

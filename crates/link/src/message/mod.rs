@@ -24,7 +24,8 @@ pub use channel::{AxisSignal, Channel, StageSignal, UnknownChannel, WordKind};
 pub use error::LinkError;
 pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
 pub use machine::{
-    AxisMode, AxisStatus, FaultReport, Identity, LimitedBy, MachineState, NumberType, Status,
+    AxisMode, AxisStatus, FaultReport, Identity, Inputs, LimitedBy, MachineState, NumberType,
+    Status,
 };
 pub use motion::{
     AxisPoint, Harmonic, Motion, Plan, PointToPoint, STREAM_POINTS, SetPoint, StreamRequest,
@@ -106,6 +107,8 @@ pub enum Body {
     Reboot,
     /// A request about a voltage added to an axis' output. [`Reply::Inject`].
     Inject(InjectRequest),
+    /// Asks for the digital inputs, and for what keeps the outputs from being enabled. [`Reply::Inputs`].
+    Inputs,
 }
 
 impl Body {
@@ -231,4 +234,6 @@ pub enum Reply {
     Words(WordPage),
     /// Progress of an injected voltage.
     Inject(InjectStatus),
+    /// The digital inputs.
+    Inputs(Inputs),
 }

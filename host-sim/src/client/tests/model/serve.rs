@@ -36,6 +36,14 @@ impl Model {
                 }));
             }
             Body::Status => return Ok(Reply::Status(self.status())),
+            Body::Inputs => {
+                return Ok(Reply::Inputs(Inputs {
+                    tick: self.tick,
+                    switches: 0,
+                    indexed: AxisSet::NONE,
+                    refusal: None,
+                }));
+            }
             Body::Fault => {
                 return Ok(Reply::Fault(self.fault.map(|code| FaultReport {
                     code,
