@@ -21,18 +21,8 @@ use super::command::WatchOptions;
 
 /// Time from one picture to the next.
 const PICTURE: Duration = Duration::from_millis(50);
-/// Bounds of the time across a chart, s.
-const WINDOW_S: (f64, f64) = (0.1, 60.0);
 
 pub(super) fn run(client: &mut Client, options: &WatchOptions) -> anyhow::Result<Answer> {
-    if !(WINDOW_S.0..=WINDOW_S.1).contains(&options.window) {
-        bail!(
-            "--window {} s is outside {} to {}",
-            options.window,
-            WINDOW_S.0,
-            WINDOW_S.1
-        );
-    }
     if !(stdin().is_terminal() && stdout().is_terminal()) {
         bail!("watch needs a terminal; `scope` draws anywhere, `record` writes a file");
     }

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
+use anyhow::ensure;
 use quadrant::link::message::{
     AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, MachineState, Notice, Status,
     Trigger,
@@ -23,9 +24,9 @@ const MOST_SAMPLES: f64 = 4000.0;
 const NUDGE: f64 = 1.05;
 /// Samples that the cursor goes at a time, as a share of the window: slowly, and fast.
 const STEPS: (f64, f64) = (0.005, 0.1);
-/// Factor by which the window is changed, and its bounds, s.
+/// Bounds of the time across a chart, s, and the factor by which it is changed.
+const WINDOW_S: (f64, f64) = (0.1, 60.0);
 const ZOOM: f64 = 2.0;
-const WINDOW_S: (f64, f64) = super::WINDOW_S;
 /// Share of a capture before its trigger, %.
 const BEFORE_TRIGGER: u8 = 30;
 /// Time in which a frozen capture is read.
@@ -82,8 +83,15 @@ impl Watch {
     /// Begins to watch.
     ///
     /// # Errors
-    /// A refused selection, a gain that is no number, or a connection that is broken.
+    /// A window out of its bounds, a refused selection, a gain that is no number, or a connection that is broken.
     pub(super) fn start(client: &mut Client, options: &WatchOptions) -> anyhow::Result<Self> {
+        ensure!(
+            (WINDOW_S.0..=WINDOW_S.1).contains(&options.window),
+            "--window {} s is outside {} to {}",
+            options.window,
+            WINDOW_S.0,
+            WINDOW_S.1
+        );
         let identity = client.identity().clone();
         let every = (options.window * identity.rate_hz / MOST_SAMPLES).ceil() as u16;
         let every = every.max(least_decimation(options.channels.len(), identity.rate_hz));
