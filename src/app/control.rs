@@ -90,7 +90,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// One control period: takes what the server has sent, and computes the outputs. The settings' changes are its own to
     /// tell, and an order of the server's acts when the inputs have no command.
     #[inline(always)]
-    pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
+    pub fn tick(&mut self, mut inputs: Inputs) -> Outputs {
         let (settings_changed, unfit) = match self.ends.swaps.peek() {
             // Settings that are not those of a commissioned stage do not drive it on.
             Some(_) => (self.take_swap(), !self.stage().is_commissioned()),
@@ -112,23 +112,16 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 None => None,
             },
         };
-        let command = command.filter(|command| *command != Command::Enable || !self.exchanging);
-        self.commanded = command.is_some();
+        inputs.command = command.filter(|command| *command != Command::Enable || !self.exchanging);
+        inputs.settings_changed = settings_changed;
+        inputs.link_lost |= self.host.is_lost();
+        self.commanded = inputs.command.is_some();
         let axes = self.axes.each_ref().map(|axis| &**axis);
         let stage = StageRef {
             axes: axes.into(),
             streaming: self.streaming,
         };
-        let outputs = stage.tick(
-            &self.plan,
-            &mut self.state,
-            &Inputs {
-                command,
-                settings_changed,
-                link_lost: inputs.link_lost | self.host.is_lost(),
-                ..*inputs
-            },
-        );
+        let outputs = stage.tick(&self.plan, &mut self.state, &inputs);
         if self.host.is_needed() {
             self.host.update(&self.state);
         }

@@ -154,17 +154,22 @@ impl<S: Scalar> FeedforwardTerms<S> {
 #[derive(Clone, Debug, PartialEq)]
 enum Presliding<S: Scalar, const N: usize> {
     /// None, static, GMS, combined: the elements move with each of them.
-    Gms {
-        elements: Gms<S, N>,
-        surface: SlidingTable<S>,
-        breakaway: PerDirection<Sliding<S>>,
-    },
+    Gms(GmsOnSurface<S, N>),
     Smoothed {
         elements: SmoothedGms<S, N>,
         surface: SlidingTable<S>,
     },
     Lugre(Lugre<S>),
     Dahl(Dahl<S>),
+}
+
+/// The elements and what they slide on, the tables last.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
+struct GmsOnSurface<S: Scalar, const N: usize> {
+    elements: Gms<S, N>,
+    breakaway: PerDirection<Sliding<S>>,
+    surface: SlidingTable<S>,
 }
 
 /// The friction state of the feedforward; slack by default.
@@ -238,13 +243,14 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 /// assert!((terms.total() / exact - 1.0).abs() < 1e-3);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
-    presliding: Presliding<S, N>,
     coulomb_gain: S::Gain,
     gms_gain: S::Gain,
     viscous: PerDirection<S::Gain>,
     inertia: S::Gain,
+    presliding: Presliding<S, N>,
 }
 
 impl<S: Scalar, const N: usize> Feedforward<S, N> {
@@ -323,11 +329,11 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         }
         let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
         let force = match &self.presliding {
-            Presliding::Gms {
+            Presliding::Gms(GmsOnSurface {
                 elements,
-                surface,
                 breakaway,
-            } => {
+                surface,
+            }) => {
                 let sliding = match self.kind {
                     FeedforwardKind::Gms => *breakaway.of(direction),
                     _ => surface.at(speed, direction),
@@ -359,18 +365,18 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
 
 impl<S: Scalar, const N: usize> Presliding<S, N> {
     fn blank() -> Self {
-        Self::Gms {
+        Self::Gms(GmsOnSurface {
             elements: Gms::build(&[]),
-            surface: SlidingTable::blank(),
             breakaway: PerDirection::default(),
-        }
+            surface: SlidingTable::blank(),
+        })
     }
 
     /// Fills the tables of a model made by [`without_tables`](Self::without_tables) of the same parameters.
     fn fill_tables(&mut self, friction: &FrictionSettings, period_s: f64) {
         let curves = friction.sliding.map(|model| model.curve);
         match self {
-            Self::Gms { surface, .. } | Self::Smoothed { surface, .. } => {
+            Self::Gms(GmsOnSurface { surface, .. }) | Self::Smoothed { surface, .. } => {
                 surface.fill(&curves, friction.gms.attraction_v_s, period_s);
             }
             Self::Lugre(model) => {
@@ -401,13 +407,13 @@ impl<S: Scalar, const N: usize> Presliding<S, N> {
                 ),
                 surface: SlidingTable::blank(),
             },
-            _ => Self::Gms {
+            _ => Self::Gms(GmsOnSurface {
                 elements: Gms::build(&gms.elements),
                 surface: SlidingTable::blank(),
                 breakaway: sliding.map(|model| {
                     Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
                 }),
-            },
+            }),
         }
     }
 }

@@ -18,6 +18,7 @@ pub(crate) const NODES: usize = INTERVALS + 1;
 
 /// `CURVES` curves over one non-negative argument, sharing its look-up; constant beyond the end of the table.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct OctaveTable<S: Scalar, const CURVES: usize> {
     start: OctaveStart<S>,
     nodes: [[S; CURVES]; NODES],

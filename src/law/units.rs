@@ -3,6 +3,7 @@
 //! A position is never held as a float. [`Position`] is an `i64` of encoder counts with 16 fraction bits, so that a
 //! reference does not drift however long it runs, and the tracking error is formed before anything is rounded.
 
+use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use crate::law::rounding;
@@ -48,14 +49,14 @@ impl Position {
     }
 
     /// This displacement clipped to the range of an `i32` (+-32767 counts): how far an axis moves in one tick.
+    #[inline(always)]
     pub const fn clipped(self) -> i32 {
-        if self.0 > i32::MAX as i64 {
-            i32::MAX
-        } else if self.0 < i32::MIN as i64 {
-            i32::MIN
-        } else {
-            self.0 as i32
+        let low = self.0 as i32;
+        if low as i64 == self.0 {
+            return low;
         }
+        cold_path();
+        if self.0 < 0 { i32::MIN } else { i32::MAX }
     }
 }
 
