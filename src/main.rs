@@ -208,25 +208,28 @@ mod app {
     fn control(cx: control::Context) {
         cx.local.tick.acknowledge();
         let mut switches = cx.local.switches.read();
-        for (axis, differs) in AxisName::ALL
-            .into_iter()
-            .zip(cx.local.amplifiers.mismatches())
-        {
-            if differs {
-                switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
+        let mismatches = cx.local.amplifiers.mismatches();
+        if mismatches.contains(&true) {
+            for (axis, differs) in AxisName::ALL.into_iter().zip(mismatches) {
+                if differs {
+                    switches = switches.with_axis(axis, AxisSwitches::OUTPUT_MISMATCH);
+                }
             }
         }
         // Behind a pointer of unknown value: each access then is one from a base register. Where control lies is known when the
         // image is linked, and the compiler would make every address of two halves.
         let control = core::hint::black_box(&mut **cx.local.control);
         control.hear(FRAMES.load(Ordering::Relaxed));
-        let outputs = control.tick(Inputs {
+        let mut inputs = Inputs {
             readings: cx.local.encoders.read().into(),
             switches,
-            command: cx.local.commands_out.dequeue(),
             deadline_missed: *cx.local.deadline_missed,
             ..Inputs::default()
-        });
+        };
+        if cx.local.commands_out.ready() {
+            inputs.command = cx.local.commands_out.dequeue();
+        }
+        let outputs = control.tick(&mut inputs);
         cx.local
             .amplifiers
             .write(outputs.codes.into_array(), outputs.enabled);

@@ -28,6 +28,14 @@ impl EncoderReading {
     }
 }
 
+impl EncoderReading {
+    /// True if nothing is wrong with the reading and no index pulse passed.
+    #[inline(always)]
+    pub(crate) const fn is_plain(&self) -> bool {
+        self.index.is_none() && self.fresh && self.valid
+    }
+}
+
 impl Default for EncoderReading {
     fn default() -> Self {
         Self::of(0)
@@ -118,8 +126,14 @@ impl Encoder {
         state.position = state.position.saturating_add(Position::from_step(counts));
         Step {
             counts,
-            plausible: counts.unsigned_abs() <= self.largest_step as u32,
+            plausible: self.is_plausible(counts),
         }
+    }
+
+    /// True if the axis can have moved that far in a tick.
+    #[inline(always)]
+    pub(crate) const fn is_plausible(&self, counts: i32) -> bool {
+        counts.unsigned_abs() <= self.largest_step as u32
     }
 
     /// The accumulated count at which the counter showed `raw`, within half its range of the last reading.

@@ -34,7 +34,13 @@ impl Position {
     /// The sum, saturating: for what adds up without end.
     #[inline(always)]
     pub const fn saturating_add(self, other: Self) -> Self {
-        Self(self.0.saturating_add(other.0))
+        match self.0.checked_add(other.0) {
+            Some(sum) => Self(sum),
+            None => {
+                cold_path();
+                Self(self.0.saturating_add(other.0))
+            }
+        }
     }
 
     /// Rounds `value_mm` to the nearest unit; `resolution_mm` is the length of one encoder count. Settings time only.

@@ -608,17 +608,36 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let alive =
             self.signal_loss
                 .step(&mut state.signal_loss, step.counts, state.telemetry.output);
-        let plausible = !due || self.compare(state);
+        let agrees = !due || self.compare(state);
+        if step.plausible && slow && alive && agrees && reading.is_plain() {
+            return Ok(());
+        }
+        self.examine(state, reading, step.counts, alive, agrees)
+    }
+
+    /// Examines a reading that has an index pulse, or that a monitor takes for a fault.
+    #[cold]
+    #[inline(never)]
+    fn examine(
+        &self,
+        state: &mut AxisState<S, N>,
+        reading: &EncoderReading,
+        counts: i32,
+        alive: bool,
+        agrees: bool,
+    ) -> Result<(), FaultCode> {
+        let possible = self.encoder.is_plausible(counts);
+        let slow = self.overspeed.allows(&state.overspeed)
+            && (state.homed || state.speed().unsigned_abs() <= self.reduced_speed);
         let indexed = match reading.index {
             Some(raw) => self.take_pulse(state, raw),
             None => true,
         };
-        if reading.fresh && reading.valid && step.plausible && slow && alive && plausible && indexed
-        {
+        if reading.fresh && reading.valid && possible && slow && alive && agrees && indexed {
             return Ok(());
         }
         // Where counts may be lost, so is the origin.
-        if !reading.valid | !step.plausible | !indexed | !plausible {
+        if !reading.valid | !possible | !indexed | !agrees {
             state.homed = false;
         }
         // The first that explains the others.
@@ -626,13 +645,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             FaultCode::StaleSample
         } else if !reading.valid {
             FaultCode::EncoderInvalid
-        } else if !step.plausible {
+        } else if !possible {
             FaultCode::EncoderJump
         } else if !indexed {
             FaultCode::IndexMismatch
         } else if !slow {
             FaultCode::Overspeed
-        } else if !plausible {
+        } else if !agrees {
             FaultCode::EncoderImplausible
         } else {
             FaultCode::EncoderSignalLoss
@@ -647,8 +666,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
-    #[cold]
-    #[inline(never)]
     fn take_pulse(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
         let at = self.encoder.count_at(&state.encoder, raw);
         state.pulse = Some(at.position());

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion_state::MotionState;
 use super::sample::{MotionScale, ReferenceSample};
-use super::sine::{SINE_BITS, sine, sine_and_cosine};
+use super::sine::{SINE_BITS, SinePolynomial};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
@@ -84,6 +84,7 @@ pub struct Harmonic<S: Scalar> {
     centripetal: S::Gain,
     tangential: S::Gain,
     q30: S::Gain,
+    polynomial: SinePolynomial,
 }
 
 /// The part of a harmonic motion that a tick lies in.
@@ -140,7 +141,11 @@ impl<S: Scalar> Harmonic<S> {
             amplitude_counts,
             amplitude_fraction,
             start_phase,
-            start_swing: swing(sine(start_phase), amplitude_counts, amplitude_fraction),
+            start_swing: swing(
+                SinePolynomial::FIT.sine(start_phase),
+                amplitude_counts,
+                amplitude_fraction,
+            ),
             phase_per_tick,
             lead_ticks,
             lead_step: (1 << 62) / u64::from(lead_ticks),
@@ -156,6 +161,7 @@ impl<S: Scalar> Harmonic<S> {
                 Quantity::Acceleration,
             ),
             q30: S::gain(unit, Quantity::Integer, Quantity::Fraction),
+            polynomial: SinePolynomial::FIT,
         }
     }
 
@@ -200,7 +206,7 @@ impl<S: Scalar> Harmonic<S> {
     #[inline(always)]
     fn advance(&self, state: &mut MotionState, phase: u64) -> ReferenceSample<S> {
         state.phase = state.phase.wrapping_add(phase);
-        let (sine, cosine) = sine_and_cosine(self.phase(state));
+        let (sine, cosine) = self.polynomial.sine_and_cosine(self.phase(state));
         let swing = swing(sine, self.amplitude_counts, self.amplitude_fraction);
         ReferenceSample {
             position: Position(swing - self.start_swing),
@@ -232,7 +238,7 @@ impl<S: Scalar> Harmonic<S> {
             .times(ratio, Quantity::Fraction);
         // The slope of the smooth step over its largest, 4 p (1 - p).
         let slope = fraction((progress * (ONE - progress)) >> 29);
-        let (_, cosine) = sine_and_cosine(self.phase(state));
+        let (_, cosine) = self.polynomial.sine_and_cosine(self.phase(state));
         let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
             velocity: full.velocity.times(ratio, Quantity::Fraction),
