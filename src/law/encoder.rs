@@ -1,5 +1,7 @@
 //! From a hardware counter that wraps to a count that does not.
 
+use core::hint::cold_path;
+
 use crate::law::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
 
 /// A board's reading of one encoder in one tick.
@@ -114,20 +116,25 @@ impl Encoder {
     /// position is not lost when the limit was wrong.
     #[inline(always)]
     pub fn update(&self, state: &mut EncoderState, raw: u32) -> Step {
-        let counts = self.between(state.raw, raw);
-        state.raw = raw;
-        if !state.started {
-            state.started = true;
-            return Step {
-                counts: 0,
-                plausible: true,
-            };
-        }
-        state.position = state.position.saturating_add(Position::from_step(counts));
+        let counts = self.accumulate(state, raw);
         Step {
             counts,
             plausible: self.is_plausible(counts),
         }
+    }
+
+    /// As [`update`](Self::update), without the judgement; returns the counts. The first reading is where zero is.
+    #[inline(always)]
+    pub(crate) fn accumulate(&self, state: &mut EncoderState, raw: u32) -> i32 {
+        let counts = self.between(state.raw, raw);
+        state.raw = raw;
+        if !state.started {
+            cold_path();
+            state.started = true;
+            return 0;
+        }
+        state.position = state.position.saturating_add(Position::from_step(counts));
+        counts
     }
 
     /// True if the axis can have moved that far in a tick.

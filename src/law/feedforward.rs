@@ -247,6 +247,7 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
     coulomb_gain: S::Gain,
+    /// Zero where the kind has no pre-sliding model, or no viscous friction.
     gms_gain: S::Gain,
     viscous: PerDirection<S::Gain>,
     inertia: S::Gain,
@@ -281,6 +282,8 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// Feeds nothing forward. The tables stay: to clear them would take as long as to fill them.
     pub(crate) fn switch_off(&mut self) {
         self.kind = FeedforwardKind::None;
+        self.gms_gain = S::Gain::default();
+        self.viscous = PerDirection::default();
         self.inertia = S::Gain::default();
     }
 
@@ -295,10 +298,13 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     ) {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         self.kind = kind;
-        (self.coulomb_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
+        let acts = |does: bool| if does { 1.0 } else { 0.0 };
+        self.coulomb_gain = share(gains.level);
+        self.gms_gain = share(acts(kind.has_presliding()) * gains.gms);
+        let viscous = acts(kind.has_viscous()) * gains.viscous;
         self.viscous = friction.sliding.map(|model| {
             S::gain(
-                gains.viscous * model.viscous_v_s_per_mm,
+                viscous * model.viscous_v_s_per_mm,
                 Quantity::Velocity,
                 Quantity::Voltage,
             )
@@ -324,9 +330,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             ..FeedforwardTerms::default()
         };
         let direction = Direction::of(reference.velocity);
-        if self.kind.has_viscous() {
-            terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
-        }
+        terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
         let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
         let force = match &self.presliding {
             Presliding::Gms(GmsOnSurface {
@@ -356,9 +360,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
             Presliding::Dahl(model) => model.step(state.bristle(), displacement),
         };
-        if self.kind.has_presliding() {
-            terms.gms = force.scale(self.gms_gain);
-        }
+        terms.gms = force.scale(self.gms_gain);
         terms
     }
 }

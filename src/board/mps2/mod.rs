@@ -149,13 +149,6 @@ fn record() -> usize {
         .min(RECORDED_TICKS as u32 - 1) as usize
 }
 
-/// This tick's inputs as the host wrote them.
-#[cold]
-#[inline(never)]
-fn inputs() -> InputRecord {
-    InputRecord::from_words(core::array::from_fn(|word| mailbox::read(input(word))))
-}
-
 /// Three position encoders.
 pub(crate) struct Encoders {
     mode: Mode,
@@ -166,14 +159,25 @@ impl hal::Encoders for Encoders {
     fn read(&mut self) -> [EncoderReading; 3] {
         let at = input(0);
         let flags = mailbox::read(at + 4 * InputRecord::FLAGS_WORD);
-        if flags & InputRecord::SELDOM == 0 {
-            return [0, 1, 2].map(|axis| EncoderReading::of(mailbox::read(at + 4 * axis)));
+        let mut readings = [0, 1, 2].map(|axis| EncoderReading::of(mailbox::read(at + 4 * axis)));
+        if flags & InputRecord::SELDOM != 0 {
+            self.read_flags(&mut readings);
         }
-        let inputs = inputs();
+        readings
+    }
+}
+
+impl Encoders {
+    /// Takes over what the flags say, and is as slow as they say.
+    #[cold]
+    #[inline(never)]
+    fn read_flags(&self, readings: &mut [EncoderReading; 3]) {
+        let inputs =
+            InputRecord::from_words(core::array::from_fn(|word| mailbox::read(input(word))));
         if inputs.slow && self.mode == Mode::Paced {
             timer::CONTROL.wait_until_due();
         }
-        inputs.readings
+        *readings = inputs.readings;
     }
 }
 

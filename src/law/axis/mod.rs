@@ -601,18 +601,30 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         reading: &EncoderReading,
         due: bool,
     ) -> Result<(), FaultCode> {
-        let step = self.encoder.update(&mut state.encoder, reading.count);
+        let counts = self.encoder.accumulate(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
-        let slow = self.overspeed.step(&mut state.overspeed, step.counts)
-            && (state.homed || state.speed().unsigned_abs() <= self.reduced_speed);
-        let alive =
-            self.signal_loss
-                .step(&mut state.signal_loss, step.counts, state.telemetry.output);
+        state.overspeed.filter(counts);
+        let alive = self
+            .signal_loss
+            .step(&mut state.signal_loss, counts, state.telemetry.output);
         let agrees = !due || self.compare(state);
-        if step.plausible && slow && alive && agrees && reading.is_plain() {
-            return Ok(());
+        let usual = alive
+            && agrees
+            && self.encoder.is_plausible(counts)
+            && self.is_slow(state)
+            && reading.is_plain();
+        if usual {
+            Ok(())
+        } else {
+            self.examine(state, reading, counts, alive, agrees)
         }
-        self.examine(state, reading, step.counts, alive, agrees)
+    }
+
+    /// True if the measured speed is within its limits.
+    #[inline(always)]
+    fn is_slow(&self, state: &AxisState<S, N>) -> bool {
+        self.overspeed.allows(&state.overspeed)
+            && (state.homed || state.speed().unsigned_abs() <= self.reduced_speed)
     }
 
     /// Examines a reading that has an index pulse, or that a monitor takes for a fault.
@@ -627,8 +639,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         agrees: bool,
     ) -> Result<(), FaultCode> {
         let possible = self.encoder.is_plausible(counts);
-        let slow = self.overspeed.allows(&state.overspeed)
-            && (state.homed || state.speed().unsigned_abs() <= self.reduced_speed);
+        let slow = self.is_slow(state);
         let indexed = match reading.index {
             Some(raw) => self.take_pulse(state, raw),
             None => true,

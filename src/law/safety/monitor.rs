@@ -57,13 +57,7 @@ impl Overspeed {
     /// Takes a step of the encoder, counts; returns true if the filtered speed is within the limit.
     #[inline(always)]
     pub fn step(&self, state: &mut OverspeedState, counts: i32) -> bool {
-        let mut counts = counts;
-        if counts.wrapping_add(1 << STEP_BITS) as u32 >> (STEP_BITS + 1) != 0 {
-            cold_path();
-            counts = counts.clamp(-1 << STEP_BITS, (1 << STEP_BITS) - 1);
-        }
-        let speed = counts << SPEED_FRACTION_BITS;
-        state.filtered += (speed - state.filtered) >> SPEED_FILTER_BITS;
+        state.filter(counts);
         self.allows(state)
     }
 
@@ -71,6 +65,20 @@ impl Overspeed {
     #[inline(always)]
     pub(crate) fn allows(&self, state: &OverspeedState) -> bool {
         state.filtered.unsigned_abs() <= self.limit
+    }
+}
+
+impl OverspeedState {
+    /// Takes a step of the encoder, counts.
+    #[inline(always)]
+    pub(crate) fn filter(&mut self, counts: i32) {
+        let mut counts = counts;
+        if counts.wrapping_add(1 << STEP_BITS) as u32 >> (STEP_BITS + 1) != 0 {
+            cold_path();
+            counts = counts.clamp(-1 << STEP_BITS, (1 << STEP_BITS) - 1);
+        }
+        let speed = counts << SPEED_FRACTION_BITS;
+        self.filtered += (speed - self.filtered) >> SPEED_FILTER_BITS;
     }
 }
 
