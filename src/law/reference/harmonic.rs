@@ -192,27 +192,28 @@ impl<S: Scalar> Harmonic<S> {
     #[inline(always)]
     pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
         match self.lead(state.elapsed) {
-            Lead::FullSpeed => self.advance(state, self.phase_per_tick),
+            Lead::FullSpeed => self.turn(state, self.phase_per_tick).0,
             Lead::Under { tick, leaving } => self.step_lead(state, tick, leaving),
             Lead::Ended => ReferenceSample {
                 velocity: S::ZERO,
                 acceleration: S::ZERO,
-                ..self.advance(state, 0)
+                ..self.turn(state, 0).0
             },
         }
     }
 
-    /// Turns the phase and looks up the sample at full speed.
+    /// Turns the phase; returns the sample at full speed, and the cosine.
     #[inline(always)]
-    fn advance(&self, state: &mut MotionState, phase: u64) -> ReferenceSample<S> {
+    fn turn(&self, state: &mut MotionState, phase: u64) -> (ReferenceSample<S>, i32) {
         state.phase = state.phase.wrapping_add(phase);
         let (sine, cosine) = self.polynomial.sine_and_cosine(self.phase(state));
         let swing = swing(sine, self.amplitude_counts, self.amplitude_fraction);
-        ReferenceSample {
+        let sample = ReferenceSample {
             position: Position(swing - self.start_swing),
             velocity: S::scale_integer(cosine, self.velocity),
             acceleration: S::scale_integer(sine, self.centripetal),
-        }
+        };
+        (sample, cosine)
     }
 
     #[inline(always)]
@@ -228,7 +229,7 @@ impl<S: Scalar> Harmonic<S> {
         let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
         let square = (progress * progress) >> 31;
         let speed = (square * (3 * ONE - 2 * progress)) >> 31;
-        let full = self.advance(state, scaled_phase(self.phase_per_tick, speed));
+        let (full, cosine) = self.turn(state, scaled_phase(self.phase_per_tick, speed));
 
         let fraction = |q31: u64| S::scale_integer((q31 >> 1) as i32, self.q30);
         let ratio = fraction(speed);
@@ -238,7 +239,6 @@ impl<S: Scalar> Harmonic<S> {
             .times(ratio, Quantity::Fraction);
         // The slope of the smooth step over its largest, 4 p (1 - p).
         let slope = fraction((progress * (ONE - progress)) >> 29);
-        let (_, cosine) = self.polynomial.sine_and_cosine(self.phase(state));
         let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
             velocity: full.velocity.times(ratio, Quantity::Fraction),
