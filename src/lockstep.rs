@@ -202,6 +202,8 @@ impl InputRecord {
     const LINK_LOST: u32 = 25;
     const STUCK: u32 = 26;
     const SLOW: u32 = 29;
+    /// The flags beside the switches, one of which is seldom set.
+    pub const SELDOM: u32 = !0 << Self::INDEX_SEEN;
 
     /// Fresh and valid raw counts and a request: a stage without switches and index pulses.
     pub fn of_counts(counts: [u32; 3], request: Option<Command>) -> Self {

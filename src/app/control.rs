@@ -90,49 +90,35 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         self.host.hear(frames);
     }
 
-    /// One control period: takes what the server has sent, and computes the outputs. The settings' changes are its own to
-    /// tell, and an order of the server's acts when the inputs have no command.
+    /// One control period: takes what the server has sent, and computes the outputs. It adds to the inputs: the settings'
+    /// changes are its own to tell, and an order of the server's acts when they have no command.
     #[inline(always)]
-    pub fn tick(&mut self, inputs: &Inputs) -> Outputs {
-        let (settings_changed, unfit) = match self.ends.swaps.peek() {
+    pub fn tick(&mut self, inputs: &mut Inputs) -> Outputs {
+        let mut unfit = false;
+        if self.ends.swaps.ready() {
+            inputs.settings_changed = self.take_swap();
             // Settings that are not those of a commissioned stage do not drive it on.
-            Some(_) => (self.take_swap(), !self.stage().is_commissioned()),
-            None => (PerAxis::splat(false), false),
-        };
+            unfit = !self.stage().is_commissioned();
+        }
         match self.ends.stream_items.peek() {
             None => {}
             Some(StreamItem::Segments(_)) => self.take_segments(),
             Some(StreamItem::Injection(_) | StreamItem::Voltages(_)) => self.take_voltage(),
         }
-        let command = match inputs.command {
-            _ if unfit => Some(Command::Disable),
-            Some(command) => {
-                self.overtake(command);
-                Some(command)
-            }
-            None => match self.ends.orders.dequeue() {
-                Some(order) => self.take_order(order),
-                None => None,
-            },
-        };
-        let command = command.filter(|command| *command != Command::Enable || !self.exchanging);
-        self.commanded = command.is_some();
+        if unfit || inputs.command.is_some() || self.ends.orders.ready() {
+            self.choose_command(&mut inputs.command, unfit);
+        }
+        if self.host.is_needed() {
+            inputs.link_lost |= self.host.is_lost();
+        }
+        self.commanded = inputs.command.is_some();
         self.switches = inputs.switches;
         let axes = self.axes.each_ref().map(|axis| &**axis);
         let stage = StageRef {
             axes: axes.into(),
             streaming: self.streaming,
         };
-        let outputs = stage.tick(
-            &self.plan,
-            &mut self.state,
-            &Inputs {
-                command,
-                settings_changed,
-                link_lost: inputs.link_lost | self.host.is_lost(),
-                ..*inputs
-            },
-        );
+        let outputs = stage.tick(&self.plan, &mut self.state, inputs);
         if self.host.is_needed() {
             self.host.update(&self.state);
         }
@@ -155,11 +141,11 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// [`snapshot`]: Self::snapshot
     #[inline(always)]
     pub fn observe(&mut self, elapsed_cycles: u32) -> bool {
-        if let Some(sampler) = self.ends.samplers.dequeue() {
-            self.sampler = sampler;
+        if self.ends.samplers.ready() {
+            self.take_sampler();
         }
-        if let Some(command) = self.ends.capture_commands.dequeue() {
-            self.take_capture_command(command);
+        if self.ends.capture_commands.ready() {
+            self.take_capture_command();
         }
         let seen = Observation {
             stage: &self.state,
@@ -190,6 +176,24 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             plan_taken: self.plan_taken,
             ..Snapshot::of(&self.stage(), &self.state)
         }
+    }
+
+    /// Chooses the command of this tick. `unfit`: the settings are no longer those of a commissioned stage.
+    #[cold]
+    #[inline(never)]
+    fn choose_command(&mut self, given: &mut Option<Command>, unfit: bool) {
+        let command = match *given {
+            _ if unfit => Some(Command::Disable),
+            Some(command) => {
+                self.overtake(command);
+                Some(command)
+            }
+            None => match self.ends.orders.dequeue() {
+                Some(order) => self.take_order(order),
+                None => None,
+            },
+        };
+        *given = command.filter(|command| *command != Command::Enable || !self.exchanging);
     }
 
     /// Acts on an order of the server; returns the command that it is or brings about.
@@ -330,10 +334,19 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
 
     #[cold]
     #[inline(never)]
-    fn take_capture_command(&mut self, command: CaptureCommand<'a>) {
-        match command {
-            CaptureCommand::Record(capture) => self.capture = Some(capture),
-            CaptureCommand::GiveBack => {
+    fn take_sampler(&mut self) {
+        if let Some(sampler) = self.ends.samplers.dequeue() {
+            self.sampler = sampler;
+        }
+    }
+
+    #[cold]
+    #[inline(never)]
+    fn take_capture_command(&mut self) {
+        match self.ends.capture_commands.dequeue() {
+            None => {}
+            Some(CaptureCommand::Record(capture)) => self.capture = Some(capture),
+            Some(CaptureCommand::GiveBack) => {
                 if let Some(capture) = &mut self.capture {
                     capture.stop();
                 }

@@ -1,5 +1,7 @@
 //! From a hardware counter that wraps to a count that does not.
 
+use core::hint::cold_path;
+
 use crate::law::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
 
 /// A board's reading of one encoder in one tick.
@@ -25,6 +27,14 @@ impl EncoderReading {
             fresh: true,
             valid: true,
         }
+    }
+}
+
+impl EncoderReading {
+    /// True if nothing is wrong with the reading and no index pulse passed.
+    #[inline(always)]
+    pub(crate) const fn is_plain(&self) -> bool {
+        self.index.is_none() && self.fresh && self.valid
     }
 }
 
@@ -106,20 +116,31 @@ impl Encoder {
     /// position is not lost when the limit was wrong.
     #[inline(always)]
     pub fn update(&self, state: &mut EncoderState, raw: u32) -> Step {
+        let counts = self.accumulate(state, raw);
+        Step {
+            counts,
+            plausible: self.is_plausible(counts),
+        }
+    }
+
+    /// As [`update`](Self::update), without the judgement; returns the counts. The first reading is where zero is.
+    #[inline(always)]
+    pub(crate) fn accumulate(&self, state: &mut EncoderState, raw: u32) -> i32 {
         let counts = self.between(state.raw, raw);
         state.raw = raw;
         if !state.started {
+            cold_path();
             state.started = true;
-            return Step {
-                counts: 0,
-                plausible: true,
-            };
+            return 0;
         }
         state.position = state.position.saturating_add(Position::from_step(counts));
-        Step {
-            counts,
-            plausible: counts.unsigned_abs() <= self.largest_step as u32,
-        }
+        counts
+    }
+
+    /// True if the axis can have moved that far in a tick.
+    #[inline(always)]
+    pub(crate) const fn is_plausible(&self, counts: i32) -> bool {
+        counts.unsigned_abs() <= self.largest_step as u32
     }
 
     /// The accumulated count at which the counter showed `raw`, within half its range of the last reading.

@@ -154,17 +154,22 @@ impl<S: Scalar> FeedforwardTerms<S> {
 #[derive(Clone, Debug, PartialEq)]
 enum Presliding<S: Scalar, const N: usize> {
     /// None, static, GMS, combined: the elements move with each of them.
-    Gms {
-        elements: Gms<S, N>,
-        surface: SlidingTable<S>,
-        breakaway: PerDirection<Sliding<S>>,
-    },
+    Gms(GmsOnSurface<S, N>),
     Smoothed {
         elements: SmoothedGms<S, N>,
         surface: SlidingTable<S>,
     },
     Lugre(Lugre<S>),
     Dahl(Dahl<S>),
+}
+
+/// The elements and what they slide on, the tables last.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
+struct GmsOnSurface<S: Scalar, const N: usize> {
+    elements: Gms<S, N>,
+    breakaway: PerDirection<Sliding<S>>,
+    surface: SlidingTable<S>,
 }
 
 /// The friction state of the feedforward; slack by default.
@@ -238,13 +243,15 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 /// assert!((terms.total() / exact - 1.0).abs() < 1e-3);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct Feedforward<S: Scalar, const N: usize> {
     kind: FeedforwardKind,
-    presliding: Presliding<S, N>,
     coulomb_gain: S::Gain,
+    /// Zero where the kind has no pre-sliding model, or no viscous friction.
     gms_gain: S::Gain,
     viscous: PerDirection<S::Gain>,
     inertia: S::Gain,
+    presliding: Presliding<S, N>,
 }
 
 impl<S: Scalar, const N: usize> Feedforward<S, N> {
@@ -275,6 +282,8 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// Feeds nothing forward. The tables stay: to clear them would take as long as to fill them.
     pub(crate) fn switch_off(&mut self) {
         self.kind = FeedforwardKind::None;
+        self.gms_gain = S::Gain::default();
+        self.viscous = PerDirection::default();
         self.inertia = S::Gain::default();
     }
 
@@ -289,10 +298,13 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     ) {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
         self.kind = kind;
-        (self.coulomb_gain, self.gms_gain) = (share(gains.level), share(gains.gms));
+        let acts = |does: bool| if does { 1.0 } else { 0.0 };
+        self.coulomb_gain = share(gains.level);
+        self.gms_gain = share(acts(kind.has_presliding()) * gains.gms);
+        let viscous = acts(kind.has_viscous()) * gains.viscous;
         self.viscous = friction.sliding.map(|model| {
             S::gain(
-                gains.viscous * model.viscous_v_s_per_mm,
+                viscous * model.viscous_v_s_per_mm,
                 Quantity::Velocity,
                 Quantity::Voltage,
             )
@@ -318,16 +330,14 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             ..FeedforwardTerms::default()
         };
         let direction = Direction::of(reference.velocity);
-        if self.kind.has_viscous() {
-            terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
-        }
+        terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
         let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
         let force = match &self.presliding {
-            Presliding::Gms {
+            Presliding::Gms(GmsOnSurface {
                 elements,
-                surface,
                 breakaway,
-            } => {
+                surface,
+            }) => {
                 let sliding = match self.kind {
                     FeedforwardKind::Gms => *breakaway.of(direction),
                     _ => surface.at(speed, direction),
@@ -350,27 +360,25 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
             Presliding::Dahl(model) => model.step(state.bristle(), displacement),
         };
-        if self.kind.has_presliding() {
-            terms.gms = force.scale(self.gms_gain);
-        }
+        terms.gms = force.scale(self.gms_gain);
         terms
     }
 }
 
 impl<S: Scalar, const N: usize> Presliding<S, N> {
     fn blank() -> Self {
-        Self::Gms {
+        Self::Gms(GmsOnSurface {
             elements: Gms::build(&[]),
-            surface: SlidingTable::blank(),
             breakaway: PerDirection::default(),
-        }
+            surface: SlidingTable::blank(),
+        })
     }
 
     /// Fills the tables of a model made by [`without_tables`](Self::without_tables) of the same parameters.
     fn fill_tables(&mut self, friction: &FrictionSettings, period_s: f64) {
         let curves = friction.sliding.map(|model| model.curve);
         match self {
-            Self::Gms { surface, .. } | Self::Smoothed { surface, .. } => {
+            Self::Gms(GmsOnSurface { surface, .. }) | Self::Smoothed { surface, .. } => {
                 surface.fill(&curves, friction.gms.attraction_v_s, period_s);
             }
             Self::Lugre(model) => {
@@ -401,13 +409,13 @@ impl<S: Scalar, const N: usize> Presliding<S, N> {
                 ),
                 surface: SlidingTable::blank(),
             },
-            _ => Self::Gms {
+            _ => Self::Gms(GmsOnSurface {
                 elements: Gms::build(&gms.elements),
                 surface: SlidingTable::blank(),
                 breakaway: sliding.map(|model| {
                     Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
                 }),
-            },
+            }),
         }
     }
 }

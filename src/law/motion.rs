@@ -237,8 +237,31 @@ impl<S: Scalar> ReferenceGenerator<S> {
 }
 
 impl<S: Scalar> ReferenceGenerator<S> {
-    /// The reference of the next tick. `homed`: the axis knows where it is.
+    /// The reference of the next tick of an axis that stands at `position` or follows the plan, as most do in most ticks; none
+    /// in every other mode.
     #[inline(always)]
+    pub(crate) fn advance_plan(
+        &self,
+        state: &mut GeneratorState<S>,
+        motion: &Motion<S>,
+        position: Position,
+    ) -> Option<ReferenceSample<S>> {
+        match state.mode {
+            MotionMode::Plan if state.waiting == 0 => {
+                let sample = motion.step(&mut state.motion);
+                if motion.finished(&state.motion) {
+                    state.mode = MotionMode::Hold;
+                }
+                Some(sample)
+            }
+            MotionMode::Hold => Some(ReferenceSample::standing(position)),
+            _ => None,
+        }
+    }
+
+    /// The reference of the next tick in every mode for which [`advance_plan`](Self::advance_plan) has none. `homed`: the axis
+    /// knows where it is.
+    #[inline(never)]
     pub(crate) fn advance(
         &self,
         state: &mut GeneratorState<S>,
@@ -247,20 +270,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
         homed: bool,
         input: HomingInput,
     ) -> (ReferenceSample<S>, GeneratorEvent) {
-        if state.mode == MotionMode::Plan && state.waiting == 0 {
-            let sample = motion.step(&mut state.motion);
-            if motion.finished(&state.motion) {
-                state.mode = MotionMode::Hold;
-            }
-            return (sample, GeneratorEvent::None);
-        }
-        let standing = ReferenceSample {
-            position: from.position,
-            ..ReferenceSample::default()
-        };
-        if state.mode == MotionMode::Hold {
-            return (standing, GeneratorEvent::None);
-        }
+        let standing = ReferenceSample::standing(from.position);
         if state.waiting > 0 {
             state.waiting -= 1;
             if state.mode == MotionMode::Plan && motion.finished(&state.motion) {
@@ -268,18 +278,6 @@ impl<S: Scalar> ReferenceGenerator<S> {
             }
             return (standing, GeneratorEvent::None);
         }
-        self.advance_otherwise(state, from, homed, input)
-    }
-
-    /// The same for every mode but the plan's.
-    #[inline(never)]
-    fn advance_otherwise(
-        &self,
-        state: &mut GeneratorState<S>,
-        from: ReferenceState,
-        homed: bool,
-        input: HomingInput,
-    ) -> (ReferenceSample<S>, GeneratorEvent) {
         match (state.mode, &self.homing) {
             (MotionMode::Jog, _) => {
                 let limits = self.soft_limits.filter(|_| homed);
@@ -302,13 +300,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
                     (sample, GeneratorEvent::Fault(FaultCode::StreamUnderrun))
                 }
             },
-            (MotionMode::OpenLoop, _) => {
-                let standing = ReferenceSample {
-                    position: from.position,
-                    ..ReferenceSample::default()
-                };
-                (standing, GeneratorEvent::Open)
-            }
+            (MotionMode::OpenLoop, _) => (standing, GeneratorEvent::Open),
             // Homing whose settings have gone ends in a stop as well.
             (MotionMode::Home, None) => {
                 self.stop(state, from);

@@ -107,8 +107,6 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     interlock: Option<EnableInterlock>,
     /// An axis that moves though the outputs are off.
     moving: Option<AxisName>,
-    /// The axes that start no more than jogs and homing until they are homed.
-    awaiting_homing: PerAxis<bool>,
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
@@ -130,7 +128,6 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             tick: 0,
             interlock: None,
             moving: None,
-            awaiting_homing: PerAxis::splat(false),
             held: None,
             settled: 0,
             injection: InjectionState::default(),
@@ -282,7 +279,10 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             running: state.is_running(),
             interlock: state.interlock(),
             moving: state.moving(),
-            awaiting_homing: state.awaiting_homing,
+            awaiting_homing: self
+                .axes
+                .zip(state.axes.by_ref())
+                .map(|(axis, memory)| axis.awaits_homing(memory)),
             held: state.held(),
             modes: state.axes.by_ref().map(AxisState::mode),
             homed: state.axes.by_ref().map(AxisState::is_homed),
@@ -357,21 +357,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         let tick = state.tick;
         state.tick = tick.wrapping_add(1);
         let driven = state.safety.drives();
-        let mut good = inputs.switches.are_good();
-        let mut findings = Findings::splat(Ok(()));
-        for ((((axis, memory), reading), finding), index) in self
-            .axes
-            .into_iter()
-            .zip(&mut state.axes)
-            .zip(&inputs.readings)
-            .zip(&mut findings)
-            .zip(0..)
-        {
-            *finding = axis.read_encoder(memory, reading, is_due(tick, index));
-            good &= finding.is_ok();
-        }
+        let [x, y, z] = self.axes.into_array();
+        let [of_x, of_y, of_z] = &mut *state.axes;
+        let [at_x, at_y, at_z] = &*inputs.readings;
+        let findings = Findings::new([
+            x.read_encoder(of_x, at_x, is_due(tick, 0)),
+            y.read_encoder(of_y, at_y, is_due(tick, 1)),
+            z.read_encoder(of_z, at_z, is_due(tick, 2)),
+        ]);
         state.interlock = None;
-        if !good {
+        if !(inputs.switches.are_good() & is_empty(&findings)) {
             self.report_bad_inputs(state, inputs.switches, findings, tick);
         }
         if inputs.deadline_missed && driven {
@@ -382,14 +377,6 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         }
         if state.safety == SafetyState::Start && state.interlock.is_none() {
             state.safety = SafetyState::Disabled;
-        }
-        for ((axis, memory), awaiting) in self
-            .axes
-            .into_iter()
-            .zip(&state.axes)
-            .zip(&mut state.awaiting_homing)
-        {
-            *awaiting = axis.awaits_homing(memory);
         }
         state.moving = if driven { None } else { self.moving(state) };
         if let Some(command) = inputs.command {
@@ -408,20 +395,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             }
             return Outputs::default();
         }
-        let mut outputs = Outputs {
-            codes: PerAxis::splat(DacCode::ZERO),
+        let [of_x, of_y, of_z] = &mut *state.axes;
+        let [new_x, new_y, new_z] = inputs.settings_changed.into_array();
+        Outputs {
+            codes: PerAxis::new([
+                x.drive(of_x, new_x),
+                y.drive(of_y, new_y),
+                z.drive(of_z, new_z),
+            ]),
             enabled: true,
-        };
-        for (((axis, memory), code), changed) in self
-            .axes
-            .into_iter()
-            .zip(&mut state.axes)
-            .zip(&mut outputs.codes)
-            .zip(inputs.settings_changed)
-        {
-            *code = axis.drive(memory, changed);
         }
-        outputs
     }
 
     /// The first axis that does not stand.
@@ -443,20 +426,16 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         switches: Switches,
         tick: u32,
     ) {
-        let mut good = true;
-        let mut findings = Findings::splat(Ok(()));
-        for ((((axis, memory), motion), name), finding) in self
-            .axes
-            .into_iter()
-            .zip(&mut state.axes)
-            .zip(plan)
-            .zip(AxisName::ALL)
-            .zip(&mut findings)
-        {
-            *finding = axis.update_reference(memory, motion, switches.axis(name), tick);
-            good &= finding.is_ok();
-        }
-        if !good {
+        let [x, y, z] = self.axes.into_array();
+        let [of_x, of_y, of_z] = &mut *state.axes;
+        let [to_x, to_y, to_z] = &**plan;
+        let at = |axis| switches.axis(axis);
+        let findings = Findings::new([
+            x.update_reference(of_x, to_x, at(AxisName::X), tick),
+            y.update_reference(of_y, to_y, at(AxisName::Y), tick),
+            z.update_reference(of_z, to_z, at(AxisName::Z), tick),
+        ]);
+        if !is_empty(&findings) {
             self.trip_findings(state, findings, tick);
         }
         if let SafetyState::Stopping(fault) = state.safety {
@@ -630,6 +609,13 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             self.axes[name].end_injection(&mut state.axes[name]);
         }
     }
+}
+
+/// True if no axis found anything.
+#[inline(always)]
+fn is_empty(findings: &Findings) -> bool {
+    let [x, y, z] = &**findings;
+    x.is_ok() & y.is_ok() & z.is_ok()
 }
 
 /// Latches the fault of a stop once the axes stand.

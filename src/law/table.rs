@@ -18,6 +18,7 @@ pub(crate) const NODES: usize = INTERVALS + 1;
 
 /// `CURVES` curves over one non-negative argument, sharing its look-up; constant beyond the end of the table.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct OctaveTable<S: Scalar, const CURVES: usize> {
     start: OctaveStart<S>,
     nodes: [[S; CURVES]; NODES],
@@ -98,9 +99,12 @@ impl<S: Scalar, const CURVES: usize> OctaveTable<S, CURVES> {
         else {
             return self.nodes[NODES - 1];
         };
-        core::array::from_fn(|curve| {
-            low[curve] + (high[curve] - low[curve]).times(place, Quantity::Fraction)
-        })
+        // Not `array::from_fn`, which is not inlined everywhere.
+        let mut values = *low;
+        for (value, high) in values.iter_mut().zip(high) {
+            *value = *value + (*high - *value).times(place, Quantity::Fraction);
+        }
+        values
     }
 }
 

@@ -3,6 +3,7 @@
 //! A position is never held as a float. [`Position`] is an `i64` of encoder counts with 16 fraction bits, so that a
 //! reference does not drift however long it runs, and the tracking error is formed before anything is rounded.
 
+use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use crate::law::rounding;
@@ -33,7 +34,13 @@ impl Position {
     /// The sum, saturating: for what adds up without end.
     #[inline(always)]
     pub const fn saturating_add(self, other: Self) -> Self {
-        Self(self.0.saturating_add(other.0))
+        match self.0.checked_add(other.0) {
+            Some(sum) => Self(sum),
+            None => {
+                cold_path();
+                Self(self.0.saturating_add(other.0))
+            }
+        }
     }
 
     /// Rounds `value_mm` to the nearest unit; `resolution_mm` is the length of one encoder count. Settings time only.
@@ -48,14 +55,14 @@ impl Position {
     }
 
     /// This displacement clipped to the range of an `i32` (+-32767 counts): how far an axis moves in one tick.
+    #[inline(always)]
     pub const fn clipped(self) -> i32 {
-        if self.0 > i32::MAX as i64 {
-            i32::MAX
-        } else if self.0 < i32::MIN as i64 {
-            i32::MIN
-        } else {
-            self.0 as i32
+        let low = self.0 as i32;
+        if low as i64 == self.0 {
+            return low;
         }
+        cold_path();
+        if self.0 < 0 { i32::MIN } else { i32::MAX }
     }
 }
 

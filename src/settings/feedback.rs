@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::law::control::cascade::{Cascade, CascadeGains};
 use crate::law::control::feedback::{Feedback, LawKind};
 use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
-use crate::law::control::npid::{NonlinearGain, NonlinearGainTable};
+use crate::law::control::npid::{NonlinearGain, NonlinearGainTable, NonlinearPid};
 use crate::law::control::pid::Pid;
 use crate::law::control::pid::PidGains;
 use crate::law::control::schedule::{GainSchedule, MAX_POINTS, SchedulePoint, ScheduledPid};
@@ -136,10 +136,12 @@ impl FeedbackSettings {
         let law = match self.law {
             LawKind::Pid => None,
             LawKind::Pd => Some(Feedback::Pid(Pid::build(&self.pid, 0.0, period_s))),
-            LawKind::NPid => self
-                .nonlinear
-                .as_ref()
-                .map(|gain| Feedback::NPid(NonlinearGainTable::build(gain), pid())),
+            LawKind::NPid => self.nonlinear.as_ref().map(|gain| {
+                Feedback::NPid(NonlinearPid {
+                    pid: pid(),
+                    gain: NonlinearGainTable::build(gain),
+                })
+            }),
             LawKind::Scheduled => self.schedule.as_ref().map(|schedule| {
                 Feedback::Scheduled(ScheduledPid::build(&self.pid, schedule, limit_v, period_s))
             }),

@@ -104,7 +104,7 @@ impl Upper {
             readings[0] = EncoderReading::of(count as u32);
         }
         self.control.hear(self.intake.frames());
-        self.outputs = self.control.tick(&Inputs {
+        self.outputs = self.control.tick(&mut Inputs {
             readings: readings.into(),
             command: self.commands.pop_front(),
             ..self.inputs

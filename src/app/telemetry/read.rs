@@ -31,18 +31,19 @@ impl<S: Scalar, const N: usize> Observation<'_, S, N> {
 /// Reads a channel's word.
 #[inline(always)]
 pub fn read<S: Scalar, const N: usize>(channel: Channel, seen: &Observation<'_, S, N>) -> u32 {
-    let [x, y, z] = seen.stage.axes().by_ref().into_array();
-    let [glitch_x, glitch_y, glitch_z] = seen.glitches.heights_um;
     match channel {
         Channel::Stage(signal) => read_stage(signal, seen),
-        Channel::Axis(name, signal) => {
-            let (axis, glitch_um) = match name {
-                AxisName::X => (x, glitch_x),
-                AxisName::Y => (y, glitch_y),
-                AxisName::Z => (z, glitch_z),
-            };
-            read_axis(signal, axis, glitch_um)
-        }
+        Channel::Axis(name, signal) => match seen.stage.axes().get(name as usize) {
+            Some(axis) => read_axis(signal, axis, || {
+                let [x, y, z] = seen.glitches.heights_um;
+                match name {
+                    AxisName::X => x,
+                    AxisName::Y => y,
+                    AxisName::Z => z,
+                }
+            }),
+            None => 0,
+        },
     }
 }
 
@@ -50,7 +51,7 @@ pub fn read<S: Scalar, const N: usize>(channel: Channel, seen: &Observation<'_, 
 fn read_axis<S: Scalar, const N: usize>(
     signal: AxisSignal,
     axis: &AxisState<S, N>,
-    glitch_um: f32,
+    glitch_um: impl FnOnce() -> f32,
 ) -> u32 {
     let seen = axis.telemetry();
     let volts = |value: S| value.to_f32(Quantity::Voltage).to_bits();
@@ -72,7 +73,7 @@ fn read_axis<S: Scalar, const N: usize>(
         AxisSignal::LimitedBy => seen.limited_by as u32,
         AxisSignal::Injection => volts(axis.injected()),
         AxisSignal::CodeSum => seen.code_sum.wrapping_sub(seen.code.0.into()) as u32,
-        AxisSignal::Glitch => glitch_um.to_bits(),
+        AxisSignal::Glitch => glitch_um().to_bits(),
     }
 }
 

@@ -37,6 +37,9 @@ use quadrant::lockstep::{
 /// Control ticks begun. Written by [`Tick::acknowledge`] alone.
 static TICKS: AtomicU32 = AtomicU32::new(0);
 
+/// Offset of this tick's inputs. Written by [`Tick::acknowledge`] alone.
+static INPUTS: AtomicU32 = AtomicU32::new(lockstep::INPUT as u32);
+
 /// Cycles from the start of the control timer to the last tick of a paced run.
 static PACED_CYCLES: AtomicU32 = AtomicU32::new(0);
 
@@ -94,8 +97,8 @@ impl Board {
         mailbox::write_sequence(lockstep::STARTS, starts);
         Self {
             encoders: Encoders { mode: boot.mode },
-            switches: Switches { mode: boot.mode },
-            operator: Operator { mode: boot.mode },
+            switches: Switches,
+            operator: Operator,
             amplifiers: Amplifiers {
                 mode: boot.mode,
                 mismatches: [false; 3],
@@ -131,13 +134,10 @@ pub(crate) fn job() -> Option<&'static [u8]> {
     (!job.is_empty()).then_some(job)
 }
 
-/// Offset of this tick's inputs.
+/// Offset of a word of this tick's inputs.
 #[inline(always)]
-fn input(mode: Mode) -> usize {
-    match mode {
-        Mode::Lockstep => lockstep::INPUT,
-        Mode::Paced | Mode::Unpaced => RECORDED_INPUTS + InputRecord::BYTES * record(),
-    }
+fn input(word: usize) -> usize {
+    INPUTS.load(Ordering::Relaxed) as usize + 4 * word
 }
 
 /// The index of this tick's record, which stays inside the memory whatever happens.
@@ -149,13 +149,6 @@ fn record() -> usize {
         .min(RECORDED_TICKS as u32 - 1) as usize
 }
 
-/// This tick's inputs as the host wrote them.
-#[inline(always)]
-fn inputs(mode: Mode) -> InputRecord {
-    let at = input(mode);
-    InputRecord::from_words(core::array::from_fn(|word| mailbox::read(at + 4 * word)))
-}
-
 /// Three position encoders.
 pub(crate) struct Encoders {
     mode: Mode,
@@ -164,39 +157,48 @@ pub(crate) struct Encoders {
 impl hal::Encoders for Encoders {
     #[inline(always)]
     fn read(&mut self) -> [EncoderReading; 3] {
-        let inputs = inputs(self.mode);
+        let at = input(0);
+        let flags = mailbox::read(at + 4 * InputRecord::FLAGS_WORD);
+        let mut readings = [0, 1, 2].map(|axis| EncoderReading::of(mailbox::read(at + 4 * axis)));
+        if flags & InputRecord::SELDOM != 0 {
+            self.read_flags(&mut readings);
+        }
+        readings
+    }
+}
+
+impl Encoders {
+    /// Takes over what the flags say, and is as slow as they say.
+    #[cold]
+    #[inline(never)]
+    fn read_flags(&self, readings: &mut [EncoderReading; 3]) {
+        let inputs =
+            InputRecord::from_words(core::array::from_fn(|word| mailbox::read(input(word))));
         if inputs.slow && self.mode == Mode::Paced {
             timer::CONTROL.wait_until_due();
         }
-        inputs.readings
+        *readings = inputs.readings;
     }
 }
 
 /// The digital inputs of the stage.
-pub(crate) struct Switches {
-    mode: Mode,
-}
+pub(crate) struct Switches;
 
 impl hal::Switches for Switches {
     #[inline(always)]
     fn read(&mut self) -> safety::Switches {
-        let at = input(self.mode) + 4 * InputRecord::FLAGS_WORD;
-        safety::Switches::from_bits(mailbox::read(at) as u16)
+        safety::Switches::from_bits(mailbox::read(input(InputRecord::FLAGS_WORD)) as u16)
     }
 }
 
 /// The operator's requests.
-pub(crate) struct Operator {
-    mode: Mode,
-}
+pub(crate) struct Operator;
 
 impl Operator {
     /// Returns this tick's request.
     #[inline(always)]
     pub(crate) fn request(&mut self) -> Option<Command> {
-        Command::from_number(mailbox::read(
-            input(self.mode) + 4 * InputRecord::REQUEST_WORD,
-        ))
+        Command::from_number(mailbox::read(input(InputRecord::REQUEST_WORD)))
     }
 }
 
@@ -212,11 +214,15 @@ impl hal::Amplifiers for Amplifiers {
     /// Hands to the host what the converters hold of this tick's codes.
     #[inline(always)]
     fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
-        let flags = mailbox::read(input(self.mode) + 4 * InputRecord::FLAGS_WORD);
-        let held = lockstep::held(codes, InputRecord::stuck_of(flags));
-        let [x, y, z] = codes;
-        let [held_x, held_y, held_z] = held;
-        self.mismatches = [x != held_x, y != held_y, z != held_z];
+        let flags = mailbox::read(input(InputRecord::FLAGS_WORD));
+        let mut held = codes;
+        self.mismatches = [false; 3];
+        if flags & InputRecord::SELDOM != 0 {
+            held = lockstep::held(codes, InputRecord::stuck_of(flags));
+            let [x, y, z] = codes;
+            let [held_x, held_y, held_z] = held;
+            self.mismatches = [x != held_x, y != held_y, z != held_z];
+        }
         let answer = OutputRecord {
             outputs: Outputs {
                 codes: held.into(),
@@ -275,6 +281,10 @@ impl Tick {
     pub(crate) fn acknowledge(&mut self) {
         let ticks = TICKS.load(Ordering::Relaxed).wrapping_add(1);
         TICKS.store(ticks, Ordering::Relaxed);
+        if self.mode != Mode::Lockstep {
+            let at = RECORDED_INPUTS + InputRecord::BYTES * record();
+            INPUTS.store(at as u32, Ordering::Relaxed);
+        }
         if self.mode == Mode::Paced {
             timer::CONTROL.acknowledge();
             if ticks == self.last {

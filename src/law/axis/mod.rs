@@ -44,7 +44,7 @@ use crate::law::homing::HomingInput;
 use crate::law::motion::{
     GeneratorEvent, GeneratorState, MotionMode, ReferenceGenerator, ReferenceState,
 };
-use crate::law::reference::{Motion, Segment};
+use crate::law::reference::{Motion, ReferenceSample, Segment};
 use crate::law::rounding;
 use crate::law::safety::monitor::{
     Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
@@ -85,27 +85,30 @@ impl<S: Scalar> Amplifier<S> {
 }
 
 /// An axis ready for the tick; `N` is the room for GMS elements. Made by an [`AxisBuilder`].
+///
+/// What every tick reads comes first, and tables last: floating-point loads reach 1020 bytes from an address.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct Axis<S: Scalar, const N: usize> {
     encoder: Encoder,
-    unit_mm: S::Gain,
-    /// A displacement in a tick as a velocity.
-    unit_mm_s: S::Gain,
-    feedback: Feedback<S>,
-    feedforward: Feedforward<S, N>,
+    overspeed: Overspeed,
+    /// Limit of the measured speed until the axis is homed, 2^-8 counts per tick; the largest number for none.
+    reduced_speed: u32,
+    signal_loss: SignalLoss<S>,
     preview_ticks: usize,
+    unit_mm: S::Gain,
+    following: Following<S>,
     amplifier: Amplifier<S>,
     bumpless_decay: S,
-    overspeed: Overspeed,
-    signal_loss: SignalLoss<S>,
+    travel: Travel,
+    feedback: Feedback<S>,
+    feedforward: Feedforward<S, N>,
+    /// A displacement in a tick as a velocity.
+    unit_mm_s: S::Gain,
     plausibility: Plausibility,
     index_spacing: IndexSpacing,
-    following: Following<S>,
-    travel: Travel,
     /// Measured speed above which the axis does not stand, 2^-8 counts per tick.
     standstill: u32,
-    /// Limit of the measured speed until the axis is homed, 2^-8 counts per tick.
-    reduced_speed: Option<u32>,
     generator: ReferenceGenerator<S>,
     commissioning: Commissioning,
 }
@@ -196,7 +199,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
         axis.standstill = u32::MAX;
-        axis.reduced_speed = None;
+        axis.reduced_speed = u32::MAX;
         axis.generator = ReferenceGenerator::default();
         axis.commissioning = Commissioning::Done;
         let builder = Self {
@@ -331,7 +334,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     /// quantisation. With it, the axis starts no motion but jogs and homing until then.
     #[must_use]
     pub fn reduced_speed(self, counts_per_tick: Option<f64>) -> Self {
-        self.axis.reduced_speed = counts_per_tick.map(speed_limit);
+        self.axis.reduced_speed = counts_per_tick.map_or(u32::MAX, speed_limit);
         self
     }
 
@@ -366,38 +369,37 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     }
 }
 
-/// The memory of an axis.
+/// The memory of an axis. What every tick reads and writes comes first.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct AxisState<S: Scalar, const N: usize> {
     encoder: EncoderState,
-    generator: GeneratorState<S>,
-    /// Position of the axis at the last index pulse, until homing takes it.
-    pulse: Option<Position>,
-    /// The travel is in force.
-    homed: bool,
     overspeed: OverspeedState,
     signal_loss: SignalLossState,
-    plausibility: PlausibilityState,
-    index: IndexState,
-    following: FollowingState<S>,
+    /// The travel is in force.
+    homed: bool,
     travel: TravelState,
+    telemetry: AxisTelemetry<S>,
     /// The displacement of the reference at the feedforward's tick, and in the tick before.
     displacement: Position,
     displacement_before: Position,
-    /// The reference's step at the feedforward's tick.
-    step: ReferenceStep<S>,
     /// The reference at the feedforward's tick, ahead of the feedback's.
     look_ahead: Position,
-    preview: [Position; PREVIEW_ROOM],
-    /// The tracking error of this tick, and the velocity of the feedback's reference for a law that needs it.
-    input: FeedbackInput<S>,
-    feedback: FeedbackState<S>,
-    friction: FeedforwardState<S, N>,
-    bumpless_offset: S,
+    following: FollowingState<S>,
+    /// The acceleration of the reference at the feedforward's tick, mm/s^2.
+    acceleration: S,
+    /// The velocity of the feedback's reference, mm/s, for a law that needs it.
+    reference_velocity: S,
     /// Voltage that a host adds to the output in this tick, V.
     injected: S,
-    last_output: S,
-    telemetry: AxisTelemetry<S>,
+    feedback: FeedbackState<S>,
+    friction: FeedforwardState<S, N>,
+    generator: GeneratorState<S>,
+    plausibility: PlausibilityState,
+    preview: [Position; PREVIEW_ROOM],
+    /// Position of the axis at the last index pulse, until homing takes it.
+    pulse: Option<Position>,
+    index: IndexState,
 }
 
 impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
@@ -415,15 +417,13 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             travel: TravelState::default(),
             displacement: Position::ZERO,
             displacement_before: Position::ZERO,
-            step: ReferenceStep::default(),
+            acceleration: S::ZERO,
             look_ahead: Position::ZERO,
             preview: [Position::ZERO; PREVIEW_ROOM],
-            input: FeedbackInput::default(),
+            reference_velocity: S::ZERO,
             feedback: FeedbackState::default(),
             friction: FeedforwardState::default(),
-            bumpless_offset: S::ZERO,
             injected: S::ZERO,
-            last_output: S::ZERO,
             telemetry: AxisTelemetry::default(),
         }
     }
@@ -512,6 +512,14 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.index.is_seen()
     }
 
+    /// Takes the next position of the look-ahead reference.
+    #[inline(always)]
+    fn move_reference(&mut self, position: Position) {
+        self.displacement_before = self.displacement;
+        self.displacement = position - self.look_ahead;
+        self.look_ahead = position;
+    }
+
     #[inline(always)]
     fn reference_state(&self) -> ReferenceState {
         ReferenceState {
@@ -562,7 +570,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             following: Following::default(),
             travel: Travel::UNLIMITED,
             standstill: u32::MAX,
-            reduced_speed: None,
+            reduced_speed: u32::MAX,
             generator: ReferenceGenerator::default(),
             commissioning: Commissioning::Inert,
         }
@@ -591,41 +599,61 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Takes the encoder's reading and checks it. `due`: it is compared with the plant in this tick.
-    #[inline(always)]
+    #[inline(never)]
     pub(crate) fn read_encoder(
         &self,
         state: &mut AxisState<S, N>,
         reading: &EncoderReading,
         due: bool,
     ) -> Result<(), FaultCode> {
-        let step = self.encoder.update(&mut state.encoder, reading.count);
+        let counts = self.encoder.accumulate(&mut state.encoder, reading.count);
         state.telemetry.measured = state.encoder.count();
-        let slow = self.overspeed.step(&mut state.overspeed, step.counts);
-        let slow = slow
-            & match self.reduced_speed {
-                Some(most) if !state.homed => state.speed().unsigned_abs() <= most,
-                _ => true,
-            };
+        state.overspeed.filter(counts);
         let alive = self
             .signal_loss
-            .step(&mut state.signal_loss, step.counts, state.last_output);
-        let plausible = !due || {
-            let shown = state.shown();
-            self.plausibility.step(&mut state.plausibility, shown)
-        };
+            .step(&mut state.signal_loss, counts, state.telemetry.output);
+        let agrees = !due || self.compare(state);
+        let usual = alive
+            && agrees
+            && self.encoder.is_plausible(counts)
+            && self.is_slow(state)
+            && reading.is_plain();
+        if usual {
+            Ok(())
+        } else {
+            self.examine(state, reading, counts, alive, agrees)
+        }
+    }
+
+    /// True if the measured speed is within its limits.
+    #[inline(always)]
+    fn is_slow(&self, state: &AxisState<S, N>) -> bool {
+        self.overspeed.allows(&state.overspeed)
+            && (state.homed || state.speed().unsigned_abs() <= self.reduced_speed)
+    }
+
+    /// Examines a reading that has an index pulse, or that a monitor takes for a fault.
+    #[cold]
+    #[inline(never)]
+    fn examine(
+        &self,
+        state: &mut AxisState<S, N>,
+        reading: &EncoderReading,
+        counts: i32,
+        alive: bool,
+        agrees: bool,
+    ) -> Result<(), FaultCode> {
+        let possible = self.encoder.is_plausible(counts);
+        let slow = self.is_slow(state);
         let indexed = match reading.index {
-            Some(raw) => {
-                let at = self.encoder.count_at(&state.encoder, raw);
-                state.pulse = Some(at.position());
-                self.index_spacing.step(&mut state.index, at.0 as u32)
-            }
+            Some(raw) => self.take_pulse(state, raw),
             None => true,
         };
-        if reading.fresh & reading.valid & step.plausible & slow & alive & plausible & indexed {
+        if reading.fresh && reading.valid && possible && slow && alive && agrees && indexed {
             return Ok(());
         }
         // Where counts may be lost, so is the origin.
-        if !reading.valid | !step.plausible | !indexed | !plausible {
+        if !reading.valid | !possible | !indexed | !agrees {
             state.homed = false;
         }
         // The first that explains the others.
@@ -633,23 +661,37 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             FaultCode::StaleSample
         } else if !reading.valid {
             FaultCode::EncoderInvalid
-        } else if !step.plausible {
+        } else if !possible {
             FaultCode::EncoderJump
         } else if !indexed {
             FaultCode::IndexMismatch
         } else if !slow {
             FaultCode::Overspeed
-        } else if !plausible {
+        } else if !agrees {
             FaultCode::EncoderImplausible
         } else {
             FaultCode::EncoderSignalLoss
         })
     }
 
+    /// Compares the encoder with the plant; returns true if they agree.
+    #[inline(never)]
+    fn compare(&self, state: &mut AxisState<S, N>) -> bool {
+        let shown = state.shown();
+        self.plausibility.step(&mut state.plausibility, shown)
+    }
+
+    /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
+    fn take_pulse(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
+        let at = self.encoder.count_at(&state.encoder, raw);
+        state.pulse = Some(at.position());
+        self.index_spacing.step(&mut state.index, at.0 as u32)
+    }
+
     /// True if the axis has to be homed before it may start more than jogs and homing.
     #[inline(always)]
     pub(crate) fn awaits_homing(&self, state: &AxisState<S, N>) -> bool {
-        self.reduced_speed.is_some() & !state.homed
+        (self.reduced_speed != u32::MAX) & !state.homed
     }
 
     /// True if the measured speed is that of an axis that stands.
@@ -673,7 +715,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             following: self.following.start(),
             look_ahead: here,
             preview: [here; PREVIEW_ROOM],
-            telemetry: state.telemetry,
+            telemetry: AxisTelemetry {
+                bumpless_offset: S::ZERO,
+                output: S::ZERO,
+                ..state.telemetry
+            },
             ..AxisState::default()
         };
     }
@@ -731,7 +777,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state: &mut AxisState<S, N>,
         switches: AxisSwitches,
     ) -> Result<(), FaultCode> {
-        let switches = switches.without(self.generator.expected(&state.generator));
         if switches.at_limit() {
             // Away from a pressed switch the axis may go.
             let forward = state.displacement > Position::ZERO;
@@ -764,6 +809,28 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         switches: AxisSwitches,
         tick: u32,
     ) -> Result<(), FaultCode> {
+        let here = state.look_ahead;
+        let planned = self
+            .generator
+            .advance_plan(&mut state.generator, motion, here);
+        let Some(ahead) = planned else {
+            return self.update_other_reference(state, motion, switches, tick);
+        };
+        state.move_reference(ahead.position);
+        let found = self.check_limits(state, switches);
+        self.form_error(state, &ahead, tick)?;
+        found
+    }
+
+    /// The same in every mode but the plan's and standstill.
+    #[inline(never)]
+    fn update_other_reference(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        switches: AxisSwitches,
+        tick: u32,
+    ) -> Result<(), FaultCode> {
         let input = HomingInput {
             switches,
             index: state.pulse.take(),
@@ -779,10 +846,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if let GeneratorEvent::Origin(offset) = event {
             Self::shift(state, offset);
         }
-        state.displacement_before = state.displacement;
-        state.displacement = ahead.position - state.look_ahead;
-        let displacement = state.displacement.clipped();
-        state.look_ahead = ahead.position;
+        state.move_reference(ahead.position);
+        let switches = switches.without(self.generator.expected(&state.generator));
         let mut found = if state.mode() == MotionMode::Stopping {
             Ok(())
         } else {
@@ -791,7 +856,18 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if let GeneratorEvent::Fault(code) = event {
             found = Err(code);
         }
+        self.form_error(state, &ahead, tick)?;
+        found
+    }
 
+    /// Forms the error, and checks it.
+    #[inline(always)]
+    fn form_error(
+        &self,
+        state: &mut AxisState<S, N>,
+        ahead: &ReferenceSample<S>,
+        tick: u32,
+    ) -> Result<(), FaultCode> {
         // The feedback's reference is what the feedforward's was `preview_ticks` ago.
         let slot = tick as usize % PREVIEW_ROOM;
         state.preview[slot] = ahead.position;
@@ -800,24 +876,21 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if self.feedback.needs_velocity() {
             let before = state.preview[delayed.wrapping_sub(1) % PREVIEW_ROOM];
             let displacement = (reference - before).clipped();
-            state.input.velocity = S::scale_integer(displacement, self.unit_mm_s);
+            state.reference_velocity = S::scale_integer(displacement, self.unit_mm_s);
         }
 
         let measured = state.encoder.position();
         let error = S::scale_wide((reference - measured).0, self.unit_mm);
-        state.input.error = error;
         state.telemetry.reference = reference;
-        state.step = ReferenceStep {
-            displacement: S::scale_integer(displacement, self.unit_mm),
-            velocity: ahead.velocity,
-            acceleration: ahead.acceleration,
-        };
+        state.telemetry.error = error;
+        state.telemetry.velocity = ahead.velocity;
+        state.acceleration = ahead.acceleration;
         let follows = self
             .following
             .step(&mut state.following, error, ahead.velocity.magnitude());
         // An axis that does not follow cannot be stopped under control, so this goes before what could.
         if follows {
-            found
+            Ok(())
         } else {
             Err(FaultCode::FollowingError)
         }
@@ -844,11 +917,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.displacement = Position(speed);
         state.displacement_before = state.displacement;
         let velocity = S::scale_integer(state.displacement.clipped(), self.unit_mm_s);
-        state.input = FeedbackInput {
-            error: S::ZERO,
-            velocity,
-        };
-        state.step.velocity = velocity;
+        state.reference_velocity = velocity;
+        state.telemetry.error = S::ZERO;
+        state.telemetry.velocity = velocity;
         state.telemetry.reference = here;
         self.check_limits(state, switches)
     }
@@ -860,56 +931,54 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if state.mode() == MotionMode::OpenLoop {
             return self.drive_open(state);
         }
-        let feedforward = self.feedforward.step(&mut state.friction, state.step);
-        let total = feedforward.total();
-        let input = state.input;
+        let seen = &mut state.telemetry;
+        let step = ReferenceStep {
+            displacement: S::scale_integer(state.displacement.clipped(), self.unit_mm),
+            velocity: seen.velocity,
+            acceleration: state.acceleration,
+        };
+        seen.feedforward = self.feedforward.step(&mut state.friction, step);
+        let total = seen.feedforward.total();
+        let input = FeedbackInput {
+            error: seen.error,
+            velocity: state.reference_velocity,
+        };
         if changed {
             self.make_bumpless(state, input, total + state.injected);
         }
-        let base = total + state.bumpless_offset + state.injected;
+        let base = total + state.telemetry.bumpless_offset + state.injected;
         let feedback = self.feed_back(&mut state.feedback, input, base);
-        let limit = self.amplifier.limit;
-        let output = (feedback.output + base).limit(-limit, limit);
-        state.bumpless_offset = state
+        let output = (feedback.output + base).within(self.amplifier.limit);
+        let seen = &mut state.telemetry;
+        seen.feedback = feedback;
+        seen.bumpless_offset = seen
             .bumpless_offset
             .times(self.bumpless_decay, Quantity::Fraction);
-        self.put_out(state, feedback, feedforward, output)
+        self.put_out(state, output)
     }
 
     /// Puts the injected voltage out.
     #[cold]
     #[inline(never)]
     fn drive_open(&self, state: &mut AxisState<S, N>) -> DacCode {
-        let limit = self.amplifier.limit;
-        let output = state.injected.limit(-limit, limit);
-        let feedback = FeedbackTerms {
+        let output = state.injected.within(self.amplifier.limit);
+        state.telemetry.feedback = FeedbackTerms {
             saturated: output != state.injected,
             ..FeedbackTerms::default()
         };
-        self.put_out(state, feedback, FeedforwardTerms::default(), output)
+        state.telemetry.feedforward = FeedforwardTerms::default();
+        self.put_out(state, output)
     }
 
     /// Makes a converter's word of the output, and leaves everything to be seen.
     #[inline(always)]
-    fn put_out(
-        &self,
-        state: &mut AxisState<S, N>,
-        feedback: FeedbackTerms<S>,
-        feedforward: FeedforwardTerms<S>,
-        output: S,
-    ) -> DacCode {
-        state.last_output = output;
+    fn put_out(&self, state: &mut AxisState<S, N>, output: S) -> DacCode {
         let code = self.amplifier.code(output);
         let telemetry = &mut state.telemetry;
-        telemetry.error = state.input.error;
-        telemetry.velocity = state.step.velocity;
-        telemetry.feedback = feedback;
-        telemetry.feedforward = feedforward;
-        telemetry.bumpless_offset = state.bumpless_offset;
         telemetry.output = output;
         telemetry.code = code;
         telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
-        telemetry.limited_by = if feedback.saturated {
+        telemetry.limited_by = if telemetry.feedback.saturated {
             LimitedBy::OutputLimit
         } else {
             LimitedBy::Nothing
@@ -938,7 +1007,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         // The output under the new settings, computed on a copy, decides the offset.
         let mut trial = state.feedback.clone();
         let terms = self.feed_back(&mut trial, input, base);
-        state.bumpless_offset = state.last_output - (terms.output + base);
+        state.telemetry.bumpless_offset = state.telemetry.output - (terms.output + base);
     }
 
     /// Opens the loop of an axis at rest.
@@ -954,7 +1023,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             // As after enabling: the law's memory is of before, and its error is zero now.
             state.feedback = FeedbackState::default();
             state.friction = FeedforwardState::default();
-            state.bumpless_offset = S::ZERO;
+            state.telemetry.bumpless_offset = S::ZERO;
             self.stop(state);
         }
     }
@@ -965,7 +1034,6 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let measured = state.encoder.count();
         state.generator.hold();
         state.injected = S::ZERO;
-        state.last_output = S::ZERO;
         state.plausibility = self.plausibility.start(state.shown());
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),

@@ -95,7 +95,7 @@ impl<S: Scalar> Cascade<S> {
     ) -> FeedbackTerms<S> {
         let error = self.inner.rate.clip(input.error);
         let wanted = error.scale(self.position) + input.velocity.scale(self.feedforward);
-        let set = wanted.limit(-self.limit, self.limit);
+        let set = wanted.within(self.limit);
         let proportional = (set - input.velocity).scale(self.velocity);
         let derivative = self.inner.rate.step(state, error);
         self.inner

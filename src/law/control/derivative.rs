@@ -39,7 +39,7 @@ impl<S: Scalar> Derivative<S> {
     /// The error that a law acts on; one that is not a number counts as none.
     #[inline(always)]
     pub(super) fn clip(&self, error: S) -> S {
-        error.limit(-self.error_limit, self.error_limit)
+        error.within(self.error_limit)
     }
 
     /// Forgets the past: no kick at the next step from the present error.

@@ -5,7 +5,7 @@ use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
 
 use super::cascade::Cascade;
 use super::nctf::Nctf;
-use super::npid::NonlinearGainTable;
+use super::npid::NonlinearPid;
 use super::pid::Pid;
 use super::schedule::ScheduledPid;
 use super::sliding_mode::SlidingMode;
@@ -72,7 +72,7 @@ pub enum Feedback<S: Scalar> {
     /// PID, or PD: a PID whose integral is held at zero.
     Pid(Pid<S>),
     /// PID behind the nonlinear gain.
-    NPid(NonlinearGainTable<S>, Pid<S>),
+    NPid(NonlinearPid<S>),
     /// PID with scheduled gains.
     Scheduled(ScheduledPid<S>),
     /// P position loop around a PI velocity loop.
@@ -95,7 +95,7 @@ impl<S: Scalar> Feedback<S> {
     pub fn take_over(&self, state: &mut FeedbackState<S>, error: S) {
         match self {
             Self::Pid(pid) => pid.take_over(state, error),
-            Self::NPid(gain, pid) => pid.take_over(state, gain.scaled_error(error)),
+            Self::NPid(law) => law.pid.take_over(state, law.gain.scaled_error(error)),
             Self::Scheduled(law) => law.pid.take_over(state, error),
             Self::Cascade(law) => law.inner.rate.take_over(state, error),
             Self::SlidingMode(law) => law.inner.rate.take_over(state, error),
@@ -114,7 +114,10 @@ impl<S: Scalar> Feedback<S> {
     ) -> FeedbackTerms<S> {
         match self {
             Self::Pid(pid) => pid.step(state, input.error, low, high),
-            Self::NPid(gain, pid) => pid.step(state, gain.scaled_error(input.error), low, high),
+            Self::NPid(law) => {
+                let error = law.gain.scaled_error(input.error);
+                law.pid.step(state, error, low, high)
+            }
             Self::Scheduled(law) => law.step(state, input, low, high),
             Self::Cascade(law) => law.step(state, input, low, high),
             Self::SlidingMode(law) => law.step(state, input.error, low, high),

@@ -1,6 +1,8 @@
 //! The end of every law: the integral is added, the output is cut to its bounds, and while it is cut the integral takes
 //! nothing that would push it further out.
 
+use core::hint::cold_path;
+
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 
@@ -36,6 +38,18 @@ impl<S: Scalar> Integrator<S> {
         let sum = driver.accumulate(state.integral, self.per_tick);
         let integral = S::total(sum);
         let wanted = fast + integral;
+        // Most ticks: neither the output nor the integral is at a bound. Not so if either is not a number.
+        if wanted <= high && wanted >= low && integral.magnitude() <= self.limit {
+            state.integral = sum;
+            return FeedbackTerms {
+                proportional,
+                integral,
+                derivative,
+                output: wanted,
+                saturated: false,
+            };
+        }
+        cold_path();
         let outward = if wanted > high {
             driver > S::ZERO
         } else {
@@ -44,7 +58,7 @@ impl<S: Scalar> Integrator<S> {
         let integral = if outward {
             S::total(state.integral)
         } else {
-            let bounded = integral.limit(-self.limit, self.limit);
+            let bounded = integral.within(self.limit);
             state.integral = if bounded == integral {
                 sum
             } else {

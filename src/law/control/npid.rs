@@ -6,6 +6,7 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
+use super::pid::Pid;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
 
@@ -51,10 +52,21 @@ impl NonlinearGain {
 /// assert_eq!(table.scaled_error(-0.02), -0.02 * gain.largest());
 /// ```
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct NonlinearGainTable<S: Scalar> {
-    table: OctaveTable<S, 1>,
     range: S,
     largest: S,
+    table: OctaveTable<S, 1>,
+}
+
+/// A PID behind the nonlinear gain. What every tick reads comes before the table, within reach of one address.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
+pub struct NonlinearPid<S: Scalar> {
+    /// Acts on the scaled error.
+    pub pid: Pid<S>,
+    /// Scales the error.
+    pub gain: NonlinearGainTable<S>,
 }
 
 impl<S: Scalar> NonlinearGainTable<S> {

@@ -82,7 +82,7 @@ impl<S: Scalar> SlidingMode<S> {
     ) -> FeedbackTerms<S> {
         let error = self.inner.rate.clip(error);
         let distance = error.scale(self.line) + self.inner.rate.step(state, error);
-        let switching = distance.limit(-self.switching, self.switching);
+        let switching = distance.within(self.switching);
         self.inner.close(state, switching, S::ZERO, (low, high))
     }
 }

@@ -92,7 +92,8 @@ pub struct Gms<S: Scalar, const N: usize> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct GmsState<S: Scalar, const N: usize> {
     pub(super) forces: [S; N],
-    slipping: [bool; N],
+    /// A bit for each element.
+    slipping: u32,
     direction: Direction,
 }
 
@@ -101,7 +102,7 @@ impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
     fn default() -> Self {
         Self {
             forces: [S::ZERO; N],
-            slipping: [false; N],
+            slipping: 0,
             direction: Direction::Positive,
         }
     }
@@ -136,11 +137,17 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
     #[inline(always)]
     pub(super) fn stick(&mut self, direction: Direction) {
         self.direction = direction;
-        self.slipping = [false; N];
+        self.slipping = 0;
     }
 }
 
 impl<S: Scalar, const N: usize> Gms<S, N> {
+    /// The bits of all elements.
+    const ALL: u32 = {
+        assert!(N < 32);
+        (1 << N) - 1
+    };
+
     /// Makes the model from its elements, at most `N` of them; any beyond are left out, so settings are checked
     /// against `N` before they come here. Settings time only.
     pub fn build(elements: &[GmsElement]) -> Self {
@@ -168,11 +175,12 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
     #[inline(always)]
     pub fn step(&self, state: &mut GmsState<S, N>, displacement: S, sliding: Sliding<S>) -> S {
         if displacement > S::ZERO {
-            self.advance(state, displacement, sliding, Direction::Positive, |f| f);
+            self.advance(state, displacement, sliding, Direction::Positive, |f| f)
         } else if displacement < S::ZERO {
-            self.advance(state, displacement, sliding, Direction::Negative, |f| -f);
+            self.advance(state, displacement, sliding, Direction::Negative, |f| -f)
+        } else {
+            state.total()
         }
-        state.total()
     }
 
     /// `along` turns a force into its component along the motion, and back.
@@ -184,27 +192,40 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         sliding: Sliding<S>,
         direction: Direction,
         along: impl Fn(S) -> S,
-    ) {
+    ) -> S {
         if state.direction != direction {
             state.stick(direction);
         }
-        for ((element, force), slipping) in self
-            .elements
-            .iter()
-            .zip(&mut state.forces)
-            .zip(&mut state.slipping)
-        {
+        let slip = |force: S, share: S| {
+            along(share + (along(force) - share).times(sliding.decay, Quantity::Fraction))
+        };
+        let elements = self.elements.iter().zip(&mut state.forces);
+        let mut total = S::ZERO;
+        if state.slipping == Self::ALL {
+            for (element, force) in elements {
+                *force = slip(*force, sliding.level.scale(element.weight));
+                total = total + *force;
+            }
+            return total;
+        }
+        let mut slipping = state.slipping;
+        for ((element, force), bit) in elements.zip((0..N).map(|index| 1 << index)) {
             let share = sliding.level.scale(element.weight);
-            if *slipping {
-                let distance = along(*force) - share;
-                *force = along(share + distance.times(sliding.decay, Quantity::Fraction));
+            if slipping & bit != 0 {
+                *force = slip(*force, share);
             } else {
                 let trial = *force + displacement.scale(element.stiffness);
                 // Not so if the trial is not a number.
-                let sticks = along(trial) < share;
-                *slipping = !sticks;
-                *force = if sticks { trial } else { along(share) };
+                if along(trial) < share {
+                    *force = trial;
+                } else {
+                    slipping |= bit;
+                    *force = along(share);
+                }
             }
+            total = total + *force;
         }
+        state.slipping = slipping;
+        total
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 
 use super::motion_state::MotionState;
 use super::sample::{MotionScale, ReferenceSample};
-use super::sine::{SINE_BITS, sine, sine_and_cosine};
+use super::sine::{SINE_BITS, SinePolynomial};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
@@ -84,6 +84,7 @@ pub struct Harmonic<S: Scalar> {
     centripetal: S::Gain,
     tangential: S::Gain,
     q30: S::Gain,
+    polynomial: SinePolynomial,
 }
 
 /// The part of a harmonic motion that a tick lies in.
@@ -140,7 +141,11 @@ impl<S: Scalar> Harmonic<S> {
             amplitude_counts,
             amplitude_fraction,
             start_phase,
-            start_swing: swing(sine(start_phase), amplitude_counts, amplitude_fraction),
+            start_swing: swing(
+                SinePolynomial::FIT.sine(start_phase),
+                amplitude_counts,
+                amplitude_fraction,
+            ),
             phase_per_tick,
             lead_ticks,
             lead_step: (1 << 62) / u64::from(lead_ticks),
@@ -156,6 +161,7 @@ impl<S: Scalar> Harmonic<S> {
                 Quantity::Acceleration,
             ),
             q30: S::gain(unit, Quantity::Integer, Quantity::Fraction),
+            polynomial: SinePolynomial::FIT,
         }
     }
 
@@ -186,27 +192,28 @@ impl<S: Scalar> Harmonic<S> {
     #[inline(always)]
     pub(super) fn step(&self, state: &mut MotionState) -> ReferenceSample<S> {
         match self.lead(state.elapsed) {
-            Lead::FullSpeed => self.advance(state, self.phase_per_tick),
+            Lead::FullSpeed => self.turn(state, self.phase_per_tick).0,
             Lead::Under { tick, leaving } => self.step_lead(state, tick, leaving),
             Lead::Ended => ReferenceSample {
                 velocity: S::ZERO,
                 acceleration: S::ZERO,
-                ..self.advance(state, 0)
+                ..self.turn(state, 0).0
             },
         }
     }
 
-    /// Turns the phase and looks up the sample at full speed.
+    /// Turns the phase; returns the sample at full speed, and the cosine.
     #[inline(always)]
-    fn advance(&self, state: &mut MotionState, phase: u64) -> ReferenceSample<S> {
+    fn turn(&self, state: &mut MotionState, phase: u64) -> (ReferenceSample<S>, i32) {
         state.phase = state.phase.wrapping_add(phase);
-        let (sine, cosine) = sine_and_cosine(self.phase(state));
+        let (sine, cosine) = self.polynomial.sine_and_cosine(self.phase(state));
         let swing = swing(sine, self.amplitude_counts, self.amplitude_fraction);
-        ReferenceSample {
+        let sample = ReferenceSample {
             position: Position(swing - self.start_swing),
             velocity: S::scale_integer(cosine, self.velocity),
             acceleration: S::scale_integer(sine, self.centripetal),
-        }
+        };
+        (sample, cosine)
     }
 
     #[inline(always)]
@@ -222,7 +229,7 @@ impl<S: Scalar> Harmonic<S> {
         let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
         let square = (progress * progress) >> 31;
         let speed = (square * (3 * ONE - 2 * progress)) >> 31;
-        let full = self.advance(state, scaled_phase(self.phase_per_tick, speed));
+        let (full, cosine) = self.turn(state, scaled_phase(self.phase_per_tick, speed));
 
         let fraction = |q31: u64| S::scale_integer((q31 >> 1) as i32, self.q30);
         let ratio = fraction(speed);
@@ -232,7 +239,6 @@ impl<S: Scalar> Harmonic<S> {
             .times(ratio, Quantity::Fraction);
         // The slope of the smooth step over its largest, 4 p (1 - p).
         let slope = fraction((progress * (ONE - progress)) >> 29);
-        let (_, cosine) = sine_and_cosine(self.phase(state));
         let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
             velocity: full.velocity.times(ratio, Quantity::Fraction),

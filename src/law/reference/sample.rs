@@ -1,5 +1,6 @@
 //! A point of the reference, and the scale that it is made with.
 
+use crate::law::scalar::Scalar;
 use crate::law::units::Position;
 
 /// Position of the reference at one tick, with its derivatives.
@@ -11,6 +12,17 @@ pub struct ReferenceSample<S> {
     pub velocity: S,
     /// Acceleration of the reference, mm/s^2.
     pub acceleration: S,
+}
+
+impl<S: Scalar> ReferenceSample<S> {
+    /// At rest at a position.
+    #[inline(always)]
+    pub(crate) fn standing(position: Position) -> Self {
+        Self {
+            position,
+            ..Self::default()
+        }
+    }
 }
 
 /// The scale of an axis' motion.

@@ -1,18 +1,18 @@
 //! Sine and cosine of an integer phase in integer arithmetic: the same on every machine, and exact enough that a
 //! position reference errs by picometres.
 
-/// `sin(pi/2 z) / z` in powers of `t = z^2 - 1/2`, a Chebyshev fit over -1/2..=1/2, exact to 3e-11 before rounding. Each
-/// coefficient has two fraction bits more than the one before, from 31 for that of `t`: then a step of Horner's scheme
-/// is the upper half of one product, one instruction with the sum.
-const COEFFICIENTS: [i32; 5] = [
-    -1_223_429_338,
-    626_259_569,
-    -150_142_711,
-    20_846_069,
-    -1_886_646,
-];
-/// The constant coefficient, with 61 fraction bits.
-const CONSTANT: i64 = 2_921_876_942_130_950_361;
+/// `sin(pi/2 z) / z` in powers of `t = z^2 - 1/2`, a Chebyshev fit over -1/2..=1/2, exact to 3e-11 before rounding.
+///
+/// A value that lies beside the motion in memory: there a coefficient takes one instruction to load, as a constant of the
+/// program two.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct SinePolynomial {
+    /// The constant coefficient, with 61 fraction bits.
+    constant: i64,
+    /// The others. Each has two fraction bits more than the one before, from 31 for that of `t`: then a step of Horner's
+    /// scheme is the upper half of one product, one instruction with the sum.
+    coefficients: [i32; 5],
+}
 /// One half, with the 30 fraction bits of the square.
 const HALF: i32 = 1 << 29;
 
@@ -25,51 +25,54 @@ fn upper(a: i32, b: i32) -> i32 {
 /// Fraction bits of a sine.
 pub(super) const SINE_BITS: u32 = 30;
 
-/// The sines of phases (a turn is 2^32) in units of 2^-30; the error is below 3e-9. Together, so that each coefficient is
-/// fetched once.
-#[inline(always)]
-fn sines<const COUNT: usize>(phases: [u32; COUNT]) -> [i32; COUNT] {
-    // z in quarter turns, Q31. The second and third quarters mirror the others.
-    let z = phases.map(|phase| {
+impl SinePolynomial {
+    /// The only one.
+    pub(super) const FIT: Self = Self {
+        constant: 2_921_876_942_130_950_361,
+        coefficients: [
+            -1_223_429_338,
+            626_259_569,
+            -150_142_711,
+            20_846_069,
+            -1_886_646,
+        ],
+    };
+
+    /// The sine of a phase (a turn is 2^32) in units of 2^-30; the error is below 3e-9.
+    #[inline(always)]
+    pub(super) fn sine(&self, phase: u32) -> i32 {
+        // z in quarter turns, Q31. The second and third quarters mirror the others.
         let doubled = (phase << 1) as i32;
-        if (phase ^ (phase << 1)) >> 31 == 0 {
+        let z = if (phase ^ (phase << 1)) >> 31 == 0 {
             doubled
         } else {
             doubled.saturating_neg()
+        };
+        let t = upper(z, z) - HALF;
+        let [first, second, third, fourth, fifth] = self.coefficients;
+        let mut sum = fifth;
+        for coefficient in [fourth, third, second, first] {
+            sum = coefficient + upper(sum, t);
         }
-    });
-    let t = z.map(|z| upper(z, z) - HALF);
-    let [first, second, third, fourth, fifth] = COEFFICIENTS;
-    // Loops, because the compiler does not inline `array::from_fn` into every caller.
-    let mut sums = [fifth; COUNT];
-    for coefficient in [fourth, third, second, first] {
-        for (sum, &t) in sums.iter_mut().zip(&t) {
-            *sum = coefficient + upper(*sum, t);
-        }
+        let slope = ((self.constant + i64::from(sum) * i64::from(t)) >> 31) as i32;
+        ((i64::from(z) * i64::from(slope)) >> 31) as i32
     }
-    for ((sum, &t), &z) in sums.iter_mut().zip(&t).zip(&z) {
-        let slope = ((CONSTANT + i64::from(*sum) * i64::from(t)) >> 31) as i32;
-        *sum = ((i64::from(z) * i64::from(slope)) >> 31) as i32;
+
+    /// The sine and the cosine of a phase.
+    // Not inlined: the coefficients fit the registers of a function of its own.
+    #[inline(never)]
+    pub(super) fn sine_and_cosine(&self, phase: u32) -> (i32, i32) {
+        (self.sine(phase), self.sine(phase.wrapping_add(1 << 30)))
     }
-    sums
-}
-
-/// The sine of a phase.
-pub(super) fn sine(phase: u32) -> i32 {
-    let [sine] = sines([phase]);
-    sine
-}
-
-/// The sine and the cosine of a phase.
-#[inline(always)]
-pub(super) fn sine_and_cosine(phase: u32) -> (i32, i32) {
-    let [sine, cosine] = sines([phase, phase.wrapping_add(1 << 30)]);
-    (sine, cosine)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn sine(phase: u32) -> i32 {
+        SinePolynomial::FIT.sine(phase)
+    }
 
     #[test]
     fn sine_and_cosine_are_exact_to_3e_9_of_full_scale() {
@@ -79,7 +82,7 @@ mod tests {
             let phase = step.wrapping_mul(2_147_483_659 / 7);
             let angle = f64::from(phase) * turn;
             assert!((f64::from(sine(phase)) * scale - libm::sin(angle)).abs() < 3e-9);
-            let (_, cosine) = sine_and_cosine(phase);
+            let (_, cosine) = SinePolynomial::FIT.sine_and_cosine(phase);
             assert!((f64::from(cosine) * scale - libm::cos(angle)).abs() < 3e-9);
         }
     }

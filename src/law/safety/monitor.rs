@@ -1,5 +1,7 @@
 //! The monitors of each axis, one small pure step a tick each, without a division.
 
+use core::hint::cold_path;
+
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
@@ -9,8 +11,8 @@ pub(super) const DITHER_COUNTS: u32 = 2;
 pub(super) const SPEED_FRACTION_BITS: u32 = 8;
 /// The speed is filtered over 2^3 ticks: at one count a tick, a single reading says little.
 pub(super) const SPEED_FILTER_BITS: u32 = 3;
-/// No axis moves further in a tick, counts; an encoder that does so is faulty, and its filter shall not wrap.
-const LARGEST_STEP: i32 = 1 << 16;
+/// No axis moves further in a tick than 2^16 counts; an encoder that does so is faulty, and its filter shall not wrap.
+const STEP_BITS: u32 = 16;
 /// Addition of quantisation and noise to a filtered speed, counts per tick.
 const SPEED_NOISE_COUNTS: f64 = 0.5;
 
@@ -55,9 +57,28 @@ impl Overspeed {
     /// Takes a step of the encoder, counts; returns true if the filtered speed is within the limit.
     #[inline(always)]
     pub fn step(&self, state: &mut OverspeedState, counts: i32) -> bool {
-        let speed = counts.clamp(-LARGEST_STEP, LARGEST_STEP - 1) << SPEED_FRACTION_BITS;
-        state.filtered += (speed - state.filtered) >> SPEED_FILTER_BITS;
+        state.filter(counts);
+        self.allows(state)
+    }
+
+    /// True if the filtered speed is within the limit.
+    #[inline(always)]
+    pub(crate) fn allows(&self, state: &OverspeedState) -> bool {
         state.filtered.unsigned_abs() <= self.limit
+    }
+}
+
+impl OverspeedState {
+    /// Takes a step of the encoder, counts.
+    #[inline(always)]
+    pub(crate) fn filter(&mut self, counts: i32) {
+        let mut counts = counts;
+        if counts.wrapping_add(1 << STEP_BITS) as u32 >> (STEP_BITS + 1) != 0 {
+            cold_path();
+            counts = counts.clamp(-1 << STEP_BITS, (1 << STEP_BITS) - 1);
+        }
+        let speed = counts << SPEED_FRACTION_BITS;
+        self.filtered += (speed - self.filtered) >> SPEED_FILTER_BITS;
     }
 }
 

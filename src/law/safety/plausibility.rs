@@ -231,7 +231,7 @@ impl Plausibility {
     }
 
     /// Compares what the axis shows with what it showed the last time; returns true if the motion can come of the output.
-    #[inline(never)]
+    #[inline(always)]
     pub fn step(&self, state: &mut PlausibilityState, shown: Shown) -> bool {
         let counts = shown.count.wrapping_sub(state.count);
         let words = shown.words.wrapping_sub(state.words);

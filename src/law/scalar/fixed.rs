@@ -1,5 +1,6 @@
 //! 32-bit fixed point for a machine without a floating-point unit.
 
+use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};
@@ -10,11 +11,21 @@ use crate::law::rounding;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Fixed(pub i32);
 
-/// A constant as a normalised mantissa and a shift, `mantissa * 2^-shift`: 31 significant bits whatever its size.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// A constant as a normalised mantissa and a shift, `mantissa * 2^-shift`: 31 significant bits whatever its size. Zero by
+/// default.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedGain {
     mantissa: i32,
     shift: u32,
+}
+
+impl Default for FixedGain {
+    fn default() -> Self {
+        Self {
+            mantissa: 0,
+            shift: LARGEST_SHIFT,
+        }
+    }
 }
 
 /// Fraction bits that a [`Scalar::Sum`] of [`Fixed`] has beyond its signal's.
@@ -23,14 +34,14 @@ const SUM_EXTRA_BITS: u32 = 32;
 /// A shift past which a product of two 32-bit numbers has nothing left.
 const LARGEST_SHIFT: u32 = 62;
 
+#[inline(always)]
 const fn saturate(value: i64) -> Fixed {
-    if value > i32::MAX as i64 {
-        Fixed(i32::MAX)
-    } else if value < i32::MIN as i64 {
-        Fixed(i32::MIN)
-    } else {
-        Fixed(value as i32)
+    let low = value as i32;
+    if low as i64 == value {
+        return Fixed(low);
     }
+    cold_path();
+    Fixed(if value < 0 { i32::MIN } else { i32::MAX })
 }
 
 /// `value / 2^shift`, rounded to the nearest.
@@ -39,8 +50,29 @@ const fn round_shift(value: i64, shift: u32) -> i64 {
     if shift == 0 {
         value
     } else {
-        value.saturating_add(1 << (shift - 1)) >> shift
+        // As the sum of the value and a half, but that cannot overflow.
+        ((value >> (shift - 1)) + 1) >> 1
     }
+}
+
+/// The number `value / 2^fraction_bits`, rounded to even as a conversion in hardware does, where there is no such hardware.
+#[inline(always)]
+const fn to_float(value: i32, fraction_bits: u32) -> f32 {
+    const MANTISSA_BITS: u32 = f32::MANTISSA_DIGITS - 1;
+    const BIAS: u32 = 127;
+    if value == 0 {
+        return 0.0;
+    }
+    let size = value.unsigned_abs();
+    let leading = size.leading_zeros();
+    // The leading one at bit 31, and below the mantissa what is rounded.
+    let normal = size << leading;
+    let (mantissa, rest) = (normal >> 8, normal & 0xFF);
+    let up = rest + (mantissa & 1) > 0x80;
+    // The leading one adds the one that the exponent lacks, and a carry out of the mantissa another.
+    let exponent = BIAS + 30 - leading - fraction_bits;
+    let sign = value as u32 & 1 << 31;
+    f32::from_bits(sign | ((exponent << MANTISSA_BITS) + mantissa + up as u32))
 }
 
 impl Add for Fixed {
@@ -73,6 +105,32 @@ impl FixedGain {
     const fn product(self, value: i32) -> i64 {
         value as i64 * self.mantissa as i64
     }
+
+    /// The product with a 32-bit signal, rounded to the nearest, saturating.
+    #[inline(always)]
+    const fn scaled(self, value: i32) -> Fixed {
+        if self.shift > u32::BITS {
+            // The lower half of the product is less than the half that rounds, so its upper half is enough.
+            let upper = (self.product(value) >> u32::BITS) as i32;
+            Fixed(((upper >> ((self.shift - 1) & 31)) + 1) >> 1)
+        } else {
+            shifted_product(value, self.mantissa, self.shift)
+        }
+    }
+}
+
+/// `value * factor / 2^shift`, rounded to the nearest, saturating; `shift` is 32 at most.
+#[inline(always)]
+const fn shifted_product(value: i32, factor: i32, shift: u32) -> Fixed {
+    // Shifted to the left first, where there is room, so that the upper half of the product is the result, which then fits.
+    let left = (u32::BITS - shift) & 31;
+    let shifted = value << left;
+    if shifted >> left == value && shift != 0 {
+        let product = shifted as i64 * factor as i64;
+        return Fixed((product >> u32::BITS) as i32 + (product as u32 >> 31) as i32);
+    }
+    cold_path();
+    saturate(round_shift(value as i64 * factor as i64, shift))
 }
 
 impl Scalar for Fixed {
@@ -88,7 +146,7 @@ impl Scalar for Fixed {
     }
 
     fn to_f32(self, quantity: Quantity) -> f32 {
-        self.0 as f32 * (1.0 / (1u32 << quantity.fraction_bits()) as f32)
+        to_float(self.0, quantity.fraction_bits())
     }
 
     fn to_f64(self, quantity: Quantity) -> f64 {
@@ -101,7 +159,7 @@ impl Scalar for Fixed {
         // fraction is in 0.5..1: 2^31 of it would not fit, 2^30 does with the sign.
         let shift = 30 - power;
         let (mantissa, shift) = if fraction == 0.0 || !fraction.is_finite() {
-            (0.0, 0)
+            (0.0, LARGEST_SHIFT as i32)
         } else if shift < 0 {
             (f64::from(i32::MAX).copysign(fraction), 0)
         } else if shift > LARGEST_SHIFT as i32 {
@@ -123,15 +181,22 @@ impl Scalar for Fixed {
 
     #[inline(always)]
     fn scale_integer(value: i32, gain: FixedGain) -> Self {
-        saturate(round_shift(gain.product(value), gain.shift))
+        gain.scaled(value)
     }
 
     #[inline(always)]
     fn scale_wide(value: i64, gain: FixedGain) -> Self {
         const LIMIT: i64 = (1 << 40) - 1;
-        let value = value.clamp(-LIMIT, LIMIT);
         // 40 bits of value and 23 of mantissa fit 64; the last 7 bits of the mantissa weigh 1e-7 of a position error.
         const DROPPED: u32 = 8;
+        if let Ok(value) = i32::try_from(value) {
+            let product = i64::from(value) * i64::from(gain.mantissa >> DROPPED);
+            if gain.shift >= DROPPED {
+                return saturate(round_shift(product, gain.shift - DROPPED));
+            }
+        }
+        cold_path();
+        let value = value.clamp(-LIMIT, LIMIT);
         let mantissa = i64::from(gain.mantissa >> DROPPED);
         let product = value * mantissa;
         if gain.shift >= DROPPED {
@@ -148,8 +213,7 @@ impl Scalar for Fixed {
 
     #[inline(always)]
     fn times(self, factor: Self, factor_quantity: Quantity) -> Self {
-        let product = i64::from(self.0) * i64::from(factor.0);
-        saturate(round_shift(product, factor_quantity.fraction_bits()))
+        shifted_product(self.0, factor.0, factor_quantity.fraction_bits())
     }
 
     #[inline(always)]
@@ -202,5 +266,48 @@ impl Scalar for Fixed {
     #[inline(always)]
     fn into_sum(self) -> i64 {
         i64::from(self.0) << SUM_EXTRA_BITS
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_float_is_that_of_a_conversion_and_a_division() {
+        let exact = |value: i32, bits: u32| value as f32 * (1.0 / (1u32 << bits) as f32);
+        let mut value = 1i32;
+        for step in 0..2_000_000 {
+            value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            for value in [value, value >> (step % 31), i32::MIN, i32::MAX, 0, -1] {
+                for bits in [0, 16, 20, 26, 30] {
+                    assert_eq!(
+                        to_float(value, bits).to_bits(),
+                        exact(value, bits).to_bits()
+                    );
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_product_is_rounded_as_a_wide_one_is() {
+        let wide = |value: i32, gain: FixedGain| {
+            let product = i128::from(value) * i128::from(gain.mantissa);
+            let half = (1i128 << gain.shift) >> 1;
+            let rounded = (product + half) >> gain.shift;
+            rounded.clamp(i32::MIN.into(), i32::MAX.into()) as i32
+        };
+        let mut value = 1i32;
+        for step in 0..300_000 {
+            value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let mantissa = value.rotate_left(7) >> 1;
+            for shift in 0..=LARGEST_SHIFT {
+                let gain = FixedGain { mantissa, shift };
+                for value in [value, value >> (step % 31), i32::MIN, i32::MAX] {
+                    assert_eq!(gain.scaled(value).0, wide(value, gain));
+                }
+            }
+        }
     }
 }

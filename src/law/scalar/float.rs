@@ -1,6 +1,8 @@
 //! `f32` for the target and `f64` for the host. Plain IEEE operations in a fixed order: no fused multiply-add and no
 //! platform library, so that host and target agree to the bit.
 
+use core::hint::cold_path;
+
 use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};
 use super::quantity::Quantity;
 
@@ -48,7 +50,12 @@ macro_rules! float_scalar {
 
             #[inline(always)]
             fn scale_wide(value: i64, gain: Self::Gain) -> Self {
-                // Two halves, the lower one exact: a 64-bit conversion is a library call on the target.
+                if let Ok(value) = i32::try_from(value) {
+                    return value as $float * gain;
+                }
+                cold_path();
+                // Two halves, the lower one exact: a 64-bit conversion is a library call on the target. Their sum is rounded once,
+                // as the conversion of a narrow value is.
                 let high = value >> 20;
                 let low = (value & 0xF_FFFF) as i32;
                 let high = if high == i64::from(high as i32) {
@@ -81,6 +88,16 @@ macro_rules! float_scalar {
                     high
                 } else {
                     0.0
+                }
+            }
+
+            #[inline(always)]
+            fn within(self, most: Self) -> Self {
+                if self.magnitude() <= most {
+                    self
+                } else {
+                    cold_path();
+                    self.limit(-most, most)
                 }
             }
 

@@ -59,6 +59,12 @@ pub trait Scalar:
     /// The value within `low..=high`, which must be ordered; `NaN` gives zero.
     fn limit(self, low: Self, high: Self) -> Self;
 
+    /// The value within `-most..=most`; `NaN` gives zero.
+    #[inline(always)]
+    fn within(self, most: Self) -> Self {
+        self.limit(-most, most)
+    }
+
     /// The magnitude of the value.
     fn magnitude(self) -> Self {
         if self < Self::ZERO { -self } else { self }
