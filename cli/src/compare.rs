@@ -29,8 +29,8 @@ pub(super) struct Arguments {
 
 /// Control ticks between two lines of a trace's CSV file.
 const TRACE_TICKS: usize = 10;
-/// Control period of the traces, s.
-const PERIOD_S: f64 = 1e-4;
+/// Control rate of the traces, Hz.
+const RATE_HZ: f64 = 1e4;
 /// Steps of the progress bar.
 const STEPS: u64 = 1_000_000;
 
@@ -81,12 +81,10 @@ fn write_errors(
     knowledge: ModelKnowledge,
     velocity_mm_s: f64,
 ) -> anyhow::Result<()> {
+    // To the nanometre.
     let thin = |signal: &[f64]| {
-        signal
-            .iter()
-            .step_by(TRACE_TICKS)
-            .copied()
-            .collect::<Vec<_>>()
+        let thinned = signal.iter().step_by(TRACE_TICKS);
+        thinned.map(|mm| (1e6 * mm).round() / 1e6).collect()
     };
     let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
     for configuration in Configuration::all() {
@@ -96,8 +94,8 @@ fn write_errors(
         };
         let cycle = &entry.last_cycle;
         if columns.is_empty() {
-            let reference = thin(&cycle.reference_mm);
-            let time = (0..reference.len()).map(|k| (k * TRACE_TICKS) as f64 * PERIOD_S);
+            let reference: Vec<f64> = thin(&cycle.reference_mm);
+            let time = (0..reference.len()).map(|k| (k * TRACE_TICKS) as f64 / RATE_HZ);
             columns.push(("t_s".to_owned(), time.collect()));
             columns.push(("reference_mm".to_owned(), reference));
         }

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use anyhow::bail;
 use quadrant::axes::AxisName;
-use quadrant::link::message::{AxisSet, Body, Status};
+use quadrant::link::message::{self, AxisSet, Body, Status};
 use quadrant_sim::client::{Client, settle, with_reset};
 use serde_json::json;
 
@@ -45,6 +45,13 @@ pub(super) fn status(client: &mut Client) -> anyhow::Result<Answer> {
         let _ = write!(text, "\n{refusal}");
     }
     let mut data = json!(status);
+    // Names instead of the wire's bits.
+    let homed = status.homed.iter().map(message::AxisName::as_str);
+    data["homed"] = json!(homed.collect::<Vec<_>>());
+    for (index, axis) in AxisName::ALL.into_iter().enumerate() {
+        data["axes"][index]["axis"] = json!(axis.as_str());
+        data["axes"][index]["limited_by"] = json!(name(&status.axes[index].limited_by));
+    }
     data["inputs"] = json!(active);
     data["refusal"] = json!(inputs.refusal);
     Ok(Answer::new(text, data))

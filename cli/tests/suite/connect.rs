@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 
 use quadrant_sim::record::{AxisLimits, Record};
 use quadrant_sim::settings_file::SettingsFile;
-use serde_json::Value;
+use serde_json::{Value, json};
 
 const LIMITS: AxisLimits = AxisLimits {
     travel_mm: 410.0,
@@ -63,7 +63,7 @@ fn a_circle_is_homed_run_and_recorded_for_the_other_commands() {
     let results = results(&said);
     let status = &results[3]["result"];
     assert_eq!(status["state"], "enabled");
-    assert_eq!(status["homed"], 7);
+    assert_eq!(status["homed"], json!(["x", "y", "z"]));
     assert!(status["frames"]["good"].as_u64().unwrap() > 3, "{status}");
     for axis in status["axes"].as_array().unwrap() {
         assert!(axis["position_mm"].as_f64().unwrap().abs() < 0.01, "{axis}");

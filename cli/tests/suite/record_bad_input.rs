@@ -99,6 +99,23 @@ fn a_signal_that_never_changes_is_refused() {
 }
 
 #[test]
+fn positions_and_voltages_in_other_units_are_refused() {
+    let scaled = |columns: &'static [usize], factor: f64| {
+        spoilt(HEADER, |_, cells| {
+            for &column in columns {
+                let value: f64 = cells[column].parse().unwrap();
+                cells[column] = (factor * value).to_string();
+            }
+        })
+    };
+    assert_refused(&scaled(&[1, 2], 1e3), &["column position", "10000 mm"]);
+    assert_refused(
+        &scaled(&[3, 4], 1e-3),
+        &["column voltage_v", "another unit"],
+    );
+}
+
+#[test]
 fn without_an_injection_there_is_no_response() {
     let silent = spoilt(HEADER, |_, cells| cells[4] = "0".to_owned());
     let message = refusal(&silent, &[]);

@@ -1,6 +1,7 @@
 //! The table and figures of the comparison's circle.
 
 use crate::circle::{CircleOutcome, FEED_MM_S, RADIUS_MM};
+use crate::experiment::configuration::Configuration;
 use crate::pages::UM_PER_MM;
 use crate::report::{
     Cell, Column, DeviationTrace, Figure, Lines, Plot, PolarDeviation, Series, Style, Table,
@@ -44,11 +45,16 @@ fn over_angle(name: String, path: &[(f64, f64)], style: Style) -> Series {
     Series { name, x, y, style }
 }
 
-/// The circle as a ball-bar draws it, and the same deviation over the angle.
-pub fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
+/// Some of the circles as a ball-bar draws them, in the styles that they have among all.
+pub fn polar_figure(
+    id: &str,
+    circles: &[CircleOutcome],
+    shown: impl Fn(Configuration) -> bool,
+) -> Figure {
     let traces = circles
         .iter()
         .enumerate()
+        .filter(|(_, circle)| shown(circle.configuration))
         .map(|(index, circle)| DeviationTrace {
             name: circle.configuration.name(),
             angle_rad: circle.path.iter().map(|&(angle, _)| angle).collect(),
@@ -60,6 +66,20 @@ pub fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
             style: Style::nth(index),
         })
         .collect();
+    Figure {
+        id: id.to_owned(),
+        caption: "Radial deviation, magnified, around the nominal circle".to_owned(),
+        plot: Plot::PolarDeviation(PolarDeviation {
+            radius_mm: RADIUS_MM,
+            x_label: "x (mm)".to_owned(),
+            y_label: "y (mm)".to_owned(),
+            traces,
+        }),
+    }
+}
+
+/// The circle as a ball-bar draws it, and the same deviation over the angle.
+pub fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
     let over_angle = circles
         .iter()
         .enumerate()
@@ -69,16 +89,7 @@ pub fn circle_figures(circles: &[CircleOutcome]) -> Vec<Figure> {
         })
         .collect();
     vec![
-        Figure {
-            id: "circle-polar".to_owned(),
-            caption: "Radial deviation, magnified, around the nominal circle".to_owned(),
-            plot: Plot::PolarDeviation(PolarDeviation {
-                radius_mm: RADIUS_MM,
-                x_label: "x (mm)".to_owned(),
-                y_label: "y (mm)".to_owned(),
-                traces,
-            }),
-        },
+        polar_figure("circle-polar", circles, |_| true),
         Figure {
             id: "circle-deviation".to_owned(),
             caption: "The same radial deviation over the angle".to_owned(),

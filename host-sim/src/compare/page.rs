@@ -1,7 +1,9 @@
 //! The comparison's tables and page.
 
+use quadrant::control::feedback::LawKind;
+
 use crate::circle::CircleOutcome;
-use crate::circle::single_page::{circle_figures, circle_table};
+use crate::circle::single_page::{circle_figures, circle_table, polar_figure};
 use crate::compare::comparison::Comparison;
 use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
 use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
@@ -112,6 +114,18 @@ pub fn comparison_page(
         sections: vec![
             Section {
                 provenance: None,
+                id: "glance".to_owned(),
+                heading: "At a glance".to_owned(),
+                prose: vec![glance_prose(circles)],
+                blocks: std::iter::once(polar_figure("circle-glance", circles, |configuration| {
+                    Configuration::EXTREMES.contains(&configuration)
+                }))
+                .chain(reversal_figure(comparison))
+                .map(Block::Figure)
+                .collect(),
+            },
+            Section {
+                provenance: None,
                 id: "summary".to_owned(),
                 heading: "The thesis' headlines".to_owned(),
                 prose: vec![HEADLINE_PROSE.to_owned(), experiment_prose()],
@@ -150,6 +164,74 @@ pub fn comparison_page(
             },
         ],
     }
+}
+
+/// Part of the cycle before and after the reversal that is shown.
+const REVERSAL: (f64, f64) = (0.003, 0.022);
+/// The laws whose reversal is shown.
+const SHOWN: [Configuration; 3] = [
+    Configuration::PID,
+    Configuration {
+        controller: LawKind::NPid,
+        ..Configuration::PID
+    },
+    Configuration::BEST,
+];
+
+fn glance_prose(circles: &[CircleOutcome]) -> String {
+    let deviation_um = |configuration| {
+        let found = circles
+            .iter()
+            .find(|circle| circle.configuration == configuration);
+        found.map_or(f64::NAN, |circle| circle.circular_deviation_mm * UM_PER_MM)
+    };
+    let [pid, full] = Configuration::EXTREMES;
+    format!(
+        "A circle of the simulated XY stage, and one reversal of its x axis at {velocity} mm/s. Where an axis reverses, friction \
+         holds it, and the error of {pid_name} rises until it breaks away: the quadrant glitch. {full_name} puts the friction's \
+         voltage out before it is missed. Circular deviation: {pid_um:.1} um and {full_um:.1} um. The N-PID alone trembles while \
+         it waits for the break-away: its gain is largest where its error is, and little margin is left there. With \
+         feedforward the error stays small, and so does the gain.",
+        velocity = VELOCITIES_MM_S[0],
+        pid_name = pid.name(),
+        full_name = full.name(),
+        pid_um = deviation_um(pid),
+        full_um = deviation_um(full),
+    )
+}
+
+/// The error about a reversal in the middle of the cycle, every tick of it.
+fn reversal_figure(comparison: &Comparison) -> Option<Figure> {
+    let velocity_mm_s = VELOCITIES_MM_S[0];
+    let mut series = Vec::new();
+    for (index, configuration) in SHOWN.into_iter().enumerate() {
+        let knowledge = ModelKnowledge::Identified;
+        let entry = comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)?;
+        let cycle = &entry.last_cycle;
+        let count = cycle.reference_mm.len();
+        let quarter = count / 4..count - count / 4;
+        let extreme = |index: &usize| cycle.reference_mm[*index].abs();
+        let at = quarter.max_by(|one, other| extreme(one).total_cmp(&extreme(other)))?;
+        let part = |share: f64| (share * count as f64) as usize;
+        let (from, to) = (at.saturating_sub(part(REVERSAL.0)), at + part(REVERSAL.1));
+        let error_mm = cycle.error_mm.get(from..to)?;
+        let mut curve = error_curve(configuration.name(), error_mm, PERIOD_S, Style::nth(index));
+        let before_s = (at - from) as f64 * PERIOD_S;
+        curve.x.iter_mut().for_each(|time_s| *time_s -= before_s);
+        series.push(curve);
+    }
+    Some(Figure {
+        id: "reversal".to_owned(),
+        caption: format!(
+            "Tracking error about one reversal at {velocity_mm_s} mm/s, every control period, identified model"
+        ),
+        plot: Plot::Lines(Lines {
+            x_label: "time from the reversal (s)".to_owned(),
+            y_label: "tracking error (um)".to_owned(),
+            series,
+            ..Lines::default()
+        }),
+    })
 }
 
 fn experiment_prose() -> String {

@@ -151,6 +151,20 @@ pub enum UnusableSignal {
         /// Largest magnitude in the column.
         largest: f64,
     },
+    /// It is less than friction takes.
+    FaintVoltage {
+        /// Largest magnitude in the column, V.
+        largest: f64,
+        /// The smallest that is believed, V.
+        least_v: f64,
+    },
+    /// It goes further than any machine's axis.
+    FarTravel {
+        /// Travel of the column, mm.
+        travel_mm: f64,
+        /// The largest that is believed, mm.
+        most_mm: f64,
+    },
     /// It is no force in newtons.
     NotForce {
         /// Largest magnitude in the column.
@@ -178,6 +192,18 @@ impl fmt::Display for UnusableSignal {
                  most 1 % may be: lower the amplitude",
                 Brief(*percent),
                 Brief(*limit_v)
+            ),
+            Self::FaintVoltage { largest, least_v } => write!(
+                f,
+                "it reaches {} V, and an axis with friction needs more than {} V to move; is it in another unit?",
+                Brief(*largest),
+                Brief(*least_v)
+            ),
+            Self::FarTravel { travel_mm, most_mm } => write!(
+                f,
+                "it moves {} mm in all, and no axis has more than {} mm; is it in another unit?",
+                Brief(*travel_mm),
+                Brief(*most_mm)
             ),
             Self::NotVoltage { largest } => write!(
                 f,

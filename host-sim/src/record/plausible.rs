@@ -159,7 +159,8 @@ impl Motion {
     }
 }
 
-fn travel_mm(column: &Column) -> f64 {
+/// The distance between the ends of a column's values, mm.
+pub(super) fn travel_mm(column: &Column) -> f64 {
     let (low, high) = column
         .values
         .iter()

@@ -11,6 +11,10 @@ use super::{plausible, time};
 
 /// Largest voltage of an amplifier's input, V.
 const MOST_VOLTS: f64 = 20.0;
+/// Smallest voltage that moves an axis with friction, V: some 30 steps of a 16-bit converter.
+const LEAST_VOLTS: f64 = 0.01;
+/// Longest travel of a machine's axis, mm.
+const MOST_TRAVEL_MM: f64 = 1e4;
 /// The usual limit of an amplifier's input, V, and the share of rows that may lie there.
 const LIMIT_V: f64 = 10.0;
 const MOST_SATURATED: f64 = 0.01;
@@ -97,6 +101,7 @@ impl Recording {
         let sample_time_s = time::check(path, &columns.time)?;
         check(path, &columns)?;
         plausible::check_experiment(path, &columns)?;
+        check_travel(path, &columns)?;
         // A long recording need not hold its time as well.
         drop(columns.time);
         let position_mm = columns
@@ -118,6 +123,22 @@ impl Recording {
             voltage_v,
         })
     }
+}
+
+/// Refuses a position that no axis reaches, whatever the reference says.
+fn check_travel(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
+    if travel_mm <= MOST_TRAVEL_MM {
+        return Ok(());
+    }
+    Err(RecordError::Useless {
+        path: path.to_owned(),
+        column: "position",
+        fault: UnusableSignal::FarTravel {
+            travel_mm,
+            most_mm: MOST_TRAVEL_MM,
+        },
+    })
 }
 
 fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
@@ -148,6 +169,13 @@ fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
         .fold(0.0_f64, |most, value| most.max(value.abs()));
     if largest > MOST_VOLTS {
         return refuse("voltage_v", UnusableSignal::NotVoltage { largest });
+    }
+    if largest < LEAST_VOLTS {
+        let least_v = LEAST_VOLTS;
+        return refuse(
+            "voltage_v",
+            UnusableSignal::FaintVoltage { largest, least_v },
+        );
     }
     let at_limit = |value: &f64| value.abs() >= 0.9999 * LIMIT_V;
     let saturated = voltage
