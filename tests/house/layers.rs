@@ -91,6 +91,17 @@ fn the_host_library_knows_neither_studies_nor_command_line() {
 }
 
 #[test]
+fn the_simulation_stands_on_the_library_alone() {
+    let manifest = manifest("crates/simulation/Cargo.toml");
+    let found: Vec<_> = dependencies(&manifest)
+        .into_iter()
+        .filter(|(_, name, _)| name.starts_with("quadrant-") || name == "rayon")
+        .map(|(table, _, line)| format!("{table} {line}"))
+        .collect();
+    assert_none("crates/simulation knows more than the law", &found);
+}
+
+#[test]
 fn the_command_does_not_know_the_studies() {
     let mut found = offences("cli/", |_, path| path[0] == "quadrant_studies");
     if dependencies(&manifest("cli/Cargo.toml"))
