@@ -10,24 +10,27 @@ function colours() {
 
 const FONT = '11px system-ui, -apple-system, "Segoe UI", Roboto, "DejaVu Sans", sans-serif';
 
-// The smallest of 1, 2, 5 times a power of ten that is not below a value.
-function nice(value) {
-  const power = 10 ** Math.floor(Math.log10(Math.max(value, 1e-9)));
-  return [1, 2, 5, 10].map((step) => step * power).find((step) => step >= value * 0.999);
+// The smallest of some steps times a power of ten that is not below a value.
+function nice(value, steps = [1, 2, 5, 10]) {
+  const power = Math.floor(Math.log10(Math.max(value, 1e-9)));
+  return steps.map((step) => Number(`${step}e${power}`)).find((step) => step >= value * 0.999);
 }
 
 // A scale that grows at once and shrinks only when much too large, so that a live plot does not tremble.
 class Scale {
-  constructor(least) {
+  constructor(least, steps) {
     this.least = least;
+    this.steps = steps;
     this.value = least;
   }
   fit(largest) {
-    const wanted = Math.max(nice(largest * 1.05), this.least);
-    if (wanted > this.value || wanted < 0.45 * this.value) this.value = wanted;
+    const wanted = Math.max(nice(largest * 1.05, this.steps), this.least);
+    if (wanted > this.value || wanted < 0.6 * this.value) this.value = wanted;
     return this.value;
   }
 }
+
+const FINE = [1, 1.5, 2, 3, 4, 5, 6, 8, 10];
 
 function decimals(step) {
   return Math.max(0, -Math.floor(Math.log10(step) + 1e-9));
@@ -58,7 +61,7 @@ class Chart {
 class ErrorPlot {
   constructor(box) {
     this.box = box;
-    this.scale = new Scale(1);
+    this.scale = new Scale(1, FINE);
     this.rebuild();
   }
   rebuild() {
@@ -157,7 +160,7 @@ function sheet(canvas) {
 class PolarPlot {
   constructor(canvas) {
     this.canvas = canvas;
-    this.scale = new Scale(1);
+    this.scale = new Scale(1, FINE);
   }
   // Angles and radial deviations of the turn before and of the turn so far, oldest first, and the latest of them.
   draw(turns, radius_mm) {

@@ -30,7 +30,7 @@ const TOUR = [
     title: "N-PID alone",
     law: "n-pid", feedforward: "none",
     text: "Without a model of friction: a PID whose gain grows with the error, so that it pulls harder in a glitch. Its gain is held to what the loop bears.",
-    look: "the spikes: lower than with PID, and in the same places. The open loop is the same, since it is that of small errors.",
+    look: "the spikes: lower than with PID, in the same places, and with a small oscillation on their tops, where the gain is highest. The open loop is that of small errors, and the same.",
   },
   {
     title: "N-PID, static and GMS",
