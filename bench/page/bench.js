@@ -128,7 +128,7 @@ function settingControl(setting) {
   const sides = { positive: ", towards +", negative: ", towards −" };
   const side = sides[setting.field.split(".")[2]] ?? "";
   return numberControl({ ...setting, label: head(setting.meaning) + side }, (value, refused) => {
-    const done = tryTo({ do: "set", path: setting.path, value }, refused);
+    const done = tryTo({ set: { path: setting.path, value } }, refused);
     leaveTour();
     showLoop();
     return done;
@@ -137,7 +137,7 @@ function settingControl(setting) {
 
 // Takes everything that the controls show from the bench.
 function show() {
-  const shown = bench.request({ do: "show", axis });
+  const shown = bench.request({ show: { axis } });
   const { controls } = shown;
   motion = shown.motion;
   choices($("law"), controls.laws, controls.law);
@@ -148,7 +148,7 @@ function show() {
   for (const name of document.querySelectorAll(".axis-name")) name.textContent = AXES[axis];
   $("knobs").replaceChildren(...form.knobs.map((knob, index) =>
     numberControl({ ...knob, range: [knob.least, knob.most], slider: [knob.least, knob.most], value: shown.knobs[index] }, (value, refused) => {
-      const done = tryTo({ do: "turn", knob: knob.name, value }, refused);
+      const done = tryTo({ turn: { knob: knob.name, value } }, refused);
       forgetScores();
       showLoop();
       return done;
@@ -159,7 +159,7 @@ function show() {
 }
 
 function showLoop() {
-  const loop = bench.request({ do: "loop", axis });
+  const loop = bench.request({ loop: { axis } });
   bodePlot.draw(loop);
   $("margins-told").textContent = loop.told?.margins ?? "the settings have no plant";
   $("margins-true").textContent = loop.true_stage?.margins ?? "the law has no linear form";
@@ -171,7 +171,7 @@ function begin() {
 }
 
 function start(wanted, refused) {
-  const done = tryTo({ do: "start", motion: wanted }, refused);
+  const done = tryTo({ start: { motion: wanted } }, refused);
   if (done) {
     motion = wanted;
     begin();
@@ -180,13 +180,13 @@ function start(wanted, refused) {
 }
 
 function restart() {
-  bench.request({ do: "restart" });
+  bench.request("restart");
   begin();
 }
 
 function chooseLaw() {
   leaveTour();
-  tryTo({ do: "choose", law: $("law").value, feedforward: $("feedforward").value });
+  tryTo({ choose: { law: $("law").value, feedforward: $("feedforward").value } });
   show();
 }
 
@@ -199,7 +199,7 @@ function leaveTour() {
 
 function goTo(index) {
   const { law, feedforward } = TOUR[index];
-  if (!tryTo({ do: "choose", law, feedforward })) return;
+  if (!tryTo({ choose: { law, feedforward } })) return;
   step = index;
   scores.delete(index);
   settle();
@@ -311,7 +311,7 @@ function measure(at) {
   $("load").textContent = share(meters.law);
   $("drawing").textContent = share(meters.drawing);
   Object.assign(meters, { since: at, simulated: 0, law: 0, drawing: 0 });
-  const { fault } = bench.request({ do: "show", axis });
+  const { fault } = bench.request({ show: { axis } });
   $("fault").hidden = !fault;
   if (fault) $("fault-text").textContent = fault;
 }
@@ -351,7 +351,7 @@ function frame(at) {
 
 async function take(file) {
   if (!file) return;
-  if (tryTo({ do: "load", text: await file.text(), name: file.name })) {
+  if (tryTo({ load: { text: await file.text(), name: file.name } })) {
     begin();
     leaveTour();
     show();
@@ -371,12 +371,12 @@ function connect() {
     show();
   });
   $("knobs-reset").addEventListener("click", () => {
-    for (const { name, default: value } of form.knobs) bench.request({ do: "turn", knob: name, value });
+    for (const { name, default: value } of form.knobs) bench.request({ turn: { knob: name, value } });
     forgetScores();
     show();
   });
   $("tell").addEventListener("click", () => {
-    if (tryTo({ do: "tell-friction" })) say("the law has the stage's own friction");
+    if (tryTo("tell-friction")) say("the law has the stage's own friction");
     show();
   });
   $("file").addEventListener("change", (event) => {
@@ -384,7 +384,7 @@ function connect() {
     event.target.value = "";
   });
   $("save").addEventListener("click", () => {
-    const text = bench.request({ do: "save" });
+    const text = bench.request("save");
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([text], { type: "application/toml" }));
     link.download = "settings.toml";
@@ -392,7 +392,7 @@ function connect() {
     setTimeout(() => URL.revokeObjectURL(link.href), 1000);
   });
   $("reset").addEventListener("click", () => {
-    bench.request({ do: "reset" });
+    bench.request("reset");
     begin();
     leaveTour();
     show();
@@ -422,7 +422,7 @@ function connect() {
 
 async function open() {
   bench = await openBench();
-  form = bench.request({ do: "describe" });
+  form = bench.request("describe");
   const names = [...form.signals, ...AXES.flatMap((name) => form.axis_signals.map((signal) => `${name}.${signal}`))];
   record = new Record(names, (KEPT_S * form.rate_hz) / form.sample_ticks);
   errorPlot = new ErrorPlot($("error-plot"));

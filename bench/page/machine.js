@@ -8,7 +8,7 @@ async function openBench() {
   const encoder = new TextEncoder();
   const decoder = new TextDecoder();
   return {
-    // Returns the reply, or throws the reason.
+    // Returns the reply, or throws the reason. A request is a name, or a name with its fields.
     request(body) {
       const text = encoder.encode(JSON.stringify(body));
       const place = room(text.length);

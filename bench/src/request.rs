@@ -8,9 +8,9 @@ use crate::controls::Controls;
 use crate::loop_response::LoopResponse;
 use crate::truth::KNOBS;
 
-/// A request.
+/// A request: its name, or an object of its name and an object of its fields.
 #[derive(Clone, Debug, PartialEq, Deserialize)]
-#[serde(tag = "do", rename_all = "kebab-case", deny_unknown_fields)]
+#[serde(rename_all = "kebab-case", deny_unknown_fields)]
 pub enum Request {
     /// The signals of a sample, the sample rate, the knobs of the stage and the numbers of the motion.
     Describe,
@@ -144,15 +144,14 @@ mod tests {
     #[test]
     fn every_law_and_feedforward_that_is_offered_can_be_chosen() {
         let mut bench = Bench::default();
-        let shown = ask(&mut bench, &json!({"do": "show", "axis": 0}));
+        let shown = ask(&mut bench, &json!({"show": {"axis": 0}}));
         let controls = &shown["ok"]["controls"];
         for law in controls["laws"].as_array().unwrap() {
             for feedforward in controls["feedforwards"].as_array().unwrap() {
-                let choice = json!({
-                    "do": "choose", "law": law["name"], "feedforward": feedforward["name"]
-                });
+                let choice =
+                    json!({"choose": {"law": law["name"], "feedforward": feedforward["name"]}});
                 assert!(ask(&mut bench, &choice)["error"].is_null(), "{choice}");
-                let shown = ask(&mut bench, &json!({"do": "show", "axis": 2}));
+                let shown = ask(&mut bench, &json!({"show": {"axis": 2}}));
                 assert_eq!(shown["ok"]["controls"]["law"], law["name"]);
             }
         }
@@ -162,10 +161,10 @@ mod tests {
     fn what_cannot_be_done_is_told_in_words() {
         let mut bench = Bench::default();
         for request in [
-            json!({"do": "dance"}),
-            json!({"do": "show", "axis": 3}),
-            json!({"do": "turn", "knob": "mass", "value": 9.0}),
-            json!({"do": "choose", "law": "pid", "feedforward": "magic"}),
+            json!("dance"),
+            json!({"show": {"axis": 3}}),
+            json!({"turn": {"knob": "mass", "value": 9.0}}),
+            json!({"choose": {"law": "pid", "feedforward": "magic"}}),
         ] {
             let reply = ask(&mut bench, &request);
             assert!(reply["error"].is_string(), "{request}: {reply}");

@@ -21,23 +21,23 @@ const RUNS: [(&[&str], u32); 4] = [
     (&[], 60),
     (
         &[
-            r#"{"do": "choose", "law": "pid", "feedforward": "none"}"#,
-            r#"{"do": "turn", "knob": "friction", "value": 1.7}"#,
+            r#"{"choose": {"law": "pid", "feedforward": "none"}}"#,
+            r#"{"turn": {"knob": "friction", "value": 1.7}}"#,
         ],
         10,
     ),
     (
         &[
-            r#"{"do": "choose", "law": "sliding-mode", "feedforward": "lugre"}"#,
-            r#"{"do": "start", "motion": {"radius_mm": 20.0, "feed_mm_min": 2400.0}}"#,
+            r#"{"choose": {"law": "sliding-mode", "feedforward": "lugre"}}"#,
+            r#"{"start": {"motion": {"radius_mm": 20.0, "feed_mm_min": 2400.0}}}"#,
         ],
         10,
     ),
     (
         &[
-            r#"{"do": "choose", "law": "cascade", "feedforward": "smoothed-gms"}"#,
-            r#"{"do": "turn", "knob": "mass", "value": 1.2}"#,
-            r#"{"do": "tell-friction"}"#,
+            r#"{"choose": {"law": "cascade", "feedforward": "smoothed-gms"}}"#,
+            r#"{"turn": {"knob": "mass", "value": 1.2}}"#,
+            r#""tell-friction""#,
         ],
         10,
     ),
