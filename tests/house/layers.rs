@@ -91,6 +91,17 @@ fn the_host_library_knows_neither_studies_nor_command_line() {
 }
 
 #[test]
+fn the_simulation_stands_on_the_library_alone() {
+    let manifest = manifest("crates/simulation/Cargo.toml");
+    let found: Vec<_> = dependencies(&manifest)
+        .into_iter()
+        .filter(|(_, name, _)| name.starts_with("quadrant-") || name == "rayon")
+        .map(|(table, _, line)| format!("{table} {line}"))
+        .collect();
+    assert_none("crates/simulation knows more than the law", &found);
+}
+
+#[test]
 fn the_command_does_not_know_the_studies() {
     let mut found = offences("cli/", |_, path| path[0] == "quadrant_studies");
     if dependencies(&manifest("cli/Cargo.toml"))
@@ -130,9 +141,27 @@ fn the_library_brings_no_runtime_and_no_log_to_a_target() {
 #[test]
 fn unsafe_code_is_in_the_boards_only() {
     let found = offences("", |file, path| {
-        path.contains(&"unsafe") && !file.starts_with("src/board/")
+        path.contains(&"unsafe") && !file.starts_with("src/board/") && file != EXPORTS
     });
     assert_none("unsafe outside src/board", &found);
+}
+
+/// The functions that WebAssembly gives to a page: their names must not be mangled, and that attribute is unsafe.
+const EXPORTS: &str = "bench/src/exports.rs";
+
+#[test]
+fn the_exports_of_the_page_take_nothing_unsafe_but_their_names() {
+    let source = &sources()[EXPORTS];
+    let all = tokens(source);
+    let found: Vec<_> = (0..all.len())
+        .filter(|&at| all[at].is_word("unsafe"))
+        .filter(|&at| {
+            let after: Vec<_> = all[at + 1..].iter().take(4).map(|of| of.text).collect();
+            after != ["(", "no_mangle", ")", "]"]
+        })
+        .map(|at| format!("{EXPORTS}:{}", all[at].line))
+        .collect();
+    assert_none("unsafe that is not a name", &found);
 }
 
 #[test]

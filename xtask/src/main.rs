@@ -1,4 +1,4 @@
-//! The project's chores: `cargo xtask setup`, `build`, `sizes`, `prove-no-panic`, `transcript`, `test`, and by way of the
+//! The project's chores: `cargo xtask setup`, `build`, `sizes`, `prove-no-panic`, `transcript`, `web`, `test`, and by way of the
 //! package `target-tests` what runs an image.
 #![forbid(unsafe_code)]
 
@@ -9,6 +9,7 @@ mod setup;
 mod stack;
 mod test;
 mod transcript;
+mod web;
 
 use std::ffi::OsString;
 use std::process::ExitCode;
@@ -61,6 +62,8 @@ enum Verb {
     Combinations(Forwarded),
     /// Count the instructions of a control tick while link, queues and log are overloaded
     Saturation(Forwarded),
+    /// Build the page of the bench, which a browser opens
+    Web(WebArgs),
     /// Set up, then run every check there is
     Test {
         /// Only the firmware's own: lints, images, proofs
@@ -76,6 +79,20 @@ struct Forwarded {
     /// Its options; `--help` lists them
     #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
     options: Vec<OsString>,
+}
+
+/// Options of the page.
+#[derive(Args)]
+struct WebArgs {
+    /// Serve it on this machine until interrupted
+    #[arg(long)]
+    serve: bool,
+    /// Port to serve it on
+    #[arg(long, default_value_t = 8080, requires = "serve")]
+    port: u16,
+    /// Compare its converter words with the host's in a headless Chromium
+    #[arg(long)]
+    check: bool,
 }
 
 /// Options that choose an image.
@@ -154,6 +171,15 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Count(args) => forward(toolchain()?, "count", args)?,
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
+        Verb::Web(args) => {
+            let page = web::build(toolchain()?)?;
+            if args.check {
+                web::check(&page)?;
+            }
+            if args.serve {
+                web::serve(&page, args.port)?;
+            }
+        }
         Verb::Test {
             firmware_only: false,
         } => return test::run(cli.toolchain.unwrap_or(Choice::Auto)),

@@ -1,4 +1,4 @@
-//! Finding, or else installing, what building and emulating the firmware and testing the reports take.
+//! Finding, or else installing, what building and emulating the firmware, and building and testing pages take.
 
 use std::path::Path;
 use std::process::Command;
@@ -7,7 +7,7 @@ use anyhow::{Context, Result, bail};
 
 use xtask::command;
 use xtask::image::{LIBRARY_TRIPLES, TRIPLES};
-use xtask::toolchain::{Choice, Toolchain};
+use xtask::toolchain::{Choice, Toolchain, WEB_TRIPLE};
 
 /// Something that must be there, how to see it, and the Debian package it comes in.
 struct Tool {
@@ -16,7 +16,7 @@ struct Tool {
 }
 
 /// Tools that are needed whichever compiler is used.
-const TOOLS: [Tool; 3] = [
+const TOOLS: [Tool; 4] = [
     Tool {
         program: "qemu-system-arm",
         package: "qemu-system-arm",
@@ -25,7 +25,12 @@ const TOOLS: [Tool; 3] = [
         program: "arm-none-eabi-objdump",
         package: "binutils-arm-none-eabi",
     },
-    // The tests open the reports in it.
+    // It fetches what the page of the bench is drawn with.
+    Tool {
+        program: "npm",
+        package: "npm",
+    },
+    // The tests open reports and bench in it.
     Tool {
         program: "chromium",
         package: "chromium",
@@ -55,7 +60,7 @@ pub(crate) fn run(choice: Choice) -> Result<Toolchain> {
     };
     let missing = missing(toolchain);
     if missing.is_empty() {
-        println!("setup: QEMU, binutils and Chromium are installed");
+        println!("setup: QEMU, binutils, npm and Chromium are installed");
     } else {
         install(&missing)?;
     }
@@ -105,6 +110,7 @@ fn add_targets() -> Result<()> {
     let missing: Vec<&str> = TRIPLES
         .into_iter()
         .chain(LIBRARY_TRIPLES)
+        .chain([WEB_TRIPLE])
         .filter(|triple| !installed.lines().any(|line| line == *triple))
         .collect();
     if missing.is_empty() {
@@ -137,8 +143,8 @@ fn install(packages: &[&str]) -> Result<()> {
     if !command::exists("apt-get") {
         bail!(
             "there is no apt-get here to install it with: please install QEMU for Arm (qemu-system-arm), the \
-             GNU binutils for arm-none-eabi (arm-none-eabi-objdump) and Chromium (chromium) by your system's own \
-             means, then try again"
+             GNU binutils for arm-none-eabi (arm-none-eabi-objdump), npm and Chromium (chromium) by your system's \
+             own means, then try again"
         );
     }
     command::run(apt().arg("update"))?;

@@ -13,7 +13,7 @@ use xtask::image::{self, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{layout, setup, transcript};
+use crate::{layout, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -76,6 +76,9 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     let firmware = Beside::start(toolchain)?;
     host(&mut report)?;
     firmware.finish(&mut report)?;
+    report.step("every converter word in a browser", || {
+        web::check(&web::build(toolchain)?)
+    });
     emulated(&mut report, toolchain)?;
     println!("\n{:.1} min", started.elapsed().as_secs_f64() / 60.0);
     Ok(report.finish())
@@ -250,6 +253,7 @@ pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
             command::run(check.args(["--target", triple]))
         });
     }
+    report.step("the page of the bench", || web::build(toolchain).map(drop));
     Ok(report.finish())
 }
 

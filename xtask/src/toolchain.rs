@@ -4,7 +4,7 @@ use std::fs;
 use std::path::PathBuf;
 use std::process::Command;
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, ensure};
 use clap::ValueEnum;
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +18,9 @@ pub fn denies_warnings(compiler: &str) -> bool {
     let release = compiler.split(' ').next();
     release.is_some_and(|release| LINTED_WITH.contains(&release))
 }
+
+/// The target of the page of the bench.
+pub const WEB_TRIPLE: &str = "wasm32-unknown-unknown";
 
 /// Compiler that the user asks for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -100,6 +103,23 @@ impl Toolchain {
         }
     }
 
+    /// Cargo, for the page of the bench, in a target folder of its own; the triple is [`WEB_TRIPLE`].
+    ///
+    /// # Errors
+    /// Debian's compiler, and no linker for WebAssembly.
+    pub fn web_cargo(self, verb: &str) -> Result<Command> {
+        let mut cargo = command::command("cargo");
+        if self == Self::Debian {
+            cargo.arg("+debian");
+        }
+        cargo.args([verb, "--target", WEB_TRIPLE, "--target-dir", "target/web"]);
+        if self == Self::Debian {
+            cargo.args(["--config", "xtask/toolchain/debian-web.toml", "--config"]);
+            cargo.arg(format!("target.{WEB_TRIPLE}.linker = {:?}", web_linker()?));
+        }
+        Ok(cargo)
+    }
+
     /// Cargo, for the firmware: with this toolchain, and in a target folder of its own, so that neither compiler
     /// rebuilds what the other built.
     pub fn cargo(self, verb: &str) -> Command {
@@ -114,6 +134,26 @@ impl Toolchain {
         }
         cargo
     }
+}
+
+/// Returns a linker for WebAssembly: LLVM's own, or the one that rustup's compiler brings.
+fn web_linker() -> Result<PathBuf> {
+    if command::exists("wasm-ld") {
+        return Ok(PathBuf::from("wasm-ld"));
+    }
+    let ask = |what: &[&str]| command::output(command::command("rustc").args(what));
+    let verbose = ask(&["-vV"])?;
+    let host = verbose.lines().find_map(|line| line.strip_prefix("host: "));
+    let linker = PathBuf::from(ask(&["--print", "sysroot"])?.trim())
+        .join("lib/rustlib")
+        .join(host.context("rustc names no host")?)
+        .join("bin/rust-lld");
+    ensure!(
+        linker.is_file(),
+        "no linker for WebAssembly: neither wasm-ld (Debian's package lld) nor {}",
+        linker.display()
+    );
+    Ok(linker)
 }
 
 /// Returns the compiler that builds for the host.

@@ -7,10 +7,7 @@
 mod bandwidth;
 pub mod best;
 mod form;
-pub mod held_plant;
 pub mod integral_gain;
-pub mod loop_shape;
-pub mod margins;
 pub mod measured;
 pub mod npid;
 pub mod pages;
@@ -33,6 +30,7 @@ pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
 pub use process::Process;
+pub use quadrant_simulation::{held_plant, loop_shape, margins};
 pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]

@@ -4,8 +4,8 @@
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use crate::browser::Browser;
 use crate::sample::{full, lines, page, table};
+use quadrant_chromium::Browser;
 use quadrant_report::{Block, Page};
 use serde_json::{Value, json};
 
@@ -35,7 +35,7 @@ impl Opened {
     /// Everything that is wrong with a page in a window, in words; nothing, if all is well.
     fn faults(&mut self, path: &Path, window: (u32, u32), is_dark: bool) -> Vec<String> {
         self.browser.open(path, window, is_dark);
-        let found = self.browser.evaluate(include_str!("browser/inspect.js"));
+        let found = self.browser.evaluate(include_str!("inspect.js"));
         let mut faults = self.browser.problems();
         for figure in found["figures"].as_array().unwrap() {
             if figure["traces"] != figure["curves"] || figure["curves"] == 0 {

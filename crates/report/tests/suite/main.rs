@@ -1,6 +1,5 @@
 //! Pages as files, as text and in a browser.
 
-mod browser;
 mod browser_page;
 mod formats;
 mod page;

@@ -9,8 +9,8 @@ use quadrant::reference::MotionSettings;
 use quadrant::safety::SafetyState;
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant::units::DacCode;
+use quadrant_simulation::law_machine::{LawMachine, Operator};
 
-use super::controller::{LawMachine, Operator};
 use super::recorder::{Period, Recorder};
 use super::watch::Watch;
 use crate::machine::error::MachineError;

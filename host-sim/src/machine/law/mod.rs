@@ -5,11 +5,10 @@
 //! - [`LawStage`]: its three axes.
 
 mod axis;
-mod controller;
 mod recorder;
 mod stage;
 mod watch;
 
 pub use axis::SimulatedTestAxis;
-pub use controller::{LawMachine, Operator};
+pub use quadrant_simulation::law_machine::{LawMachine, Operator};
 pub use stage::LawStage;

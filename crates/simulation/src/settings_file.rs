@@ -189,12 +189,20 @@ impl SettingsFile {
     /// # Errors
     /// A value that the firmware would refuse, in which case nothing is written; or a file that cannot be written.
     pub fn write(&self, path: &Path) -> Result<(), SettingsFileError> {
-        self.check(path)?;
-        let text = toml::to_string_pretty(self).map_err(|source| SettingsFileError::Serialise {
+        let text = self.text(path)?;
+        std::fs::write(path, text).map_err(|source| SettingsFileError::Io {
             path: path.to_owned(),
             source,
-        })?;
-        std::fs::write(path, text).map_err(|source| SettingsFileError::Io {
+        })
+    }
+
+    /// Checks the file and returns its text; `path` is what messages call it.
+    ///
+    /// # Errors
+    /// A value that the firmware would refuse.
+    pub fn text(&self, path: &Path) -> Result<String, SettingsFileError> {
+        self.check(path)?;
+        toml::to_string_pretty(self).map_err(|source| SettingsFileError::Serialise {
             path: path.to_owned(),
             source,
         })

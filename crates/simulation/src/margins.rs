@@ -5,7 +5,7 @@ use std::fmt;
 
 use num_complex::Complex64;
 
-use super::loop_shape::OpenLoop;
+use crate::loop_shape::OpenLoop;
 
 /// Stability margins of a stable loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -101,7 +101,7 @@ pub fn margins(open_loop: &impl OpenLoop) -> Result<Margins, MarginError> {
 }
 
 /// The lowest frequency at which the loop's phase falls through -180 degrees, rad/s.
-pub(super) fn falling_phase_crossover(open_loop: &impl OpenLoop) -> Result<f64, MarginError> {
+pub fn falling_phase_crossover(open_loop: &impl OpenLoop) -> Result<f64, MarginError> {
     let scan = Scan::new(open_loop)?;
     let falls = |&omega: &f64| scan.direction(omega) < 0;
     let first = scan.phase_crossovers().into_iter().find(falls);
@@ -207,7 +207,7 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
 }
 
 /// Finds the point at which `below`, true at `low` and false at `high`, changes, to the last bit but a few.
-pub(super) fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
+pub fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -> f64 {
     for _ in 0..80 {
         let middle = 0.5 * (low + high);
         if below(middle) {
@@ -222,8 +222,8 @@ pub(super) fn bisect(mut low: f64, mut high: f64, below: impl Fn(f64) -> bool) -
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::fixtures::{X_GAINS, X_PLANT};
-    use crate::design::{ContinuousLoop, SampledLoop};
+    use crate::fixtures::{X_GAINS, X_PLANT};
+    use crate::loop_shape::{ContinuousLoop, SampledLoop};
     use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
     const CONTINUOUS: ContinuousLoop = ContinuousLoop {

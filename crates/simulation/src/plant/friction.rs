@@ -61,6 +61,19 @@ impl Presliding {
         })
     }
 
+    /// Gives the axis' model other parameters; its memory stays where the model is of the same kind.
+    pub fn change(&mut self, truth: &AxisParameters, step_s: f64) {
+        let Self(mut model) = Self::new(truth, step_s);
+        match (&mut model, &self.0) {
+            (Model::Gms(.., state), Model::Gms(.., kept))
+            | (Model::Smoothed(.., state), Model::Smoothed(.., kept)) => state.clone_from(kept),
+            (Model::Lugre(_, bristle), Model::Lugre(_, kept))
+            | (Model::Dahl(_, bristle), Model::Dahl(_, kept)) => bristle.clone_from(kept),
+            _ => {}
+        }
+        self.0 = model;
+    }
+
     /// The friction in V without its viscous part, after a displacement (mm) that ended at a speed (mm/s) and took
     /// `step_s`.
     pub fn step(&mut self, displacement: f64, speed: f64, step_s: f64) -> f64 {

@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use num_complex::Complex64;
 use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
-use super::held_plant::HeldPlant;
+use crate::held_plant::HeldPlant;
 
 /// An open loop without poles in the right half plane (outside the unit circle, when sampled).
 pub trait OpenLoop {
@@ -76,7 +76,7 @@ impl SampledLoop {
 }
 
 /// The controller's difference equations at a point of the z plane, V/mm. The derivative filter must not be zero.
-pub(super) fn controller_response(gains: &PidGains, period: f64, z: Complex64) -> Complex64 {
+pub fn controller_response(gains: &PidGains, period: f64, z: Complex64) -> Complex64 {
     let filter = 2.0 * gains.derivative_filter_s;
     let a = (filter - period) / (filter + period);
     let b = 2.0 * gains.kd_v_s_per_mm / (filter + period);
@@ -100,7 +100,7 @@ impl OpenLoop for SampledLoop {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::design::fixtures::{X_GAINS, X_PLANT};
+    use crate::fixtures::{X_GAINS, X_PLANT};
 
     #[test]
     fn sampled_form_approaches_the_continuous_one_at_a_high_rate() {

@@ -1,4 +1,7 @@
-//! A headless Chromium, driven through the pipe of its DevTools protocol.
+//! A headless Chromium for tests of pages, driven through the pipe of its DevTools protocol.
+//!
+//! What goes wrong in it is a failure of the test, so its functions panic.
+#![forbid(unsafe_code)]
 
 use std::io::{BufRead, BufReader, Write};
 use std::path::{Path, PathBuf};
@@ -16,7 +19,8 @@ const PROGRAMS: [&str; 4] = ["chromium", "chromium-browser", "google-chrome", "c
 const REQUIRED: &str = "QUADRANT_BROWSER_TESTS";
 
 /// A browser with one tab.
-pub(crate) struct Browser {
+#[derive(Debug)]
+pub struct Browser {
     process: Child,
     requests: ChildStdin,
     answers: Receiver<Value>,
@@ -30,7 +34,7 @@ pub(crate) struct Browser {
 
 impl Browser {
     /// Starts the browser; `None`, with a message, where there is none and none is required.
-    pub(crate) fn start() -> Option<Self> {
+    pub fn start() -> Option<Self> {
         let Some(program) = find() else {
             let message = "no Chromium in the search path: install the package chromium, or run cargo xtask setup";
             assert_ne!(
@@ -120,7 +124,7 @@ impl Browser {
     }
 
     /// Sends a request and waits for its answer; keeps what the page complains of meanwhile.
-    pub(crate) fn call(&mut self, method: &str, parameters: Value) -> Value {
+    pub fn call(&mut self, method: &str, parameters: Value) -> Value {
         self.next_id += 1;
         let mut request = json!({"id": self.next_id, "method": method, "params": parameters});
         if let Some(session) = &self.session {
@@ -173,12 +177,12 @@ impl Browser {
     }
 
     /// Returns the page's complaints since the last call: errors, exceptions, violations, requests.
-    pub(crate) fn problems(&mut self) -> Vec<String> {
+    pub fn problems(&mut self) -> Vec<String> {
         std::mem::take(&mut self.problems)
     }
 
     /// Opens a page in a window of a size, in CSS pixels, on a device that prefers light or dark pages.
-    pub(crate) fn open(&mut self, page: &Path, (width, height): (u32, u32), is_dark: bool) {
+    pub fn open(&mut self, page: &Path, (width, height): (u32, u32), is_dark: bool) {
         let metrics = json!({"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600});
         self.call("Emulation.setDeviceMetricsOverride", metrics);
         self.emulate("screen", is_dark);
@@ -191,7 +195,7 @@ impl Browser {
     }
 
     /// Shows the page as on a medium, "screen" or "print", that prefers light or dark pages.
-    pub(crate) fn emulate(&mut self, medium: &str, is_dark: bool) {
+    pub fn emulate(&mut self, medium: &str, is_dark: bool) {
         let scheme = if is_dark { "dark" } else { "light" };
         let features = json!([{"name": "prefers-color-scheme", "value": scheme}]);
         self.call(
@@ -201,7 +205,7 @@ impl Browser {
     }
 
     /// The value of an expression, awaited if it is a promise.
-    pub(crate) fn evaluate(&mut self, expression: &str) -> Value {
+    pub fn evaluate(&mut self, expression: &str) -> Value {
         let answer = self.call(
             "Runtime.evaluate",
             json!({"expression": expression, "awaitPromise": true, "returnByValue": true, "userGesture": true}),
@@ -212,7 +216,7 @@ impl Browser {
     }
 
     /// Clicks on what a selector finds, and returns the file that is downloaded, by the name it was given.
-    pub(crate) fn download(&mut self, selector: &str, name: &str) -> Option<Vec<u8>> {
+    pub fn download(&mut self, selector: &str, name: &str) -> Option<Vec<u8>> {
         let before = self.downloads;
         self.evaluate(&format!("document.querySelector({selector:?}).click()"));
         let started = Instant::now();

@@ -55,6 +55,21 @@ impl SimulatedAxis {
         }
     }
 
+    /// Gives the axis other parameters while it moves: position, velocity and the deflection of the friction's elements stay,
+    /// as after a drop of oil.
+    pub fn change(&mut self, truth: AxisParameters) {
+        let delay = (truth.delay_s / self.step_s).round() as usize;
+        let latest = self.pipeline.back().copied().unwrap_or(0.0);
+        // The oldest voltages are those that arrive next.
+        while self.pipeline.len() > delay {
+            self.pipeline.pop_front();
+        }
+        self.pipeline.resize(delay, latest);
+        self.volts_per_code = truth.full_scale_v / DacCode::FULL_SCALE;
+        self.presliding.change(&truth, self.step_s);
+        self.truth = truth;
+    }
+
     /// The true position, mm.
     pub fn position_mm(&self) -> f64 {
         self.position_mm

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
-use quadrant::axes::AxisName;
+use quadrant::axes::{AxisName, PerAxis};
 use quadrant::command::Command;
 use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
@@ -22,6 +22,8 @@ pub struct LawMachine<S: Scalar, const N: usize> {
     /// Segments of a stream on their way to the axes.
     segments: [VecDeque<Segment>; 3],
     command: Option<Command>,
+    /// Axes whose settings were exchanged since the last tick.
+    settings_changed: PerAxis<bool>,
     events: Vec<(u32, Event)>,
 }
 
@@ -47,6 +49,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
             requests: VecDeque::new(),
             segments: Default::default(),
             command: None,
+            settings_changed: PerAxis::splat(false),
             events: Vec::new(),
         }
     }
@@ -64,6 +67,12 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.
     pub fn set_motion(&mut self, axis: AxisName, motion: Motion<S>) {
         self.plan[axis as usize] = motion;
+    }
+
+    /// Takes other settings between two ticks, as the firmware does: the outputs go over without a jump.
+    pub fn exchange(&mut self, stage: Stage<S, N>) {
+        self.stage = stage;
+        self.settings_changed = PerAxis::splat(true);
     }
 
     /// Appends a segment of each axis to the stream's queues.
@@ -96,6 +105,10 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
             &mut self.state,
             &Inputs {
                 command: self.command.take(),
+                settings_changed: std::mem::replace(
+                    &mut self.settings_changed,
+                    PerAxis::splat(false),
+                ),
                 ..input.inputs()
             },
         );

@@ -1,0 +1,31 @@
+//! The simulated stage under the control law, wherever Rust runs: on a host, and in a browser.
+//!
+//! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
+//! - [`law_machine`]: the control law and its supervisor, tick by tick;
+//! - [`settings_file`]: a stage's settings with their origin, as TOML;
+//! - [`held_plant`], [`loop_shape`], [`margins`]: the linear axis behind its converter, the open loop, its margins.
+//!
+//! No threads, no ports and no clock.
+#![forbid(unsafe_code)]
+// A tool, not a library for others: a comment that only repeats a name is left out.
+#![allow(missing_docs)]
+
+pub mod held_plant;
+pub mod law_machine;
+pub mod loop_shape;
+pub mod margins;
+pub mod plant;
+pub mod settings_file;
+
+#[cfg(test)]
+mod fixtures {
+    use quadrant::control::pid::PidGains;
+    use quadrant::settings::presets;
+    pub(crate) use quadrant::settings::presets::X_PLANT;
+
+    /// The proportional and derivative gains of the x axis, chosen with its plant.
+    pub(crate) const X_GAINS: PidGains = PidGains {
+        ki_v_per_mm_s: 0.0,
+        ..presets::X_GAINS
+    };
+}

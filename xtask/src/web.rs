@@ -1,0 +1,183 @@
+//! The page of the bench: one HTML file with everything in it, which a browser opens from a disk as from a server.
+
+use std::fs;
+use std::io::{BufRead, BufReader, Write};
+use std::net::{Ipv4Addr, TcpListener, TcpStream};
+use std::path::{Path, PathBuf};
+
+use anyhow::{Context, Result, ensure};
+
+use xtask::command;
+use xtask::toolchain::{Toolchain, WEB_TRIPLE};
+
+/// The page.
+const PAGE: &str = "target/web/quadrant-bench.html";
+/// What npm fetches for it.
+const FETCHED: &str = "target/web/npm";
+/// Its sources.
+const SOURCES: &str = "bench/page";
+/// Its scripts, in the order in which they name each other.
+const SCRIPTS: [&str; 4] = ["machine.js", "tour.js", "plots.js", "bench.js"];
+/// Largest page, bytes.
+const MOST_BYTES: usize = 3_000_000;
+/// Path of the page, for the test that opens it.
+const PAGE_VARIABLE: &str = "QUADRANT_BENCH_PAGE";
+
+/// Builds the page and returns its path.
+pub(crate) fn build(toolchain: Toolchain) -> Result<PathBuf> {
+    let root = command::root();
+    let sources = root.join(SOURCES);
+    let source = |name: &str| read(&sources.join(name));
+    let plots = fetch()?;
+    let mut cargo = toolchain.web_cargo("build")?;
+    cargo.args(["--package", "quadrant-bench", "--lib", "--profile", "web"]);
+    command::run(&mut cargo)?;
+    let wasm = root.join(format!("target/web/{WEB_TRIPLE}/web/quadrant_bench.wasm"));
+    let wasm = fs::read(&wasm).with_context(|| format!("cannot read {}", wasm.display()))?;
+
+    let scripts = SCRIPTS.iter().map(|name| source(name));
+    let scripts = scripts.collect::<Result<Vec<_>>>()?.join("\n");
+    let dist = |name: &str| read(&plots.join("dist").join(name));
+    let style = format!("{}\n{}", dist("uPlot.min.css")?, source("page.css")?);
+    let licence = read(&plots.join("LICENSE"))?;
+    let script = format!("/* uPlot\n{licence}*/\n{}", dist("uPlot.iife.min.js")?);
+    let page = source("index.html")?
+        .replace("{{version}}", env!("CARGO_PKG_VERSION"))
+        .replace("{{style}}", &style)
+        .replace("{{uplot}}", &script)
+        .replace("{{script}}", &scripts)
+        .replace("{{wasm}}", &base64(&wasm));
+    ensure!(
+        page.len() <= MOST_BYTES,
+        "the page has {} bytes; {MOST_BYTES} are allowed",
+        page.len()
+    );
+    let path = root.join(PAGE);
+    fs::write(&path, &page).with_context(|| format!("cannot write {}", path.display()))?;
+    println!(
+        "{}: {} kB, of which the law and the stage {} kB",
+        path.display(),
+        page.len() / 1000,
+        wasm.len() / 1000
+    );
+    Ok(path)
+}
+
+/// Compares the page's converter words with the host's, in a browser.
+pub(crate) fn check(page: &Path) -> Result<()> {
+    // Of the whole workspace, like the other tests: else the libraries would be built once more.
+    command::run(
+        command::command("cargo")
+            .args(["test", "--workspace", "--test", "browser", "--"])
+            .args(["--ignored", "--nocapture"])
+            .env(PAGE_VARIABLE, page)
+            .env("QUADRANT_BROWSER_TESTS", "required"),
+    )
+}
+
+/// Serves the page to this machine's browsers until the process is ended.
+pub(crate) fn serve(page: &Path, port: u16) -> Result<()> {
+    let listener = TcpListener::bind((Ipv4Addr::LOCALHOST, port))
+        .with_context(|| format!("cannot listen on port {port}; --port takes another"))?;
+    println!("http://{}", listener.local_addr()?);
+    let page = fs::read(page)?;
+    for connection in listener.incoming().flatten() {
+        // A browser that hangs up early asks again.
+        let _ = reply(connection, &page);
+    }
+    Ok(())
+}
+
+fn reply(mut connection: TcpStream, page: &[u8]) -> std::io::Result<()> {
+    let mut request = String::new();
+    let mut lines = BufReader::new(connection.try_clone()?);
+    lines.read_line(&mut request)?;
+    // What follows the first line is read, or closing would reset the connection.
+    let mut line = String::new();
+    while lines.read_line(&mut line)? > 2 {
+        line.clear();
+    }
+    let is_page = request.starts_with("GET / ");
+    let (status, body) = if is_page {
+        ("200 OK", page)
+    } else {
+        ("404 Not Found", &[][..])
+    };
+    write!(
+        connection,
+        "HTTP/1.1 {status}\r\nContent-Type: text/html; charset=utf-8\r\nContent-Length: {}\r\nConnection: close\r\n\r\n",
+        body.len()
+    )?;
+    connection.write_all(body)
+}
+
+/// Lets npm fetch the plotting library, unless it is there, and returns its folder.
+fn fetch() -> Result<PathBuf> {
+    let root = command::root();
+    let (sources, folder) = (root.join(SOURCES), root.join(FETCHED));
+    let lock = "package-lock.json";
+    let found = folder.join("node_modules/uplot");
+    let is_same = fs::read(folder.join(lock)).ok() == fs::read(sources.join(lock)).ok();
+    if is_same && found.join("package.json").is_file() {
+        return Ok(found);
+    }
+    ensure!(
+        command::exists("npm"),
+        "npm is needed to fetch the plotting library of the page"
+    );
+    fs::create_dir_all(&folder)?;
+    for name in ["package.json", lock] {
+        fs::copy(sources.join(name), folder.join(name))
+            .with_context(|| format!("cannot copy {name}"))?;
+    }
+    command::run(command::command("npm").current_dir(&folder).args([
+        "ci",
+        "--ignore-scripts",
+        "--no-audit",
+        "--no-fund",
+    ]))?;
+    Ok(found)
+}
+
+fn read(path: &Path) -> Result<String> {
+    fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))
+}
+
+/// Bytes as text, RFC 4648.
+fn base64(bytes: &[u8]) -> String {
+    const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut text = String::with_capacity(bytes.len().div_ceil(3) * 4);
+    for three in bytes.chunks(3) {
+        let byte = |place: usize| u32::from(three.get(place).copied().unwrap_or(0));
+        let word = byte(0) << 16 | byte(1) << 8 | byte(2);
+        for place in 0..4 {
+            if place <= three.len() {
+                let digit = word >> (18 - 6 * place) & 63;
+                text.push(char::from(DIGITS[digit as usize]));
+            } else {
+                text.push('=');
+            }
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bytes_become_the_text_of_the_standard() {
+        let pairs = [
+            ("", ""),
+            ("f", "Zg=="),
+            ("fo", "Zm8="),
+            ("foo", "Zm9v"),
+            ("foobar", "Zm9vYmFy"),
+        ];
+        for (bytes, text) in pairs {
+            assert_eq!(base64(bytes.as_bytes()), text);
+        }
+        assert_eq!(base64(&[0xFB, 0xFF, 0xBF]), "+/+/");
+    }
+}
