@@ -1,6 +1,6 @@
 //! The bench in the browser: the control law on the simulated stage, tick by tick, for a page that turns its knobs.
 //!
-//! - [`bench`]: law, stage and motion, and what may be changed about them while the axes move;
+//! - [`bench`](mod@bench): law, stage and motion, and what may be changed about them while the axes move;
 //! - [`truth`]: the stage's own parameters, which the law does not know;
 //! - [`controls`]: the settings that the page offers, from the table of all settings;
 //! - [`loop_response`]: the open loop over frequency, as the law was told and as the stage is;
