@@ -13,7 +13,7 @@ use quadrant_sim::record::{ForceRecord, write_trace};
 use quadrant_sim::report::Page;
 
 use crate::robustness::page::{robustness_full_table, robustness_sections, robustness_tables};
-use crate::robustness::study::{StudyRequest, run_study, runs};
+use crate::robustness::study::{StudyRequest, names, run_study, runs};
 use quadrant_cli::say;
 
 /// Options of `quadrant-studies robustness`.
@@ -37,6 +37,9 @@ pub struct Arguments {
     /// Run only scenarios whose name contains this, and those that changes are counted from; no compliance.
     #[arg(long, value_name = "TEXT")]
     only: Option<String>,
+    /// List the scenarios, and run none.
+    #[arg(long)]
+    list: bool,
     #[command(flatten)]
     output: Output,
 }
@@ -57,11 +60,19 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
             arguments.backlash_um
         );
     }
+    let backlash_mm = 1e-3 * arguments.backlash_um;
+    if arguments.list {
+        for (name, what) in names(axis.index(), backlash_mm) {
+            say!("{name:<28} {what}");
+        }
+        return Ok(());
+    }
+    output.ready()?;
     let stage = arguments.settings.read()?.stage;
     let request = StudyRequest {
         stage,
         axis: axis.index(),
-        backlash_mm: 1e-3 * arguments.backlash_um,
+        backlash_mm,
         force: recorded_force(arguments)?,
         only: arguments.only.clone(),
         seed: output.seed,

@@ -48,7 +48,7 @@ pub struct RobustnessReport {
 #[derive(Debug, thiserror::Error)]
 pub enum StudyError {
     /// No scenario has such a name.
-    #[error("no scenario's name contains {0:?}; without --only the first table lists them all")]
+    #[error("no scenario's name contains {0:?}; --list shows them all")]
     NoScenario(String),
     /// The settings hold no linear model.
     #[error(
@@ -57,6 +57,16 @@ pub enum StudyError {
     NoPlant,
     #[error(transparent)]
     Run(#[from] RobustnessError),
+}
+
+/// Name and meaning of every scenario.
+pub fn names(axis: usize, backlash_mm: f64) -> Vec<(String, String)> {
+    let scenarios = scenarios(axis, None).into_iter();
+    let cases = drive_cases(axis, backlash_mm).into_iter();
+    scenarios
+        .map(|scenario| (scenario.name, scenario.what))
+        .chain(cases.map(|case| (case.name, case.what)))
+        .collect()
 }
 
 /// Calls of a study's progress, about.
