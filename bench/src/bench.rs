@@ -21,7 +21,7 @@ use crate::truth::{Ripple, Truth};
 
 /// The settings that commissioning the simulated stage gave.
 const COMMISSIONED: &str = include_str!("../../host-sim/data/identified-stage.toml");
-/// What messages call them.
+/// Their name in messages.
 const COMMISSIONED_NAME: &str = "identified-stage.toml";
 /// The command of what the page has set, in a settings file.
 const PROVENANCE: &str = "the bench in the browser";

@@ -101,7 +101,7 @@ fn number(settings: &StageSettings, axis: usize, leaf: &LeafInfo) -> Option<Numb
 }
 
 impl Controls {
-    /// What is offered for an axis, 0 to 2.
+    /// The controls of an axis, 0 to 2.
     pub fn of(settings: &StageSettings, axis: usize) -> Self {
         let feedback = &settings.axes[axis].feedback;
         let friction = &settings.axes[axis].friction;

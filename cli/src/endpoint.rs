@@ -108,7 +108,7 @@ fn heed_signals(interrupt: Interrupt) -> anyhow::Result<()> {
     ctrlc::set_handler(move || match interrupt.request() {
         1 => warn!("stopping the axes; once more disables the outputs"),
         SIGNALS.. => {
-            warn!("ended, unheeded by the machine");
+            warn!("ended");
             std::process::exit(130);
         }
         _ => warn!("disabling the outputs"),

@@ -39,11 +39,6 @@ pub fn print_error(what: Arguments<'_>) {
     let _ = io::stderr().lock().write_fmt(what);
 }
 
-/// True once standard output takes nothing more.
-pub fn is_closed() -> bool {
-    FAILED.lock().is_ok_and(|failed| failed.is_some())
-}
-
 /// Says whether everything was printed.
 ///
 /// # Errors

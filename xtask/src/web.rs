@@ -12,7 +12,7 @@ use xtask::toolchain::{Toolchain, WEB_TRIPLE};
 
 /// The page.
 const PAGE: &str = "target/web/quadrant-bench.html";
-/// What npm fetches for it.
+/// Packages that npm fetches for it.
 const FETCHED: &str = "target/web/npm";
 /// Its sources.
 const SOURCES: &str = "bench/page";

@@ -78,7 +78,7 @@ fn text(inputs: &Inputs) -> String {
     lines.join("\n")
 }
 
-/// What keeps the outputs from being enabled, as a line.
+/// The reason for which the outputs would not be enabled, as a line.
 pub(super) fn refusal(inputs: &Inputs) -> Option<String> {
     let refusal = inputs.refusal.as_ref()?;
     Some(format!("`enable` would be refused: {refusal}"))

@@ -57,24 +57,14 @@ pub(super) fn status(client: &mut Client) -> anyhow::Result<Answer> {
     Ok(Answer::new(text, data))
 }
 
-fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
-    let mut text = format!(
-        "{state}{fault}, {motion}; tick {tick} ({time:.4} s)\n",
-        state = status.state.as_str(),
-        fault = status
-            .fault
-            .map(|code| format!(" {code} (`fault` says more)"))
-            .unwrap_or_default(),
-        motion = if status.running { "moving" } else { "at rest" },
-        tick = status.tick,
-        time = f64::from(status.tick) / rate_hz,
-    );
-    text.push_str(
-        "axis  homed  follows   position mm   error um  output V  limited by    high mark\n",
-    );
+/// The axes as a table of 80 columns, its heads first.
+pub(super) fn axis_lines(status: &Status) -> Vec<String> {
+    let mut lines = vec![
+        "axis  homed  follows   position mm   error um  output V  limited by    high mark"
+            .to_owned(),
+    ];
     for (axis, seen) in AxisName::ALL.into_iter().zip(&status.axes) {
-        let _ = writeln!(
-            text,
+        lines.push(format!(
             "{axis:<4}  {homed:<5}  {mode:<8}  {position:>11.4}  {error:>9.2}  {output:>8.4}  {limit:<12}  {mark:>9.3}",
             axis = axis.as_str(),
             homed = if status.homed.contains(axis.into()) {
@@ -88,7 +78,25 @@ fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
             output = seen.output_v,
             limit = name(&seen.limited_by),
             mark = seen.high_mark,
-        );
+        ));
+    }
+    lines
+}
+
+fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
+    let mut text = format!(
+        "{state}{fault}, {motion}; tick {tick} ({time:.4} s)\n",
+        state = status.state.as_str(),
+        fault = status
+            .fault
+            .map(|code| format!(" {code} (`fault` says more)"))
+            .unwrap_or_default(),
+        motion = if status.running { "moving" } else { "at rest" },
+        tick = status.tick,
+        time = f64::from(status.tick) / rate_hz,
+    );
+    for line in axis_lines(status) {
+        let _ = writeln!(text, "{line}");
     }
     // A simulated machine measures no time.
     if cycle_hz > 0 {

@@ -6,7 +6,7 @@ use std::thread;
 use std::time::Duration;
 
 use anyhow::Context;
-use quadrant::link::message::{Body, MachineState};
+use quadrant::link::message::Body;
 use quadrant_sim::client::settle;
 use rustyline::DefaultEditor;
 use rustyline::error::ReadlineError;
@@ -38,7 +38,7 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
     });
     for index in 0.. {
         let Some(line) = attended(session, &read) else {
-            return Ok(all && !session.client.is_interrupted());
+            break;
         };
         let line = line.context("cannot read standard input")?;
         if echo {
@@ -50,7 +50,7 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
             break;
         }
     }
-    Ok(all)
+    Ok(all && !session.client.is_interrupted())
 }
 
 fn one(session: &mut Session, line: &str, source: &str) -> bool {
@@ -91,11 +91,7 @@ const LEAVING: Duration = Duration::from_secs(10);
 /// Leaves no outputs on.
 fn leave(session: &mut Session) -> anyhow::Result<()> {
     let client = &mut session.client;
-    let state = client.status()?.state;
-    if matches!(
-        state,
-        MachineState::Start | MachineState::Disabled | MachineState::Fault
-    ) {
+    if !client.status()?.state.drives() {
         return Ok(());
     }
     say!("the outputs are on: the axes stop, and the outputs go off");

@@ -1,6 +1,6 @@
 //! A headless Chromium for tests of pages, driven through the pipe of its DevTools protocol.
 //!
-//! What goes wrong in it is a failure of the test, so its functions panic.
+//! A failure in it is one of the test, so its functions panic.
 #![forbid(unsafe_code)]
 
 use std::io::{BufRead, BufReader, Write};

@@ -63,7 +63,7 @@ pub enum ClientError {
     /// Somebody asked to stop: see [`Interrupt`](super::Interrupt).
     #[error("interrupted: {done}")]
     Interrupted {
-        /// What was done about it, for the message.
+        /// State of the axes since, for the message.
         done: &'static str,
     },
     /// The machine has restarted since the session was opened.

@@ -8,16 +8,46 @@ use std::sync::atomic::{AtomicU32, Ordering};
 ///
 /// [`Client`]: super::Client
 #[derive(Clone, Debug, Default)]
-pub struct Interrupt(Arc<AtomicU32>);
+pub struct Interrupt(Arc<Requests>);
+
+#[derive(Debug, Default)]
+struct Requests {
+    /// Requests that nobody has heeded yet.
+    waiting: AtomicU32,
+    /// Requests since a person gave the last command.
+    all: AtomicU32,
+}
 
 impl Interrupt {
-    /// Asks to stop; returns the number of requests that wait, this one included.
+    /// Asks to stop; returns the number of requests since the last command, heeded or not, this one included.
     pub fn request(&self) -> u32 {
-        self.0.fetch_add(1, Ordering::Relaxed) + 1
+        self.0.waiting.fetch_add(1, Ordering::Relaxed);
+        self.0.all.fetch_add(1, Ordering::Relaxed) + 1
     }
 
     /// Takes the requests that wait.
     pub(super) fn take(&self) -> u32 {
-        self.0.swap(0, Ordering::Relaxed)
+        self.0.waiting.swap(0, Ordering::Relaxed)
+    }
+
+    /// Counts anew: a person has given another command.
+    pub(super) fn forget(&self) {
+        self.0.all.store(0, Ordering::Relaxed);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Interrupt;
+
+    #[test]
+    fn a_request_is_the_second_though_the_first_was_heeded() {
+        let interrupt = Interrupt::default();
+        assert_eq!(interrupt.request(), 1);
+        assert_eq!(interrupt.take(), 1);
+        assert_eq!(interrupt.request(), 2);
+        assert_eq!(interrupt.take(), 1);
+        interrupt.forget();
+        assert_eq!(interrupt.request(), 1);
     }
 }

@@ -39,7 +39,7 @@ pub struct Client {
     /// A motion may be under way, which the machine ends when its host falls silent.
     moves: bool,
     interrupt: Interrupt,
-    /// What was done about an interruption: nothing starts until [`Client::resume`].
+    /// State of the axes since an interruption: nothing starts until [`Client::resume`].
     interrupted: Option<&'static str>,
     /// The interruption is being heeded.
     stopping: bool,
@@ -108,8 +108,9 @@ impl Client {
     }
 
     /// Forgets an interruption: a person has given another command.
-    pub const fn resume(&mut self) {
+    pub fn resume(&mut self) {
         self.interrupted = None;
+        self.interrupt.forget();
     }
 
     /// Asks, and waits for the answer. A request that may be made twice is made again if none comes, and for two seconds if the
@@ -250,7 +251,7 @@ impl Client {
         self.heed_interrupt()?;
         if self.moves && self.now().saturating_sub(self.asked) >= ALIVE {
             let status = self.status()?;
-            self.moves = !is_at_rest(&status);
+            self.moves = !status.is_at_rest();
         }
         Ok(())
     }
@@ -284,7 +285,7 @@ impl Client {
                 return Ok("the outputs are off");
             }
             self.wait(STOPPING_LOOK)?;
-            if is_at_rest(&self.status()?) {
+            if self.status()?.is_at_rest() {
                 return Ok("the axes have stopped");
             }
         }
@@ -460,11 +461,6 @@ impl Client {
             theirs,
         }
     }
-}
-
-/// True if no motion is under way.
-pub(super) fn is_at_rest(status: &Status) -> bool {
-    !status.running && status.state != MachineState::Homing
 }
 
 /// Returns the name of a reply.

@@ -5,7 +5,7 @@ use std::time::Duration;
 use quadrant::link::message::{AxisMode, AxisSet, Status};
 
 use super::error::ClientError;
-use super::session::{Client, is_at_rest};
+use super::session::Client;
 
 /// Time in which an order that was acknowledged has reached the control law.
 const ARRIVAL: Duration = Duration::from_millis(20);
@@ -22,7 +22,7 @@ pub fn rest(client: &mut Client, timeout: Duration) -> Result<Status, ClientErro
         "wait rest",
         timeout,
         "the motion has not ended; `stop` ends it",
-        is_at_rest,
+        Status::is_at_rest,
     )
 }
 

@@ -3,7 +3,7 @@
 use super::Server;
 use crate::hal::SettingsFlash;
 use crate::law::admission;
-use crate::law::axes::AxisName;
+use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::motion::MotionMode;
 use crate::law::safety::SafetyState;
@@ -41,15 +41,12 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 high_mark: axis.following.high_mark(),
             }
         });
-        let homed = AxisName::ALL.into_iter().zip(view.homed);
         Status {
             tick: self.seen.tick,
             state: self.state(),
             fault: view.safety.fault().map(|fault| fault.code.number()),
             running: view.running,
-            homed: homed
-                .filter_map(|(axis, homed)| homed.then_some(axis.into()))
-                .collect::<AxisSet>(),
+            homed: set_of(view.homed),
             axes,
             overruns: self.timing.overruns,
             longest_tick_cycles: self.timing.longest_tick_cycles,
@@ -62,14 +59,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     pub(super) fn inputs(&self) -> Inputs {
         let view = self.seen.view;
-        let indexed = AxisName::ALL.into_iter().zip(self.seen.indexed);
         let refusal = admission::refusal(view, Command::Enable);
         Inputs {
             tick: self.seen.tick,
             switches: self.seen.switches.bits(),
-            indexed: indexed
-                .filter_map(|(axis, indexed)| indexed.then_some(axis.into()))
-                .collect::<AxisSet>(),
+            indexed: set_of(self.seen.indexed),
             refusal: refusal.map(|refusal| match refusal.axis() {
                 Some(axis) => text(format_args!("{axis}: {}", refusal.as_str())),
                 None => text(format_args!("{}", refusal.as_str())),
@@ -103,4 +97,12 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             captured: self.recorder.holds_trace_of(fault.tick),
         })
     }
+}
+
+/// The axes for which it is true.
+fn set_of(axes: PerAxis<bool>) -> AxisSet {
+    let named = AxisName::ALL.into_iter().zip(axes);
+    named
+        .filter_map(|(axis, is_true)| is_true.then_some(axis.into()))
+        .collect()
 }

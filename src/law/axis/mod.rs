@@ -86,7 +86,7 @@ impl<S: Scalar> Amplifier<S> {
 
 /// An axis ready for the tick; `N` is the room for GMS elements. Made by an [`AxisBuilder`].
 ///
-/// What every tick reads comes first, and tables last: floating-point loads reach 1020 bytes from an address.
+/// Fields that every tick reads come first, and tables last: floating-point loads reach 1020 bytes from an address.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
 pub struct Axis<S: Scalar, const N: usize> {

@@ -1,12 +1,11 @@
-//! What is seen of the machine, and what a person's keys ask of it.
+//! State of the live view, and the keys that act on it and on the machine.
 
 use std::path::PathBuf;
 use std::time::Duration;
 
 use anyhow::ensure;
 use quadrant::link::message::{
-    AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, MachineState, Notice, Status,
-    Trigger,
+    AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, Notice, Status, Trigger,
 };
 use quadrant_sim::client::samples::{
     Samples, TelemetryRecorder, arm, least_decimation, read_capture,
@@ -181,8 +180,8 @@ impl Watch {
         match key.code {
             KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => {
                 // The first stops, a second disables.
-                let moves = self.status.running || self.status.state == MachineState::Homing;
-                self.order(client, if moves { Body::Stop } else { Body::Disable })?;
+                let rests = self.status.is_at_rest();
+                self.order(client, if rests { Body::Disable } else { Body::Stop })?;
             }
             KeyCode::Char('?' | 'h') => self.help = !self.help,
             KeyCode::Char('q') | KeyCode::Esc => return Ok(self.leave()),
@@ -218,11 +217,7 @@ impl Watch {
 
     /// Leaves the outputs on only if that was asked for twice.
     fn leave(&mut self) -> Going {
-        let off = matches!(
-            self.status.state,
-            MachineState::Start | MachineState::Disabled | MachineState::Fault
-        );
-        if off || self.warned {
+        if !self.status.state.drives() || self.warned {
             return Going::Leave;
         }
         self.warned = true;

@@ -1,6 +1,5 @@
 //! The picture: 80 x 24 and larger.
 
-use quadrant::axes::AxisName;
 use quadrant::link::message::{Channel, MachineState};
 use quadrant_sim::client::{columns, with_reset};
 use ratatui::Frame;
@@ -11,8 +10,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
 
 use super::state::Watch;
-use crate::connect::answer::name;
 use crate::connect::inputs;
+use crate::connect::machine::axis_lines;
 
 const KEYS: [(&str, &str); 12] = [
     ("space", "freeze the charts, or let them go on"),
@@ -99,34 +98,13 @@ fn headline(watch: &Watch) -> Line<'_> {
 }
 
 fn axes(watch: &Watch) -> Paragraph<'_> {
-    let status = &watch.status;
-    let mut lines = vec![
-        Line::from(
-            "axis  homed  follows   position mm   error um  output V  limited by   high mark",
-        )
-        .style(Modifier::DIM),
-    ];
-    lines.extend(
-        AxisName::ALL
-            .into_iter()
-            .zip(&status.axes)
-            .map(|(axis, seen)| {
-                let homed = if status.homed.contains(axis.into()) {
-                    "yes"
-                } else {
-                    "no"
-                };
-                Line::from(format!(
-                    "{axis:<4}  {homed:<5}  {:<8}  {:>11.4}  {:>9.2}  {:>8.4}  {:<12} {:>9.3}",
-                    name(&seen.mode),
-                    seen.position_mm,
-                    1e3 * seen.error_mm,
-                    seen.output_v,
-                    name(&seen.limited_by),
-                    seen.high_mark,
-                ))
-            }),
-    );
+    let mut lines: Vec<Line> = axis_lines(&watch.status)
+        .into_iter()
+        .map(Line::from)
+        .collect();
+    if let Some(heads) = lines.first_mut() {
+        heads.style = Modifier::DIM.into();
+    }
     Paragraph::new(lines)
 }
 

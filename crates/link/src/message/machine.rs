@@ -80,6 +80,11 @@ pub enum MachineState {
 }
 
 impl MachineState {
+    /// True if the control law drives the outputs.
+    pub const fn drives(self) -> bool {
+        matches!(self, Self::Homing | Self::Enabled | Self::Stopping)
+    }
+
     /// Its name in lower case.
     pub fn as_str(self) -> &'static str {
         self.into()
@@ -140,6 +145,13 @@ pub struct Status {
     pub dropped_samples: u32,
     /// Events that were dropped.
     pub dropped_events: u32,
+}
+
+impl Status {
+    /// True if no motion is under way, nor homing.
+    pub fn is_at_rest(&self) -> bool {
+        !self.running && self.state != MachineState::Homing
+    }
 }
 
 /// The digital inputs.
