@@ -11,7 +11,7 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::{ResetCause, SettingsFlash};
 use quadrant::link::message::{NumberType, Provenance};
 use quadrant::lockstep::Job;
-use quadrant::safety::{FaultCode, StreamLoss};
+use quadrant::safety::{FaultCode, Operation};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
@@ -99,9 +99,9 @@ pub(crate) fn machine<S: Scalar, F: SettingsFlash>(
         .axes
         .each_ref()
         .map(|axis| axis.encoder.resolution_mm);
-    let streaming = settings.streaming.build();
+    let operation = settings.operation();
     let (control_ends, intake_ends, ends) = storage.queues.split();
-    let control = place_control(&mut storage.control, axes, streaming, plan, control_ends);
+    let control = place_control(&mut storage.control, axes, operation, plan, control_ends);
     let invalid = invalid.then_some(FaultCode::SettingsInvalid);
     for code in [crashed, invalid].into_iter().flatten() {
         control.start_faulted(code);
@@ -288,11 +288,11 @@ fn blank_axis<S: Scalar>(place: &mut MaybeUninit<Axis<S>>) -> &mut Axis<S> {
 fn place_control<S: Scalar>(
     place: &'static mut MaybeUninit<Control<'static, 'static, S>>,
     axes: [&'static mut Axis<S>; 3],
-    streaming: StreamLoss,
+    operation: Operation,
     plan: Plan<S>,
     ends: ControlEnds<'static, 'static, S>,
 ) -> &'static mut Control<'static, 'static, S> {
-    place.write(Control::new(axes.into(), streaming, plan, ends))
+    place.write(Control::new(axes.into(), operation, plan, ends))
 }
 
 /// Makes the slow half in its place.

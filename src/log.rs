@@ -191,7 +191,7 @@ impl Printer {
 const fn topic(event: Event) -> Topic {
     match event {
         Event::Enabled | Event::Disabled => Topic::State,
-        Event::MotionStarted | Event::MotionFinished => Topic::Motion,
+        Event::MotionStarted | Event::MotionFinished | Event::MovedWhileOff(_) => Topic::Motion,
         Event::Refused(..) => Topic::Refusals,
         Event::Faulted(_) | Event::Stopping(_) | Event::Held(_) => Topic::Faults,
     }
@@ -203,6 +203,9 @@ fn print_event(event: Event) {
         Event::Disabled => defmt::info!("outputs disabled"),
         Event::MotionStarted => defmt::info!("motion started"),
         Event::MotionFinished => defmt::info!("motion finished"),
+        Event::MovedWhileOff(axis) => {
+            defmt::warn!("{=str} moves though the outputs are off", axis.as_str());
+        }
         Event::Refused(_, refusal) => match refusal.axis() {
             Some(axis) => {
                 defmt::warn!(

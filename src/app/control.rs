@@ -10,14 +10,14 @@ use crate::app::telemetry::{Observation, Sampler, SamplerState};
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::safety::{FaultCode, StreamLoss, Switches};
+use crate::law::safety::{FaultCode, Operation, Station, Switches};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
 
 /// Everything that the control interrupt owns.
 pub struct Control<'q, 'a, S: Scalar> {
     axes: PerAxis<&'a mut Axis<S>>,
-    streaming: StreamLoss,
+    operation: Operation,
     plan: Plan<S>,
     state: StageState<S, FIRMWARE_ELEMENTS>,
     sampler: Sampler,
@@ -45,13 +45,13 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     #[inline(never)]
     pub fn new(
         axes: PerAxis<&'a mut Axis<S>>,
-        streaming: StreamLoss,
+        operation: Operation,
         plan: Plan<S>,
         ends: ControlEnds<'q, 'a, S>,
     ) -> Self {
         Self {
             axes,
-            streaming,
+            operation,
             plan,
             state: StageState::default(),
             sampler: Sampler::default(),
@@ -116,7 +116,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let axes = self.axes.each_ref().map(|axis| &**axis);
         let stage = StageRef {
             axes: axes.into(),
-            streaming: self.streaming,
+            operation: self.operation,
         };
         let outputs = stage.tick(&self.plan, &mut self.state, inputs);
         if self.host.is_needed() {
@@ -131,7 +131,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let axes = self.axes.each_ref().map(|axis| &**axis);
         StageRef {
             axes: axes.into(),
-            streaming: self.streaming,
+            operation: self.operation,
         }
     }
 
@@ -186,7 +186,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             _ if unfit => Some(Command::Disable),
             Some(command) => {
                 self.overtake(command);
-                Some(command)
+                self.heeded(Station::Operator, command)
             }
             None => match self.ends.orders.dequeue() {
                 Some(order) => self.take_order(order),
@@ -231,8 +231,15 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 return None;
             }
         };
-        self.host.start(command, &self.plan, &self.state);
-        Some(command)
+        let needed = self.operation.host_needed;
+        self.host.start(command, needed, &self.plan, &self.state);
+        self.heeded(Station::Host, command)
+    }
+
+    /// The command, unless it would enable and does not come from whom the rules of now allow to.
+    fn heeded(&self, station: Station, command: Command) -> Option<Command> {
+        let allowed = command != Command::Enable || self.operation.enabled_by.allows(station);
+        allowed.then_some(command)
     }
 
     /// Drops the server's orders that were waiting when a command to stop or to disable came by the shorter way: nothing
@@ -281,7 +288,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let AxisSwap {
             name,
             axis,
-            streaming,
+            operation,
             needs_disabled,
             more,
         } = swap;
@@ -289,7 +296,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);
         let _ = self.ends.back_buffers.enqueue(replaced);
-        self.streaming = streaming;
+        self.operation = operation;
         PerAxis::from_fn(|axis| axis == name)
     }
 

@@ -1,10 +1,12 @@
-//! The host that a motion needs: one that has no end of its own, or that the host feeds.
+//! The host that a motion needs: every one that it has started, or, if the settings say so, one that has no end of its own or
+//! that it feeds.
 
 use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::injection::Coupling;
 use crate::law::motion::MotionMode;
+use crate::law::safety::HostNeeded;
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, StageState};
 
@@ -13,6 +15,8 @@ pub const LINK_TIMEOUT_TICKS: u32 = 5_000;
 
 /// Bit of an injected voltage, above those of the axes.
 const INJECTION: u8 = 1 << 3;
+/// Bits of all axes.
+const AXES: u8 = INJECTION - 1;
 
 /// The motions that need their host, and how long it has been silent. Kept by the control interrupt, so that no other task
 /// can keep it from ending them.
@@ -54,6 +58,7 @@ impl HostNeed {
     pub(super) fn start<S: Scalar>(
         &mut self,
         command: Command,
+        needed: HostNeeded,
         plan: &Plan<S>,
         state: &StageState<S, FIRMWARE_ELEMENTS>,
     ) {
@@ -63,11 +68,14 @@ impl HostNeed {
                 .filter(|&axis| !plan[axis].ends())
                 .fold(0, |bits, axis| bits | bit(axis))
         };
+        let every = needed == HostNeeded::EveryMotion;
         self.motions |= match command {
+            Command::Run if every => AXES,
+            Command::StartMove(axis) | Command::Home(axis) if every => bit(axis),
             Command::Jog(axis, _) => bit(axis),
             Command::Run => endless(),
             Command::StartMove(axis) => endless() & bit(axis),
-            Command::StartStream => INJECTION - 1,
+            Command::StartStream => AXES,
             Command::StartInjection => match state.injection_coupling() {
                 Some(Coupling::WithPlan) => INJECTION | endless(),
                 _ => INJECTION,
@@ -83,7 +91,7 @@ impl HostNeed {
         for (name, axis) in state.axes().named() {
             let moves = matches!(
                 axis.mode(),
-                MotionMode::Jog | MotionMode::Plan | MotionMode::Stream
+                MotionMode::Jog | MotionMode::Plan | MotionMode::Stream | MotionMode::Home
             );
             if !moves {
                 self.motions &= !bit(name);

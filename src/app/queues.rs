@@ -11,7 +11,7 @@ use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::injection::{Injection, VoltageBlock};
 use crate::law::reference::Segment;
-use crate::law::safety::StreamLoss;
+use crate::law::safety::Operation;
 use crate::law::scalar::Scalar;
 use crate::law::stage::Plan;
 
@@ -38,7 +38,7 @@ pub(super) enum Order {
 pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) name: AxisName,
     pub(super) axis: &'a mut Axis<S>,
-    pub(super) streaming: StreamLoss,
+    pub(super) operation: Operation,
     /// It waits until the outputs are off.
     pub(super) needs_disabled: bool,
     /// Another axis of the same settings follows: the outputs stay off until then.

@@ -12,7 +12,7 @@ pub struct Supervised {
     /// The command for the control law's next tick.
     pub command: Option<Command>,
     /// The events found.
-    pub events: [Option<Event>; 4],
+    pub events: [Option<Event>; 5],
     /// Glitches and circles that have ended.
     pub glitches: heapless::Vec<GlitchEvent, MAX_GLITCH_EVENTS>,
     /// True once a second: the tracking errors are due in the log.

@@ -3,10 +3,11 @@
 //! Runs every [`PERIOD_TICKS`] control ticks, below the control interrupt. Pure, so that the firmware and the host's
 //! run of the same job decide alike.
 
+use crate::law::axes::AxisName;
 use crate::law::command::Command;
-use crate::law::safety::{Fault, SafetyState};
+use crate::law::safety::{Fault, SafetyState, Station};
 
-pub use crate::law::admission::{Refusal, StageView, refusal};
+pub use crate::law::admission::{Refusal, StageView, refusal, refusal_from};
 
 /// Control ticks between two runs of the supervisor: 1 kHz at a control rate of 10 kHz.
 pub const PERIOD_TICKS: u32 = 10;
@@ -28,14 +29,21 @@ pub enum Event {
     MotionStarted,
     /// The plan's motions came to their end.
     MotionFinished,
+    /// An axis that stood was moved though the outputs are off.
+    MovedWhileOff(AxisName),
     /// A request was refused.
     Refused(Command, Refusal),
 }
+
+/// Runs at rest with the outputs off after which a motion is told: 0.1 s at 10 kHz.
+const REST_RUNS: u8 = 100;
 
 /// The supervisor's state: the view of its last step.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Supervisor {
     seen: StageView,
+    /// Runs for which the outputs have been off and all axes at rest, up to [`REST_RUNS`].
+    rested: u8,
 }
 
 /// The decision of one step.
@@ -43,8 +51,8 @@ pub struct Supervisor {
 pub struct Decision {
     /// The command for the control law's next tick.
     pub command: Option<Command>,
-    /// Events: a change of state, a held fault, a change of motion, a refusal.
-    pub events: [Option<Event>; 4],
+    /// Events: a change of state, a held fault, a change of motion, one that nobody asked for, a refusal.
+    pub events: [Option<Event>; 5],
 }
 
 impl Supervisor {
@@ -70,12 +78,25 @@ impl Supervisor {
             (true, false) if view.safety.is_enabled() => Some(Event::MotionFinished),
             _ => None,
         };
+        let moved = view.moving.filter(|_| self.rested == REST_RUNS);
+        self.rested = if view.safety.drives() || view.moving.is_some() {
+            0
+        } else {
+            REST_RUNS.min(self.rested + 1)
+        };
         let refusal = request.and_then(|command| {
-            refusal(view, command).map(|reason| Event::Refused(command, reason))
+            let refused = refusal_from(Station::Operator, view, command);
+            refused.map(|reason| Event::Refused(command, reason))
         });
         Decision {
             command: if refusal.is_none() { request } else { None },
-            events: [state, held, motion, refusal],
+            events: [
+                state,
+                held,
+                motion,
+                moved.map(Event::MovedWhileOff),
+                refusal,
+            ],
         }
     }
 }

@@ -89,6 +89,7 @@ impl From<supervisor::Event> for wire::Event {
             },
             Event::MotionStarted => Self::MotionStarted,
             Event::MotionFinished => Self::MotionFinished,
+            Event::MovedWhileOff(axis) => Self::MovedWhileOff(axis.into()),
             Event::Refused(_, reason) => Self::Refused(text(format_args!("{reason}"))),
         }
     }

@@ -5,7 +5,7 @@ use core::fmt;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::motion::MotionMode;
-use crate::law::safety::{EnableInterlock, Fault, FaultCode, SafetyState};
+use crate::law::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState, Station};
 
 /// The state of the stage, as far as a command depends on it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -36,6 +36,8 @@ pub struct StageView {
     ///
     /// [`StageRef::is_commissioned`]: crate::law::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// Who may enable the outputs.
+    pub enabled_by: EnabledBy,
     /// The outputs are kept off while flash is written, or until a restart.
     pub locked: bool,
     /// The stored settings are damaged or were refused, and nobody has stored others since.
@@ -69,6 +71,10 @@ pub enum Refusal {
     Injecting,
     /// No axis is commissioned, or one that has a law is not.
     NotCommissioned,
+    /// The host alone may enable.
+    HostOnly,
+    /// The operator at the machine alone may enable.
+    OperatorOnly,
     /// The outputs are kept off while flash is written, or until a restart.
     Locked,
     /// The stored settings are damaged or were refused.
@@ -98,6 +104,10 @@ impl Refusal {
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
                 "not commissioned: no axis is, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
+            }
+            Self::HostOnly => "the host alone may enable (operation.enabled_by)",
+            Self::OperatorOnly => {
+                "the button at the machine alone enables (operation.enabled_by): hold it"
             }
             Self::Locked => "flash is being written, or a restart is due; ask again",
             Self::SettingsInvalid => {
@@ -145,6 +155,19 @@ impl fmt::Display for Refusal {
             write!(f, "{axis}: ")?;
         }
         f.write_str(self.as_str())
+    }
+}
+
+/// Decides if a command from a station is acted on: [`refusal`], and who may enable.
+pub fn refusal_from(station: Station, view: StageView, command: Command) -> Option<Refusal> {
+    match refusal(view, command) {
+        None if command == Command::Enable && !view.enabled_by.allows(station) => {
+            Some(match station {
+                Station::Host => Refusal::OperatorOnly,
+                Station::Operator => Refusal::HostOnly,
+            })
+        }
+        refused => refused,
     }
 }
 

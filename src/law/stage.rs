@@ -27,7 +27,7 @@ use crate::law::injection::{
 use crate::law::reference::{Motion, Segment};
 use crate::law::safety::plausibility::is_due;
 use crate::law::safety::{
-    EnableInterlock, Fault, FaultCode, Reaction, SafetyState, StreamLoss, Switches,
+    EnableInterlock, Fault, FaultCode, Operation, Reaction, SafetyState, Switches,
 };
 use crate::law::scalar::Scalar;
 use crate::law::units::DacCode;
@@ -86,7 +86,7 @@ pub type Plan<S> = PerAxis<Motion<S>>;
 #[derive(Clone, Debug, PartialEq)]
 pub struct Stage<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     axes: PerAxis<Axis<S, N>>,
-    streaming: StreamLoss,
+    operation: Operation,
 }
 
 /// A stage in pieces, so that one axis can be exchanged without moving the others.
@@ -94,8 +94,8 @@ pub struct Stage<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
 pub struct StageRef<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     /// The axes x, y and z.
     pub axes: PerAxis<&'a Axis<S, N>>,
-    /// Reactions to the end of set points.
-    pub streaming: StreamLoss,
+    /// Rules of operation.
+    pub operation: Operation,
 }
 
 /// The memory of the stage.
@@ -290,6 +290,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
             commissioned: self.is_commissioned(),
+            enabled_by: self.operation.enabled_by,
             locked: state.locked,
             settings_invalid: state.settings_invalid,
         }
@@ -317,8 +318,8 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
 
 impl<S: Scalar, const N: usize> Stage<S, N> {
     /// A stage of three axes.
-    pub fn new(axes: PerAxis<Axis<S, N>>, streaming: StreamLoss) -> Self {
-        Self { axes, streaming }
+    pub fn new(axes: PerAxis<Axis<S, N>>, operation: Operation) -> Self {
+        Self { axes, operation }
     }
 
     /// The stage in pieces.
@@ -326,13 +327,13 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
     pub fn as_ref(&self) -> StageRef<'_, S, N> {
         StageRef {
             axes: self.axes.by_ref(),
-            streaming: self.streaming,
+            operation: self.operation,
         }
     }
 
     /// The axes themselves, and what belongs to the stage beside them.
-    pub fn into_axes(self) -> (PerAxis<Axis<S, N>>, StreamLoss) {
-        (self.axes, self.streaming)
+    pub fn into_axes(self) -> (PerAxis<Axis<S, N>>, Operation) {
+        (self.axes, self.operation)
     }
 
     /// One axis, to be put in the place of another in a [`StageRef`].
@@ -465,8 +466,14 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
                 });
             }
         }
-        if let Some(EnableInterlock { code, axis }) = switches.interlock() {
-            self.trip(state, code, axis, tick);
+        // The emergency stop goes first; should it brake, what switches off beside it still does.
+        if switches.emergency_stop() {
+            self.trip(state, FaultCode::EmergencyStop, None, tick);
+        }
+        for axis in AxisName::ALL {
+            if let Some(code) = switches.axis(axis).fault() {
+                self.trip(state, code, Some(axis), tick);
+            }
         }
         self.trip_findings(state, findings, tick);
     }
@@ -478,7 +485,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         for first in [Reaction::Off, Reaction::Stop, Reaction::Hold] {
             for (name, finding) in findings.named() {
                 if let Err(code) = *finding
-                    && self.streaming.reaction(code) == first
+                    && self.operation.reaction(code) == first
                 {
                     self.trip(state, code, Some(name), tick);
                 }
@@ -500,7 +507,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             return;
         }
         let fault = Fault { code, axis, tick };
-        let reaction = self.streaming.reaction(code);
+        let reaction = self.operation.reaction(code);
         let was_enabled = state.safety.is_enabled();
         state.safety.trip(fault, reaction);
         if !was_enabled || reaction == Reaction::Off {

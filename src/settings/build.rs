@@ -1,6 +1,8 @@
 //! From checked settings to what the tick reads.
 
-use super::{AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings};
+use super::{
+    AmplifierSettings, AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings,
+};
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::axis::{Axis, AxisBuilder, Commissioning};
 use crate::law::control::feedback::LawKind;
@@ -9,7 +11,9 @@ use crate::law::feedforward::FeedforwardKind;
 use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
+use crate::law::safety::Operation;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
+use crate::law::safety::overload::Overload;
 use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
 use crate::law::scalar::Scalar;
@@ -53,7 +57,7 @@ impl StageSettings {
         self.validate(N)?;
         Ok(Stage::new(
             PerAxis::from_fn(|axis| self.build_axis(axis)),
-            self.streaming.build(),
+            self.operation(),
         ))
     }
 
@@ -76,6 +80,17 @@ impl StageSettings {
         let longest = self.longest_preview_ticks();
         self.axis(axis)
             .build_into(1.0 / self.rate_hz, longest, place);
+    }
+
+    /// The rules of operation as the tick reads them.
+    pub fn operation(&self) -> Operation {
+        Operation {
+            enabled_by: self.operation.enabled_by,
+            host_needed: self.operation.host_needed,
+            emergency_stop: self.operation.emergency_stop.into(),
+            link_lost: self.streaming.link_lost.into(),
+            underrun: self.streaming.underrun.into(),
+        }
     }
 
     /// The longest preview of any axis: the others wait for it.
@@ -170,6 +185,7 @@ impl AxisSettings {
                 rounding::round(limits.silent_s / period_s) as u32,
             ))
             .plausibility(self.build_plausibility(period_s))
+            .overload(amplifier.build_overload(period_s))
             .index_spacing(IndexSpacing::new(
                 encoder.counts_per_index,
                 encoder.index_tolerance_counts,
@@ -265,6 +281,15 @@ impl AxisSettings {
                 .map(|reduced_mm_s| Velocity::from_mm_s(reduced_mm_s, scale)),
         )
         .with_wait(wait_ticks)
+    }
+}
+
+impl AmplifierSettings {
+    fn build_overload(&self, period_s: f64) -> Overload {
+        let words = |volts: f64| volts * DacCode::FULL_SCALE / self.full_scale_v;
+        let (continuous, largest) = (words(self.continuous_v), words(self.output_limit_v));
+        let offset = rounding::round(words(self.offset_v)) as i32;
+        Overload::new(continuous, largest, self.overload_s, offset, period_s)
     }
 }
 

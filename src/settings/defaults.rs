@@ -5,7 +5,8 @@ use heapless::Vec;
 use super::axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardSettings};
 use super::feedback::FeedbackSettings;
 use super::leaves::default;
-use super::limits::{LimitSettings, LossReaction, StreamingSettings};
+use super::limits::LimitSettings;
+use super::operation::{EmergencyReaction, LossReaction, OperationSettings, StreamingSettings};
 use super::stage::StageSettings;
 use crate::law::axis::Commissioning;
 use crate::law::control::feedback::LawKind;
@@ -16,6 +17,7 @@ use crate::law::friction::PerDirection;
 use crate::law::friction::gms::{GmsElement, GmsParameters};
 use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
 use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
+use crate::law::safety::{EnabledBy, HostNeeded};
 
 impl StageSettings {
     /// Takes the [default](Self::default) settings over, in place.
@@ -23,6 +25,7 @@ impl StageSettings {
     #[inline(never)]
     pub fn set_default(&mut self) {
         self.rate_hz = default!("rate_hz");
+        self.operation = OperationSettings::default();
         self.streaming = StreamingSettings::default();
         for axis in &mut self.axes {
             *axis = AxisSettings::default();
@@ -34,10 +37,12 @@ impl StageSettings {
     pub fn copy_from(&mut self, other: &Self) {
         let Self {
             rate_hz,
+            operation,
             streaming,
             axes,
         } = self;
         *rate_hz = other.rate_hz;
+        *operation = other.operation;
         *streaming = other.streaming;
         for (axis, other) in axes.iter_mut().zip(&other.axes) {
             axis.clone_from(other);
@@ -61,8 +66,19 @@ impl Default for StageSettings {
     fn default() -> Self {
         Self {
             rate_hz: default!("rate_hz"),
+            operation: OperationSettings::default(),
             streaming: StreamingSettings::default(),
             axes: core::array::from_fn(|_| AxisSettings::default()),
+        }
+    }
+}
+
+impl Default for OperationSettings {
+    fn default() -> Self {
+        Self {
+            enabled_by: EnabledBy::default(),
+            host_needed: HostNeeded::default(),
+            emergency_stop: EmergencyReaction::Off,
         }
     }
 }
@@ -112,6 +128,8 @@ impl Default for AmplifierSettings {
             full_scale_v: default!("amplifier.full_scale_v"),
             output_limit_v: default!("amplifier.output_limit_v"),
             offset_v: default!("amplifier.offset_v"),
+            continuous_v: default!("amplifier.continuous_v"),
+            overload_s: default!("amplifier.overload_s"),
             reversed: false,
         }
     }

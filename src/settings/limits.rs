@@ -1,11 +1,7 @@
-//! Limits of an axis, and the reactions to a lost stream of set points. Ranges and defaults stand in
-//! [the table](super::leaves).
+//! Limits of an axis. Ranges and defaults stand in [the table](super::leaves).
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
-use strum::{AsRefStr, EnumString, VariantNames};
-
-use crate::law::safety::{Reaction, StreamLoss};
 
 /// Limits of motion, of the tracking error and of the encoder signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -80,47 +76,3 @@ defaults!(
     silent_s,
     silent_share
 );
-
-/// Reaction of the axes when set points of a stream no longer come.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, AsRefStr, EnumString, VariantNames,
-)]
-#[serde(rename_all = "kebab-case")]
-#[strum(serialize_all = "kebab-case")]
-pub enum LossReaction {
-    /// Brake, switch off, and latch a fault.
-    Stop,
-    /// Brake under control and hold.
-    Hold,
-}
-
-impl From<LossReaction> for Reaction {
-    fn from(loss: LossReaction) -> Self {
-        match loss {
-            LossReaction::Stop => Self::Stop,
-            LossReaction::Hold => Self::Hold,
-        }
-    }
-}
-
-/// Reactions of the stage while a host streams set points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TreeSchema, TreeAny)]
-#[serde(deny_unknown_fields)]
-pub struct StreamingSettings {
-    /// Reaction when the host falls silent.
-    #[tree(with = miniconf::leaf)]
-    pub link_lost: LossReaction,
-    /// Reaction when the next set point is late.
-    #[tree(with = miniconf::leaf)]
-    pub underrun: LossReaction,
-}
-
-impl StreamingSettings {
-    /// As the tick reads it.
-    pub fn build(self) -> StreamLoss {
-        StreamLoss {
-            link_lost: self.link_lost.into(),
-            underrun: self.underrun.into(),
-        }
-    }
-}

@@ -4,7 +4,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::axis::AxisSettings;
-use super::limits::StreamingSettings;
+use super::operation::{OperationSettings, StreamingSettings};
 use crate::law::reference::MotionSettings;
 
 /// Everything the stage's control law is made from.
@@ -13,6 +13,9 @@ use crate::law::reference::MotionSettings;
 pub struct StageSettings {
     /// Control rate, Hz.
     pub rate_hz: f64,
+    /// Rules of operation.
+    #[serde(default)]
+    pub operation: OperationSettings,
     /// Reactions when set points of a stream no longer come.
     #[serde(default)]
     pub streaming: StreamingSettings,

@@ -6,13 +6,14 @@
 use core::any::Any;
 
 use super::homing::HomeSwitch;
-use super::limits::LossReaction;
+use super::operation::{EmergencyReaction, LossReaction};
 use crate::law::control::feedback::LawKind;
 use crate::law::control::nctf::Characteristic;
 use crate::law::control::schedule::GainSchedule;
 use crate::law::feedforward::FeedforwardKind;
 use crate::law::friction::Direction;
 use crate::law::friction::gms::GmsElements;
+use crate::law::safety::{EnabledBy, HostNeeded};
 
 /// The longest value in bytes: a list of 16 points of two numbers takes 257.
 pub const MAX_VALUE_BYTES: usize = 320;
@@ -138,7 +139,10 @@ pub(crate) fn number(leaf: &dyn Any) -> Option<f64> {
 
 // A leaf of another type is to be added to both lists, with a kind of its own that stays.
 plain!(1 GmsElements, 1 GainSchedule, 1 Characteristic, 2 bool, 4 f64, 5 u8, 7 u32);
-name!(3 LawKind, 3 FeedforwardKind, 3 Direction, 3 HomeSwitch, 3 LossReaction);
+name!(
+    3 LawKind, 3 FeedforwardKind, 3 Direction, 3 HomeSwitch, 3 LossReaction, 3 EmergencyReaction, 3 EnabledBy,
+    3 HostNeeded
+);
 each!(
     f64,
     bool,
@@ -147,6 +151,9 @@ each!(
     Direction,
     HomeSwitch,
     LossReaction,
+    EmergencyReaction,
+    EnabledBy,
+    HostNeeded,
     LawKind,
     FeedforwardKind,
     GmsElements,

@@ -81,6 +81,9 @@ fn perturbed(path: &str, value: &Value) -> Value {
         Value::String(direction) if direction == "negative" => Value::from("positive"),
         Value::String(switch) if switch == "home" => Value::from("limit"),
         Value::String(reaction) if reaction == "stop" => Value::from("hold"),
+        Value::String(reaction) if reaction == "off" => Value::from("stop"),
+        Value::String(_) if field == "enabled_by" => Value::from("host"),
+        Value::String(_) if field == "host_needed" => Value::from("endless-motion"),
         Value::String(kind) => Value::from(if kind == "static" { "gms" } else { "static" }),
         // Left out by default: with it, the plan waits for homing.
         Value::Null if field == "unhomed_mm_s" => Value::from(10.0),
@@ -174,6 +177,11 @@ fn is_of_another_law(path: &str) -> bool {
         .any(|law| path.contains(&format!("/feedback/{law}/")))
 }
 
+/// Parameters of the load, which by default nobody watches.
+fn is_of_the_load(path: &str) -> bool {
+    path.ends_with("/continuous_v") || path.ends_with("/overload_s")
+}
+
 /// Paths of the fields that act with one kind of feedforward alone, below each axis.
 const OF_ONE_KIND: [(FeedforwardKind, &[&str]); 4] = [
     (FeedforwardKind::Static, &["feedforward/gains/level"]),
@@ -205,7 +213,7 @@ fn on_each_axis(fields: &[&str]) -> Vec<String> {
 
 #[test]
 fn every_parameter_acts_with_combined_feedforward_or_with_its_own_kind() {
-    let other_laws = |path: &str| !is_of_another_law(path);
+    let other_laws = |path: &str| !is_of_another_law(path) && !is_of_the_load(path);
     let mut combined = inert(&with_kind(FeedforwardKind::Combined), other_laws);
     let mut others: Vec<String> = OF_ONE_KIND
         .iter()
@@ -259,6 +267,19 @@ fn every_parameter_of_a_law_acts_where_the_law_does() {
             assert!(idle.is_empty(), "{idle:?}");
         }
     }
+}
+
+#[test]
+fn every_parameter_of_the_load_acts_where_it_is_watched() {
+    let mut settings = with_kind(FeedforwardKind::Combined);
+    for axis in &mut settings.axes {
+        axis.amplifier.continuous_v = 1.0;
+        axis.amplifier.overload_s = 0.25;
+        // Later than the load.
+        axis.limits.silent_s = 10.0;
+    }
+    let idle = inert(&settings, is_of_the_load);
+    assert!(idle.is_empty(), "{idle:?}");
 }
 
 /// The weights act on the outputs too, not only through their sum.

@@ -200,6 +200,7 @@ fn notices() -> Vec<(Notice, &'static str)> {
         (event(Event::CaptureFrozen { number: 9 }), "0001ac020a09"),
         (event(Event::SettingsApplied(AxisSet::ALL)), "0001ac020b07"),
         (event(Event::SettingsStored), "0001ac020c"),
+        (event(Event::MovedWhileOff(Y)), "0001ac020d01"),
         (
             Notice::Telemetry(TelemetryBlock {
                 generation: 2,

@@ -47,6 +47,8 @@ mod motion_modes;
 mod nonlinear_gain;
 mod not_commissioned;
 mod number_types;
+mod operation;
+mod overload;
 mod parameter_trace;
 mod pid;
 mod plant;

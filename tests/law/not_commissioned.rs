@@ -8,7 +8,7 @@ use quadrant::axes::PerAxis;
 use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::safety::SafetyState;
+use quadrant::safety::{EnabledBy, SafetyState};
 use quadrant::settings::{AxisSettings, StageSettings};
 
 use crate::common::Rig;
@@ -26,6 +26,7 @@ const READY: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: false,
+    enabled_by: EnabledBy::Any,
     locked: false,
     settings_invalid: false,
 };

@@ -2,7 +2,7 @@
 
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
-use quadrant::safety::{AxisSwitches, SafetyState, StreamLoss, Switches};
+use quadrant::safety::{AxisSwitches, Operation, SafetyState, Switches};
 use quadrant::settings::StageSettings;
 
 use crate::common::Rig;
@@ -124,8 +124,8 @@ fn run(settings: &StageSettings, axis: usize, moves: bool, run: Run) -> Trace {
     (trace, rig.state.safety())
 }
 
-/// The result of every run, and the stage's reaction if a stream ran dry.
-pub(crate) fn provoke(settings: &StageSettings, axis: usize) -> Option<(Vec<Trace>, StreamLoss)> {
+/// The result of every run, and the stage's rules of operation.
+pub(crate) fn provoke(settings: &StageSettings, axis: usize) -> Option<(Vec<Trace>, Operation)> {
     let stage = settings.build::<f32, 4>().ok()?;
     plan().validate(settings).ok()?;
     let moving = MOVING.iter().map(|each| run(settings, axis, true, *each));
@@ -133,5 +133,5 @@ pub(crate) fn provoke(settings: &StageSettings, axis: usize) -> Option<(Vec<Trac
         .iter()
         .chain(&HOMING)
         .map(|each| run(settings, axis, false, *each));
-    Some((moving.chain(standing).collect(), stage.as_ref().streaming))
+    Some((moving.chain(standing).collect(), stage.as_ref().operation))
 }

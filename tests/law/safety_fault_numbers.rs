@@ -37,11 +37,12 @@ fn numbers_and_names_are_stable() {
             "injection-bounds",
             "encoder-implausible",
             "stop-overrun",
+            "overload",
         ]
     );
     for code in FaultCode::ALL {
         assert_eq!(FaultCode::from_number(code.number()), Some(code));
     }
     assert_eq!(FaultCode::from_number(0), None);
-    assert_eq!(FaultCode::from_number(30), None);
+    assert_eq!(FaultCode::from_number(31), None);
 }

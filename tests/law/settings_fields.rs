@@ -121,6 +121,18 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
         0.9,
         1.1e9,
     ),
+    (
+        "amplifier.continuous_v",
+        |a| &mut a.amplifier.continuous_v,
+        0.9e-3,
+        20.1,
+    ),
+    (
+        "amplifier.overload_s",
+        |a| &mut a.amplifier.overload_s,
+        0.009,
+        1001.0,
+    ),
     ("limits.silent_s", |a| &mut a.limits.silent_s, 0.9e-4, 10.1),
     (
         "limits.silent_share",

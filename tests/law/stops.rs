@@ -6,7 +6,7 @@ use quadrant::axis::{Axis, AxisBuilder};
 use quadrant::command::Command;
 use quadrant::motion::ReferenceGenerator;
 use quadrant::reference::{MotionScale, Ramp, Velocity};
-use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, StreamLoss, Switches};
+use quadrant::safety::{AxisSwitches, FaultCode, Operation, SafetyState, Switches};
 use quadrant::settings::{AxisSettings, HomeSwitch, PlanSettings, StageSettings};
 use quadrant::stage::{Outputs, Stage};
 
@@ -84,7 +84,7 @@ fn endless() -> Axis<f32, 4> {
 
 fn jogging() -> Rig<f32> {
     let mut rig = Rig::new(&StageSettings::simulated(), &PlanSettings::default());
-    rig.stage = Stage::new(PerAxis::from_fn(|_| endless()), StreamLoss::default());
+    rig.stage = Stage::new(PerAxis::from_fn(|_| endless()), Operation::default());
     rig.tick();
     rig.command(Command::Enable);
     rig.command(Command::Jog(AxisName::X, Velocity::from_mm_s(100.0, SCALE)));

@@ -156,7 +156,7 @@ fn the_sectors_wear_evenly() {
     );
     assert!(first.abs_diff(second) <= 1);
     assert!(
-        first + second <= 1000 / 4 + 1,
+        first + second <= 1000 / 3 + 1,
         "{first} and {second} erasures"
     );
 }

@@ -7,7 +7,7 @@ use quadrant::axes::AxisName;
 use quadrant::axes::PerAxis;
 use quadrant::command::Command;
 use quadrant::motion::MotionMode;
-use quadrant::safety::{EnableInterlock, Fault, FaultCode, SafetyState};
+use quadrant::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState};
 
 const FAULT: Fault = Fault {
     code: FaultCode::DeadlineMissed,
@@ -28,6 +28,7 @@ const DISABLED: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: true,
+    enabled_by: EnabledBy::Any,
     locked: false,
     settings_invalid: false,
 };
@@ -75,7 +76,7 @@ fn requests_pass_where_they_make_sense() {
     ] {
         let decision = decide(view, view, Some(command));
         assert_eq!(decision.command, Some(command), "{view:?}");
-        assert_eq!(decision.events, [None; 4]);
+        assert_eq!(decision.events, [None; 5]);
     }
 }
 
@@ -96,7 +97,7 @@ fn requests_are_refused_with_a_reason_where_they_do_not() {
         let decision = decide(view, view, Some(command));
         assert_eq!(decision.command, None, "{view:?} {command:?}");
         let told = Event::Refused(command, reason);
-        assert_eq!(decision.events, [None, None, None, Some(told)]);
+        assert_eq!(decision.events, [None, None, None, None, Some(told)]);
         assert!(!reason.as_str().is_empty());
     }
 }
@@ -171,7 +172,7 @@ fn enabling_with_a_bad_input_is_refused_and_names_it() {
             };
             let decision = decide(view, view, Some(Command::Enable));
             assert_eq!(decision.command, None);
-            let Some(Event::Refused(Command::Enable, refusal)) = decision.events[3] else {
+            let Some(Event::Refused(Command::Enable, refusal)) = decision.events[4] else {
                 panic!("{decision:?}");
             };
             assert_eq!(refusal, Refusal::BadInput(interlock));
@@ -184,7 +185,7 @@ fn enabling_with_a_bad_input_is_refused_and_names_it() {
         };
         let decision = decide(faulted, faulted, Some(Command::Enable));
         let told = Event::Refused(Command::Enable, Refusal::FaultLatched);
-        assert_eq!(decision.events[3], Some(told));
+        assert_eq!(decision.events[4], Some(told));
     }
 }
 

@@ -20,14 +20,20 @@ mod simulated_io;
 mod watch;
 
 use std::path::PathBuf;
+use std::time::Duration;
 
 use clap::Args;
+use quadrant::link::message::AxisMode;
+use quadrant_cli::warn;
 use quadrant_sim::client::Client;
 
 use self::command::Command;
 use self::printer::Printer;
 use self::session::Session;
 use crate::endpoint::{DEFAULT_IMAGE, LinkEndpoint};
+
+/// Time between two looks at a motion.
+const LOOK: Duration = Duration::from_millis(20);
 
 /// Options of `quadrant connect`.
 #[derive(Clone, Debug, Args)]
@@ -92,13 +98,33 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
         Some(command) => dispatch::run(&mut session, command, ""),
     };
-    if succeeded {
+    if succeeded && stay(&mut session.client)? {
         Ok(())
     } else {
         // What failed has been said. The emulator ends with the session.
         drop(session);
         std::process::exit(1)
     }
+}
+
+/// Stays until the motion ends that the session has started: the machine stops it when its host falls silent. A jog has no
+/// end, and is left to that. Returns false if somebody interrupted it.
+fn stay(client: &mut Client) -> anyhow::Result<bool> {
+    let mut told = false;
+    while client.moves() && !client.is_interrupted() {
+        // First, for what was acknowledged reaches the control law a little later.
+        client.wait(LOOK)?;
+        let status = client.status()?;
+        let jogs = status.axes.iter().any(|axis| axis.mode == AxisMode::Jog);
+        if status.is_at_rest() || jogs {
+            break;
+        }
+        if !told {
+            warn!("the motion is under way, and this ends with it; Ctrl-C stops the axes");
+            told = true;
+        }
+    }
+    Ok(!client.is_interrupted())
 }
 
 fn connect(arguments: &Arguments) -> anyhow::Result<Client> {

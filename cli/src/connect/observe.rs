@@ -247,5 +247,6 @@ fn said(event: &Event) -> String {
         Event::CaptureFrozen { number } => format!("capture {number} can be read"),
         Event::SettingsApplied(_) => "settings act".to_owned(),
         Event::SettingsStored => "settings are kept".to_owned(),
+        Event::MovedWhileOff(axis) => format!("{axis} moves though the outputs are off"),
     }
 }

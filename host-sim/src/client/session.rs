@@ -241,6 +241,11 @@ impl Client {
         Ok(())
     }
 
+    /// True if this session has started a motion that, as far as it knows, is under way.
+    pub const fn moves(&self) -> bool {
+        self.moves
+    }
+
     /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
     /// its host has started when that falls silent. Whoever lets time pass without [`wait`](Self::wait) calls this a few
     /// times a second.

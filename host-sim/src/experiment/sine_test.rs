@@ -2,7 +2,9 @@
 
 use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings, StreamingSettings};
+use quadrant::settings::{
+    AxisSettings, OperationSettings, PlanSettings, StageSettings, StreamingSettings,
+};
 
 use crate::experiment::configuration::ELEMENTS;
 use crate::experiment::metrics::{Score, score};
@@ -74,6 +76,7 @@ pub fn run_sine_tests(
     let job = Job {
         stage: StageSettings {
             rate_hz,
+            operation: OperationSettings::default(),
             streaming: StreamingSettings::default(),
             axes: settings,
         },

@@ -8,6 +8,7 @@ use crate::hal::SettingsFlash;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::reference::{Motion, MotionSettings};
+use crate::law::safety::Station;
 use crate::law::scalar::Scalar;
 use crate::settings::PlanSettings;
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
@@ -76,7 +77,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     /// Checks that the control law would take a command, as far as the last snapshot tells.
     pub(super) fn check(&self, command: Command) -> Result<(), LinkError> {
-        match supervisor::refusal(self.seen.view, command) {
+        match supervisor::refusal_from(Station::Host, self.seen.view, command) {
             Some(reason) => Err(refused(format_args!("{reason}"))),
             None => Ok(()),
         }

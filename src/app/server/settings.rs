@@ -142,7 +142,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         let swap = AxisSwap {
             name,
             axis,
-            streaming: settings.streaming.build(),
+            operation: settings.operation(),
             needs_disabled: self.needs_disabled,
             more: self.pending.iter().nth(1).is_some(),
         };

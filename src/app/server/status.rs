@@ -6,7 +6,7 @@ use crate::law::admission;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::motion::MotionMode;
-use crate::law::safety::SafetyState;
+use crate::law::safety::{SafetyState, Station};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
 use quadrant_link::PROTOCOL_VERSION;
@@ -59,7 +59,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     pub(super) fn inputs(&self) -> Inputs {
         let view = self.seen.view;
-        let refusal = admission::refusal(view, Command::Enable);
+        let refusal = admission::refusal_from(Station::Host, view, Command::Enable);
         Inputs {
             tick: self.seen.tick,
             switches: self.seen.switches.bits(),

@@ -50,6 +50,7 @@ use crate::law::safety::monitor::{
     Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
     SignalLossState, speed_limit,
 };
+use crate::law::safety::overload::{Overload, OverloadState};
 use crate::law::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
 use crate::law::safety::travel::{Travel, TravelState};
 use crate::law::safety::{AxisSwitches, FaultCode};
@@ -106,6 +107,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     /// A displacement in a tick as a velocity.
     unit_mm_s: S::Gain,
     plausibility: Plausibility,
+    overload: Overload,
     index_spacing: IndexSpacing,
     /// Measured speed above which the axis does not stand, 2^-8 counts per tick.
     standstill: u32,
@@ -195,6 +197,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.overspeed = Overspeed::UNLIMITED;
         axis.signal_loss = SignalLoss::off();
         axis.plausibility = Plausibility::off();
+        axis.overload = Overload::UNLIMITED;
         axis.index_spacing = IndexSpacing::default();
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
@@ -302,6 +305,13 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
+    /// The load that the motor bears.
+    #[must_use]
+    pub fn overload(self, overload: Overload) -> Self {
+        self.axis.overload = overload;
+        self
+    }
+
     /// The distance of the encoder's index pulses.
     #[must_use]
     pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
@@ -396,6 +406,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     friction: FeedforwardState<S, N>,
     generator: GeneratorState<S>,
     plausibility: PlausibilityState,
+    overload: OverloadState,
     preview: [Position; PREVIEW_ROOM],
     /// Position of the axis at the last index pulse, until homing takes it.
     pulse: Option<Position>,
@@ -412,6 +423,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             overspeed: OverspeedState::default(),
             signal_loss: SignalLossState::default(),
             plausibility: PlausibilityState::default(),
+            overload: OverloadState::default(),
             index: IndexState::default(),
             following: FollowingState::default(),
             travel: TravelState::default(),
@@ -566,6 +578,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             overspeed: Overspeed::default(),
             signal_loss: SignalLoss::default(),
             plausibility: Plausibility::off(),
+            overload: Overload::UNLIMITED,
             index_spacing: IndexSpacing::default(),
             following: Following::default(),
             travel: Travel::UNLIMITED,
@@ -612,16 +625,16 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let alive = self
             .signal_loss
             .step(&mut state.signal_loss, counts, state.telemetry.output);
-        let agrees = !due || self.compare(state);
+        let watched = if due { self.compare(state) } else { Ok(()) };
         let usual = alive
-            && agrees
+            && watched.is_ok()
             && self.encoder.is_plausible(counts)
             && self.is_slow(state)
             && reading.is_plain();
         if usual {
             Ok(())
         } else {
-            self.examine(state, reading, counts, alive, agrees)
+            self.examine(state, reading, counts, alive, watched)
         }
     }
 
@@ -641,7 +654,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         reading: &EncoderReading,
         counts: i32,
         alive: bool,
-        agrees: bool,
+        watched: Result<(), FaultCode>,
     ) -> Result<(), FaultCode> {
         let possible = self.encoder.is_plausible(counts);
         let slow = self.is_slow(state);
@@ -649,9 +662,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             Some(raw) => self.take_pulse(state, raw),
             None => true,
         };
-        if reading.fresh && reading.valid && possible && slow && alive && agrees && indexed {
-            return Ok(());
-        }
+        let agrees = watched != Err(FaultCode::EncoderImplausible);
         // Where counts may be lost, so is the origin.
         if !reading.valid | !possible | !indexed | !agrees {
             state.homed = false;
@@ -669,16 +680,27 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             FaultCode::Overspeed
         } else if !agrees {
             FaultCode::EncoderImplausible
-        } else {
+        } else if !alive {
             FaultCode::EncoderSignalLoss
+        } else {
+            return watched;
         })
     }
 
-    /// Compares the encoder with the plant; returns true if they agree.
+    /// Compares the encoder with the plant, and watches the load.
     #[inline(never)]
-    fn compare(&self, state: &mut AxisState<S, N>) -> bool {
+    fn compare(&self, state: &mut AxisState<S, N>) -> Result<(), FaultCode> {
         let shown = state.shown();
-        self.plausibility.step(&mut state.plausibility, shown)
+        let bears = self
+            .overload
+            .step(&mut state.overload, state.telemetry.code.0);
+        if !self.plausibility.step(&mut state.plausibility, shown) {
+            Err(FaultCode::EncoderImplausible)
+        } else if !bears {
+            Err(FaultCode::Overload)
+        } else {
+            Ok(())
+        }
     }
 
     /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
@@ -710,6 +732,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *state = AxisState {
             encoder: state.encoder.clone(),
             plausibility: self.plausibility.start(shown),
+            overload: state.overload,
             homed: state.homed,
             index: state.index,
             following: self.following.start(),

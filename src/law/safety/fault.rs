@@ -80,13 +80,15 @@ pub enum FaultCode {
     EncoderImplausible = 28,
     /// A controlled stop lasted longer than its limits allow.
     StopOverrun = 29,
+    /// The motor was loaded for longer than it bears.
+    Overload = 30,
 }
 
 impl FaultCode {
     /// All faults, in order of their numbers.
     pub const ALL: [Self; Self::COUNT] = *Self::VARIANTS.first_chunk().unwrap();
 
-    /// The stable number, 1 to 29.
+    /// The stable number, 1 to 30.
     pub const fn number(self) -> u8 {
         self as u8
     }
@@ -111,8 +113,8 @@ impl FaultCode {
         self.text()[1]
     }
 
-    /// The reaction of the stage by itself; of [`Self::LinkLost`] and [`Self::StreamUnderrun`] unless the settings say
-    /// otherwise ([`StreamLoss`]).
+    /// The reaction of the stage by itself; of [`Self::EmergencyStop`], [`Self::LinkLost`] and [`Self::StreamUnderrun`]
+    /// unless the settings say otherwise ([`Operation`](super::Operation)).
     pub const fn reaction(self) -> Reaction {
         match self {
             // The measured position can be trusted, and an axis under control stops shorter than one that coasts.
@@ -127,7 +129,8 @@ impl FaultCode {
             | Self::IndexMissing
             | Self::IndexNearSwitch
             | Self::InjectionUnderrun
-            | Self::InjectionBounds => Reaction::Stop,
+            | Self::InjectionBounds
+            | Self::Overload => Reaction::Stop,
             _ => Reaction::Off,
         }
     }
@@ -250,6 +253,11 @@ impl FaultCode {
                 "check the encoder's cable and both its lines, the signs of encoder and amplifier, the plant's model, \
                  and for a blocked axis; then home again",
             ],
+            Self::Overload => [
+                "the output was above amplifier.continuous_v for longer than amplifier.overload_s allows",
+                "let the motor cool; check for a tight guide, a blocked axis and a brake that holds; lower accelerations or \
+                 the share of motion; check amplifier.continuous_v",
+            ],
             Self::StopOverrun => [
                 "a controlled stop lasted longer than braking_mm_s2 and braking_jerk_mm_s3 allow",
                 "report it with the firmware's version and the settings",
@@ -267,35 +275,6 @@ pub struct Fault {
     pub axis: Option<AxisName>,
     /// The control tick that found it.
     pub tick: u32,
-}
-
-/// Reactions to the end of set points.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct StreamLoss {
-    /// Reaction to the loss of the host's signal.
-    pub link_lost: Reaction,
-    /// Reaction to a set point that is late.
-    pub underrun: Reaction,
-}
-
-impl StreamLoss {
-    /// The reaction to a fault under these settings.
-    pub const fn reaction(self, code: FaultCode) -> Reaction {
-        match code {
-            FaultCode::LinkLost => self.link_lost,
-            FaultCode::StreamUnderrun => self.underrun,
-            _ => code.reaction(),
-        }
-    }
-}
-
-impl Default for StreamLoss {
-    fn default() -> Self {
-        Self {
-            link_lost: FaultCode::LinkLost.reaction(),
-            underrun: FaultCode::StreamUnderrun.reaction(),
-        }
-    }
 }
 
 /// A bad input that keeps the outputs from being enabled.

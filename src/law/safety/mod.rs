@@ -15,17 +15,21 @@
 //! |----------|---------|-------|
 //! | every reading | [`encoder`](crate::law::encoder), [`monitor`] | jump, both lines at once, stale, overspeed, silent, index |
 //! | every output and reading | [`plausibility`] | encoder dead, or of the wrong sign |
+//! | every output | [`overload`] | load of the motor, I²t |
 //! | every error | [`monitor`] | following error |
 //! | every reference | [`travel`], [`Switches`] | braking distance, limit switches |
 //! | the board's inputs | [`Switches`] | emergency stop, amplifier fault, output mismatch |
 
 mod fault;
 pub mod monitor;
+mod operation;
+pub mod overload;
 pub mod plausibility;
 mod state;
 mod switches;
 pub mod travel;
 
-pub use fault::{EnableInterlock, Fault, FaultCode, Reaction, StreamLoss};
+pub use fault::{EnableInterlock, Fault, FaultCode, Reaction};
+pub use operation::{EnabledBy, HostNeeded, Operation, Station};
 pub use state::SafetyState;
 pub use switches::{AxisSwitches, Switches};

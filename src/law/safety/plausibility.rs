@@ -49,10 +49,13 @@ const UNITS_PER_VOLT: f64 = (1u32 << 18) as f64;
 /// Fraction bits of the force of a converter's word.
 const PUSH_BITS: u32 = 16;
 
+/// Ticks between two looks at an axis.
+pub(super) const DUE_TICKS: u32 = 1 << INTERVAL_BITS;
+
 /// True in the ticks in which the axis of this index is compared.
 #[inline(always)]
 pub(crate) const fn is_due(tick: u32, index: usize) -> bool {
-    tick & ((1 << INTERVAL_BITS) - 1) == index as u32
+    tick & (DUE_TICKS - 1) == index as u32
 }
 
 /// The converter's words as a voltage. Settings time only.

@@ -40,6 +40,17 @@ impl AxisSwitches {
         self.0 & others.0 == others.0
     }
 
+    /// The first that speaks against enabled outputs.
+    pub(crate) const fn fault(self) -> Option<FaultCode> {
+        if self.has(Self::AMPLIFIER_FAULT) {
+            Some(FaultCode::AmplifierFault)
+        } else if self.has(Self::OUTPUT_MISMATCH) {
+            Some(FaultCode::OutputMismatch)
+        } else {
+            None
+        }
+    }
+
     /// True if a limit switch is pressed.
     #[inline(always)]
     pub const fn at_limit(self) -> bool {
@@ -122,20 +133,12 @@ impl Switches {
                 axis: None,
             });
         }
-        for axis in AxisName::ALL {
-            let switches = self.axis(axis);
-            let code = if switches.has(AxisSwitches::AMPLIFIER_FAULT) {
-                FaultCode::AmplifierFault
-            } else if switches.has(AxisSwitches::OUTPUT_MISMATCH) {
-                FaultCode::OutputMismatch
-            } else {
-                continue;
-            };
-            return Some(EnableInterlock {
+        AxisName::ALL.into_iter().find_map(|axis| {
+            let code = self.axis(axis).fault()?;
+            Some(EnableInterlock {
                 code,
                 axis: Some(axis),
-            });
-        }
-        None
+            })
+        })
     }
 }

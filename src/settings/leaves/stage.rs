@@ -3,8 +3,9 @@
 use strum::VariantNames;
 
 use super::row::{Exchange, LeafInfo, UNSET, at, exchanged, flag, name, number, of_stage, times};
+use crate::law::safety::{EnabledBy, HostNeeded};
 use crate::settings::axis::AxisSettings;
-use crate::settings::limits::LossReaction;
+use crate::settings::operation::{EmergencyReaction, LossReaction};
 
 fn full_scale_v(axis: &AxisSettings, _: f64) -> f64 {
     axis.amplifier.full_scale_v
@@ -20,6 +21,9 @@ fn most_index_tolerance(axis: &AxisSettings, _: f64) -> f64 {
 #[rustfmt::skip]
 pub(super) const OF_STAGE: &[LeafInfo] = &[
     RATE,
+    OPERATION[0],
+    OPERATION[1],
+    OPERATION[2],
     STREAMING[0],
     STREAMING[1],
 ];
@@ -30,6 +34,19 @@ const RATE: LeafInfo = LeafInfo {
     ..of_stage(number("rate_hz", "Hz", at(1e3), at(1e5), 10e3,
         "Control rate. Changes with a restart."))
 };
+
+#[rustfmt::skip]
+const OPERATION: [LeafInfo; 3] = exchanged(Exchange::Disabled, [
+    of_stage(name("operation.enabled_by", EnabledBy::VARIANTS,
+        "Who may enable: any, host, or operator (the button is an enabling device: axes move only while it is held). \
+         Everybody may stop and disable.")),
+    of_stage(name("operation.host_needed", HostNeeded::VARIANTS,
+        "Motions of a host that end when it falls silent: every-motion, or endless-motion (jogs, plans without an end, \
+         streams, injected voltages).")),
+    of_stage(name("operation.emergency_stop", EmergencyReaction::VARIANTS,
+        "Reaction to the emergency stop: off (category 0) or stop (category 1: brake, then off; the hardware must cut the \
+         power later).")),
+]);
 
 #[rustfmt::skip]
 const STREAMING: [LeafInfo; 2] = exchanged(Exchange::Disabled, [
@@ -66,6 +83,10 @@ pub(super) const AMPLIFIER_AND_PLANT: &[LeafInfo] = &exchanged(Exchange::Disable
         "Voltage at which the motor gives no force; it is added to every output."),
     flag("amplifier.reversed",
         "True if a positive voltage moves the axis to smaller positions."),
+    number("amplifier.continuous_v", "V", at(1e-3), at(20.0), 20.0,
+        "Output that the motor bears for ever; from the output limit on, the load is not watched."),
+    number("amplifier.overload_s", "s", at(0.01), at(1e3), 2.0,
+        "Time for which the motor bears the output limit, after rest (I²t)."),
     flag("commissioned",
         "True if the axis was commissioned, by the tool or by a person; outputs are enabled only if one was, and every other \
          has no gains, feedforward or offset."),

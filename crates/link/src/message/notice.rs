@@ -73,4 +73,6 @@ pub enum Event {
     SettingsApplied(AxisSet),
     /// Settings were stored for the next start.
     SettingsStored,
+    /// An axis that stood was moved though the outputs are off.
+    MovedWhileOff(AxisName),
 }

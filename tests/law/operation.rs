@@ -1,0 +1,227 @@
+//! Who may enable, which motions need their host, and how an emergency stops the stage.
+
+use quadrant::app::supervisor::{Event, StageView, Supervisor};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::link::message::{AxisName as WireAxis, Body};
+use quadrant::safety::{AxisSwitches, EnabledBy, FaultCode, HostNeeded, SafetyState, Switches};
+use quadrant::settings::{EmergencyReaction, StageSettings};
+use quadrant::stage::Outputs;
+
+use crate::common::Rig;
+use crate::preemption::{endless, plan, refused, safety, settings};
+use crate::safety_faults::{follow, moving};
+use crate::tasks::Tasks;
+
+/// The host counts as lost after so long.
+const HOST_TICKS: u32 = 5000;
+
+fn tasks(change: impl FnOnce(&mut StageSettings)) -> Tasks {
+    let mut settings = settings();
+    change(&mut settings);
+    Tasks::new(&settings, 1)
+}
+
+fn is_enabled(tasks: &Tasks) -> bool {
+    tasks.upper.borrow().outputs.enabled
+}
+
+/// What the operator asks, and a while.
+fn operate(tasks: &mut Tasks, command: Command) {
+    tasks.upper.borrow_mut().operate(command);
+    tasks.run(40);
+}
+
+#[test]
+fn host_and_operator_both_enable_unless_the_settings_say_who() {
+    for (enabled_by, host_may, operator_may) in [
+        (EnabledBy::Any, true, true),
+        (EnabledBy::Host, true, false),
+        (EnabledBy::Operator, false, true),
+    ] {
+        let mut tasks = tasks(|settings| settings.operation.enabled_by = enabled_by);
+        let answer = tasks.ask(Body::Enable);
+        assert_eq!(refused(Some(&answer)), !host_may, "{answer:?}");
+        tasks.run(40);
+        assert_eq!(is_enabled(&tasks), host_may);
+        tasks.ask(Body::Disable).expect("everybody may");
+        tasks.run(40);
+        operate(&mut tasks, Command::Enable);
+        assert_eq!(is_enabled(&tasks), operator_may);
+    }
+}
+
+#[test]
+fn the_law_itself_enables_for_nobody_whom_the_settings_do_not_allow_to() {
+    let mut tasks = tasks(|settings| settings.operation.enabled_by = EnabledBy::Host);
+    // Past supervising task and server, which judge what was.
+    tasks.upper.borrow_mut().inputs.command = Some(Command::Enable);
+    tasks.run(20);
+    assert!(!is_enabled(&tasks));
+}
+
+#[test]
+fn a_button_that_is_an_enabling_device_ends_what_the_host_moves_when_it_is_let_go() {
+    let mut tasks = tasks(|settings| settings.operation.enabled_by = EnabledBy::Operator);
+    operate(&mut tasks, Command::Enable);
+    let jog = Body::Jog {
+        axis: WireAxis::Z,
+        velocity_mm_s: 2.0,
+    };
+    tasks.ask(jog.clone()).expect("the button is held");
+    tasks.run(500);
+    assert!(tasks.upper.borrow().state().is_running());
+    operate(&mut tasks, Command::Disable);
+    assert!(!is_enabled(&tasks));
+    assert!(refused(Some(&tasks.ask(Body::Enable))));
+    assert!(refused(Some(&tasks.ask(jog))));
+}
+
+/// Runs a plan of some 0.9 s that a host has started, or the operator, and then nobody asks anything.
+fn left_alone(host_needed: HostNeeded, by_host: bool) -> (SafetyState, i64) {
+    let mut tasks = tasks(|settings| settings.operation.host_needed = host_needed);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.ask(plan(4.0)).expect("takes the plan");
+    if by_host {
+        tasks.ask(Body::Run).expect("runs");
+    } else {
+        operate(&mut tasks, Command::Run);
+    }
+    tasks.run(3 * HOST_TICKS);
+    let measured = tasks.upper.borrow().snapshot().axes[2].measured.0;
+    (safety(&tasks), measured)
+}
+
+/// The plan's end on the z axis, counts.
+const PLAN_END: i64 = 24_000;
+
+#[test]
+fn a_motion_that_a_host_started_ends_with_it_even_if_it_would_end_by_itself() {
+    let (safety, measured) = left_alone(HostNeeded::EveryMotion, true);
+    let fault = safety.fault().expect("latched");
+    assert_eq!(fault.code, FaultCode::LinkLost);
+    assert!(measured < PLAN_END, "{measured}");
+}
+
+#[test]
+fn a_motion_with_an_end_goes_on_alone_if_the_settings_or_the_operator_say_so() {
+    for (needed, by_host) in [
+        (HostNeeded::EndlessMotion, true),
+        (HostNeeded::EveryMotion, false),
+    ] {
+        let (safety, measured) = left_alone(needed, by_host);
+        assert!(safety.is_enabled(), "{safety:?}");
+        assert_eq!(measured, PLAN_END);
+    }
+}
+
+#[test]
+fn homing_needs_its_host_too() {
+    let mut tasks = tasks(|_| {});
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    tasks
+        .ask(Body::Home([WireAxis::Y].into_iter().collect()))
+        .expect("starts");
+    tasks.run(HOST_TICKS - 500);
+    assert!(tasks.upper.borrow().state().is_running());
+    tasks.run(3000);
+    let code = safety(&tasks).fault().map(|fault| fault.code);
+    assert_eq!(code, Some(FaultCode::LinkLost));
+}
+
+#[test]
+fn an_endless_motion_needs_its_host_whatever_the_settings_say() {
+    let mut tasks = tasks(|settings| settings.operation.host_needed = HostNeeded::EndlessMotion);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.ask(endless()).expect("takes the plan");
+    tasks.ask(Body::Run).expect("runs");
+    tasks.run(3 * HOST_TICKS);
+    let code = safety(&tasks).fault().map(|fault| fault.code);
+    assert_eq!(code, Some(FaultCode::LinkLost));
+}
+
+/// A stage in motion whose emergency stop brakes.
+fn braking() -> Rig<f32> {
+    let mut settings = StageSettings::simulated();
+    settings.operation.emergency_stop = EmergencyReaction::Stop;
+    let mut rig = moving(&settings);
+    rig.inputs.switches = Switches::EMERGENCY_STOP;
+    follow(&mut rig);
+    assert!(rig.tick().enabled);
+    rig
+}
+
+#[test]
+fn an_emergency_stop_of_category_1_brakes_and_then_switches_off() {
+    let mut rig = braking();
+    // 105 ms of braking, 20 ms of rest.
+    let mut ticks = 0;
+    loop {
+        follow(&mut rig);
+        ticks += 1;
+        if !rig.tick().enabled {
+            break;
+        }
+        assert!(ticks < 1250, "never ends");
+    }
+    assert!(ticks > 200, "{ticks}");
+    let fault = rig.state.safety().fault().expect("latched");
+    assert_eq!((fault.code, fault.axis), (FaultCode::EmergencyStop, None));
+    // Nothing is enabled while it is pressed.
+    rig.command(Command::ResetFault);
+    assert_eq!(rig.command(Command::Enable), Outputs::default());
+}
+
+#[test]
+fn what_switches_off_still_does_while_an_emergency_stop_brakes() {
+    let fault = Switches::EMERGENCY_STOP.with_axis(AxisName::Z, AxisSwitches::AMPLIFIER_FAULT);
+    for ticks_before in [0, 5] {
+        let mut rig = if ticks_before == 0 {
+            let mut settings = StageSettings::simulated();
+            settings.operation.emergency_stop = EmergencyReaction::Stop;
+            moving(&settings)
+        } else {
+            braking()
+        };
+        rig.inputs.switches = fault;
+        follow(&mut rig);
+        assert_eq!(rig.tick(), Outputs::default());
+        // What began it is what a person is told.
+        let first = rig.state.safety().fault().expect("latched").code;
+        assert_eq!(first, FaultCode::EmergencyStop);
+    }
+}
+
+#[test]
+fn an_axis_that_is_pushed_while_the_outputs_are_off_is_told_once_a_push() {
+    let standing = StageView {
+        safety: SafetyState::Disabled,
+        commissioned: true,
+        ..StageView::default()
+    };
+    let pushed = StageView {
+        moving: Some(AxisName::Y),
+        ..standing
+    };
+    let enabled = StageView {
+        safety: SafetyState::Enabled,
+        ..standing
+    };
+    let mut supervisor = Supervisor::default();
+    let mut told = |view, runs| {
+        (0..runs)
+            .flat_map(|_| supervisor.step(view, None).events)
+            .flatten()
+            .filter(|event| matches!(event, Event::MovedWhileOff(AxisName::Y)))
+            .count()
+    };
+    assert_eq!(told(standing, 200), 0);
+    assert_eq!(told(pushed, 50), 1);
+    assert_eq!(told(standing, 200), 0);
+    assert_eq!(told(pushed, 1), 1);
+    // What coasts after it was switched off was not pushed.
+    assert_eq!(told(enabled, 200), 0);
+    assert_eq!(told(standing, 1), 0);
+    assert_eq!(told(pushed, 50), 0);
+}
