@@ -18,7 +18,8 @@
 //! - [`simulated`], [`application`], [`memory_flash`]: the firmware's application in this process;
 //! - [`emulated`], [`emulator`] (feature `emulated`): the firmware's image in QEMU; [`benchmark_job`]: the motion that it is
 //!   counted with;
-//! - [`Transport`], [`SerialTransport`], [`TcpTransport`], [`Loopback`]: bytes to a machine and back;
+//! - [`Transport`], [`SerialTransport`], [`TcpTransport`], [`Loopback`]: bytes to a machine and back; `claim`: one program
+//!   at a time;
 //! - [`simulated_io`]: fault injection at machines that are not real: inputs, supply, log.
 //!
 //! Nothing here knows the client: [`client`](crate::client) is built on this.
@@ -26,6 +27,7 @@
 pub mod application;
 mod approach;
 pub mod benchmark_job;
+mod claim;
 #[cfg(all(unix, feature = "emulated"))]
 pub mod emulated;
 #[cfg(all(unix, feature = "emulated"))]

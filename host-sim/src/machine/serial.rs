@@ -3,6 +3,7 @@
 use std::io::{self, Read, Write};
 use std::time::{Duration, Instant};
 
+use super::claim::Claim;
 use super::stream::{LEAST_TIMEOUT, TIMEOUT, ended, or_none};
 use super::transport::Transport;
 
@@ -14,19 +15,22 @@ pub struct SerialTransport {
     port: Box<dyn serialport::SerialPort>,
     path: String,
     opened: Instant,
+    _claim: Claim,
 }
 
 impl SerialTransport {
     /// Opens a port by its path, such as `/dev/ttyACM0` or `COM3`, at [`BAUD`].
     ///
     /// # Errors
-    /// A port that is not there, in use, or forbidden.
+    /// A port that is not there, held by another program, or forbidden.
     pub fn open(path: &str) -> io::Result<Self> {
+        let claim = Claim::take(path)?;
         let port = serialport::new(path, BAUD).timeout(TIMEOUT).open()?;
         Ok(Self {
             port,
             path: path.to_owned(),
             opened: Instant::now(),
+            _claim: claim,
         })
     }
 }

@@ -4,6 +4,7 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
+use super::claim::Claim;
 use super::stream::{LEAST_TIMEOUT, TIMEOUT, ended, or_none};
 use super::transport::Transport;
 
@@ -12,14 +13,16 @@ pub struct TcpTransport {
     stream: TcpStream,
     address: String,
     opened: Instant,
+    _claim: Claim,
 }
 
 impl TcpTransport {
     /// Connects to `host:port`.
     ///
     /// # Errors
-    /// An address that is none, or where nobody answers within 5 s.
+    /// An address that is none, where nobody answers within 5 s, or to which another program talks.
     pub fn connect(address: &str) -> io::Result<Self> {
+        let claim = Claim::take(address)?;
         let mut last = io::Error::new(io::ErrorKind::InvalidInput, "no such host");
         for candidate in address.to_socket_addrs()? {
             match TcpStream::connect_timeout(&candidate, TIMEOUT) {
@@ -30,6 +33,7 @@ impl TcpTransport {
                         stream,
                         address: address.to_owned(),
                         opened: Instant::now(),
+                        _claim: claim,
                     });
                 }
                 Err(error) => last = error,

@@ -73,6 +73,26 @@ fn a_machine_that_hangs_up_is_told_with_its_address() {
     assert!(error.contains(&address), "{error}");
 }
 
+#[test]
+fn one_program_at_a_time_talks_to_a_machine_and_another_is_told_which() {
+    let (address, server) = behind_a_socket(usize::MAX);
+    let mut client = Client::open(TcpTransport::connect(&address).unwrap()).unwrap();
+    // A lock is a file's: another opening of it stands for another program.
+    let refused = TcpTransport::connect(&address).err().expect("held");
+    assert_eq!(refused.kind(), std::io::ErrorKind::ResourceBusy);
+    let said = refused.to_string();
+    assert!(
+        said.contains(&format!("process {}", std::process::id())),
+        "{said}"
+    );
+    client.status().unwrap();
+    drop(client);
+    server.join().unwrap();
+    // Given back: what fails now is that nobody listens.
+    let after = TcpTransport::connect(&address).err().expect("no server");
+    assert_ne!(after.kind(), std::io::ErrorKind::ResourceBusy);
+}
+
 #[cfg(unix)]
 #[test]
 fn a_serial_port_carries_a_session() {
