@@ -9,7 +9,7 @@ use embedded_storage::nor_flash::NorFlash;
 
 use crate::law::encoder::EncoderReading;
 use crate::law::safety;
-use crate::law::units::DacCode;
+use crate::law::stage::Outputs;
 
 /// The three axes' encoders.
 pub trait Encoders {
@@ -18,10 +18,11 @@ pub trait Encoders {
     fn read(&mut self) -> [EncoderReading; 3];
 }
 
-/// The three axes' amplifiers: converters and their common enable line.
+/// The three axes' amplifiers: converters, their common enable line, and the holding brake.
 pub trait Amplifiers {
-    /// Sets all three converters together, and the enable line. When disabling, the line goes first.
-    fn write(&mut self, codes: [DacCode; 3], enabled: bool);
+    /// Sets all three converters together, the enable line and the current of the brake. When disabling, line and brake go
+    /// first.
+    fn write(&mut self, outputs: &Outputs);
 
     /// Whose converters held something else than they were told when the last call of [`write`](Self::write) looked.
     /// Where any did, that call has disabled the amplifiers.

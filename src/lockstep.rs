@@ -294,7 +294,7 @@ pub fn held(codes: [DacCode; 3], stuck: [bool; 3]) -> [DacCode; 3] {
 /// The outputs of one tick, from the target.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OutputRecord {
-    /// The codes that the converters hold, and the amplifiers' enable.
+    /// The codes that the converters hold, the amplifiers' enable, and the brake's current.
     pub outputs: Outputs,
 }
 
@@ -306,7 +306,11 @@ impl OutputRecord {
     #[inline(always)]
     pub fn words(&self) -> [u32; 2] {
         let [x, y, z] = (*self.outputs.codes).map(|code| u32::from(code.0 as u16));
-        [x | y << 16, z | u32::from(self.outputs.enabled) << 16]
+        [
+            x | y << 16,
+            z | u32::from(self.outputs.enabled) << 16
+                | u32::from(self.outputs.brake_released) << 17,
+        ]
     }
 
     /// The record as bytes.
@@ -322,6 +326,7 @@ impl OutputRecord {
             outputs: Outputs {
                 codes: [code(low), code(low >> 16), code(high)].into(),
                 enabled: high >> 16 & 1 == 1,
+                brake_released: high >> 17 & 1 == 1,
             },
         }
     }

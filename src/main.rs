@@ -230,9 +230,7 @@ mod app {
             inputs.command = cx.local.commands_out.dequeue();
         }
         let outputs = control.tick(&mut inputs);
-        cx.local
-            .amplifiers
-            .write(outputs.codes.into_array(), outputs.enabled);
+        cx.local.amplifiers.write(&outputs);
 
         TICK.store(control.state().tick(), Ordering::Relaxed);
         if let Some(request) = cx.local.operator.request() {

@@ -36,6 +36,8 @@ pub struct StageView {
     ///
     /// [`StageRef::is_commissioned`]: crate::law::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// The holding brake is being released or applied.
+    pub brake_moves: bool,
     /// Who may enable the outputs.
     pub enabled_by: EnabledBy,
     /// The outputs are kept off while flash is written, or until a restart.
@@ -71,6 +73,8 @@ pub enum Refusal {
     Injecting,
     /// No axis is commissioned, or one that has a law is not.
     NotCommissioned,
+    /// The holding brake is being released or applied.
+    BrakeMoves,
     /// The host alone may enable.
     HostOnly,
     /// The operator at the machine alone may enable.
@@ -105,6 +109,7 @@ impl Refusal {
             Self::NotCommissioned => {
                 "not commissioned: no axis is, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
             }
+            Self::BrakeMoves => "the brake is being released or applied; ask again",
             Self::HostOnly => "the host alone may enable (operation.enabled_by)",
             Self::OperatorOnly => {
                 "the button at the machine alone enables (operation.enabled_by): hold it"
@@ -184,6 +189,7 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         Command::ResetFault => None,
         _ if faulted => Some(Refusal::FaultLatched),
         _ if stopping => Some(Refusal::Stopping),
+        _ if view.brake_moves => Some(Refusal::BrakeMoves),
         Command::Enable if view.safety != SafetyState::Enabled && view.interlock.is_some() => {
             view.interlock.map(Refusal::BadInput)
         }

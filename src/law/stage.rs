@@ -27,7 +27,7 @@ use crate::law::injection::{
 use crate::law::reference::{Motion, Segment};
 use crate::law::safety::plausibility::is_due;
 use crate::law::safety::{
-    EnableInterlock, Fault, FaultCode, Operation, Reaction, SafetyState, Switches,
+    BrakeState, EnableInterlock, Fault, FaultCode, Operation, Reaction, SafetyState, Switches,
 };
 use crate::law::scalar::Scalar;
 use crate::law::units::DacCode;
@@ -76,6 +76,8 @@ pub struct Outputs {
     pub codes: PerAxis<DacCode>,
     /// True if the amplifiers are enabled.
     pub enabled: bool,
+    /// True if the holding brake has its current.
+    pub brake_released: bool,
 }
 
 /// The motions that the axes run together.
@@ -111,6 +113,7 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
     injection: InjectionState<S>,
+    brake: BrakeState,
     /// The outputs are kept off: [`StageState::lock`].
     locked: bool,
     /// The stored settings are damaged or were refused.
@@ -131,6 +134,7 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             held: None,
             settled: 0,
             injection: InjectionState::default(),
+            brake: BrakeState::default(),
             locked: false,
             settings_invalid: false,
         }
@@ -290,6 +294,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
             commissioned: self.is_commissioned(),
+            brake_moves: state.brake.is_moving(),
             enabled_by: self.operation.enabled_by,
             locked: state.locked,
             settings_invalid: state.settings_invalid,
@@ -383,6 +388,9 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if let Some(command) = inputs.command {
             self.handle_command(state, command, driven, tick);
         }
+        if state.brake.is_moving() {
+            turn_brake(state);
+        }
         if state.injection.is_running() {
             self.inject(state, tick);
         }
@@ -391,6 +399,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         }
         if !state.safety.drives() {
             state.injection.end();
+            state.brake = BrakeState::Applied;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
                 axis.output_zero(memory);
             }
@@ -405,6 +414,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
                 z.drive(of_z, new_z),
             ]),
             enabled: true,
+            brake_released: state.brake.has_current(),
         }
     }
 
@@ -440,7 +450,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             self.trip_findings(state, findings, tick);
         }
         if let SafetyState::Stopping(fault) = state.safety {
-            settle(state, fault);
+            self.settle(state, fault);
         }
     }
 
@@ -541,7 +551,17 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if admission::refusal(self.view(state), command).is_some() {
             return;
         }
+        // Held by the law until the brake holds; asked a second time, or in motion, at once.
+        if command == Command::Disable
+            && state.safety.is_enabled()
+            && !state.is_running()
+            && !state.brake.is_moving()
+            && state.brake.apply(self.operation.brake)
+        {
+            return;
+        }
         if state.safety.apply(command) {
+            state.brake.release(self.operation.brake);
             state.moving = None;
             state.held = None;
             for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
@@ -572,6 +592,19 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             if command.axis().is_none_or(|only| only == name) {
                 axis.handle_command(memory, command);
             }
+        }
+    }
+
+    /// Ends a stop once the axes stand and the brake holds: its fault is latched.
+    #[cold]
+    #[inline(never)]
+    fn settle(&self, state: &mut StageState<S, N>, fault: Fault) {
+        if state.is_running() {
+            return;
+        }
+        state.settled = state.settled.saturating_add(1);
+        if state.settled > SETTLING_TICKS && !state.brake.apply(self.operation.brake) {
+            state.safety = SafetyState::Faulted(fault);
         }
     }
 
@@ -625,15 +658,11 @@ fn is_empty(findings: &Findings) -> bool {
     x.is_ok() & y.is_ok() & z.is_ok()
 }
 
-/// Latches the fault of a stop once the axes stand.
+/// Lets a tick of the brake's time pass, and switches off when it holds.
 #[cold]
 #[inline(never)]
-fn settle<S: Scalar, const N: usize>(state: &mut StageState<S, N>, fault: Fault) {
-    if state.is_running() {
-        return;
-    }
-    state.settled = state.settled.saturating_add(1);
-    if state.settled > SETTLING_TICKS {
-        state.safety = SafetyState::Faulted(fault);
+fn turn_brake<S: Scalar, const N: usize>(state: &mut StageState<S, N>) {
+    if state.brake.step() {
+        state.safety.apply(Command::Disable);
     }
 }

@@ -11,11 +11,11 @@ use crate::law::feedforward::FeedforwardKind;
 use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
-use crate::law::safety::Operation;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
 use crate::law::safety::overload::Overload;
 use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
+use crate::law::safety::{Brake, Operation};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
 use crate::law::units::{DacCode, Position};
@@ -90,6 +90,10 @@ impl StageSettings {
             emergency_stop: self.operation.emergency_stop.into(),
             link_lost: self.streaming.link_lost.into(),
             underrun: self.streaming.underrun.into(),
+            brake: Brake {
+                release_ticks: rounding::ceil(self.brake.release_s * self.rate_hz) as u32,
+                apply_ticks: rounding::ceil(self.brake.apply_s * self.rate_hz) as u32,
+            },
         }
     }
 

@@ -6,7 +6,9 @@ use super::axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardS
 use super::feedback::FeedbackSettings;
 use super::leaves::default;
 use super::limits::LimitSettings;
-use super::operation::{EmergencyReaction, LossReaction, OperationSettings, StreamingSettings};
+use super::operation::{
+    BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
+};
 use super::stage::StageSettings;
 use crate::law::axis::Commissioning;
 use crate::law::control::feedback::LawKind;
@@ -26,6 +28,7 @@ impl StageSettings {
     pub fn set_default(&mut self) {
         self.rate_hz = default!("rate_hz");
         self.operation = OperationSettings::default();
+        self.brake = BrakeSettings::default();
         self.streaming = StreamingSettings::default();
         for axis in &mut self.axes {
             *axis = AxisSettings::default();
@@ -38,11 +41,13 @@ impl StageSettings {
         let Self {
             rate_hz,
             operation,
+            brake,
             streaming,
             axes,
         } = self;
         *rate_hz = other.rate_hz;
         *operation = other.operation;
+        *brake = other.brake;
         *streaming = other.streaming;
         for (axis, other) in axes.iter_mut().zip(&other.axes) {
             axis.clone_from(other);
@@ -67,6 +72,7 @@ impl Default for StageSettings {
         Self {
             rate_hz: default!("rate_hz"),
             operation: OperationSettings::default(),
+            brake: BrakeSettings::default(),
             streaming: StreamingSettings::default(),
             axes: core::array::from_fn(|_| AxisSettings::default()),
         }
@@ -79,6 +85,15 @@ impl Default for OperationSettings {
             enabled_by: EnabledBy::default(),
             host_needed: HostNeeded::default(),
             emergency_stop: EmergencyReaction::Off,
+        }
+    }
+}
+
+impl Default for BrakeSettings {
+    fn default() -> Self {
+        Self {
+            release_s: default!("brake.release_s"),
+            apply_s: default!("brake.apply_s"),
         }
     }
 }

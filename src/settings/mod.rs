@@ -32,6 +32,8 @@ pub use feedback::FeedbackSettings;
 pub use homing::{HomeSwitch, HomingSettings};
 pub use injection::InjectionSettings;
 pub use limits::{LimitSettings, TravelSettings};
-pub use operation::{EmergencyReaction, LossReaction, OperationSettings, StreamingSettings};
+pub use operation::{
+    BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
+};
 pub use stage::{PlanSettings, StageSettings};
 pub use value::MAX_VALUE_BYTES;

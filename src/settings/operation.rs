@@ -43,6 +43,16 @@ impl From<EmergencyReaction> for Reaction {
     }
 }
 
+/// The holding brake of the stage. Without one, or with one that takes no time, both times are zero.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields, default)]
+pub struct BrakeSettings {
+    /// Time from its current to a brake that does not hold, s: no motion starts before.
+    pub release_s: f64,
+    /// Time from the end of its current to a brake that holds, s: the law holds the axes until then.
+    pub apply_s: f64,
+}
+
 /// Reactions of the stage while a host streams set points.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]

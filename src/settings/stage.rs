@@ -4,7 +4,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 use super::axis::AxisSettings;
-use super::operation::{OperationSettings, StreamingSettings};
+use super::operation::{BrakeSettings, OperationSettings, StreamingSettings};
 use crate::law::reference::MotionSettings;
 
 /// Everything the stage's control law is made from.
@@ -16,6 +16,9 @@ pub struct StageSettings {
     /// Rules of operation.
     #[serde(default)]
     pub operation: OperationSettings,
+    /// The holding brake.
+    #[serde(default)]
+    pub brake: BrakeSettings,
     /// Reactions when set points of a stream no longer come.
     #[serde(default)]
     pub streaming: StreamingSettings,

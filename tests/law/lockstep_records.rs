@@ -48,8 +48,8 @@ proptest! {
     }
 
     #[test]
-    fn output_records_round_trip(codes in any::<[i16; 3]>(), enabled in any::<bool>()) {
-        let outputs = Outputs { codes: codes.map(DacCode).into(), enabled };
+    fn output_records_round_trip(codes in any::<[i16; 3]>(), enabled in any::<bool>(), brake_released in any::<bool>()) {
+        let outputs = Outputs { codes: codes.map(DacCode).into(), enabled, brake_released };
         let record = OutputRecord { outputs };
         prop_assert_eq!(OutputRecord::decode(&record.encode()), record);
     }
@@ -87,9 +87,10 @@ fn records_are_little_endian_words() {
         outputs: Outputs {
             codes: [DacCode(-1), DacCode(2), DacCode(-3)].into(),
             enabled: true,
+            brake_released: true,
         },
     };
-    assert_eq!(record.encode(), [0xFF, 0xFF, 2, 0, 0xFD, 0xFF, 1, 0]);
+    assert_eq!(record.encode(), [0xFF, 0xFF, 2, 0, 0xFD, 0xFF, 3, 0]);
 }
 
 #[test]

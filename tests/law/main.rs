@@ -3,6 +3,7 @@
 mod anti_windup;
 mod axis_limits;
 mod board_wiring;
+mod brake;
 mod bumpless;
 mod campaign;
 mod capture;

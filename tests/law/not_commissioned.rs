@@ -26,6 +26,7 @@ const READY: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: false,
+    brake_moves: false,
     enabled_by: EnabledBy::Any,
     locked: false,
     settings_invalid: false,

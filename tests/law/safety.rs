@@ -17,7 +17,7 @@ fn rig() -> Rig<f32> {
 fn off() -> Outputs {
     Outputs {
         codes: PerAxis::splat(DacCode::ZERO),
-        enabled: false,
+        ..Outputs::default()
     }
 }
 

@@ -89,7 +89,7 @@ fn the_list_of_fields_is_complete() {
 }
 
 #[test]
-fn the_control_rate_and_the_counter_width_have_ranges() {
+fn the_control_rate_the_brake_and_the_counter_width_have_ranges() {
     for rate_hz in [999.0, 1.01e5, f64::NAN] {
         let settings = StageSettings {
             rate_hz,
@@ -98,6 +98,17 @@ fn the_control_rate_and_the_counter_width_have_ranges() {
         let error = refusal(&settings);
         assert_eq!((error.axis, error.field), (None, "rate_hz"));
         assert!(error.to_string().starts_with("rate_hz = "), "{error}");
+    }
+    for (release_s, apply_s, field) in [
+        (-1e-3, 0.0, "brake.release_s"),
+        (2.01, 0.0, "brake.release_s"),
+        (0.0, -1e-3, "brake.apply_s"),
+        (0.0, 2.01, "brake.apply_s"),
+    ] {
+        let mut settings = StageSettings::simulated();
+        (settings.brake.release_s, settings.brake.apply_s) = (release_s, apply_s);
+        let error = refusal(&settings);
+        assert_eq!((error.axis, error.field), (None, field));
     }
     for bits in [0, 7, 33, 255] {
         let error = refusal(&with_x(|axis| axis.encoder.counter_bits = bits));

@@ -215,7 +215,7 @@ fn every_leaf_of_amplifier_limits_homing_plant_and_commissioning_needs_the_outpu
         let group = leaf.field.split('.').next().expect("a name");
         let expected = match group {
             "rate_hz" | "encoder" => Exchange::Restart,
-            "operation" | "streaming" | "amplifier" | "limits" | "homing" | "plant"
+            "operation" | "brake" | "streaming" | "amplifier" | "limits" | "homing" | "plant"
             | "commissioned" => Exchange::Disabled,
             "feedback" | "friction" | "feedforward" => Exchange::Driven,
             other => panic!("{other} is no group"),

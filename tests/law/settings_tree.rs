@@ -247,8 +247,8 @@ fn a_list_of_paths_is_complete_without_repetition_and_can_be_limited() {
         get(&settings, path).expect("listed");
     }
     let of_x = paths(&settings, "/axes/x");
-    // The rate, three of operation, and two of streams.
-    assert_eq!(3 * of_x.len() + 6, all.len());
+    // The rate, three of operation, two of the brake, and two of streams.
+    assert_eq!(3 * of_x.len() + 8, all.len());
     let pid = paths(&settings, "/axes/x/feedback/pid");
     assert_eq!(pid.len(), 4, "{pid:?}");
     assert_eq!(paths(&settings, "/axes/y/plant").len(), 5);

@@ -18,7 +18,7 @@ const SCALE: MotionScale = MotionScale {
 };
 
 /// Lets the encoders follow the references to the count.
-fn follow(rig: &mut Rig<f32>) {
+pub(crate) fn follow(rig: &mut Rig<f32>) {
     for index in 0..3 {
         let reference = rig.state.axes()[index].telemetry().reference;
         rig.inputs.readings[index].count = (reference.0 >> 16) as u32;

@@ -28,6 +28,7 @@ const DISABLED: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: true,
+    brake_moves: false,
     enabled_by: EnabledBy::Any,
     locked: false,
     settings_invalid: false,

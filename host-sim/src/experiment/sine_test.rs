@@ -3,7 +3,7 @@
 use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::{
-    AxisSettings, OperationSettings, PlanSettings, StageSettings, StreamingSettings,
+    AxisSettings, BrakeSettings, OperationSettings, PlanSettings, StageSettings, StreamingSettings,
 };
 
 use crate::experiment::configuration::ELEMENTS;
@@ -77,6 +77,7 @@ pub fn run_sine_tests(
         stage: StageSettings {
             rate_hz,
             operation: OperationSettings::default(),
+            brake: BrakeSettings::default(),
             streaming: StreamingSettings::default(),
             axes: settings,
         },

@@ -32,6 +32,7 @@ use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};
 use crate::app::telemetry::Packer;
 use crate::hal::{Serial, SettingsFlash};
+use crate::law::admission::Refusal;
 use crate::law::axes::AxisName;
 use crate::law::scalar::Scalar;
 use crate::settings::StageSettings;
@@ -39,7 +40,8 @@ use crate::settings::draft::Draft;
 use crate::store::{BUFFER_BYTES, Store};
 use quadrant_link::frame::FrameCounters;
 use quadrant_link::message::{
-    AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply, text,
+    AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply,
+    SettingsRequest, text,
 };
 use quadrant_link::server::LinkServer;
 
@@ -304,6 +306,13 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             self.urgent = self.urgent.wrapping_add(1);
         } else if body.may_move() {
             self.check_not_stopped()?;
+        }
+        let waits = matches!(
+            body,
+            Body::Settings(SettingsRequest::Apply | SettingsRequest::Store(_)) | Body::Reboot
+        );
+        if self.seen.view.brake_moves && (body.may_move() || waits) {
+            return Err(busy(format_args!("{}", Refusal::BrakeMoves.as_str())));
         }
         match body {
             Body::Hello => Ok(Reply::Identity(self.identity())),

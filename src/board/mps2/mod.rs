@@ -213,7 +213,8 @@ pub(crate) struct Amplifiers {
 impl hal::Amplifiers for Amplifiers {
     /// Hands to the host what the converters hold of this tick's codes.
     #[inline(always)]
-    fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
+    fn write(&mut self, outputs: &Outputs) {
+        let codes = outputs.codes.into_array();
         let flags = mailbox::read(input(InputRecord::FLAGS_WORD));
         let mut held = codes;
         self.mismatches = [false; 3];
@@ -223,10 +224,12 @@ impl hal::Amplifiers for Amplifiers {
             let [held_x, held_y, held_z] = held;
             self.mismatches = [x != held_x, y != held_y, z != held_z];
         }
+        let agree = self.mismatches == [false; 3];
         let answer = OutputRecord {
             outputs: Outputs {
                 codes: held.into(),
-                enabled: enabled && self.mismatches == [false; 3],
+                enabled: outputs.enabled && agree,
+                brake_released: outputs.brake_released && agree,
             },
         };
         let [low, high] = answer.words();

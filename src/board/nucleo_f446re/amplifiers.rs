@@ -3,14 +3,14 @@
 use embedded_hal::delay::DelayNs;
 use quadrant::drivers::ad5754r::{self, ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
-use quadrant::units::DacCode;
-use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB12, PB13, PB14, PB15, PC9, Speed};
+use quadrant::stage::Outputs;
+use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB5, PB12, PB13, PB14, PB15, PC9, Speed};
 use stm32f4xx_hal::pac::{self, SPI2};
 use stm32f4xx_hal::rcc::Rcc;
 
 use super::CORE_HZ;
 use super::converter_bus::{ConverterBus, READING_HZ, WRITING_HZ};
-use super::pins::ENABLE;
+use super::pins::{BRAKE, ENABLE};
 
 /// Numbers of /SYNC, /LDAC and /CLR in port B.
 const SYNC: u8 = 12;
@@ -31,6 +31,7 @@ pub(super) struct Pins {
     pub(super) load: PB1,
     pub(super) clear: PB2,
     pub(super) enable: PC9,
+    pub(super) brake: PB5,
 }
 
 type Converter = Ad5754r<ConverterBus, PB12<Output>, PB1<Output>, PB2<Output>, CoreDelay>;
@@ -39,6 +40,7 @@ type Converter = Ad5754r<ConverterBus, PB12<Output>, PB1<Output>, PB2<Output>, C
 pub(crate) struct Amplifiers {
     converter: Converter,
     enable: PC9<Output>,
+    brake: PB5<Output>,
     /// The converter answered when it was started. One that did not is left alone, and nothing is ever enabled.
     is_present: bool,
     mismatches: [bool; 3],
@@ -49,6 +51,8 @@ impl Amplifiers {
     pub(super) fn new(spi: SPI2, pins: Pins, rcc: &mut Rcc) -> Self {
         let mut enable = pins.enable.into_push_pull_output();
         enable.set_low();
+        let mut brake = pins.brake.into_push_pull_output();
+        brake.set_low();
         let outputs = ad5754r::Pins {
             sync: pins.sync.into_push_pull_output().speed(Speed::VeryHigh),
             load: pins.load.into_push_pull_output().speed(Speed::VeryHigh),
@@ -77,6 +81,7 @@ impl Amplifiers {
         Self {
             converter,
             enable,
+            brake,
             is_present,
             mismatches: [!is_present; 3],
         }
@@ -84,13 +89,17 @@ impl Amplifiers {
 }
 
 impl hal::Amplifiers for Amplifiers {
-    /// Disabled before the codes change, enabled after.
+    /// Disabled before the codes change, enabled after; the brake with them.
     #[inline(always)]
-    fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
-        if !enabled {
+    fn write(&mut self, outputs: &Outputs) {
+        if !outputs.enabled {
             self.enable.set_low();
         }
+        if !outputs.brake_released {
+            self.brake.set_low();
+        }
         if self.is_present {
+            let codes = outputs.codes.into_array();
             let written = self.converter.write(codes.map(|code| code.0));
             self.mismatches = match written {
                 Ok(()) => [false; 3],
@@ -101,11 +110,15 @@ impl hal::Amplifiers for Amplifiers {
                 Err(_) => [true; 3],
             };
         }
-        if enabled && self.mismatches == [false; 3] {
+        if outputs.enabled && self.mismatches == [false; 3] {
             self.enable.set_high();
+            if outputs.brake_released {
+                self.brake.set_high();
+            }
         } else {
             // Codes that did not get through must not keep driving the machine.
             self.enable.set_low();
+            self.brake.set_low();
         }
     }
 
@@ -134,7 +147,7 @@ impl DelayNs for CoreDelay {
     }
 }
 
-/// Zero volts, amplifiers disabled, from any context: also from a panic before or in the middle of anything.
+/// Zero volts, amplifiers disabled, brake applied, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
     // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
     // `halt`. Only single register writes are made, each valid in any state the owner left.
@@ -142,6 +155,7 @@ pub(crate) fn outputs_off() {
         unsafe { (pac::GPIOB::steal(), pac::GPIOC::steal(), pac::SPI2::steal()) };
     // First of all, and independent of the bus.
     port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
+    port_b.bsrr().write(|w| w.br(BRAKE).set_bit());
     port_b.bsrr().write(|w| w.br(CLEAR).set_bit());
 
     // /CLR holds the outputs at zero; should that wire be broken, the zero codes do. End the frame that may be under way;

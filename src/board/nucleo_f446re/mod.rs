@@ -10,6 +10,7 @@
 //! | DAC: SCLK, SDIN, SDO            | PB13, PB15, PB14       | SPI2 |
 //! | DAC: /SYNC, /LDAC, /CLR         | PB12, PB1, PB2         | |
 //! | amplifier enable                | PC9, high enables      | |
+//! | holding brake                   | PB5, high releases     | |
 //! | emergency stop, amplifiers ready | PA0, PA1              | low while all is well |
 //! | amplifier faults x, y, z        | PA8, PA9, PA10         | low while all is well |
 //! | limits x- x+ y- y+ z- z+        | PC0 to PC5             | low while all is well |
@@ -20,7 +21,7 @@
 //! | control tick                    |                        | TIM7 |
 //!
 //! Left alone: SWD and SWO (PA13, PA14, PB3), PA15 and PB4, which are JTAG's at power-up, the oscillators' (PC14, PC15,
-//! PH0, PH1), and the spare PA11, PA12, PB5, PB6, PB7, PD2.
+//! PH0, PH1), and the spare PA11, PA12, PB6, PB7, PD2.
 
 #[cfg(not(feature = "output-on-chip"))]
 mod amplifiers;
@@ -115,11 +116,17 @@ impl Board {
                 load: port_b.pb1,
                 clear: port_b.pb2,
                 enable: port_c.pc9,
+                brake: port_b.pb5,
             };
             Amplifiers::new(chip.SPI2, pins, &mut rcc)
         };
         #[cfg(feature = "output-on-chip")]
-        let amplifiers = Amplifiers::new(chip.DAC, (port_a.pa4, port_a.pa5), port_c.pc9, &mut rcc);
+        let amplifiers = Amplifiers::new(
+            chip.DAC,
+            (port_a.pa4, port_a.pa5),
+            (port_c.pc9, port_b.pb5),
+            &mut rcc,
+        );
         PWR::enable(&mut rcc);
         let supply = Supply::new(chip.PWR);
         if supply.is_low() {

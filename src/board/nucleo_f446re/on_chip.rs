@@ -5,12 +5,12 @@
 
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::hal;
-use quadrant::units::DacCode;
-use stm32f4xx_hal::gpio::{Output, PA4, PA5, PC9};
+use quadrant::stage::Outputs;
+use stm32f4xx_hal::gpio::{Output, PA4, PA5, PB5, PC9};
 use stm32f4xx_hal::pac::{self, DAC};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-use super::pins::ENABLE;
+use super::pins::{BRAKE, ENABLE};
 
 /// The word in the middle: zero volts.
 const ZERO: u32 = 2048;
@@ -23,14 +23,17 @@ const SHAPER: NoiseShaper = NoiseShaper::FirstOrder;
 pub(crate) struct Amplifiers {
     converter: DAC,
     enable: PC9<Output>,
+    brake: PB5<Output>,
     states: [NoiseShaperState; 2],
 }
 
 impl Amplifiers {
     /// Starts the converters with zero volts and the amplifiers disabled.
-    pub(super) fn new(converter: DAC, pins: (PA4, PA5), enable: PC9, rcc: &mut Rcc) -> Self {
-        let mut enable = enable.into_push_pull_output();
+    pub(super) fn new(converter: DAC, pins: (PA4, PA5), lines: (PC9, PB5), rcc: &mut Rcc) -> Self {
+        let mut enable = lines.0.into_push_pull_output();
         enable.set_low();
+        let mut brake = lines.1.into_push_pull_output();
+        brake.set_low();
         DAC::enable(rcc);
         DAC::reset(rcc);
         write_both(&converter, [0; 2]);
@@ -41,27 +44,34 @@ impl Amplifiers {
         Self {
             converter,
             enable,
+            brake,
             states: [NoiseShaperState::default(); 2],
         }
     }
 }
 
 impl hal::Amplifiers for Amplifiers {
-    /// Disabled before the codes change, enabled after.
+    /// Disabled before the codes change, enabled after; the brake with them.
     #[inline(always)]
-    fn write(&mut self, codes: [DacCode; 3], enabled: bool) {
-        if !enabled {
+    fn write(&mut self, outputs: &Outputs) {
+        if !outputs.enabled {
             self.enable.set_low();
             self.states = [NoiseShaperState::default(); 2];
         }
-        let [x, y, _] = codes;
+        if !outputs.brake_released {
+            self.brake.set_low();
+        }
+        let [x, y, _] = outputs.codes.into_array();
         let [of_x, of_y] = &mut self.states;
         write_both(
             &self.converter,
             [SHAPER.step(of_x, x), SHAPER.step(of_y, y)],
         );
-        if enabled {
+        if outputs.enabled {
             self.enable.set_high();
+        }
+        if outputs.brake_released {
+            self.brake.set_high();
         }
     }
 }
@@ -76,11 +86,13 @@ fn write_both(converter: &DAC, [x, y]: [i16; 2]) {
         .write(|w| unsafe { w.bits(word(x) | word(y) << 16) });
 }
 
-/// Zero volts, amplifiers disabled, from any context: also from a panic before or in the middle of anything.
+/// Zero volts, amplifiers disabled, brake applied, from any context: also from a panic before or in the middle of anything.
 pub(crate) fn outputs_off() {
     // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
     // `halt`. Only single register writes are made, each valid in any state the owner left.
-    let (port_c, converter) = unsafe { (pac::GPIOC::steal(), DAC::steal()) };
+    let (port_b, port_c, converter) =
+        unsafe { (pac::GPIOB::steal(), pac::GPIOC::steal(), DAC::steal()) };
     port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
+    port_b.bsrr().write(|w| w.br(BRAKE).set_bit());
     write_both(&converter, [0; 2]);
 }

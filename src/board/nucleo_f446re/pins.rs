@@ -2,3 +2,5 @@
 
 /// Number of the amplifiers' enable pin in port C.
 pub(super) const ENABLE: u8 = 9;
+/// Number of the brake's pin in port B.
+pub(super) const BRAKE: u8 = 5;

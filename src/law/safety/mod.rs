@@ -20,6 +20,7 @@
 //! | every reference | [`travel`], [`Switches`] | braking distance, limit switches |
 //! | the board's inputs | [`Switches`] | emergency stop, amplifier fault, output mismatch |
 
+mod brake;
 mod fault;
 pub mod monitor;
 mod operation;
@@ -29,6 +30,7 @@ mod state;
 mod switches;
 pub mod travel;
 
+pub use brake::{Brake, BrakeState};
 pub use fault::{EnableInterlock, Fault, FaultCode, Reaction};
 pub use operation::{EnabledBy, HostNeeded, Operation, Station};
 pub use state::SafetyState;

@@ -54,13 +54,6 @@ impl Overspeed {
         }
     }
 
-    /// Takes a step of the encoder, counts; returns true if the filtered speed is within the limit.
-    #[inline(always)]
-    pub fn step(&self, state: &mut OverspeedState, counts: i32) -> bool {
-        state.filter(counts);
-        self.allows(state)
-    }
-
     /// True if the filtered speed is within the limit.
     #[inline(always)]
     pub(crate) fn allows(&self, state: &OverspeedState) -> bool {

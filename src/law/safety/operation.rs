@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
+use super::brake::Brake;
 use super::fault::{FaultCode, Reaction};
 
 /// The place that a command comes from.
@@ -88,6 +89,8 @@ pub struct Operation {
     pub link_lost: Reaction,
     /// Reaction to a set point that is late: [`Reaction::Stop`] or [`Reaction::Hold`].
     pub underrun: Reaction,
+    /// The holding brake.
+    pub brake: Brake,
 }
 
 impl Operation {
@@ -110,6 +113,7 @@ impl Default for Operation {
             emergency_stop: FaultCode::EmergencyStop.reaction(),
             link_lost: FaultCode::LinkLost.reaction(),
             underrun: FaultCode::StreamUnderrun.reaction(),
+            brake: Brake::default(),
         }
     }
 }

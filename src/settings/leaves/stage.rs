@@ -24,6 +24,8 @@ pub(super) const OF_STAGE: &[LeafInfo] = &[
     OPERATION[0],
     OPERATION[1],
     OPERATION[2],
+    BRAKE[0],
+    BRAKE[1],
     STREAMING[0],
     STREAMING[1],
 ];
@@ -46,6 +48,14 @@ const OPERATION: [LeafInfo; 3] = exchanged(Exchange::Disabled, [
     of_stage(name("operation.emergency_stop", EmergencyReaction::VARIANTS,
         "Reaction to the emergency stop: off (category 0) or stop (category 1: brake, then off; the hardware must cut the \
          power later).")),
+]);
+
+#[rustfmt::skip]
+const BRAKE: [LeafInfo; 2] = exchanged(Exchange::Disabled, [
+    of_stage(number("brake.release_s", "s", at(0.0), at(2.0), 0.0,
+        "Time from the current of the holding brake to a brake that does not hold; no motion starts before.")),
+    of_stage(number("brake.apply_s", "s", at(0.0), at(2.0), 0.0,
+        "Time from the end of the brake's current to a brake that holds; until then the law holds the axes.")),
 ]);
 
 #[rustfmt::skip]
