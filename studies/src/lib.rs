@@ -11,16 +11,20 @@
 //! - [`outputs`]: the amplifier outputs' resolution;
 //! - [`identification`]: identification judged by the plant's parameters;
 //! - [`random_axes`]: commissioning of axes that are not the simulated stage's;
+//! - [`random_faults`]: faults at random activities, and what must hold whatever happens;
+//! - [`campaign`]: seeds, shards and results of the two;
 //! - [`report`]: all of the first five and the circle test in one page, kept part by part.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
+pub mod campaign;
 pub mod friction_models;
 pub mod identification;
 pub mod laws;
 pub mod numerics;
 pub mod outputs;
 pub mod random_axes;
+pub mod random_faults;
 pub mod report;
 pub mod robustness;
 pub mod thesis;

@@ -13,7 +13,7 @@ use quadrant::stage::Outputs;
 use crate::common::{Rig, repeatable, sine_on_x};
 use crate::preemption;
 use crate::stops::follow;
-use crate::tasks::Tasks;
+use quadrant_fault_bench::tasks::Tasks;
 
 /// Ticks that the brake of these tests takes.
 const RELEASE: u32 = 300;

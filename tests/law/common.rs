@@ -9,6 +9,7 @@ use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
+pub(crate) use quadrant_fault_bench::noise::Noise;
 
 /// A property test of `cases` cases that is the same on every run.
 pub(crate) fn repeatable(cases: u32) -> Config {
@@ -38,27 +39,6 @@ pub(crate) fn any_f32() -> impl Strategy<Value = f32> {
             -0.0,
         ]),
     ]
-}
-
-/// A small generator of the same noise on every machine (xorshift).
-pub(crate) struct Noise(u64);
-
-impl Noise {
-    pub(crate) fn new(seed: u64) -> Self {
-        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
-    }
-
-    pub(crate) fn bits(&mut self) -> u64 {
-        self.0 ^= self.0 << 13;
-        self.0 ^= self.0 >> 7;
-        self.0 ^= self.0 << 17;
-        self.0
-    }
-
-    /// Draws a number of `-most..=most`.
-    pub(crate) fn counts(&mut self, most: i64) -> i64 {
-        (self.bits() >> 16) as i64 % (2 * most + 1) - most
-    }
 }
 
 /// The default stage with one change to its x axis.

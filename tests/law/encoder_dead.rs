@@ -16,7 +16,9 @@ use quadrant::settings::{AxisSettings, InjectionSettings, PlanSettings, StageSet
 use quadrant::units::Position;
 
 use crate::common::{Noise, Rig, sine_on_x, with_x};
-use crate::plant::{COUNT_MM, DEATHS, Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
+use quadrant_fault_bench::plant::{
+    COUNT_MM, DEATHS, Death, Encoder, MODEL, PERIOD_S, Plant, Truth,
+};
 
 /// Something that the axis does while its encoder dies.
 #[derive(Clone, Copy, Debug, PartialEq)]

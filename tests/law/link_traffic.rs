@@ -1,5 +1,7 @@
 //! Traffic for the link: any request, and what a bad line makes of it.
 
+use std::ops::{Deref, DerefMut};
+
 use heapless::{String, Vec as Bounded};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::AxisName;
@@ -14,15 +16,28 @@ use quadrant::settings::PlanSettings;
 
 use crate::common::Noise;
 
-impl Noise {
-    pub(crate) fn below(&mut self, bound: u64) -> u64 {
-        (self.bits() >> 11) % bound
-    }
+/// Draws requests.
+struct Requests<'a>(&'a mut Noise);
 
-    pub(crate) fn bytes(&mut self, count: u64) -> Vec<u8> {
-        (0..count).map(|_| self.bits() as u8).collect()
-    }
+impl Deref for Requests<'_> {
+    type Target = Noise;
 
+    fn deref(&self) -> &Noise {
+        self.0
+    }
+}
+
+impl DerefMut for Requests<'_> {
+    fn deref_mut(&mut self) -> &mut Noise {
+        self.0
+    }
+}
+
+fn random_bytes(noise: &mut Noise, count: u64) -> Vec<u8> {
+    (0..count).map(|_| noise.bits() as u8).collect()
+}
+
+impl Requests<'_> {
     fn real(&mut self) -> f64 {
         self.counts(1 << 30) as f64 / 1024.0
     }
@@ -167,7 +182,7 @@ impl Noise {
     }
 
     /// Any request, all its numbers finite.
-    pub(crate) fn body(&mut self) -> Body {
+    fn body(&mut self) -> Body {
         match self.below(19) {
             0 => Body::Hello,
             1 => Body::Status,
@@ -210,6 +225,11 @@ impl Noise {
     }
 }
 
+/// Any request.
+pub(crate) fn body(noise: &mut Noise) -> Body {
+    Requests(noise).body()
+}
+
 /// A frame after the line.
 pub(crate) struct Arrival {
     /// The bytes that arrive.
@@ -231,7 +251,7 @@ pub(crate) fn framed(request: &Request) -> Vec<u8> {
 pub(crate) fn arrival(noise: &mut Noise, id: u16) -> Arrival {
     let request = Request {
         id,
-        body: noise.body(),
+        body: body(noise),
     };
     let mut bytes = framed(&request);
     let mut copies = 0;
@@ -254,11 +274,11 @@ pub(crate) fn arrival(noise: &mut Noise, id: u16) -> Arrival {
         10 => {
             let place = 1 + noise.below(bytes.len() as u64 - 2) as usize;
             let length = 1 + noise.below(20);
-            bytes.splice(place..place, noise.bytes(length));
+            bytes.splice(place..place, random_bytes(noise, length));
         }
         _ => {
             let length = noise.below(700);
-            bytes = noise.bytes(length);
+            bytes = random_bytes(noise, length);
         }
     }
     if copies > 0 {

@@ -11,7 +11,7 @@ use quadrant::stage::Outputs;
 use crate::common::Rig;
 use crate::preemption::{endless, plan, refused, safety, settings};
 use crate::safety_faults::{follow, moving};
-use crate::tasks::Tasks;
+use quadrant_fault_bench::tasks::Tasks;
 
 /// The host counts as lost after so long.
 const HOST_TICKS: u32 = 5000;

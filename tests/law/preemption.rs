@@ -12,8 +12,8 @@ use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::StageSettings;
 
 use crate::common::Noise;
-use crate::flash::Flash;
-use crate::tasks::Tasks;
+use quadrant_fault_bench::flash::Flash;
+use quadrant_fault_bench::tasks::Tasks;
 
 /// Settings that are soon checked: without a plant there is no bound to search.
 pub(crate) fn settings() -> StageSettings {

@@ -7,7 +7,7 @@ use quadrant::store::{
 };
 
 use crate::common::Noise;
-use crate::flash::{Flash, FlashError, SECTOR};
+use quadrant_fault_bench::flash::{Flash, FlashError, SECTOR};
 
 const ELEMENTS: usize = 8;
 

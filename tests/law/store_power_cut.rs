@@ -5,7 +5,7 @@ use quadrant::settings::StageSettings;
 use quadrant::store::{BUFFER_BYTES, LoadError, LogError, Provenance, SaveError, Store, Stored};
 
 use crate::common::Noise;
-use crate::flash::{Damage, Flash, FlashError};
+use quadrant_fault_bench::flash::{Damage, Flash, FlashError};
 
 const ELEMENTS: usize = 8;
 

@@ -16,9 +16,9 @@ use quadrant::store::{
 use serde::{Deserialize, Serialize};
 
 use crate::common::{Noise, repeatable};
-use crate::flash::SECTOR;
 use crate::settings_leaves::is_whole;
 use crate::settings_tree::{get, paths};
+use quadrant_fault_bench::flash::SECTOR;
 
 const ELEMENTS: usize = 8;
 

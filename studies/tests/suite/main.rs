@@ -5,6 +5,7 @@ mod command;
 mod friction_models;
 mod laws;
 mod random_axes;
+mod random_faults;
 mod report_command;
 mod report_parts;
 mod robustness;

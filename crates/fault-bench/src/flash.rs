@@ -7,14 +7,14 @@ use embedded_storage::nor_flash::{
 
 use quadrant::hal::SettingsFlash;
 
-use crate::common::Noise;
+use crate::noise::Noise;
 
 /// Bytes of a sector, as on the reference board.
-pub(crate) const SECTOR: usize = 16 * 1024;
+pub const SECTOR: usize = 16 * 1024;
 
 /// The remains of an operation that a cut falls into.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Damage {
+pub enum Damage {
     /// It has not begun.
     Nothing,
     /// The lower half of the word or sector is done.
@@ -28,7 +28,7 @@ pub(crate) enum Damage {
 }
 
 impl Damage {
-    pub(crate) fn each(seed: u64) -> [Self; 5] {
+    pub fn each(seed: u64) -> [Self; 5] {
         [
             Self::Nothing,
             Self::LowHalf,
@@ -59,19 +59,19 @@ impl Damage {
 
 /// Two sectors, written by words of four bytes, each word once between erasures.
 #[derive(Clone, Debug)]
-pub(crate) struct Flash {
-    pub(crate) bytes: Vec<u8>,
+pub struct Flash {
+    pub bytes: Vec<u8>,
     programmed: Vec<bool>,
     /// Words written and sectors erased so far.
-    pub(crate) operations: u64,
+    pub operations: u64,
     /// Erasures of each sector.
-    pub(crate) erasures: [u32; 2],
+    pub erasures: [u32; 2],
     /// The operation that the power fails in, and what becomes of it.
-    pub(crate) cut: Option<(u64, Damage)>,
+    pub cut: Option<(u64, Damage)>,
     /// Words whose bits do not change any more.
-    pub(crate) worn: Option<std::ops::Range<usize>>,
+    pub worn: Option<std::ops::Range<usize>>,
     /// The amplifiers' enable line is high.
-    pub(crate) outputs_on: bool,
+    pub outputs_on: bool,
 }
 
 impl Default for Flash {
@@ -90,7 +90,7 @@ impl Default for Flash {
 
 /// The answer of the flash.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum FlashError {
+pub enum FlashError {
     /// There is no power.
     Off,
     /// The operation is not allowed.
@@ -109,8 +109,13 @@ impl NorFlashError for FlashError {
 }
 
 impl Flash {
+    /// True if the power has failed.
+    pub fn is_off(&self) -> bool {
+        self.cut.is_some_and(|(cut, _)| self.operations > cut)
+    }
+
     /// The power comes back.
-    pub(crate) fn reboot(mut self) -> Self {
+    pub fn reboot(mut self) -> Self {
         self.cut = None;
         self
     }
@@ -140,7 +145,7 @@ impl ReadNorFlash for Flash {
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
         check_read(self, offset, bytes.len()).map_err(FlashError::Refused)?;
-        if self.cut.is_some_and(|(cut, _)| self.operations > cut) {
+        if self.is_off() {
             return Err(FlashError::Off);
         }
         let at = offset as usize;

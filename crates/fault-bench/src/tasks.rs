@@ -24,25 +24,25 @@ use quadrant::stage::{Outputs, StageState};
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
 use quadrant::units::POSITION_FRACTION_BITS;
 
-use crate::common::Noise;
 use crate::flash::{Flash, FlashError};
+use crate::noise::Noise;
 use crate::plant::{Encoder, Plant};
 
 /// Ticks that an erasure takes here; on the reference board it is 2500 to 5000.
 const ERASE_TICKS: u32 = 400;
 
 /// An x axis that moves as its output makes it, with an encoder that may die.
-pub(crate) struct Moved {
-    pub(crate) plant: Plant,
-    pub(crate) encoder: Encoder,
+pub struct Moved {
+    pub plant: Plant,
+    pub encoder: Encoder,
     /// Ticks since the encoder died.
-    pub(crate) dead: Option<u32>,
+    pub dead: Option<u32>,
 }
 
 /// Control interrupt and supervising task, and what they see.
-pub(crate) struct Upper {
+pub struct Upper {
     /// In place of an x axis that follows its reference exactly.
-    pub(crate) x: Option<Moved>,
+    pub x: Option<Moved>,
     control: Control<'static, 'static, f32>,
     intake: Intake<'static>,
     supervision: Supervision,
@@ -51,17 +51,17 @@ pub(crate) struct Upper {
     requests: VecDeque<Command>,
     seen: Snapshot<f32>,
     noise: Noise,
-    pub(crate) outputs: Outputs,
+    pub outputs: Outputs,
     /// Inputs of the next tick beside the readings, which are those of a stage that follows its reference exactly.
-    pub(crate) inputs: Inputs,
+    pub inputs: Inputs,
     /// An operation on the flash is under way.
     busy: bool,
     /// Ticks in which the outputs were on while the flash was busy.
-    pub(crate) driven_while_busy: u32,
+    pub driven_while_busy: u32,
     /// Times that the flash was to be written with the enable line high, and was not.
-    pub(crate) guarded: u32,
+    pub guarded: u32,
     /// Ticks in which the axes of one plan moved as those of two.
-    pub(crate) torn: u32,
+    pub torn: u32,
     from: [i64; 3],
     was_running: bool,
 }
@@ -86,7 +86,7 @@ impl Serial for Line {
 
 impl Upper {
     /// One control tick, and the supervising task when it is due.
-    pub(crate) fn tick(&mut self) {
+    pub fn tick(&mut self) {
         let references = self
             .control
             .state()
@@ -138,23 +138,23 @@ impl Upper {
         self.seen = snapshot;
     }
 
-    pub(crate) fn state(&self) -> &StageState<f32> {
+    pub fn state(&self) -> &StageState<f32> {
         self.control.state()
     }
 
-    pub(crate) fn snapshot(&self) -> Snapshot<f32> {
+    pub fn snapshot(&self) -> Snapshot<f32> {
         self.control.snapshot()
     }
 
     /// What the operator's button asks.
-    pub(crate) fn operate(&mut self, command: Command) {
+    pub fn operate(&mut self, command: Command) {
         if self.requests.len() < 3 {
             self.requests.push_back(command);
         }
     }
 
     /// Bytes that the host sends.
-    pub(crate) fn receive(&mut self, bytes: &[u8]) {
+    pub fn receive(&mut self, bytes: &[u8]) {
         self.line.0.extend(bytes);
     }
 
@@ -175,7 +175,7 @@ type Shared = Rc<RefCell<Upper>>;
 
 /// The flash as the server has it.
 struct SlowFlash {
-    flash: Flash,
+    flash: Rc<RefCell<Flash>>,
     upper: Shared,
 }
 
@@ -187,11 +187,11 @@ impl ReadNorFlash for SlowFlash {
     const READ_SIZE: usize = Flash::READ_SIZE;
 
     fn read(&mut self, offset: u32, bytes: &mut [u8]) -> Result<(), FlashError> {
-        self.flash.read(offset, bytes)
+        self.flash.borrow_mut().read(offset, bytes)
     }
 
     fn capacity(&self) -> usize {
-        self.flash.capacity()
+        self.flash.borrow().capacity()
     }
 }
 
@@ -209,12 +209,12 @@ impl NorFlash for SlowFlash {
 
     fn erase(&mut self, from: u32, to: u32) -> Result<(), FlashError> {
         self.during(ERASE_TICKS);
-        self.flash.erase(from, to)
+        self.flash.borrow_mut().erase(from, to)
     }
 
     fn write(&mut self, offset: u32, bytes: &[u8]) -> Result<(), FlashError> {
         self.during(1);
-        self.flash.write(offset, bytes)
+        self.flash.borrow_mut().write(offset, bytes)
     }
 }
 
@@ -251,38 +251,39 @@ impl Serial for Port<'_> {
 }
 
 /// All tasks.
-pub(crate) struct Tasks {
-    pub(crate) upper: Shared,
+pub struct Tasks {
+    pub upper: Shared,
+    pub flash: Rc<RefCell<Flash>>,
     server: Server<'static, 'static, f32, SlowFlash>,
     receiver: Receiver,
     next_id: u16,
-    pub(crate) answers: BTreeMap<u16, Result<Reply, LinkError>>,
-    pub(crate) restarts: u32,
+    pub answers: BTreeMap<u16, Result<Reply, LinkError>>,
+    pub restarts: u32,
     /// Polls that the server is late by: it builds, or is not there.
-    pub(crate) held_up: u32,
+    pub held_up: u32,
 }
 
 impl Tasks {
-    pub(crate) fn new(settings: &StageSettings, seed: u64) -> Self {
+    pub fn new(settings: &StageSettings, seed: u64) -> Self {
         Self::with_flash(settings, seed, Flash::default(), None)
     }
 
     /// The tasks on a flash that holds something; `draft`: settings to look at, beside which the default ones are in force
     /// and the stored ones invalid.
-    pub(crate) fn with_flash(
+    pub fn with_flash(
         settings: &StageSettings,
         seed: u64,
         flash: Flash,
         draft: Option<&StageSettings>,
     ) -> Self {
         let leak = |settings: &StageSettings| Box::leak(Box::new(settings.clone()));
-        let (axes, streaming) = settings.build().expect("valid settings").into_axes();
+        let (axes, operation) = settings.build().expect("valid settings").into_axes();
         let plan = PlanSettings::default().build(settings).expect("no motion");
         let back_buffer: &'static mut Axis<f32> = Box::leak(Box::new(axes[0].clone()));
         let axes = axes.map(|axis| -> &'static mut Axis<f32> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
         let (control_ends, intake_ends, ends) = queues.split();
-        let mut control = Control::new(axes, streaming, plan, control_ends);
+        let mut control = Control::new(axes, operation, plan, control_ends);
         if draft.is_some() {
             control.start_faulted(FaultCode::SettingsInvalid);
         }
@@ -305,8 +306,9 @@ impl Tasks {
             from: [0; 3],
             was_running: false,
         }));
+        let flash = Rc::new(RefCell::new(flash));
         let slow = SlowFlash {
-            flash,
+            flash: Rc::clone(&flash),
             upper: Rc::clone(&upper),
         };
         let server = Server::new(ServerParts {
@@ -326,6 +328,7 @@ impl Tasks {
         });
         let mut tasks = Self {
             upper,
+            flash,
             server,
             receiver: Receiver::new(),
             next_id: 1,
@@ -338,7 +341,7 @@ impl Tasks {
     }
 
     /// Sends requests in one burst; returns the number of the first.
-    pub(crate) fn send(&mut self, bodies: &[Body]) -> u16 {
+    pub fn send(&mut self, bodies: &[Body]) -> u16 {
         let first = self.next_id;
         for body in bodies {
             let request = Request {
@@ -354,7 +357,7 @@ impl Tasks {
     }
 
     /// Makes one request and waits for its answer.
-    pub(crate) fn ask(&mut self, body: Body) -> Result<Reply, LinkError> {
+    pub fn ask(&mut self, body: Body) -> Result<Reply, LinkError> {
         let id = self.send(&[body]);
         for _ in 0..500 {
             if let Some(answer) = self.answers.remove(&id) {
@@ -366,7 +369,7 @@ impl Tasks {
     }
 
     /// Runs this many ticks at least, and the server after each run of the supervising task, unless it is held up.
-    pub(crate) fn run(&mut self, ticks: u32) {
+    pub fn run(&mut self, ticks: u32) {
         let until = self.tick().wrapping_add(ticks);
         while (until.wrapping_sub(self.tick()) as i32) > 0 {
             let next = self.tick() / 10 * 10 + 10;
@@ -382,14 +385,14 @@ impl Tasks {
     }
 
     /// One tick, and the server if the supervising task has run in it.
-    pub(crate) fn step(&mut self) {
+    pub fn step(&mut self) {
         self.upper.borrow_mut().tick();
         if self.tick().is_multiple_of(10) {
             self.poll();
         }
     }
 
-    pub(crate) fn tick(&self) -> u32 {
+    pub fn tick(&self) -> u32 {
         self.upper.borrow().state().tick()
     }
 

@@ -4,29 +4,29 @@ use std::collections::VecDeque;
 
 use quadrant::settings::StageSettings;
 
-use crate::common::Noise;
+use crate::noise::Noise;
 
 /// Length of a count, mm.
-pub(crate) const COUNT_MM: f64 = 5e-4;
+pub const COUNT_MM: f64 = 5e-4;
 /// Control period, s.
-pub(crate) const PERIOD_S: f64 = 1e-4;
+pub const PERIOD_S: f64 = 1e-4;
 /// Steps of the plant in a control period.
 const SUBSTEPS: usize = 4;
 
 /// The simulated stage's x axis, with what may differ from the model in its settings.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Truth {
+pub struct Truth {
     /// A, B and Td over the model's.
-    pub(crate) gain: f64,
-    pub(crate) damping: f64,
-    pub(crate) delay: f64,
+    pub gain: f64,
+    pub damping: f64,
+    pub delay: f64,
     /// Friction over the settings'.
-    pub(crate) friction: f64,
+    pub friction: f64,
     /// The amplifier turns the motor the other way.
-    pub(crate) reversed: bool,
+    pub reversed: bool,
 }
 
-pub(crate) const MODEL: Truth = Truth {
+pub const MODEL: Truth = Truth {
     gain: 1.0,
     damping: 1.0,
     delay: 1.0,
@@ -35,20 +35,20 @@ pub(crate) const MODEL: Truth = Truth {
 };
 
 /// The x axis: mass, drag, dead time, and friction that yields before it slides (blocks on springs).
-pub(crate) struct Plant {
+pub struct Plant {
     gain: f64,
     damping: f64,
     /// Stiffness, V/mm, largest force, V, and present force, V, of each block.
     blocks: [[f64; 3]; 4],
     pipeline: VecDeque<f64>,
-    pub(crate) position_mm: f64,
-    pub(crate) velocity_mm_s: f64,
-    pub(crate) load_v: f64,
-    pub(crate) blocked: bool,
+    pub position_mm: f64,
+    pub velocity_mm_s: f64,
+    pub load_v: f64,
+    pub blocked: bool,
 }
 
 impl Plant {
-    pub(crate) fn new(truth: &Truth) -> Self {
+    pub fn new(truth: &Truth) -> Self {
         let settings = StageSettings::simulated();
         let [axis, ..] = &settings.axes;
         let model = axis.plant.expect("by default");
@@ -74,7 +74,7 @@ impl Plant {
         }
     }
 
-    pub(crate) fn step(&mut self, volts: f64) {
+    pub fn step(&mut self, volts: f64) {
         let step_s = PERIOD_S / SUBSTEPS as f64;
         for _ in 0..SUBSTEPS {
             self.pipeline.push_back(volts);
@@ -96,7 +96,7 @@ impl Plant {
 
 /// A way in which an encoder dies.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Death {
+pub enum Death {
     Healthy,
     /// Both lines stuck, or the counter: it stands.
     Frozen,
@@ -110,7 +110,7 @@ pub(crate) enum Death {
     Reversed,
 }
 
-pub(crate) const DEATHS: [Death; 5] = [
+pub const DEATHS: [Death; 5] = [
     Death::Frozen,
     Death::OneLine,
     Death::Dithering,
@@ -118,17 +118,17 @@ pub(crate) const DEATHS: [Death; 5] = [
     Death::Reversed,
 ];
 
-pub(crate) struct Encoder {
-    pub(crate) death: Death,
+pub struct Encoder {
+    pub death: Death,
     raw: i64,
     seen: i64,
-    pub(crate) noise: Noise,
+    pub noise: Noise,
     /// Noise that is added, counts rms.
-    pub(crate) rms: f64,
+    pub rms: f64,
 }
 
 impl Encoder {
-    pub(crate) fn new(death: Death, seed: u64) -> Self {
+    pub fn new(death: Death, seed: u64) -> Self {
         Self {
             death,
             raw: 0,
@@ -144,7 +144,7 @@ impl Encoder {
         sum as f64 * 1e-3
     }
 
-    pub(crate) fn read(&mut self, position_mm: f64, age: Option<u32>) -> i64 {
+    pub fn read(&mut self, position_mm: f64, age: Option<u32>) -> i64 {
         let fine = self.noise.counts(300) as f64 * 1e-3
             + if self.rms > 0.0 {
                 self.rms * self.normal()

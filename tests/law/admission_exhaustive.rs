@@ -1,0 +1,218 @@
+//! What must be so before anything is enabled or moved: proved by trying every view of the stage there is.
+//!
+//! A view is finite. Of the three axes y stands for all: what is asked of an axis depends on that axis and on what holds for
+//! the whole stage.
+
+use quadrant::admission::{StageView, refusal, refusal_from};
+use quadrant::axes::{AxisName, PerAxis};
+use quadrant::command::Command;
+use quadrant::motion::MotionMode;
+use quadrant::reference::{MotionScale, Velocity};
+use quadrant::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState, Station};
+
+const AXIS: AxisName = AxisName::Y;
+const FAULT: Fault = Fault {
+    code: FaultCode::Overspeed,
+    axis: Some(AXIS),
+    tick: 1,
+};
+const STATES: [SafetyState; 5] = [
+    SafetyState::Start,
+    SafetyState::Disabled,
+    SafetyState::Enabled,
+    SafetyState::Stopping(FAULT),
+    SafetyState::Faulted(FAULT),
+];
+const MODES: [MotionMode; 7] = [
+    MotionMode::Hold,
+    MotionMode::Plan,
+    MotionMode::Jog,
+    MotionMode::Home,
+    MotionMode::Stream,
+    MotionMode::Stopping,
+    MotionMode::OpenLoop,
+];
+/// Flags of a view that are enumerated as bits.
+const FLAGS: u32 = 13;
+
+fn commands() -> [Command; 10] {
+    let scale = MotionScale {
+        resolution_mm: 5e-4,
+        rate_hz: 1e4,
+    };
+    [
+        Command::Enable,
+        Command::Disable,
+        Command::ResetFault,
+        Command::Run,
+        Command::Stop,
+        Command::Home(AXIS),
+        Command::Jog(AXIS, Velocity::from_mm_s(1.0, scale)),
+        Command::StartMove(AXIS),
+        Command::StartStream,
+        Command::StartInjection,
+    ]
+}
+
+/// True for what starts a motion.
+fn starts(command: Command) -> bool {
+    !matches!(
+        command,
+        Command::Enable | Command::Disable | Command::ResetFault | Command::Stop
+    )
+}
+
+/// Every view, with each of the enablers.
+fn views() -> impl Iterator<Item = StageView> {
+    STATES.into_iter().flat_map(|safety| {
+        MODES.into_iter().flat_map(move |mode| {
+            (0..1 << FLAGS).map(move |bits: u32| {
+                let flag = |bit: u32| bits >> bit & 1 == 1;
+                let on_axis = |yes: bool| PerAxis::from_fn(|axis| yes && axis == AXIS);
+                StageView {
+                    safety,
+                    running: flag(0),
+                    interlock: flag(1).then_some(EnableInterlock {
+                        code: FaultCode::AmplifierFault,
+                        axis: Some(AXIS),
+                    }),
+                    moving: flag(2).then_some(AXIS),
+                    held: flag(3).then_some(FAULT),
+                    modes: PerAxis::from_fn(
+                        |axis| {
+                            if axis == AXIS { mode } else { MotionMode::Hold }
+                        },
+                    ),
+                    homed: on_axis(flag(4)),
+                    awaiting_homing: on_axis(flag(5)),
+                    stream_ready: flag(6),
+                    injection_ready: flag(7),
+                    injecting: flag(8),
+                    commissioned: flag(9),
+                    locked: flag(10),
+                    settings_invalid: flag(11),
+                    brake_moves: flag(12),
+                    enabled_by: EnabledBy::Any,
+                }
+            })
+        })
+    })
+}
+
+#[test]
+fn nothing_is_enabled_unless_all_is_well() {
+    let mut enabled = 0u32;
+    for view in views() {
+        for enabled_by in [EnabledBy::Any, EnabledBy::Host, EnabledBy::Operator] {
+            let view = StageView { enabled_by, ..view };
+            for (station, other) in [
+                (Station::Host, EnabledBy::Operator),
+                (Station::Operator, EnabledBy::Host),
+            ] {
+                if refusal_from(station, view, Command::Enable).is_some() {
+                    continue;
+                }
+                let mut safety = view.safety;
+                if !safety.apply(Command::Enable) {
+                    // It was enabled before, and stays so.
+                    assert_eq!(view.safety, SafetyState::Enabled);
+                    assert_eq!(safety, view.safety);
+                    continue;
+                }
+                enabled += 1;
+                assert_eq!(view.safety, SafetyState::Disabled, "{view:?}");
+                assert!(
+                    view.interlock.is_none()
+                        && view.moving.is_none()
+                        && view.commissioned
+                        && !view.locked
+                        && !view.settings_invalid
+                        && !view.brake_moves
+                        && enabled_by != other,
+                    "{view:?}"
+                );
+            }
+        }
+    }
+    assert!(enabled > 0);
+}
+
+#[test]
+fn no_motion_starts_but_on_an_enabled_stage_at_rest_whose_brake_is_released() {
+    for view in views() {
+        for command in commands().into_iter().filter(|&command| starts(command)) {
+            if refusal(view, command).is_some() {
+                continue;
+            }
+            assert_eq!(view.safety, SafetyState::Enabled, "{command:?} {view:?}");
+            assert!(!view.brake_moves, "{command:?} {view:?}");
+            match command {
+                Command::Jog(axis, _) => {
+                    assert!(!view.injecting, "{view:?}");
+                    assert!(
+                        matches!(view.modes[axis], MotionMode::Hold | MotionMode::Jog),
+                        "{view:?}"
+                    );
+                }
+                Command::Home(axis) | Command::StartMove(axis) => {
+                    assert_eq!(view.modes[axis], MotionMode::Hold, "{view:?}");
+                    assert!(!view.injecting, "{view:?}");
+                    assert!(
+                        matches!(command, Command::Home(_)) || !view.awaiting_homing[axis],
+                        "{view:?}"
+                    );
+                }
+                _ => {
+                    assert!(!view.running, "{command:?} {view:?}");
+                    assert!(!view.awaiting_homing[AXIS], "{command:?} {view:?}");
+                    assert!(
+                        command != Command::StartStream || view.stream_ready,
+                        "{view:?}"
+                    );
+                    assert!(
+                        command != Command::StartInjection || view.injection_ready,
+                        "{view:?}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn stop_and_disable_are_never_refused_and_a_reset_only_clears_what_is_latched() {
+    for view in views() {
+        for station in [Station::Host, Station::Operator] {
+            assert_eq!(refusal_from(station, view, Command::Stop), None);
+            assert_eq!(refusal_from(station, view, Command::Disable), None);
+        }
+        let resets = refusal(view, Command::ResetFault).is_none();
+        let may = matches!(view.safety, SafetyState::Faulted(_)) && !view.settings_invalid;
+        assert_eq!(resets, may, "{view:?}");
+    }
+}
+
+#[test]
+fn only_a_request_to_enable_makes_the_law_drive() {
+    for state in STATES {
+        for command in commands() {
+            let mut after = state;
+            let enabled = after.apply(command);
+            assert_eq!(
+                enabled,
+                state == SafetyState::Disabled && command == Command::Enable
+            );
+            assert!(
+                !after.drives() || state.drives() || enabled,
+                "{state:?} {command:?}"
+            );
+            if command == Command::Disable {
+                assert!(!after.drives(), "{state:?}");
+            }
+            // A fault goes by a reset alone.
+            if state.fault().is_some() && command != Command::ResetFault {
+                assert_eq!(after.fault(), state.fault(), "{state:?} {command:?}");
+            }
+        }
+    }
+}

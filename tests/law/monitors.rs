@@ -1,0 +1,75 @@
+//! The monitors of an axis at their very limits.
+
+use quadrant::admission::{Refusal, refusal};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::safety::monitor::{SignalLoss, SignalLossState};
+use quadrant::settings::StageSettings;
+
+use crate::common::Rig;
+
+/// Ticks until an encoder whose counts move like this is found silent, at an output of 2 V; at most 1000.
+fn silent(steps: impl Fn(u32) -> i32) -> Option<u32> {
+    let monitor = SignalLoss::<f32>::new(1.0, 100);
+    let mut state = SignalLossState::default();
+    (0..1000).find(|&tick| !monitor.step(&mut state, steps(tick), 2.0))
+}
+
+#[test]
+fn an_encoder_that_dithers_by_two_counts_is_silent_and_three_counts_are_motion() {
+    // Back and forth, from where it stood and to either side.
+    let dither = |counts: i32| {
+        move |tick: u32| {
+            if tick.is_multiple_of(2) {
+                counts
+            } else {
+                -counts
+            }
+        }
+    };
+    for counts in [0, 1, -1, 2, -2] {
+        assert_eq!(silent(dither(counts)), Some(100), "{counts}");
+    }
+    for counts in [3, -3] {
+        assert_eq!(silent(dither(counts)), None, "{counts}");
+    }
+    // As slow as it may be: three counts within the time.
+    assert_eq!(silent(|tick| i32::from(tick.is_multiple_of(33))), None);
+    assert!(silent(|tick| i32::from(tick.is_multiple_of(51))).is_some());
+}
+
+#[test]
+fn an_output_below_the_level_is_no_reason_to_move_and_one_at_it_is() {
+    let monitor = SignalLoss::<f32>::new(1.0, 100);
+    for (volts, found) in [(0.999, false), (-0.999, false), (1.0, true), (-1.0, true)] {
+        let mut state = SignalLossState::default();
+        let alive = (0..1000).all(|_| monitor.step(&mut state, 0, volts));
+        assert_eq!(!alive, found, "{volts} V");
+    }
+}
+
+#[test]
+fn a_jump_of_the_counter_however_far_is_motion_until_the_filter_has_forgotten_it() {
+    for jump in [1 << 17, 1 << 24, i32::MAX, -(1 << 17), -(1 << 24), i32::MIN] {
+        let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &Default::default());
+        rig.stand();
+        let said = |rig: &Rig<f32>| refusal(rig.stage.as_ref().view(&rig.state), Command::Enable);
+        assert_eq!(said(&rig), None);
+        rig.inputs.readings[1].count = jump as u32;
+        rig.tick();
+        // A jump of 2^16 counts and more counts as one of 2^16, of which an eighth a tick is forgotten: to 1.5 counts a tick
+        // in ln(8192 / 1.5) / ln(8 / 7) = 64 ticks.
+        for tick in 0..60 {
+            assert_eq!(
+                said(&rig),
+                Some(Refusal::NotAtStandstill(AxisName::Y)),
+                "{jump}, {tick} ticks after"
+            );
+            rig.tick();
+        }
+        for _ in 0..10 {
+            rig.tick();
+        }
+        assert_eq!(said(&rig), None, "{jump}");
+    }
+}
