@@ -117,6 +117,14 @@ pub(super) enum Command {
     },
     /// Say where the kept settings come from.
     Provenance,
+    /// List the channels that can be recorded and shown, with their units.
+    Channels {
+        /// Only those whose name begins like this: x, y., stage.
+        #[arg(default_value = "")]
+        prefix: String,
+    },
+    /// List the serial ports of this computer; needs no connection.
+    Ports,
     /// Record channels to a CSV file that every other command reads.
     Record(RecordOptions),
     /// Capture channels at the full control rate, around a trigger.
@@ -471,6 +479,8 @@ impl Command {
             Self::Defaults => "defaults",
             Self::Store { .. } => "store",
             Self::Provenance => "provenance",
+            Self::Channels { .. } => "channels",
+            Self::Ports => "ports",
             Self::Record(_) => "record",
             Self::Capture(_) => "capture",
             Self::Scope(_) => "scope",

@@ -60,6 +60,8 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         Command::Revert | Command::Defaults => settings::draft(client, command),
         Command::Store { provenance } => settings::store(client, provenance.as_deref()),
         Command::Provenance => settings::provenance(client),
+        Command::Channels { prefix } => Ok(observe::channels(prefix)),
+        Command::Ports => machine::ports(),
         Command::Record(options) => record(session, options),
         Command::Capture(command) => observe::capture(client, command),
         Command::Scope(options) => scope::run(session, options),

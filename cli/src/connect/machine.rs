@@ -2,16 +2,37 @@
 
 use std::fmt::Write as _;
 
-use anyhow::bail;
+use anyhow::{Context, bail};
 use quadrant::axes::AxisName;
 use quadrant::link::message::{self, AxisSet, Body, Status};
 use quadrant_sim::client::{Client, settle, with_reset};
+use quadrant_sim::machine::serial_ports;
 use serde_json::json;
 
 use super::answer::{Answer, name, seconds};
 use super::command::Command;
 use super::inputs;
 use quadrant_cli::axis::Axis;
+
+/// Lists the serial ports of this computer.
+pub(super) fn ports() -> anyhow::Result<Answer> {
+    let ports = serial_ports().context("the serial ports cannot be listed")?;
+    if ports.is_empty() {
+        return Ok(Answer::new(
+            "no serial port: is the board's cable in, and does it carry data?",
+            json!([]),
+        ));
+    }
+    let lines: Vec<String> = ports
+        .iter()
+        .map(|(path, what)| format!("{path:<16} {what}").trim_end().to_owned())
+        .collect();
+    let data = ports
+        .iter()
+        .map(|(path, what)| json!({ "path": path, "device": what }))
+        .collect();
+    Ok(Answer::new(lines.join("\n"), data))
+}
 
 pub(super) fn hello(client: &mut Client) -> anyhow::Result<Answer> {
     // Asked again: the machine may have been exchanged since.

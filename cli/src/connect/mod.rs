@@ -3,6 +3,7 @@
 mod answer;
 mod command;
 mod commission;
+mod completion;
 mod dispatch;
 mod flash;
 mod identify;
@@ -27,6 +28,7 @@ use quadrant::link::message::AxisMode;
 use quadrant_cli::warn;
 use quadrant_sim::client::Client;
 
+use self::answer::Answer;
 use self::command::Command;
 use self::printer::Printer;
 use self::session::Session;
@@ -91,6 +93,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let printer = Printer {
         json: arguments.json,
     };
+    if let Some(command @ Command::Ports) = &arguments.command {
+        let Answer { text, data } = machine::ports()?;
+        printer.result(command.name(), &text, &data);
+        return Ok(());
+    }
     let mut session = Session::new(connect(arguments)?, printer);
     let succeeded = match &arguments.command {
         None | Some(Command::Script) => {

@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::time::Duration;
 
 use anyhow::{Context, bail};
-use quadrant::link::message::{CaptureStatus, Edge, Event, Level, Notice, Trigger};
+use quadrant::link::message::{CaptureStatus, Channel, Edge, Event, Level, Notice, Trigger};
 use quadrant_sim::client::samples::{
     Samples, TelemetryRecorder, arm, capture_state, disarm, least_decimation, read_capture,
 };
@@ -21,6 +21,23 @@ const LOOK: Duration = Duration::from_millis(50);
 const TAIL: Duration = Duration::from_millis(100);
 /// Longest recording without a duration, s.
 const MOST: Duration = Duration::from_secs(3600);
+
+/// Lists the channels whose name begins like this.
+pub(super) fn channels(prefix: &str) -> Answer {
+    let found: Vec<(String, &str)> = Channel::all()
+        .map(|channel| (channel.to_string(), channel.unit()))
+        .filter(|(name, _)| name.starts_with(prefix))
+        .collect();
+    let lines: Vec<String> = found
+        .iter()
+        .map(|(name, unit)| format!("{name:<22} {unit}").trim_end().to_owned())
+        .collect();
+    let data = found
+        .iter()
+        .map(|(name, unit)| json!({ "channel": name, "unit": unit }))
+        .collect();
+    Answer::new(lines.join("\n"), data)
+}
 
 /// Records channels, and writes them; `then` is run once sampling has begun, and says if it succeeded.
 pub(super) fn record(

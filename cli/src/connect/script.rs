@@ -8,10 +8,12 @@ use std::time::Duration;
 use anyhow::Context;
 use quadrant::link::message::Body;
 use quadrant_sim::client::settle;
-use rustyline::DefaultEditor;
+use rustyline::Editor;
 use rustyline::error::ReadlineError;
+use rustyline::history::DefaultHistory;
 
 use super::command::Command;
+use super::completion::Completion;
 use super::dispatch;
 use super::line::{Said, parse};
 use super::session::Session;
@@ -104,7 +106,9 @@ fn leave(session: &mut Session) -> anyhow::Result<()> {
 
 /// A person: errors end nothing, Ctrl-C stops the axes, Ctrl-D ends.
 fn prompt(session: &mut Session) -> anyhow::Result<()> {
-    let mut editor = DefaultEditor::new().context("cannot use the terminal")?;
+    let mut editor =
+        Editor::<Completion, DefaultHistory>::new().context("cannot use the terminal")?;
+    editor.set_helper(Some(Completion::new()));
     let (wanted, wants) = mpsc::channel();
     let (lines, read) = mpsc::channel();
     thread::spawn(move || {
@@ -119,7 +123,7 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
         }
     });
     say!(
-        "{}; `help` lists the commands, Ctrl-C stops the axes, Ctrl-D ends",
+        "{}; `help` lists the commands, Tab completes, Ctrl-C stops the axes, Ctrl-D ends",
         session.greeting()
     );
     let mut interrupts = 0;

@@ -59,7 +59,7 @@ pub use interface::Machine;
 pub use journal::Journal;
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
 pub use loopback::{Loopback, SimulatedPeer};
-pub use serial::{BAUD, SerialTransport};
+pub use serial::{BAUD, SerialTransport, serial_ports};
 pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;

@@ -10,6 +10,29 @@ use super::transport::Transport;
 /// The speed of the serial port, baud; 8 data bits, no parity, one stop bit.
 pub const BAUD: u32 = 921_600;
 
+/// The serial ports of this computer: the path of each, and what is behind it as far as the system knows.
+///
+/// # Errors
+/// A system that does not list its ports.
+pub fn serial_ports() -> io::Result<Vec<(String, String)>> {
+    let ports = serialport::available_ports()?;
+    Ok(ports
+        .into_iter()
+        .map(|port| {
+            let what = match port.port_type {
+                serialport::SerialPortType::UsbPort(usb) => {
+                    let name = usb.product.or(usb.manufacturer).unwrap_or_default();
+                    format!("USB {:04x}:{:04x} {name}", usb.vid, usb.pid)
+                }
+                serialport::SerialPortType::BluetoothPort => "Bluetooth".to_owned(),
+                serialport::SerialPortType::PciPort => "built in".to_owned(),
+                serialport::SerialPortType::Unknown => String::new(),
+            };
+            (port.port_name, what.trim_end().to_owned())
+        })
+        .collect())
+}
+
 /// A serial port, such as a board's debugger offers.
 pub struct SerialTransport {
     port: Box<dyn serialport::SerialPort>,
