@@ -52,7 +52,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if !deviations.iter().all(|share| (0.0..=1.0).contains(share)) {
         bail!("--deviation-percent: each must be 0 to 100");
     }
-    let mut file = model.file()?;
+    let (mut file, subject) = model.file(&arguments.output)?;
     let plant = model.plant(&file)?;
     let settings = model.axis(&file).clone();
     let gains = settings.feedback.pid;
@@ -122,7 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .map(|(law, nonlinear)| (law, step_response(&plant, &gains, nonlinear, &request)))
     });
     let page = NonlinearPage {
-        subject: model.subject(),
+        subject,
         plant: PlantModel {
             delay_s: late.delay_s + 0.5 * sample_time_s,
             ..late

@@ -120,7 +120,7 @@ impl Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { model, output, .. } = arguments;
-    let mut file = model.file()?;
+    let (mut file, subject) = model.file(output)?;
     let sampled = model.sampled(&file)?;
     let (process, subject) = match &arguments.frf {
         Some(path) => {
@@ -134,7 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             );
             (Process::Measured(measured), subject)
         }
-        None => (Process::Model(model.plant(&file)?), model.subject()),
+        None => (Process::Model(model.plant(&file)?), subject),
     };
     let current = model.axis(&file).feedback.pid;
     let request = PidRequest {

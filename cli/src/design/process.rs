@@ -1,6 +1,6 @@
 //! Options that name the model to design on.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
@@ -11,7 +11,11 @@ use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::SettingsFile;
 
 use quadrant_cli::axis::Axis;
-use quadrant_cli::say;
+use quadrant_cli::{say, warn};
+
+/// File of the settings in the folder for results, and the beginning of a command that has left it.
+const SETTINGS: &str = "settings.toml";
+const DESIGN: &str = "quadrant design";
 
 /// Options that name a model of an axis: numbers, or settings that hold one.
 #[derive(Clone, Debug, Args)]
@@ -19,7 +23,8 @@ pub(super) struct Model {
     /// The axis of the settings whose model and gains are taken.
     #[arg(long, value_enum, default_value_t = Axis::X)]
     pub(super) axis: Axis,
-    /// Settings of the stage, as `quadrant commission` writes them; without it, the built-in ones.
+    /// Settings of the stage, as `quadrant commission` writes them; without it, those that an earlier `design` has left in the
+    /// folder for results, or the built-in ones.
     #[arg(long, value_name = "FILE")]
     pub(super) settings: Option<PathBuf>,
     /// A, acceleration per volt, mm/(V s²), in place of the settings' model; the next three go with it.
@@ -48,12 +53,31 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// Reads the stage's settings.
-    pub(super) fn file(&self) -> anyhow::Result<SettingsFile> {
-        Ok(match &self.settings {
-            Some(path) => SettingsFile::read(path)?,
-            None => SettingsFile::new(StageSettings::simulated()),
-        })
+    /// Reads the stage's settings, and says where they come from. Designs that follow each other build on each other.
+    pub(super) fn file(&self, output: &Output) -> anyhow::Result<(SettingsFile, String)> {
+        let of = |path: &Path| format!("The {} axis of {}", self.axis.name(), path.display());
+        if let Some(path) = &self.settings {
+            return Ok((SettingsFile::read(path)?, of(path)));
+        }
+        if self.gain.is_some() {
+            let file = SettingsFile::new(StageSettings::simulated());
+            return Ok((file, "A model given by its parameters".to_owned()));
+        }
+        let left = output.file(SETTINGS)?;
+        if left.exists() {
+            let file = SettingsFile::read(&left)?;
+            let last = file.provenance.last();
+            if last.is_some_and(|last| last.command.starts_with(DESIGN)) {
+                warn!(
+                    "starting from {}, which `{}` has left; --settings takes another file",
+                    left.display(),
+                    last.map_or("", |last| last.command.as_str())
+                );
+                return Ok((file, of(&left)));
+            }
+        }
+        let subject = format!("The {} axis of the built-in settings", self.axis.name());
+        Ok((SettingsFile::new(StageSettings::simulated()), subject))
     }
 
     /// The axis' settings in them.
@@ -107,17 +131,6 @@ impl Model {
         })
     }
 
-    /// Whence the model comes, for a page.
-    pub(super) fn subject(&self) -> String {
-        match (&self.gain, &self.settings) {
-            (Some(_), _) => "A model given by its parameters".to_owned(),
-            (None, Some(path)) => {
-                format!("The {} axis of {}", self.axis.name(), path.display())
-            }
-            (None, None) => format!("The {} axis of the built-in settings", self.axis.name()),
-        }
-    }
-
     /// Writes settings with what a design changed, checked as a whole.
     pub(super) fn write(
         &self,
@@ -128,7 +141,7 @@ impl Model {
         sets: &str,
     ) -> anyhow::Result<()> {
         file.add_provenance(command, self.axis.name(), records, &[sets]);
-        let path = output.file("settings.toml")?;
+        let path = output.file(SETTINGS)?;
         file.write(&path)?;
         say!(
             "{}: the settings of the stage with this {sets}",

@@ -81,6 +81,31 @@ fn one_design_builds_on_another_and_the_settings_tell_both() {
 }
 
 #[test]
+fn a_design_goes_on_from_what_an_earlier_one_has_left_in_the_same_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeed(at, &["pid", "--sensitivity-peak", "1.7"]);
+    let path = at.join("quadrant-out/settings.toml");
+    let pid = SettingsFile::read(&path).unwrap().stage.axes[0]
+        .feedback
+        .pid;
+    let said = succeed(at, &["npid"]);
+    let after = SettingsFile::read(&path).unwrap();
+    assert_eq!(after.stage.axes[0].feedback.pid, pid);
+    assert_eq!(after.provenance.len(), 2);
+    assert!(said.contains("quadrant-out/settings.toml"), "{said}");
+    // Settings that something else has left are not taken for a beginning.
+    let mut other = SettingsFile::new(after.stage);
+    other.add_provenance("quadrant commission --axis x", "x", vec![], &[]);
+    other.write(&path).unwrap();
+    succeed(at, &["npid"]);
+    let built_in = SettingsFile::read(&path).unwrap().stage.axes[0]
+        .feedback
+        .pid;
+    assert_ne!(built_in, pid);
+}
+
+#[test]
 fn what_cannot_be_designed_is_refused_with_what_can() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
