@@ -274,6 +274,18 @@ fn an_unstable_law_is_refused_when_a_plant_is_given() {
 }
 
 #[test]
+fn a_gain_that_is_too_high_is_blamed_and_not_the_nonlinear_gain_upon_it() {
+    for law in [LawKind::Pid, LawKind::NPid] {
+        let (field, reason_given, text) = reason(|axis| {
+            axis.feedback.law = law;
+            axis.feedback.pid.kp_v_per_mm *= 1000.0;
+        });
+        assert_eq!(field, "feedback.pid.kp_v_per_mm", "{text}");
+        assert_eq!(reason_given, Reason::Unstable);
+    }
+}
+
+#[test]
 fn points_that_do_not_rise_are_refused() {
     let (field, reason_given, _) = reason(|axis| {
         let schedule = axis.feedback.schedule.as_mut().expect("by default");

@@ -159,6 +159,16 @@ pub(super) fn read_forces(path: &Path) -> Result<(Column, [Option<Column>; 3]), 
     Ok((time.0, forces.map(|force| force.map(|(column, _)| column))))
 }
 
+/// A file's text for a terminal: what would steer it is escaped.
+fn printable(text: &str) -> String {
+    text.chars()
+        .map(|sign| match sign.is_control() {
+            true => sign.escape_default().to_string(),
+            false => sign.to_string(),
+        })
+        .collect()
+}
+
 /// A file, and its header read.
 fn open(path: &Path) -> Result<(Reader<File>, Header<'_>), RecordError> {
     let mut reader = ReaderBuilder::new()
@@ -317,7 +327,7 @@ impl Header<'_> {
         if self.names.iter().all(String::is_empty) {
             "no header".to_owned()
         } else {
-            self.names.join(", ")
+            printable(&self.names.join(", "))
         }
     }
 

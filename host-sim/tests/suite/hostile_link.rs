@@ -23,7 +23,7 @@ use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 
 use crate::common::Noise;
-use crate::link_traffic::{arrival, framed};
+use crate::link_traffic::{self, arrival, framed};
 
 /// Bytes that may wait before the machine runs on.
 const BACKLOG: usize = 1_000;
@@ -278,7 +278,7 @@ fn next(noise: &mut Noise, allowed: Allowed, paths: &[String]) -> Vec<u8> {
         0 => {
             let request = Request {
                 id: noise.bits() as u16,
-                body: noise.body(),
+                body: link_traffic::body(noise),
             };
             let mut buffer = [0; PAYLOAD_BYTES];
             let posted = postcard::to_slice(&request, &mut buffer).expect("fits");
@@ -294,7 +294,7 @@ fn next(noise: &mut Noise, allowed: Allowed, paths: &[String]) -> Vec<u8> {
             }
         }
         1..=3 => {
-            let body = noise.body();
+            let body = link_traffic::body(noise);
             let body = plausible(body, noise, paths);
             if forbidden(&body) || is_restart(&body, noise) {
                 return Vec::new();

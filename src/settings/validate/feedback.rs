@@ -44,10 +44,14 @@ impl AxisSettings {
         let Some(plant) = &self.plant else {
             return Ok(());
         };
+        let linear = match feedback.law {
+            LawKind::Pd | LawKind::Pid | LawKind::NPid => "feedback.pid.kp_v_per_mm",
+            _ => field,
+        };
         for gains in feedback.linear_gains() {
             let bound = sector_bound(plant, &gains, period_s);
             if bound <= 1.0 {
-                return at.refuse(field, gains.kp_v_per_mm, Reason::Unstable);
+                return at.refuse(linear, gains.kp_v_per_mm, Reason::Unstable);
             }
             let largest = feedback
                 .nonlinear

@@ -61,6 +61,10 @@ fn missing_columns_are_listed_beside_those_found() {
         &record("time,reference_m,position_m", |_, _| ()),
         &["no column t_s", "time, reference_m"],
     );
+    // What would colour a terminal is shown, and does not.
+    let text = good().replacen("t_s", "\u{1b}[31mt_s\u{1b}[0m", 1);
+    let error = refusal(&text, &["t_s", "\\u{1b}[31m"]);
+    assert!(!error.to_string().contains('\u{1b}'), "{error}");
     refusal("", &["no header"]);
 }
 
