@@ -235,6 +235,27 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
             "1 V in open loop, 0.02 mm allowed; from its start",
             |fixture| streams::injecting(fixture, 1.0, 0.02),
         ),
+        FaultCode::Overload => Case {
+            how: "a load of 1 V on x at rest; its motor bears 0.1 V for ever, 2 V for 50 ms",
+            adjust: |configuration| {
+                each(configuration, |axis| {
+                    far_from_following_error(axis);
+                    forget_plant(axis);
+                    axis.amplifier.output_limit_v = 2.0;
+                    axis.amplifier.continuous_v = 0.1;
+                    axis.amplifier.overload_s = 0.05;
+                    let integral = &mut axis.feedback.integral_limit_v;
+                    *integral = integral.min(2.0);
+                });
+            },
+            bring: |fixture| {
+                enabled(fixture)?;
+                Ok(broken(
+                    fixture,
+                    Box::new(|_, plant, _| plant.axes_mut()[0].set_load_v(1.0)),
+                ))
+            },
+        },
         FaultCode::DeadlineMissed
         | FaultCode::WatchdogReset
         | FaultCode::Panic
