@@ -10,11 +10,15 @@
 //! - [`numerics`]: f32 and fixed point against f64;
 //! - [`outputs`]: the amplifier outputs' resolution;
 //! - [`identification`]: identification judged by the plant's parameters;
+//! - [`cuts`]: learning under random cuts and changes of friction;
+//! - [`campaign`]: a result from each of many seeds, for the last one and the next;
 //! - [`random_axes`]: commissioning of axes that are not the simulated stage's;
 //! - [`report`]: all of the first five and the circle test in one page, kept part by part.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
+pub mod campaign;
+pub mod cuts;
 pub mod friction_models;
 pub mod identification;
 pub mod laws;

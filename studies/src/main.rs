@@ -6,7 +6,7 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use quadrant_cli::{explained, terminal, warn};
 use quadrant_studies::{
-    friction_models, identification, laws, numerics, outputs, random_axes, report, robustness,
+    cuts, friction_models, identification, laws, numerics, outputs, random_axes, report, robustness,
 };
 
 /// The thesis' tables and figures, and the comparative studies, on the simulated stage.
@@ -22,6 +22,8 @@ enum Command {
     /// Commission random axes that are not the simulated stage's, and judge the settings on motions that the commissioning did
     /// not see.
     Axes(random_axes::command::Arguments),
+    /// Run learning under random cuts while friction changes, and compare it with no feedforward, 2 s by 2 s.
+    Cuts(cuts::command::Arguments),
     /// Compare the friction models on the same motions: loops, memory, drift, lag.
     Friction(friction_models::command::Arguments),
     /// Compare identification with the plant's parameters, which it does not know: errors, and whether the stated
@@ -43,6 +45,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Axes(arguments) => random_axes::command::run(&arguments),
+        Command::Cuts(arguments) => cuts::command::run(&arguments),
         Command::Friction(arguments) => friction_models::command::run(&arguments),
         Command::Identification(arguments) => identification::command::run(&arguments),
         Command::Laws(arguments) => laws::command::run(&arguments),
