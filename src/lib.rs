@@ -71,5 +71,5 @@ pub use quadrant_link as link;
 #[doc(inline)]
 pub use law::{
     admission, axes, axis, command, control, decimal, encoder, feedforward, friction, homing,
-    injection, motion, reference, safety, scalar, stage, table, telemetry, units,
+    injection, learning, motion, reference, safety, scalar, stage, table, telemetry, units,
 };

@@ -148,6 +148,28 @@ impl<S: Scalar> FeedforwardTerms<S> {
     pub fn total(&self) -> S {
         S::ZERO + self.level + self.viscous + self.gms + self.inertia
     }
+
+    /// The friction, V.
+    #[inline(always)]
+    pub fn friction(&self) -> S {
+        self.level + self.viscous + self.gms
+    }
+
+    /// Scales the friction but for its viscous part by a [`Quantity::Multiplier`].
+    #[inline(always)]
+    pub(crate) fn gate_friction(&mut self, gate: S) {
+        for term in [&mut self.level, &mut self.gms] {
+            *term = term.times(gate, Quantity::Multiplier);
+        }
+    }
+
+    /// Scales the friction by a [`Quantity::Multiplier`].
+    #[inline(always)]
+    pub(crate) fn scale_friction(&mut self, scale: S) {
+        for term in [&mut self.level, &mut self.viscous, &mut self.gms] {
+            *term = term.times(scale, Quantity::Multiplier);
+        }
+    }
 }
 
 /// The pre-sliding model of a kind, with what only that model needs.

@@ -400,8 +400,10 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if !state.safety.drives() {
             state.injection.end();
             state.brake = BrakeState::Applied;
-            for (axis, memory) in self.axes.into_iter().zip(&mut state.axes) {
-                axis.output_zero(memory);
+            let changed = &inputs.settings_changed;
+            for ((axis, memory), changed) in self.axes.into_iter().zip(&mut state.axes).zip(changed)
+            {
+                axis.output_zero(memory, *changed);
             }
             return Outputs::default();
         }

@@ -9,6 +9,7 @@ use super::limits::LimitSettings;
 use crate::law::control::plant_model::PlantModel;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::law::friction::FrictionSettings;
+use crate::law::learning::LearningSettings;
 
 /// Everything one axis' control law is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -97,4 +98,7 @@ pub struct FeedforwardSettings {
     pub gains: FeedforwardGains,
     /// Look-ahead of the feedforward over the feedback's reference, s: the plant's delay.
     pub preview_s: f64,
+    /// Learning of the friction's scale while the axis works; none: the scale stays 1.
+    #[serde(default)]
+    pub learning: Option<LearningSettings>,
 }

@@ -8,6 +8,7 @@ use crate::law::axis::{Axis, AxisBuilder, Commissioning};
 use crate::law::control::feedback::LawKind;
 use crate::law::encoder::Encoder;
 use crate::law::feedforward::FeedforwardKind;
+use crate::law::learning::{Learning, LearningLoop};
 use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
@@ -190,6 +191,7 @@ impl AxisSettings {
             ))
             .plausibility(self.build_plausibility(period_s))
             .overload(amplifier.build_overload(period_s))
+            .learning(self.build_learning(period_s))
             .index_spacing(IndexSpacing::new(
                 encoder.counts_per_index,
                 encoder.index_tolerance_counts,
@@ -254,6 +256,23 @@ impl AxisSettings {
             velocity_mm_s: MODEL_VELOCITY_MM_S.max(MODEL_STEP_COUNTS * resolution_mm / period_s),
         };
         Plausibility::new(&model, words, resolution_mm, period_s)
+    }
+
+    #[inline(never)]
+    fn build_learning<S: Scalar>(&self, period_s: f64) -> Learning<S> {
+        match (&self.feedforward.learning, &self.plant) {
+            (Some(settings), Some(plant)) => {
+                let gains = self.feedback.linear_gains();
+                let axis = LearningLoop {
+                    plant,
+                    pid: gains.first().unwrap_or(&self.feedback.pid),
+                    breakaway_v: self.friction.mean_breakaway_v(),
+                    resolution_mm: self.encoder.resolution_mm,
+                };
+                Learning::build(settings, &axis, period_s)
+            }
+            _ => Learning::off(),
+        }
     }
 
     #[inline(never)]

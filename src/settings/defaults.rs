@@ -19,6 +19,7 @@ use crate::law::friction::PerDirection;
 use crate::law::friction::gms::{GmsElement, GmsParameters};
 use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
 use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
+use crate::law::learning::LearningSettings;
 use crate::law::safety::{EnabledBy, HostNeeded};
 
 impl StageSettings {
@@ -234,6 +235,16 @@ impl Default for FeedforwardSettings {
                 inertia_v_s2_per_mm: default!("feedforward.gains.inertia_v_s2_per_mm"),
             },
             preview_s: default!("feedforward.preview_s"),
+            learning: None,
+        }
+    }
+}
+
+impl Default for LearningSettings {
+    fn default() -> Self {
+        Self {
+            memory_s: default!("feedforward.learning.memory_s"),
+            vibration_mm_s: default!("feedforward.learning.vibration_mm_s"),
         }
     }
 }

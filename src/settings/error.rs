@@ -49,6 +49,8 @@ pub enum Reason {
         /// Largest value, V/s.
         most: f64,
     },
+    /// It works only with a PD, PID or N-PID.
+    NeedsPid,
 }
 
 /// A refused value: which field of which axis, what it holds, and why that cannot be.
@@ -70,11 +72,12 @@ impl fmt::Display for SettingsError {
             write!(f, "{axis}.")?;
         }
         f.write_str(self.field)?;
-        if self.reason != Reason::Missing {
+        if !matches!(self.reason, Reason::Missing | Reason::NeedsPid) {
             write!(f, " = {}", Decimal(self.value))?;
         }
         match self.reason {
             Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
+            Reason::NeedsPid => f.write_str(" needs feedback.law = \"pd\", \"pid\" or \"n-pid\"; choose one, or leave it out"),
             Reason::IndexUnknown => f.write_str(
                 ": homing by the index pulse needs encoder.counts_per_index; give it, or home without the index",
             ),

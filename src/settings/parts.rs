@@ -15,6 +15,7 @@ use crate::law::control::sliding_mode::SlidingModeGains;
 use crate::law::friction::Direction;
 use crate::law::friction::dahl::DahlParameters;
 use crate::law::friction::lugre::LugreParameters;
+use crate::law::learning::LearningSettings;
 
 /// A part of an axis that may be left out.
 pub(crate) struct Part {
@@ -40,7 +41,7 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub(crate) static PARTS: [Part; 12] = [
+pub(crate) static PARTS: [Part; 13] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
@@ -112,6 +113,11 @@ pub(crate) static PARTS: [Part; 12] = [
             stiffness_v_per_mm: default!("friction.lugre.stiffness_v_per_mm"),
             damping_v_s_per_mm: default!("friction.lugre.damping_v_s_per_mm"),
         }
+    ),
+    part!(
+        "/feedforward/learning",
+        feedforward.learning,
+        LearningSettings::default()
     ),
     part!(
         "/limits/travel_mm",

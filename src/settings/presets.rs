@@ -137,6 +137,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
         feedforward: FeedforwardSettings {
             kind: FeedforwardKind::Combined,
             preview_s: parameters.plant.delay_s,
+            learning: None,
             ..FeedforwardSettings::default()
         },
         limits: LimitSettings {

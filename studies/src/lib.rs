@@ -10,14 +10,16 @@
 //! - [`numerics`]: f32 and fixed point against f64;
 //! - [`outputs`]: the amplifier outputs' resolution;
 //! - [`identification`]: identification judged by the plant's parameters;
+//! - [`cuts`]: learning under random cuts and changes of friction;
 //! - [`random_axes`]: commissioning of axes that are not the simulated stage's;
 //! - [`random_faults`]: faults at random activities, and what must hold whatever happens;
-//! - [`campaign`]: seeds, shards and results of the two;
+//! - [`campaign`]: a result from each of many seeds, for the last three;
 //! - [`report`]: all of the first five and the circle test in one page, kept part by part.
 #![forbid(unsafe_code)]
 #![allow(missing_docs)]
 
 pub mod campaign;
+pub mod cuts;
 pub mod friction_models;
 pub mod identification;
 pub mod laws;

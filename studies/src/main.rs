@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use quadrant_cli::{explained, terminal, warn};
 use quadrant_studies::{
-    friction_models, identification, laws, numerics, outputs, random_axes, random_faults, report,
-    robustness,
+    cuts, friction_models, identification, laws, numerics, outputs, random_axes, random_faults,
+    report, robustness,
 };
 
 /// The thesis' tables and figures, and the comparative studies, on the simulated stage.
@@ -23,6 +23,8 @@ enum Command {
     /// Commission random axes that are not the simulated stage's, and judge the settings on motions that the commissioning did
     /// not see.
     Axes(random_axes::command::Arguments),
+    /// Run learning under random cuts while friction changes, and compare it with no feedforward, 2 s by 2 s.
+    Cuts(cuts::command::Arguments),
     /// Run the firmware's tasks through random faults at random activities, and hold them against what must be so whatever
     /// happens.
     Faults(random_faults::command::Arguments),
@@ -47,6 +49,7 @@ enum Command {
 fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Axes(arguments) => random_axes::command::run(&arguments),
+        Command::Cuts(arguments) => cuts::command::run(&arguments),
         Command::Faults(arguments) => random_faults::command::run(&arguments),
         Command::Friction(arguments) => friction_models::command::run(&arguments),
         Command::Identification(arguments) => identification::command::run(&arguments),

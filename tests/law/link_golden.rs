@@ -218,6 +218,11 @@ fn channels_have_their_golden_numbers() {
             "injection[V]",
             "code-sum[]",
             "glitch[um]",
+            "friction-scale[]",
+            "learning[]",
+            "vibration-gate[]",
+            "error-squares[]",
+            "error-squares-off[]",
         ]
         .iter()
         .zip(first..)

@@ -34,6 +34,7 @@ mod homing;
 mod injection;
 mod injection_ends;
 mod jog;
+mod learning;
 mod link_frames;
 mod link_fuzz;
 mod link_golden;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use quadrant::learning::LearningSettings;
 use quadrant::settings::leaves::{LeafInfo, Range, all, find};
 use quadrant::settings::tree::{TreeError, is_part};
 use quadrant::settings::{Reason, SettingsError, StageSettings};
@@ -12,7 +13,11 @@ use crate::settings_tree::{get, paths};
 const ELEMENTS: usize = 8;
 
 fn settings() -> StageSettings {
-    StageSettings::simulated()
+    let mut settings = StageSettings::simulated();
+    for axis in &mut settings.axes {
+        axis.feedforward.learning = Some(LearningSettings::default());
+    }
+    settings
 }
 
 /// All leaves of the tree with the axis as `*`, and the numbers of the lists' points with the point as `*`.

@@ -48,7 +48,7 @@ fn moving<S: Scalar>() -> Rig<S> {
 
 #[test]
 fn names_and_numbers_lead_back_to_their_channel() {
-    assert_eq!(Channel::all().count(), 3 * 18 + 6);
+    assert_eq!(Channel::all().count(), 3 * 23 + 6);
     for known in Channel::all() {
         assert_eq!(known.to_string().parse(), Ok(known));
         assert_eq!(Channel::try_from(u8::from(known)), Ok(known));

@@ -43,6 +43,11 @@ const fn axis_column(signal: AxisSignal) -> &'static str {
         AxisSignal::Injection => "injection_v",
         AxisSignal::CodeSum => "code_sum",
         AxisSignal::Glitch => "glitch_um",
+        AxisSignal::FrictionScale => "friction_scale",
+        AxisSignal::Learning => "learning",
+        AxisSignal::VibrationGate => "vibration_gate",
+        AxisSignal::ErrorSquares => "error_squares",
+        AxisSignal::ErrorSquaresOff => "error_squares_off",
     }
 }
 

@@ -74,6 +74,11 @@ fn read_axis<S: Scalar, const N: usize>(
         AxisSignal::Injection => volts(axis.injected()),
         AxisSignal::CodeSum => seen.code_sum.wrapping_sub(seen.code.0.into()) as u32,
         AxisSignal::Glitch => glitch_um().to_bits(),
+        AxisSignal::FrictionScale => axis.learning().scale().to_bits(),
+        AxisSignal::Learning => axis.learning().status() as u32,
+        AxisSignal::VibrationGate => axis.learning().gate().to_bits(),
+        AxisSignal::ErrorSquares => axis.learning().error_squares().to_bits(),
+        AxisSignal::ErrorSquaresOff => axis.learning().error_squares_off().to_bits(),
     }
 }
 

@@ -41,6 +41,7 @@ use crate::law::feedforward::{
 };
 use crate::law::friction::FrictionSettings;
 use crate::law::homing::HomingInput;
+use crate::law::learning::{Learning, LearningInput, LearningState, LearningStatus};
 use crate::law::motion::{
     GeneratorEvent, GeneratorState, MotionMode, ReferenceGenerator, ReferenceState,
 };
@@ -102,6 +103,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     amplifier: Amplifier<S>,
     bumpless_decay: S,
     travel: Travel,
+    learns: bool,
     feedback: Feedback<S>,
     feedforward: Feedforward<S, N>,
     /// A displacement in a tick as a velocity.
@@ -113,6 +115,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     standstill: u32,
     generator: ReferenceGenerator<S>,
     commissioning: Commissioning,
+    learning: Learning<S>,
 }
 
 /// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
@@ -205,6 +208,8 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.reduced_speed = u32::MAX;
         axis.generator = ReferenceGenerator::default();
         axis.commissioning = Commissioning::Done;
+        axis.learns = false;
+        axis.learning = Learning::off();
         let builder = Self {
             axis,
             period_s,
@@ -312,6 +317,14 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
+    /// Learning of the friction feedforward's scale.
+    #[must_use]
+    pub fn learning(self, learning: Learning<S>) -> Self {
+        self.axis.learns = learning.is_on();
+        self.axis.learning = learning;
+        self
+    }
+
     /// The distance of the encoder's index pulses.
     #[must_use]
     pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
@@ -411,6 +424,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     /// Position of the axis at the last index pulse, until homing takes it.
     pulse: Option<Position>,
     index: IndexState,
+    learning: LearningState<S>,
 }
 
 impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
@@ -437,6 +451,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             friction: FeedforwardState::default(),
             injected: S::ZERO,
             telemetry: AxisTelemetry::default(),
+            learning: LearningState::default(),
         }
     }
 }
@@ -445,6 +460,11 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// Every term of the law at the last tick.
     pub fn telemetry(&self) -> &AxisTelemetry<S> {
         &self.telemetry
+    }
+
+    /// What was learnt of the friction's scale.
+    pub fn learning(&self) -> &LearningState<S> {
+        &self.learning
     }
 
     /// True while a motion is under way.
@@ -586,6 +606,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             reduced_speed: u32::MAX,
             generator: ReferenceGenerator::default(),
             commissioning: Commissioning::Inert,
+            learns: false,
+            learning: Learning::off(),
         }
     }
 
@@ -690,6 +712,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Compares the encoder with the plant, and watches the load.
     #[inline(never)]
     fn compare(&self, state: &mut AxisState<S, N>) -> Result<(), FaultCode> {
+        if self.learns {
+            self.learn(state);
+        }
         let shown = state.shown();
         let bears = self
             .overload
@@ -701,6 +726,34 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         } else {
             Ok(())
         }
+    }
+
+    /// Learns from what the last tick left.
+    #[inline(never)]
+    fn learn(&self, state: &mut AxisState<S, N>) {
+        let seen = &state.telemetry;
+        let status = if !matches!(
+            state.mode(),
+            MotionMode::Plan | MotionMode::Stream | MotionMode::Hold
+        ) || state.injected != S::ZERO
+        {
+            LearningStatus::OtherMotion
+        } else if seen.velocity == S::ZERO {
+            LearningStatus::AtRest
+        } else {
+            LearningStatus::Learning
+        };
+        let input = LearningInput {
+            error: seen.error,
+            status,
+        };
+        let gained = self
+            .learning
+            .step(&mut state.learning, input, |error| match &self.feedback {
+                Feedback::NPid(law) => Some(law.gain.at(error)),
+                _ => None,
+            });
+        state.feedback.unload(gained);
     }
 
     /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
@@ -736,6 +789,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             homed: state.homed,
             index: state.index,
             following: self.following.start(),
+            learning: self.learning.resume(&state.learning),
             look_ahead: here,
             preview: [here; PREVIEW_ROOM],
             telemetry: AxisTelemetry {
@@ -961,9 +1015,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             acceleration: state.acceleration,
         };
         seen.feedforward = self.feedforward.step(&mut state.friction, step);
-        let total = seen.feedforward.total();
+        let mut total = seen.feedforward.total();
+        let error = seen.error;
+        if self.learns {
+            total = self.scale_friction(state, changed);
+        }
         let input = FeedbackInput {
-            error: seen.error,
+            error,
             velocity: state.reference_velocity,
         };
         if changed {
@@ -978,6 +1036,17 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             .bumpless_offset
             .times(self.bumpless_decay, Quantity::Fraction);
         self.put_out(state, output)
+    }
+
+    /// Scales the friction's feedforward as was learnt; returns the whole feedforward, V.
+    #[inline(never)]
+    fn scale_friction(&self, state: &mut AxisState<S, N>, changed: bool) -> S {
+        if changed {
+            state.learning = self.learning.start();
+        }
+        let terms = &mut state.telemetry.feedforward;
+        self.learning.apply(&mut state.learning, terms);
+        terms.total()
     }
 
     /// Puts the injected voltage out.
@@ -1002,6 +1071,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         telemetry.code = code;
         telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
         telemetry.limited_by = if telemetry.feedback.saturated {
+            state.learning.saturate();
             LimitedBy::OutputLimit
         } else {
             LimitedBy::Nothing
@@ -1027,6 +1097,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(never)]
     fn make_bumpless(&self, state: &mut AxisState<S, N>, input: FeedbackInput<S>, base: S) {
         self.feedback.take_over(&mut state.feedback, input.error);
+        if !self.learns {
+            state.learning = LearningState::default();
+        }
         // The output under the new settings, computed on a copy, decides the offset.
         let mut trial = state.feedback.clone();
         let terms = self.feed_back(&mut trial, input, base);
@@ -1051,9 +1124,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         }
     }
 
-    /// Shows an axis whose outputs are off.
+    /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick: what was learnt under others
+    /// is forgotten.
     #[inline(always)]
-    pub(crate) fn output_zero(&self, state: &mut AxisState<S, N>) {
+    pub(crate) fn output_zero(&self, state: &mut AxisState<S, N>, changed: bool) {
+        if changed {
+            state.learning = LearningState::default();
+        }
         let measured = state.encoder.count();
         state.generator.hold();
         state.injected = S::ZERO;

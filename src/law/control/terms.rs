@@ -22,6 +22,15 @@ pub struct FeedbackState<S: Scalar> {
     pub(super) last_error: S,
 }
 
+impl<S: Scalar> FeedbackState<S> {
+    /// Takes a voltage from the integral that a feedforward now gives, V.
+    pub(crate) fn unload(&mut self, voltage: S) {
+        if voltage != S::ZERO {
+            self.integral = (S::total(self.integral) - voltage).into_sum();
+        }
+    }
+}
+
 /// Outputs of a law, term by term, V.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FeedbackTerms<S> {

@@ -64,4 +64,8 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("feedforward.preview_s", "s",
         at(0.0), times(MAX_PREVIEW_TICKS as f64, "the control period", period_s), 0.0,
         "Look-ahead of the feedforward over the feedback's reference: the plant's delay."),
+    number("feedforward.learning.memory_s", "s", at(1.0), at(100.0), 7.0,
+        "Time constant with which learning of the friction's scale forgets; left out with its part, nothing is learnt."),
+    number("feedforward.learning.vibration_mm_s", "mm/s", at(0.1), at(1000.0), 2.0,
+        "Amplitude of the axis' vibration between 40 and 150 Hz, as a velocity, that halves the feedforward of all friction but the viscous."),
 ];

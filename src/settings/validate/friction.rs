@@ -2,8 +2,10 @@
 //! the kind of feedforward has its model.
 
 use super::Place;
+use crate::law::control::feedback::LawKind;
 use crate::law::feedforward::FeedforwardKind;
 use crate::law::friction::stribeck::StaticFriction;
+use crate::law::learning::MAX_DELAY_TICKS;
 use crate::settings::axis::AxisSettings;
 use crate::settings::error::{Reason, SettingsError};
 
@@ -35,7 +37,26 @@ impl AxisSettings {
             "friction.sliding.negative.curve.exponent",
         )?;
         self.validate_gms(at, period_s, room)?;
-        self.validate_bristles(at, period_s)
+        self.validate_bristles(at, period_s)?;
+        self.validate_learning(at, period_s)
+    }
+
+    /// Learning needs a plant that its model has room for, and a law that is a PID at small errors.
+    fn validate_learning(&self, at: Place, period_s: f64) -> Result<(), SettingsError> {
+        if self.feedforward.learning.is_none() {
+            return Ok(());
+        }
+        let Some(plant) = &self.plant else {
+            return at.refuse("plant", f64::NAN, Reason::Missing);
+        };
+        let longest_s = MAX_DELAY_TICKS as f64 * period_s;
+        at.within("plant.delay_s", plant.delay_s, 0.0, longest_s)?;
+        match self.feedback.law {
+            LawKind::Pd | LawKind::Pid | LawKind::NPid => Ok(()),
+            LawKind::Scheduled | LawKind::Cascade | LawKind::SlidingMode | LawKind::Nctf => {
+                at.refuse("feedforward.learning", f64::NAN, Reason::NeedsPid)
+            }
+        }
     }
 
     fn validate_gms(&self, at: Place, period_s: f64, room: usize) -> Result<(), SettingsError> {

@@ -17,6 +17,7 @@ mod trial;
 
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
+use quadrant::learning::LearningSettings;
 use quadrant::safety::Fault;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::experiment::configuration::Configuration;
@@ -77,22 +78,29 @@ impl RobustnessOutcome {
     }
 }
 
-/// The usual competitors: PID and N-PID, each without feedforward and with the combined one.
+/// The usual competitors: PID and N-PID, each without feedforward, with the combined one, and with one that learns.
 pub fn usual_competitors(stage: &StageSettings) -> Vec<(String, StageSettings)> {
-    [LawKind::Pid, LawKind::NPid]
-        .into_iter()
-        .flat_map(|controller| {
-            [FeedforwardKind::None, FeedforwardKind::Combined].map(|feedforward| Configuration {
+    let mut all = Vec::new();
+    for controller in [LawKind::Pid, LawKind::NPid] {
+        for (feedforward, learning) in [
+            (FeedforwardKind::None, None),
+            (FeedforwardKind::Combined, None),
+            (FeedforwardKind::Combined, Some(LearningSettings::default())),
+        ] {
+            let configuration = Configuration {
                 controller,
                 feedforward,
-            })
-        })
-        .map(|configuration| {
+            };
             let mut settings = stage.clone();
             configuration.apply(&mut settings);
-            (configuration.name(), settings)
-        })
-        .collect()
+            let learns = if learning.is_some() { ", learning" } else { "" };
+            for axis in &mut settings.axes {
+                axis.feedforward.learning = learning;
+            }
+            all.push((format!("{}{learns}", configuration.name()), settings));
+        }
+    }
+    all
 }
 
 /// The competitor's law on a machine that was commissioned as `found`: gains and models are the machine's; which feedforward
@@ -100,6 +108,7 @@ pub fn usual_competitors(stage: &StageSettings) -> Vec<(String, StageSettings)> 
 fn transferred(competitor: &AxisSettings, found: &AxisSettings) -> AxisSettings {
     let mut settings = found.clone();
     settings.feedforward.kind = competitor.feedforward.kind;
+    settings.feedforward.learning = competitor.feedforward.learning;
     settings.feedback.law = competitor.feedback.law;
     settings
 }

@@ -138,6 +138,16 @@ fn changed_axes(
             axis().with_friction(0.7),
         ),
         sine(
+            "friction x 2",
+            "all friction x 2",
+            axis().with_friction(2.0),
+        ),
+        sine(
+            "friction x 0.5",
+            "all friction x 0.5",
+            axis().with_friction(0.5),
+        ),
+        sine(
             "friction along the travel",
             "friction +-20 % over 40 mm",
             axis().with_imperfection(|it| {

@@ -41,6 +41,8 @@ pub(super) const FEED_MM_S: f64 = 2.0;
 const CYCLES: f64 = 2.25;
 const SCORED_CYCLES: usize = 2;
 const LEAD_S: f64 = 0.5;
+/// Cycles before, in which a law that learns has time to: five reversals.
+pub(super) const LEARNING_CYCLES: f64 = 2.5;
 /// Time from the enabling to the start of a hold, s: the bumpless transfer has faded.
 const SETTLING_S: f64 = 0.3;
 
@@ -54,12 +56,12 @@ impl Task {
         }
     }
 
-    fn motion(self) -> MotionSettings {
+    fn motion(self, cycles: f64) -> MotionSettings {
         match self {
             Self::Sine => MotionSettings::Harmonic(HarmonicSettings::with_velocity(
                 AMPLITUDE_MM,
                 SINE_MM_S,
-                CYCLES,
+                cycles,
                 LEAD_S,
             )),
             Self::SlowFeed => MotionSettings::PointToPoint(PointToPointSettings {
@@ -73,22 +75,22 @@ impl Task {
     }
 
     /// Time after which it must have ended, from the first tick, s: enabling and settling take less than one.
-    fn longest_s(self) -> f64 {
+    fn longest_s(self, cycles: f64) -> f64 {
         let task = match self {
-            Self::Sine => CYCLES * TAU * AMPLITUDE_MM / SINE_MM_S + 2.0 * LEAD_S,
+            Self::Sine => cycles * TAU * AMPLITUDE_MM / SINE_MM_S + 2.0 * LEAD_S,
             Self::SlowFeed => FEED_MM / FEED_MM_S,
             Self::Hold { seconds, .. } => seconds,
         };
         task + 2.0
     }
 
-    fn score(self, trace: &AxisTrace, rate_hz: f64) -> (Score, AxisTrace) {
+    fn score(self, trace: &AxisTrace, rate_hz: f64, cycles: f64) -> (Score, AxisTrace) {
         let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
         match self {
             Self::Sine => {
                 let cycle_s = TAU * AMPLITUDE_MM / SINE_MM_S;
                 let cycle = samples(cycle_s);
-                let end = samples(LEAD_S) + samples(CYCLES * cycle_s);
+                let end = samples(LEAD_S) + samples(cycles * cycle_s);
                 let scored = trace.slice(end - SCORED_CYCLES * cycle..end);
                 (
                     score(&scored.reference_mm, &scored.error_mm, cycle),
@@ -157,6 +159,10 @@ impl Trial<'_> {
     pub(super) fn run(&self) -> Result<Ended, Stopped> {
         // The idle axes are like it, so that none waits for another.
         let [axis, ..] = &self.stage.axes;
+        let cycles = match axis.feedforward.learning {
+            Some(_) => LEARNING_CYCLES + CYCLES,
+            None => CYCLES,
+        };
         let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job {
             stage: StageSettings {
                 axes: [axis.clone(), axis.clone(), axis.clone()],
@@ -164,7 +170,7 @@ impl Trial<'_> {
             },
             plan: PlanSettings {
                 motions: [
-                    self.task.motion(),
+                    self.task.motion(cycles),
                     MotionSettings::Hold,
                     MotionSettings::Hold,
                 ],
@@ -175,7 +181,7 @@ impl Trial<'_> {
         let resolution_mm = self.stage.axes[0].encoder.resolution_mm;
         let mut plant = SimulatedAxis::new(self.truth.clone(), rate_hz, self.seed);
         let mut operator = Operator::runs_the_plan();
-        let most_ticks = (self.task.longest_s() * rate_hz) as usize;
+        let most_ticks = (self.task.longest_s(cycles) * rate_hz) as usize;
         let mut trace = AxisTrace::default();
         let mut enabled_ticks = 0.0;
         for tick in 0..most_ticks {
@@ -202,7 +208,7 @@ impl Trial<'_> {
                 let seen = state.axes()[0].telemetry();
                 trace.push(seen, resolution_mm, plant.position_mm());
             } else if !trace.error_mm.is_empty() {
-                let (score, shown) = self.task.score(&trace, rate_hz);
+                let (score, shown) = self.task.score(&trace, rate_hz, cycles);
                 return Ok(Ended {
                     score: Ok(score),
                     trace: Some(shown),

@@ -2,6 +2,7 @@
 
 mod chapter5;
 mod command;
+mod cuts;
 mod friction_models;
 mod laws;
 mod random_axes;

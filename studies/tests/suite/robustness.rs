@@ -94,6 +94,27 @@ fn changes_are_counted_from_the_same_law_on_the_same_task() {
 }
 
 #[test]
+fn learning_takes_back_what_a_change_of_friction_and_a_cut_cost() {
+    let names = ["nominal", "friction +50 %", "friction x 0.5", "cutting"];
+    let outcomes = run(&request(&names, 1, 1));
+    let of = |scenario: &str, law: &str| largest_um(&outcomes, scenario, law);
+    for law in ["PID", "N-PID"] {
+        let (fixed, learning) = (
+            format!("{law} + static + GMS"),
+            format!("{law} + static + GMS, learning"),
+        );
+        assert!(of("nominal", &learning) < of("nominal", &fixed) + 1.5);
+        for scenario in ["friction +50 %", "friction x 0.5"] {
+            assert!(of(scenario, &learning) < 9.0, "{scenario}");
+            assert!(of(scenario, &fixed) > 50.0, "{scenario}");
+        }
+        // Fixed feedforward doubles the error of the law alone; learning halves it.
+        assert!(of("cutting", &fixed) > 1.5 * of("cutting", law));
+        assert!(of("cutting", &learning) < 0.75 * of("cutting", law));
+    }
+}
+
+#[test]
 fn a_stage_that_switches_itself_off_is_a_result() {
     let mut request = request(&["hold"], 1, 2);
     request.scenarios[0].load = Load::Sine {

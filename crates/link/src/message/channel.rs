@@ -54,6 +54,18 @@ pub enum AxisSignal {
     CodeSum = 16,
     /// Height of the last quadrant glitch: the error's peak after a reversal over its mean before it, um.
     Glitch = 17,
+    /// Scale of the friction feedforward that was learnt; 1 is the commissioned one.
+    FrictionScale = 18,
+    /// What keeps the scale from being learnt: 0 learning is off, 1 nothing, 2 at rest, 3 a jog, homing, stop or injection, 4 the
+    /// output's limit, 5 that or new settings a moment ago, 6 the scale is faded out.
+    Learning = 19,
+    /// Share of the friction's feedforward that vibration leaves.
+    VibrationGate = 20,
+    /// Sum of the error's squares, the last 2 s counting; its unit is learning's own.
+    ErrorSquares = 21,
+    /// The same of the error that there would be without feedforward, in the same unit.
+    #[strum(serialize = "error-squares-off")]
+    ErrorSquaresOff = 22,
 }
 
 /// A signal of the stage. The numbers are stable.
@@ -146,7 +158,8 @@ impl Channel {
                 | AxisSignal::Position
                 | AxisSignal::Code
                 | AxisSignal::LimitedBy
-                | AxisSignal::CodeSum,
+                | AxisSignal::CodeSum
+                | AxisSignal::Learning,
             ) => WordKind::Integer,
             Self::Stage(StageSignal::CircleDeviation | StageSignal::CircleAngle)
             | Self::Axis(..) => WordKind::Float,
@@ -161,7 +174,17 @@ impl Channel {
             Self::Stage(StageSignal::CircleDeviation) | Self::Axis(_, AxisSignal::Glitch) => "um",
             Self::Stage(StageSignal::CircleAngle) => "deg",
             Self::Stage(_)
-            | Self::Axis(_, AxisSignal::Code | AxisSignal::LimitedBy | AxisSignal::CodeSum) => "",
+            | Self::Axis(
+                _,
+                AxisSignal::Code
+                | AxisSignal::LimitedBy
+                | AxisSignal::CodeSum
+                | AxisSignal::FrictionScale
+                | AxisSignal::Learning
+                | AxisSignal::VibrationGate
+                | AxisSignal::ErrorSquares
+                | AxisSignal::ErrorSquaresOff,
+            ) => "",
             Self::Axis(_, AxisSignal::Reference) => "count/256",
             Self::Axis(_, AxisSignal::Position) => "count",
             Self::Axis(_, AxisSignal::Error) => "mm",

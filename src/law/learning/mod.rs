@@ -1,0 +1,407 @@
+//! Learning of the friction feedforward's scale while the axis works.
+//!
+//! Let `phi` be the friction that the feedforward's models give, V, and `theta` the scale that it is put out with. The nominal
+//! closed loop runs beside the axis on `phi`: its position `psi` is, to first order, the error that a unit
+//! of `theta` takes away. So
+//!
+//! - `e0 = e + theta psi` is the error that the axis would have had without feedforward, known at every moment, and
+//! - the sum over the past of `(e0 - theta psi)^2` has its least where `theta` is `sum(e0 psi) / sum(psi^2)`.
+//!
+//! The sums are forgotten exponentially. `theta` goes down the slope of the sum, `sum(e0 psi) - theta sum(psi^2)`, at a limited
+//! rate: no division, and it moves the faster the more is known. A much weaker pull leads to the commissioned value, 1. It
+//! stays within 0 to [`MOST_SCALE`]; `docs/learning.md` shows why the axis stays bounded with it.
+//!
+//! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
+//! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
+
+mod closed_loop;
+mod vibration;
+
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
+
+pub use self::closed_loop::MAX_DELAY_TICKS;
+use self::closed_loop::{ClosedLoop, ClosedLoopState, INTERVAL_TICKS};
+use self::vibration::{Gate, GateState};
+use crate::law::control::pid::PidGains;
+use crate::law::control::plant_model::PlantModel;
+use crate::law::feedforward::FeedforwardTerms;
+use crate::law::scalar::{Quantity, Scalar};
+
+/// Largest scale.
+pub const MOST_SCALE: f64 = 2.5;
+
+/// Learning as a person sets it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct LearningSettings {
+    /// Time constant with which the past is forgotten, s.
+    pub memory_s: f64,
+    /// Amplitude of the vibration's velocity that halves the friction before sliding, mm/s.
+    pub vibration_mm_s: f64,
+}
+
+/// The loop that is learnt on. Settings time only.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearningLoop<'a> {
+    /// The axis' plant.
+    pub plant: &'a PlantModel,
+    /// The linear part of its PID.
+    pub pid: &'a PidGains,
+    /// Its mean breakaway level, V.
+    pub breakaway_v: f64,
+    /// Length of an encoder count, mm.
+    pub resolution_mm: f64,
+}
+
+/// Steps of the model in a block: the scale moves once a block.
+const BLOCK_STEPS: u8 = 32;
+
+/// Unit of errors, as a multiple of breakaway over Kp: half of what a reversal without feedforward leaves.
+const UNIT: f64 = 4.0;
+
+/// Largest `sum(psi^2)` times time, in units: what was learnt before is halved beyond it.
+const MOST_INFORMATION: f64 = 0.02;
+
+/// Rate of the scale down the slope, 1/s, per unit of information.
+const RATE: f64 = 300.0;
+
+/// Time constant of the pull to 1, s.
+const PULL_S: f64 = 600.0;
+
+/// Largest change of the scale by learning, 1/s.
+const MOST_PER_S: f64 = 0.5;
+
+/// Change of the scale by the guard, 1/s.
+const FADE_PER_S: f64 = 1.0;
+
+/// Window of the guard: time constant of its mean squares, s.
+const GUARD_S: f64 = 2.0;
+
+/// What the error may be larger than without feedforward: as a share of its mean square, and in counts.
+const GUARD_SHARE: f64 = 0.05;
+const GUARD_COUNTS: f64 = 0.5;
+
+/// Time for which nothing is learnt after the model and the axis may have parted, s.
+const SETTLING_S: f64 = 1.0;
+
+/// What keeps the scale from being learnt in a tick.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[repr(u8)]
+pub enum LearningStatus {
+    /// The settings have no learning.
+    #[default]
+    Off,
+    /// Nothing: the scale is learnt.
+    Learning,
+    /// The reference stands.
+    AtRest,
+    /// The motion is none of the work's: a jog, homing, a controlled stop, an injection.
+    OtherMotion,
+    /// The output is at its limit.
+    Saturated,
+    /// The settings were exchanged, or the output was at its limit, a moment ago.
+    Settling,
+    /// The axis errs more than it would without feedforward: the scale is faded out.
+    Fading,
+}
+
+/// Learning ready for the tick.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Learning<S: Scalar> {
+    on: bool,
+    settling_steps: u16,
+    closed_loop: ClosedLoop<S>,
+    gate: Gate<S>,
+    /// Share of a change of the feedforward that the integral loses: none without an integral, which would never get it back.
+    unloaded: S::Gain,
+    /// An error in units.
+    per_unit: S::Gain,
+    one: S,
+    most: S,
+    estimate: Estimate<S>,
+}
+
+/// The sums and what moves the scale, ready for the tick.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Estimate<S: Scalar> {
+    /// Length of a step, s.
+    step: S::Gain,
+    half: S::Gain,
+    /// What a block keeps of the sums that are learnt from, and of the guard's.
+    keep: S,
+    guard_keep: S,
+    most_information: S,
+    rate: S::Gain,
+    pull: S::Gain,
+    most_change: S,
+    fade: S,
+    guard_share: S::Gain,
+    guard_least: S,
+}
+
+/// The memory of learning.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct LearningState<S: Scalar> {
+    /// The scale that the friction feedforward is put out with, less 1.
+    deviation: S,
+    /// The friction that the models gave in the last tick, and of it what the gate acts on, before the gate, V.
+    friction: S,
+    presliding: S,
+    closed_loop: ClosedLoopState<S>,
+    gate: GateState<S>,
+    status: LearningStatus,
+    /// The output was at its limit since the last step.
+    saturated: bool,
+    /// Steps in the block, and steps until learning begins again.
+    steps: u8,
+    settling: u16,
+    /// Sums of the block, and the forgetting ones.
+    block: Sums<S>,
+    sums: Sums<S>,
+}
+
+/// Sums of products, in units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums<S> {
+    /// `psi^2`.
+    information: S,
+    /// `e0 psi`.
+    correlation: S,
+    /// `e^2`.
+    with: S,
+    /// `e0^2`.
+    without: S,
+}
+
+/// The axis as a step of learning sees it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct LearningInput<S> {
+    /// Tracking error, mm.
+    pub error: S,
+    /// What keeps the axis from learning at present; [`LearningStatus::Learning`] for nothing.
+    pub status: LearningStatus,
+}
+
+impl<S: Scalar> Learning<S> {
+    /// Learning on an axis, for a control period. Settings time only.
+    pub fn build(settings: &LearningSettings, axis: &LearningLoop, period_s: f64) -> Self {
+        let step_s = period_s * f64::from(INTERVAL_TICKS);
+        let block_s = step_s * f64::from(BLOCK_STEPS);
+        let unit_mm = UNIT * axis.breakaway_v / axis.pid.kp_v_per_mm.max(1e-9);
+        let count = GUARD_COUNTS * axis.resolution_mm / unit_mm;
+        let number = |value| S::quantise(value, Quantity::Multiplier);
+        let share = |value| S::gain(value, Quantity::Multiplier, Quantity::Multiplier);
+        let fraction = |value| S::quantise(value, Quantity::Fraction);
+        Self {
+            on: true,
+            settling_steps: (SETTLING_S / step_s).min(f64::from(u16::MAX)) as u16,
+            closed_loop: ClosedLoop::build(axis.plant, axis.pid, period_s),
+            gate: Gate::build(settings.vibration_mm_s, axis.resolution_mm, period_s),
+            unloaded: S::gain(
+                if axis.pid.ki_v_per_mm_s > 0.0 {
+                    1.0
+                } else {
+                    0.0
+                },
+                Quantity::Voltage,
+                Quantity::Voltage,
+            ),
+            per_unit: S::gain(1.0 / unit_mm, Quantity::Length, Quantity::Multiplier),
+            one: number(1.0),
+            most: number(MOST_SCALE),
+            estimate: Estimate {
+                step: share(step_s),
+                half: share(0.5),
+                keep: fraction(libm::exp(-block_s / settings.memory_s)),
+                guard_keep: fraction(libm::exp(-block_s / GUARD_S)),
+                most_information: number(MOST_INFORMATION),
+                rate: share(RATE * block_s),
+                pull: share(1.0 / (RATE * PULL_S)),
+                most_change: number(MOST_PER_S * block_s),
+                fade: number(FADE_PER_S * block_s),
+                guard_share: share(GUARD_SHARE),
+                guard_least: number(GUARD_S * count * count),
+            },
+        }
+    }
+
+    /// No learning: the feedforward is put out as it is.
+    pub fn off() -> Self {
+        Self::default()
+    }
+
+    /// True if there is learning.
+    #[inline(always)]
+    pub const fn is_on(&self) -> bool {
+        self.on
+    }
+
+    /// A memory that begins at the commissioned value. Nothing is learnt from what the axis did before.
+    pub(crate) fn start(&self) -> LearningState<S> {
+        LearningState {
+            settling: self.settling_steps,
+            status: LearningStatus::Settling,
+            ..LearningState::default()
+        }
+    }
+
+    /// Goes on with what was learnt on an axis that is enabled: it is at rest, and so is the model.
+    pub(crate) fn resume(&self, state: &LearningState<S>) -> LearningState<S> {
+        LearningState {
+            deviation: state.deviation,
+            sums: state.sums,
+            status: state.status,
+            ..LearningState::default()
+        }
+    }
+
+    /// Passes the friction of this tick through the gate, and scales it.
+    #[inline(always)]
+    pub(crate) fn apply(&self, state: &mut LearningState<S>, terms: &mut FeedforwardTerms<S>) {
+        state.presliding = terms.level + terms.gms;
+        terms.gate_friction(self.one + state.gate.deviation());
+        state.friction = terms.friction();
+        terms.scale_friction(self.scale(state));
+    }
+
+    /// The scale of the friction feedforward, a [`Quantity::Multiplier`].
+    #[inline(always)]
+    fn scale(&self, state: &LearningState<S>) -> S {
+        self.one + state.deviation
+    }
+
+    /// One step, [`INTERVAL_TICKS`] control periods long; returns the voltage by which the feedforward grew with a change of
+    /// the scale, which the integral is to lose: what it has taken up of the friction is the feedforward's now. `gain` is the nonlinear gain of
+    /// the feedback at an error, if it has one.
+    #[inline(always)]
+    pub(crate) fn step(
+        &self,
+        state: &mut LearningState<S>,
+        input: LearningInput<S>,
+        gain: impl FnOnce(S) -> Option<S>,
+    ) -> S {
+        let error = input.error;
+        let opened = self.gate.step(&mut state.gate, error);
+        let ungated = state
+            .presliding
+            .times(opened, Quantity::Multiplier)
+            .scale(self.unloaded);
+        ClosedLoop::unload(&mut state.closed_loop, ungated);
+        let mut without = error;
+        let scale = self.scale(state);
+        let gained = ungated.times(scale, Quantity::Multiplier);
+        let missing = self
+            .closed_loop
+            .step(&mut state.closed_loop, state.friction, |missing| {
+                without = error + missing.times(scale, Quantity::Multiplier);
+                // Between the two errors, the gain at the larger one counts for most of the way.
+                let (with, without) = (error.magnitude(), without.magnitude());
+                gain(if with > without { with } else { without }).unwrap_or(self.one)
+            });
+        let mut status = input.status;
+        if core::mem::take(&mut state.saturated) {
+            state.settling = self.settling_steps;
+            status = LearningStatus::Saturated;
+        }
+        if let Some(left) = state.settling.checked_sub(1) {
+            state.settling = left;
+            if status == LearningStatus::Learning {
+                status = LearningStatus::Settling;
+            }
+        }
+        if status != LearningStatus::Learning {
+            state.status = status;
+            return gained;
+        }
+        let unit = |length: S| length.scale(self.per_unit).within(self.one);
+        let (psi, with, without) = (unit(missing), unit(error), unit(without));
+        let product = |one: S, other: S| one.times(other, Quantity::Multiplier);
+        let block = &mut state.block;
+        block.information = block.information + product(psi, psi);
+        block.correlation = block.correlation + product(without, psi);
+        block.with = block.with + product(with, with);
+        block.without = block.without + product(without, without);
+        state.steps += 1;
+        if state.steps < BLOCK_STEPS {
+            return gained;
+        }
+        let before = state.deviation;
+        self.end_block(state);
+        let change = state.deviation - before;
+        let gained_by_scale = state.friction.times(change, Quantity::Multiplier);
+        gained + gained_by_scale.scale(self.unloaded)
+    }
+
+    /// Takes a block into the sums, and moves the scale.
+    #[inline(never)]
+    fn end_block(&self, state: &mut LearningState<S>) {
+        let estimate = &self.estimate;
+        let scale = self.scale(state);
+        let block = core::mem::take(&mut state.block);
+        state.steps = 0;
+        let sums = &mut state.sums;
+        let add = |sum: S, keep: S, block: S| {
+            sum.times(keep, Quantity::Fraction) + block.scale(estimate.step)
+        };
+        sums.with = add(sums.with, estimate.guard_keep, block.with);
+        sums.without = add(sums.without, estimate.guard_keep, block.without);
+        let allowed = sums.without + sums.without.scale(estimate.guard_share);
+        let worse = sums.with > allowed + estimate.guard_least;
+        let keep = if worse {
+            estimate.guard_keep
+        } else {
+            estimate.keep
+        };
+        sums.information = add(sums.information, keep, block.information);
+        sums.correlation = add(sums.correlation, keep, block.correlation);
+        if sums.information > estimate.most_information {
+            sums.information = sums.information.scale(estimate.half);
+            sums.correlation = sums.correlation.scale(estimate.half);
+        }
+        let change = if worse {
+            state.status = LearningStatus::Fading;
+            -estimate.fade
+        } else {
+            state.status = LearningStatus::Learning;
+            let slope = sums.correlation
+                - sums.information.times(scale, Quantity::Multiplier)
+                - state.deviation.scale(estimate.pull);
+            slope.scale(estimate.rate).within(estimate.most_change)
+        };
+        state.deviation = (scale + change).limit(S::ZERO, self.most) - self.one;
+    }
+}
+
+impl<S: Scalar> LearningState<S> {
+    /// The scale of the friction feedforward; 1 is the commissioned one. For telemetry.
+    pub fn scale(&self) -> f32 {
+        1.0 + self.deviation.to_f32(Quantity::Multiplier)
+    }
+
+    /// What keeps the scale from being learnt, or that it is.
+    pub const fn status(&self) -> LearningStatus {
+        self.status
+    }
+
+    /// Takes note that the output is at its limit.
+    #[inline(always)]
+    pub(crate) fn saturate(&mut self) {
+        self.saturated = true;
+    }
+
+    /// The share of the friction before sliding that the vibration leaves, 0 to 1. For telemetry.
+    pub fn gate(&self) -> f32 {
+        1.0 + self.gate.deviation().to_f32(Quantity::Multiplier)
+    }
+
+    /// Sum of the error's squares, the last seconds counting, in learning's own unit. For telemetry.
+    pub fn error_squares(&self) -> f32 {
+        self.sums.with.to_f32(Quantity::Multiplier)
+    }
+
+    /// The same of the error that there would be without feedforward.
+    pub fn error_squares_off(&self) -> f32 {
+        self.sums.without.to_f32(Quantity::Multiplier)
+    }
+}

@@ -1,0 +1,18 @@
+//! Learning under random cuts.
+
+use quadrant_studies::cuts::judge;
+use rayon::prelude::*;
+
+#[test]
+fn under_random_cuts_learning_is_hardly_ever_worse_than_no_feedforward_and_far_better_on_the_whole()
+{
+    let lines: Vec<_> = (1..=20).into_par_iter().map(judge).collect();
+    let mut worse = 0.0;
+    for line in &lines {
+        println!("{line:?}");
+        assert!(line.worst_ratio.is_finite(), "{line:?}");
+        assert!(line.learning_um < line.off_um, "{line:?}");
+        worse += line.worse_percent / lines.len() as f64;
+    }
+    assert!(worse < 5.0, "{worse} % of the windows");
+}

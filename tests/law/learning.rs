@@ -1,0 +1,308 @@
+//! Learning of the friction feedforward's scale: it finds what the axis has, does no harm, and is still where nothing is
+//! to be learnt.
+
+use proptest::prelude::*;
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::control::feedback::LawKind;
+use quadrant::feedforward::FeedforwardKind;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
+use quadrant::scalar::{Fixed, Quantity, Scalar};
+use quadrant::settings::{PlanSettings, Reason, StageSettings};
+
+use crate::common::{Rig, repeatable, sine_on_x, x_alone};
+use crate::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
+
+/// The x axis alone, with a PID that integrates as a commissioned one does.
+fn fixed() -> StageSettings {
+    x_alone(|x| {
+        x.feedback.law = LawKind::Pid;
+        x.feedback.pid.ki_v_per_mm_s = 7.9;
+        // As the plant has it: no Stribeck effect.
+        for model in [
+            &mut x.friction.sliding.positive,
+            &mut x.friction.sliding.negative,
+        ] {
+            model.curve.coulomb_v = model.curve.breakaway_v;
+        }
+    })
+}
+
+/// The same, learning.
+fn learning() -> StageSettings {
+    let mut settings = fixed();
+    settings.axes[0].feedforward.learning = Some(LearningSettings::default());
+    settings
+}
+
+/// A stage whose x axis moves as its output makes it.
+struct Axis<S: Scalar> {
+    rig: Rig<S>,
+    plant: Plant,
+    encoder: Encoder,
+}
+
+impl<S: Scalar> Axis<S> {
+    /// On a slow sine, with so many times the friction that the settings know: the damping of its mass stays.
+    fn on_sine(settings: &StageSettings, friction: f64) -> Self {
+        Self::on(settings, friction, &sine_on_x(2.0, 5.0))
+    }
+
+    fn on(settings: &StageSettings, friction: f64, plan: &PlanSettings) -> Self {
+        let mut axis = Self {
+            rig: Rig::with_plant(settings, plan),
+            plant: Plant::new(&Truth { friction, ..MODEL }),
+            encoder: Encoder::new(Death::Healthy, 7),
+        };
+        axis.tick();
+        axis.rig.inputs.command = Some(Command::Enable);
+        axis.tick();
+        axis
+    }
+
+    fn command(&mut self, command: Command) {
+        self.rig.inputs.command = Some(command);
+        self.tick();
+    }
+
+    fn tick(&mut self) {
+        let count = self.encoder.read(self.plant.position_mm, None);
+        self.rig.inputs.readings[0].count = count as u32;
+        let outputs = self.rig.tick();
+        let [x, ..] = *outputs.codes;
+        self.plant.step(f64::from(x.0) / 32_767.0 * 10.0);
+    }
+
+    /// Runs for a time; returns the mean square of the error, mm^2.
+    fn run(&mut self, seconds: f64) -> f64 {
+        let ticks = (seconds / PERIOD_S) as usize;
+        let mut sum = 0.0;
+        for _ in 0..ticks {
+            self.tick();
+            let error = self.seen().error.to_f64(Quantity::Length);
+            sum += error * error;
+        }
+        sum / ticks as f64
+    }
+
+    fn seen(&self) -> quadrant::telemetry::AxisTelemetry<S> {
+        *self.rig.state.axes()[0].telemetry()
+    }
+
+    fn scale(&self) -> f32 {
+        self.rig.state.axes()[0].learning().scale()
+    }
+
+    fn status(&self) -> LearningStatus {
+        self.rig.state.axes()[0].learning().status()
+    }
+}
+
+fn learnt<S: Scalar>(friction: f64) -> f32 {
+    let mut axis = Axis::<S>::on_sine(&learning(), friction);
+    axis.command(Command::Run);
+    axis.run(10.0);
+    axis.scale()
+}
+
+#[test]
+fn the_friction_that_the_axis_has_is_learnt_in_every_number_type() {
+    for (friction, scale) in [
+        (0.5, learnt::<f32>(0.5)),
+        (1.0, learnt::<f32>(1.0)),
+        (1.5, learnt::<f32>(1.5)),
+        (1.5, learnt::<Fixed>(1.5)),
+        (1.5, learnt::<f64>(1.5)),
+        (2.0, learnt::<f32>(2.0)),
+    ] {
+        // The drag of its mass, a tenth of what is scaled, does not change.
+        let error = f64::from(scale) - friction;
+        assert!(error.abs() < 0.1, "{scale} for friction x {friction}");
+    }
+}
+
+#[test]
+fn what_was_learnt_takes_the_error_away() {
+    let error = |settings: &StageSettings| {
+        let mut axis = Axis::<f32>::on_sine(settings, 1.5);
+        axis.command(Command::Run);
+        axis.run(5.0);
+        axis.run(3.0)
+    };
+    let (with, without) = (error(&learning()), error(&fixed()));
+    assert!(with < 0.05 * without, "{with} mm^2 of {without} mm^2");
+}
+
+#[test]
+fn the_error_without_feedforward_is_known_with_it() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 1.2);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    let with = axis.run(8.0);
+    let learning = axis.rig.state.axes()[0].learning();
+    let said = f64::from(learning.error_squares() / learning.error_squares_off()).sqrt();
+    let mut off = fixed();
+    off.axes[0].feedforward.kind = FeedforwardKind::None;
+    let mut axis = Axis::<f32>::on_sine(&off, 1.2);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    let measured = (with / axis.run(8.0)).sqrt();
+    assert!(
+        (said / measured - 1.0).abs() < 0.25,
+        "{said} is said, {measured} measured"
+    );
+}
+
+#[test]
+fn a_feedforward_that_harms_is_faded_out_and_it_is_said() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 0.05);
+    axis.command(Command::Run);
+    let mut fading = false;
+    for _ in 0..30_000 {
+        axis.tick();
+        fading |= axis.status() == LearningStatus::Fading;
+    }
+    assert!(fading);
+    assert!(axis.scale() < 0.15, "{}", axis.scale());
+}
+
+#[test]
+fn nothing_is_learnt_at_rest_or_from_a_jog() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
+    axis.run(1.0);
+    assert_eq!(axis.status(), LearningStatus::AtRest);
+    let jog = learning().jog_at(AxisName::X, 5.0).expect("slow enough");
+    axis.command(Command::Jog(AxisName::X, jog));
+    axis.run(1.0);
+    assert_eq!(axis.status(), LearningStatus::OtherMotion);
+    assert_eq!(axis.scale(), 1.0);
+}
+
+#[test]
+fn nothing_is_learnt_while_the_output_is_at_its_limit_and_just_after() {
+    let mut settings = learning();
+    settings.axes[0].amplifier.output_limit_v = 2.5;
+    let mut axis = Axis::<f32>::on(&settings, 1.0, &sine_on_x(5.0, 20.0));
+    axis.command(Command::Run);
+    axis.run(0.1);
+    let mut seen = [false; 2];
+    for tick in 0..9_000 {
+        if tick == 50 {
+            // The encoder shows 50 um too much for a tick: the derivative goes to the limit.
+            let count = &mut axis.rig.inputs.readings[0].count;
+            *count = count.wrapping_add(100);
+            axis.rig.tick();
+        }
+        axis.tick();
+        seen[0] |= axis.status() == LearningStatus::Saturated;
+        seen[1] |= axis.status() == LearningStatus::Settling;
+        if seen[0] {
+            assert_ne!(axis.status(), LearningStatus::Learning);
+        }
+    }
+    assert_eq!(seen, [true; 2], "{:?}", axis.rig.state.safety());
+    assert!((axis.scale() - 1.0).abs() < 0.05, "{}", axis.scale());
+}
+
+#[test]
+fn what_was_learnt_outlives_disabling_and_ends_with_other_settings() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    let before = axis.scale();
+    assert!(before > 1.4, "{before}");
+    axis.command(Command::Disable);
+    axis.run(0.5);
+    axis.command(Command::Enable);
+    axis.run(0.5);
+    assert_eq!(axis.scale(), before);
+    // In motion, and with the outputs off.
+    axis.rig.inputs.settings_changed[AxisName::X] = true;
+    axis.tick();
+    axis.run(PERIOD_S * 8.0);
+    assert_eq!(axis.scale(), 1.0);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    assert!(axis.scale() > 1.4);
+    axis.command(Command::Disable);
+    axis.rig.inputs.settings_changed[AxisName::X] = true;
+    axis.tick();
+    assert_eq!(axis.scale(), 1.0);
+}
+
+#[test]
+fn without_an_integral_nothing_is_taken_from_it() {
+    let mut settings = learning();
+    settings.axes[0].feedback.pid.ki_v_per_mm_s = 0.0;
+    let mut axis = Axis::<f32>::on_sine(&settings, 1.5);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    assert!((axis.scale() - 1.0).abs() > 0.1, "{}", axis.scale());
+    assert_eq!(axis.seen().feedback.integral, 0.0);
+}
+
+#[test]
+fn learning_needs_a_plant_with_a_dead_time_that_it_holds_and_a_pid() {
+    let refusal = |change: fn(&mut quadrant::settings::AxisSettings)| {
+        let mut settings = learning();
+        change(&mut settings.axes[0]);
+        let error = settings.validate(FIRMWARE_ELEMENTS).expect_err("refused");
+        (error.field, error.reason)
+    };
+    assert_eq!(refusal(|x| x.plant = None), ("plant", Reason::Missing));
+    let (field, reason) = refusal(|x| {
+        x.feedback.pid.kp_v_per_mm *= 0.1;
+        x.feedback.pid.kd_v_s_per_mm *= 0.1;
+        x.plant.as_mut().expect("by default").delay_s = (MAX_DELAY_TICKS + 1) as f64 * PERIOD_S;
+    });
+    assert_eq!(field, "plant.delay_s");
+    assert!(matches!(reason, Reason::OutOfRange { .. }), "{reason:?}");
+    assert_eq!(
+        refusal(|x| x.feedback.law = LawKind::Cascade),
+        ("feedforward.learning", Reason::NeedsPid)
+    );
+}
+
+/// Learning on an encoder that shows anything; the scale and the gate after each tick.
+fn hostile<S: Scalar>(steps: &[(i32, u16)]) -> Result<(), TestCaseError> {
+    let mut settings = learning();
+    for axis in &mut settings.axes {
+        axis.limits.following_error_mm = 20.0;
+        axis.limits.following_error_max_mm = 20.0;
+    }
+    let mut rig = Rig::<S>::with_plant(&settings, &sine_on_x(5.0, 20.0));
+    rig.start();
+    let mut count = 0i32;
+    for &(step, ticks) in steps {
+        for _ in 0..ticks {
+            count = count.wrapping_add(step);
+            rig.inputs.readings[0].count = count as u32;
+            rig.tick();
+            let state = &rig.state.axes()[0];
+            let (scale, gate) = (state.learning().scale(), state.learning().gate());
+            prop_assert!((0.0..=2.5).contains(&scale), "scale {scale}");
+            prop_assert!((-1e-3..=1.001).contains(&gate), "gate {gate}");
+            prop_assert!(state.telemetry().output_v().abs() <= 10.001);
+            prop_assert!(state.learning().error_squares().is_finite());
+            prop_assert!(state.learning().error_squares_off().is_finite());
+        }
+        // A fault ends it; the next step begins anew.
+        rig.command(Command::ResetFault);
+        rig.command(Command::Enable);
+        rig.command(Command::Run);
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(repeatable(64))]
+
+    #[test]
+    fn scale_and_gate_stay_within_their_bounds_whatever_the_encoder_shows(
+        steps in prop::collection::vec((-60i32..60, 1u16..3000), 1..12)
+    ) {
+        hostile::<f32>(&steps)?;
+        hostile::<Fixed>(&steps)?;
+    }
+}
