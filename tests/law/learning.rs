@@ -12,7 +12,7 @@ use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{PlanSettings, Reason, StageSettings};
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
-use crate::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
+use quadrant_fault_bench::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
 
 /// The x axis alone, with a PID that integrates as a commissioned one does.
 fn fixed() -> StageSettings {

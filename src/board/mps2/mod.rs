@@ -23,7 +23,6 @@ use quadrant::encoder::EncoderReading;
 use quadrant::hal::{self, ResetCause};
 use quadrant::safety;
 use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
 
 pub(crate) use self::flash::SettingsFlash;
 pub(crate) use self::serial::Serial;

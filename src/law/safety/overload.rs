@@ -50,7 +50,8 @@ impl Overload {
     pub fn step(&self, state: &mut OverloadState, word: i16) -> bool {
         let force = i64::from(i32::from(word) - self.offset);
         let sum = (state.0 + force * force).saturating_sub(self.continuous);
-        state.0 = sum.clamp(0, self.budget);
+        // Not `clamp`, which panics if its bounds are the wrong way round.
+        state.0 = sum.min(self.budget).max(0);
         sum <= self.budget
     }
 }
