@@ -43,12 +43,18 @@ const RUNS: [(&[&str], u32); 4] = [
     ),
 ];
 
+/// Waits until the page has drawn what is made by its script.
+const READY: &str = "new Promise((done) => { \
+    const look = () => document.querySelectorAll('#steps button').length === 6 ? done(true) : setTimeout(look, 20); \
+    look(); })";
+
 /// The built page, in a browser; `None`, with a message, where there is no browser and none is required.
 fn open(window: (u32, u32), is_dark: bool) -> Option<Browser> {
     let page = std::env::var_os(PAGE);
     let page = PathBuf::from(page.expect("the page: run cargo xtask web --check"));
     let mut browser = Browser::start()?;
     browser.open(&page, window, is_dark);
+    browser.evaluate(READY);
     Some(browser)
 }
 

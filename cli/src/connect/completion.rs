@@ -181,11 +181,11 @@ mod tests {
     #[test]
     fn axes_channels_and_options_are_completed() {
         assert_eq!(complete("home ").1, ["x", "y", "z"]);
-        assert_eq!(complete("record --channels x.err").1, ["x.error"]);
+        assert_eq!(complete("record --channels x.refe").1, ["x.reference"]);
         // Behind a comma the next of a list begins.
         assert_eq!(
-            complete("scope x.error,y.err"),
-            (14, vec!["y.error".to_owned()])
+            complete("scope x.error,y.refe"),
+            (14, vec!["y.reference".to_owned()])
         );
         assert_eq!(complete("move x 1 --v").1, ["--velocity"]);
     }

@@ -11,7 +11,7 @@ use quadrant::link::message::{
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 use quadrant::safety::FaultCode;
 use quadrant_sim::client::test_axis::ConnectedAxis;
-use quadrant_sim::client::{Client, ClientError};
+use quadrant_sim::client::{Client, ClientError, settings};
 use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
 use quadrant_sim::machine::{
@@ -103,9 +103,8 @@ fn a_jog_goes_on_while_its_host_waits_and_stops_when_it_is_silent() {
     assert!((after_mm - there_mm).abs() < 0.1, "{after_mm}");
 }
 
-#[test]
-fn a_move_needs_no_host() {
-    let mut client = enabled();
+/// Starts a move of 10 mm, which takes 2 s, and says nothing for 3 s; returns where the axis is then.
+fn left_alone(client: &mut Client) -> Status {
     let motion = MotionSettings::PointToPoint(PointToPointSettings {
         distance_mm: 10.0,
         max_velocity_mm_s: 5.0,
@@ -116,8 +115,24 @@ fn a_move_needs_no_host() {
     let plan = quadrant::settings::PlanSettings { motions };
     client.order(Body::SetPlan(plan.into())).unwrap();
     client.order(Body::Run).unwrap();
-    silence(&mut client, Duration::from_secs(3));
-    let status = client.status().unwrap();
+    silence(client, Duration::from_secs(3));
+    client.status().unwrap()
+}
+
+#[test]
+fn a_move_needs_its_host_unless_the_settings_say_otherwise() {
+    let mut client = enabled();
+    let status = left_alone(&mut client);
+    assert_eq!(status.state, MachineState::Fault);
+    assert_eq!(fault(&mut client), Some(FaultCode::LinkLost));
+    let stopped_mm = status.axes[0].position_mm;
+    assert!((2.0..5.0).contains(&stopped_mm), "{stopped_mm}");
+
+    let mut client = self::client();
+    settings::set(&mut client, "/operation/host_needed", "\"endless-motion\"").unwrap();
+    settings::apply(&mut client).unwrap();
+    client.order(Body::Enable).unwrap();
+    let status = left_alone(&mut client);
     assert_eq!(status.state, MachineState::Enabled);
     assert!((status.axes[0].position_mm - 10.0).abs() < 0.01);
 }
