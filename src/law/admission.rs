@@ -38,7 +38,7 @@ pub struct StageView {
     pub commissioned: bool,
     /// The holding brake is being released or applied.
     pub brake_moves: bool,
-    /// Who may enable the outputs.
+    /// The stations that may enable the outputs.
     pub enabled_by: EnabledBy,
     /// The outputs are kept off while flash is written, or until a restart.
     pub locked: bool,

@@ -6,11 +6,11 @@ use strum::{AsRefStr, EnumString, VariantNames};
 
 use crate::law::safety::{EnabledBy, HostNeeded, Reaction};
 
-/// Who may enable the stage, which motions need their host, and how it stops in an emergency.
+/// The stations that may enable the stage, the motions that need their host, and the reaction to the emergency stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields, default)]
 pub struct OperationSettings {
-    /// Who may enable the outputs.
+    /// The stations that may enable the outputs.
     #[tree(with = miniconf::leaf)]
     pub enabled_by: EnabledBy,
     /// Motions, of those that a host starts, that end when it falls silent.

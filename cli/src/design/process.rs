@@ -66,12 +66,13 @@ impl Model {
         let left = output.file(SETTINGS)?;
         if left.exists() {
             let file = SettingsFile::read(&left)?;
-            let last = file.provenance.last();
-            if last.is_some_and(|last| last.command.starts_with(DESIGN)) {
+            if let Some(last) = file.provenance.last()
+                && last.command.starts_with(DESIGN)
+            {
                 warn!(
                     "starting from {}, which `{}` has left; --settings takes another file",
                     left.display(),
-                    last.map_or("", |last| last.command.as_str())
+                    last.command
                 );
                 return Ok((file, of(&left)));
             }

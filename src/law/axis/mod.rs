@@ -462,7 +462,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         &self.telemetry
     }
 
-    /// What was learnt of the friction's scale.
+    /// The memory of learning: the friction's scale.
     pub fn learning(&self) -> &LearningState<S> {
         &self.learning
     }

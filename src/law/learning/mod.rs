@@ -78,14 +78,14 @@ const FADE_PER_S: f64 = 1.0;
 /// Window of the guard: time constant of its mean squares, s.
 const GUARD_S: f64 = 2.0;
 
-/// What the error may be larger than without feedforward: as a share of its mean square, and in counts.
+/// Excess of the error over that without feedforward that the guard allows: a share of its mean square, and counts.
 const GUARD_SHARE: f64 = 0.05;
 const GUARD_COUNTS: f64 = 0.5;
 
 /// Time for which nothing is learnt after the model and the axis may have parted, s.
 const SETTLING_S: f64 = 1.0;
 
-/// What keeps the scale from being learnt in a tick.
+/// The reason for which the scale is not learnt in a tick, or that it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
 pub enum LearningStatus {
@@ -128,7 +128,7 @@ struct Estimate<S: Scalar> {
     /// Length of a step, s.
     step: S::Gain,
     half: S::Gain,
-    /// What a block keeps of the sums that are learnt from, and of the guard's.
+    /// Share that a block keeps of the sums that are learnt from, and of the guard's.
     keep: S,
     guard_keep: S,
     most_information: S,
@@ -179,7 +179,7 @@ struct Sums<S> {
 pub struct LearningInput<S> {
     /// Tracking error, mm.
     pub error: S,
-    /// What keeps the axis from learning at present; [`LearningStatus::Learning`] for nothing.
+    /// The reason for which the axis cannot learn at present; [`LearningStatus::Learning`] for none.
     pub status: LearningStatus,
 }
 
@@ -379,7 +379,7 @@ impl<S: Scalar> LearningState<S> {
         1.0 + self.deviation.to_f32(Quantity::Multiplier)
     }
 
-    /// What keeps the scale from being learnt, or that it is.
+    /// The reason for which the scale is not learnt, or that it is.
     pub const fn status(&self) -> LearningStatus {
         self.status
     }

@@ -15,7 +15,7 @@ pub enum Station {
     Operator,
 }
 
-/// Who may enable the outputs. Whoever it is, everybody may disable them and stop the axes.
+/// The stations that may enable the outputs. Every station may always disable them and stop the axes.
 #[derive(
     Clone,
     Copy,
@@ -79,7 +79,7 @@ pub enum HostNeeded {
 /// Rules of operation of the stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operation {
-    /// Who may enable.
+    /// The stations that may enable.
     pub enabled_by: EnabledBy,
     /// The motions that need their host.
     pub host_needed: HostNeeded,

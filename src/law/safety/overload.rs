@@ -1,7 +1,7 @@
 //! The load of motor and amplifier: I²t.
 //!
-//! What an amplifier puts out is a force, so a current: the heat that it brings goes with the square of the output. What goes
-//! beyond the output that the motor bears for ever is summed, what stays below is taken from the sum, which never falls below
+//! An amplifier's output is a force, so a current: the heat that it brings goes with the square of the output. The part
+//! beyond the output that the motor bears for ever is summed, a part below is taken from the sum, which never falls below
 //! nothing. In converter's words, so that all number types find the same.
 
 use crate::law::rounding;

@@ -28,7 +28,7 @@ const RUN_S: f64 = 45.0;
 const FIRST_S: f64 = 5.0;
 const WINDOW_S: f64 = 2.0;
 const STRIDE_S: f64 = 0.1;
-/// What an error may be larger by, RMS, um: a count of the encoder.
+/// Excess of an error that is none, RMS, um: a count of the encoder.
 const FLOOR_UM: f64 = 0.5;
 /// Ratio of RMS errors beyond which a window is worse.
 pub const WORSE: f64 = 1.005;

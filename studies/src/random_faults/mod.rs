@@ -1,7 +1,7 @@
 //! Random faults at random activities, over control, supervision, server and store as the target runs them, with an x axis
 //! that moves as its output makes it, and a flash that wears and loses its power. One seed is one campaign of a second.
 //!
-//! What must hold is stated here once, by constants of its own: nothing of it is taken from the code under test.
+//! The invariants are stated here once, by constants of their own: nothing of it is taken from the code under test.
 
 pub mod command;
 mod restart;
@@ -264,7 +264,7 @@ impl Watch {
 /// Runs a campaign; returns what it came to.
 ///
 /// # Errors
-/// What must hold and did not.
+/// The invariant that did not hold.
 fn run(campaign: &Campaign) -> Result<End, String> {
     let mut flash = restart::prepared(campaign.has_stored);
     flash.worn = campaign.worn.map(|(from, to)| from..to);
@@ -387,7 +387,7 @@ fn run(campaign: &Campaign) -> Result<End, String> {
     })
 }
 
-/// What a campaign came to.
+/// The end of a campaign.
 struct End {
     /// Largest way that was not planned, mm.
     unplanned_mm: f64,
@@ -403,7 +403,7 @@ struct End {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Line {
     pub seed: u64,
-    /// What must hold and did not; empty if everything did.
+    /// The invariant that did not hold; empty if all did.
     pub broken: String,
     /// Largest way that the reference did not ask for until the outputs were off, mm.
     pub unplanned_mm: Option<f64>,
@@ -413,7 +413,7 @@ pub struct Line {
     pub fault: Option<u8>,
     /// The supply failed while flash was written.
     pub was_cut: Option<bool>,
-    /// What happened, for a person.
+    /// Activity and events, for a person.
     pub campaign: String,
 }
 

@@ -38,7 +38,7 @@ pub(super) fn store() -> Body {
     Body::Settings(SettingsRequest::Store(origin))
 }
 
-/// What is known of a flash at the start.
+/// The knowledge of a flash before a start.
 pub(super) struct Before {
     /// It held a set before the campaign.
     pub(super) has_stored: bool,
@@ -51,7 +51,7 @@ pub(super) struct Before {
 /// Starts on the flash that a campaign has left, as `docs/safety.md` says in its table of stored settings.
 ///
 /// # Errors
-/// What must hold and did not.
+/// The invariant that did not hold.
 pub(super) fn check(flash: Flash, before: &Before, seed: u64) -> Result<(), String> {
     let was_cut = flash.is_off();
     let flash = flash.reboot();

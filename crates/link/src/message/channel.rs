@@ -56,7 +56,7 @@ pub enum AxisSignal {
     Glitch = 17,
     /// Scale of the friction feedforward that was learnt; 1 is the commissioned one.
     FrictionScale = 18,
-    /// What keeps the scale from being learnt: 0 learning is off, 1 nothing, 2 at rest, 3 a jog, homing, stop or injection, 4 the
+    /// The reason for not learning the scale: 0 learning is off, 1 nothing, 2 at rest, 3 a jog, homing, stop or injection, 4 the
     /// output's limit, 5 that or new settings a moment ago, 6 the scale is faded out.
     Learning = 19,
     /// Share of the friction's feedforward that vibration leaves.
