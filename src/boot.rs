@@ -244,7 +244,9 @@ pub(crate) fn report_crash(cause: ResetCause) -> Option<FaultCode> {
         );
         return Some(match record.cause {
             CrashCause::Panic => FaultCode::Panic,
-            CrashCause::HardFault | CrashCause::StrayInterrupt => FaultCode::HardFault,
+            CrashCause::HardFault | CrashCause::StrayInterrupt | CrashCause::ClockFailed => {
+                FaultCode::HardFault
+            }
         });
     }
     (cause == ResetCause::Watchdog).then_some(FaultCode::WatchdogReset)

@@ -158,6 +158,8 @@ pub enum InjectedFault {
     StrayInterrupt = 5,
     /// Loops for ever with interrupts masked.
     Hang = 6,
+    /// Masks interrupts for a control period and a half, where a clock paces the run.
+    LateTick = 7,
 }
 
 /// Settings and motions of a run.

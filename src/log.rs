@@ -313,7 +313,7 @@ impl EventLogger {
                     server.provenance().as_str()
                 ),
                 StateChange::LateTicks(ticks) => defmt::warn!(
-                    "{=u32} control ticks ended late; the longest took {=u32} cycles of its timer",
+                    "{=u32} control ticks were late; the longest took {=u32} cycles of its timer",
                     ticks,
                     timing.longest_tick_cycles
                 ),

@@ -44,7 +44,7 @@ pub enum StateChange {
     SamplesLost(u32),
     /// This number of notices to the host were dropped.
     EventsLost(u32),
-    /// This number of control ticks ended late.
+    /// This number of control ticks began or ended late.
     LateTicks(u32),
 }
 

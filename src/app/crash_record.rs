@@ -24,6 +24,8 @@ pub enum CrashCause {
     HardFault,
     /// An interrupt that has no handler.
     StrayInterrupt,
+    /// The board's clock has failed.
+    ClockFailed,
 }
 
 impl CrashCause {
@@ -33,6 +35,7 @@ impl CrashCause {
             Self::Panic => "panic",
             Self::HardFault => "hard fault",
             Self::StrayInterrupt => "interrupt without a handler",
+            Self::ClockFailed => "failure of the clock",
         }
     }
 
@@ -41,6 +44,7 @@ impl CrashCause {
             Self::Panic => 1,
             Self::HardFault => 2,
             Self::StrayInterrupt => 3,
+            Self::ClockFailed => 4,
         }
     }
 
@@ -49,6 +53,7 @@ impl CrashCause {
             1 => Some(Self::Panic),
             2 => Some(Self::HardFault),
             3 => Some(Self::StrayInterrupt),
+            4 => Some(Self::ClockFailed),
             _ => None,
         }
     }

@@ -83,7 +83,7 @@ impl<S: Scalar> Snapshot<S> {
 /// Timing statistics of the control interrupt.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TimingStatistics {
-    /// Ticks that ended after their deadline.
+    /// Ticks that began late, or ended after their deadline.
     pub overruns: u32,
     /// The longest tick, in cycles of its timer.
     pub longest_tick_cycles: u32,

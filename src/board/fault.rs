@@ -15,7 +15,7 @@ use super::{Outcome, crash_record, halt, outputs_off, stack};
 use crate::app::TICK;
 
 /// Makes the machine safe, records the cause, and ends.
-fn fail(cause: CrashCause, text: fmt::Arguments) -> ! {
+pub(super) fn fail(cause: CrashCause, text: fmt::Arguments) -> ! {
     // A second fault comes from the explanation itself: by then the outputs are off, so stay silent.
     static EXPLAINING: AtomicBool = AtomicBool::new(false);
 

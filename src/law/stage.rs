@@ -46,7 +46,7 @@ pub struct Inputs {
     pub command: Option<Command>,
     /// The axes whose settings were exchanged since the last tick.
     pub settings_changed: PerAxis<bool>,
-    /// The last tick ended after its deadline.
+    /// This tick began late, or the last one ended after its deadline.
     pub deadline_missed: bool,
     /// The signal of the host whose set points the axes follow is lost.
     pub link_lost: bool,

@@ -16,6 +16,7 @@ mod driver_ad5754r;
 mod driver_hold_button;
 mod driver_noise_shaper;
 mod driver_parts;
+mod driver_tick_interval;
 mod encoder;
 mod encoder_dead;
 mod every_parameter_counts;

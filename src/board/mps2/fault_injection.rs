@@ -1,5 +1,7 @@
 //! Fault injection by the host, from the idle loop.
 
+use core::sync::atomic::Ordering;
+
 use cortex_m::peripheral::NVIC;
 use quadrant::lockstep::{
     HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault,
@@ -43,6 +45,7 @@ fn act() {
             cortex_m::asm::isb();
         }
         Some(InjectedFault::Hang) => hang(),
+        Some(InjectedFault::LateTick) => mask_interrupts(),
         None => {}
     }
 }
@@ -66,4 +69,14 @@ fn hang() -> ! {
     loop {
         mailbox::write(HANGS_UNTIL, timer::CLOCK.value());
     }
+}
+
+/// Masks interrupts for a control period and a half: the next tick is late, and none is lost.
+fn mask_interrupts() {
+    cortex_m::interrupt::free(|_| {
+        let from = timer::CLOCK.value();
+        let cycles = super::PERIOD.load(Ordering::Relaxed) / 2 * 3;
+        // The clock counts down.
+        while from.wrapping_sub(timer::CLOCK.value()) < cycles {}
+    });
 }

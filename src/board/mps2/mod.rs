@@ -19,6 +19,7 @@ use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
 use quadrant::command::Command;
+use quadrant::drivers::tick_interval::TickInterval;
 use quadrant::encoder::EncoderReading;
 use quadrant::hal::{self, ResetCause};
 use quadrant::safety;
@@ -33,10 +34,10 @@ use quadrant::lockstep::{
     RECORDED_TICKS, Reset,
 };
 
-/// Control ticks begun. Written by [`Tick::acknowledge`] alone.
+/// Control ticks begun. Written by [`Tick::begin`] alone.
 static TICKS: AtomicU32 = AtomicU32::new(0);
 
-/// Offset of this tick's inputs. Written by [`Tick::acknowledge`] alone.
+/// Offset of this tick's inputs. Written by [`Tick::begin`] alone.
 static INPUTS: AtomicU32 = AtomicU32::new(lockstep::INPUT as u32);
 
 /// Cycles from the start of the control timer to the last tick of a paced run.
@@ -108,6 +109,7 @@ impl Board {
                 mode: boot.mode,
                 period: u32::MAX,
                 last: boot.ticks,
+                interval: TickInterval::new(u32::MAX, 0),
             },
             idle: Idle {
                 mode: boot.mode,
@@ -261,6 +263,7 @@ pub(crate) struct Tick {
     mode: Mode,
     period: u32,
     last: u32,
+    interval: TickInterval,
 }
 
 impl Tick {
@@ -278,9 +281,9 @@ impl Tick {
         }
     }
 
-    /// Begins a tick: clears its interrupt and counts it.
+    /// Begins a tick: clears its interrupt and counts it. Returns true if it begins late; only a paced one can.
     #[inline(always)]
-    pub(crate) fn acknowledge(&mut self) {
+    pub(crate) fn begin(&mut self) -> bool {
         let ticks = TICKS.load(Ordering::Relaxed).wrapping_add(1);
         TICKS.store(ticks, Ordering::Relaxed);
         if self.mode != Mode::Lockstep {
@@ -294,7 +297,18 @@ impl Tick {
                 // The clock counts down, and a record is shorter than its range: 172 s.
                 PACED_CYCLES.store(u32::MAX - timer::CLOCK.value(), Ordering::Relaxed);
             }
+            return self.begins_late(ticks);
         }
+        false
+    }
+
+    /// True if this tick, one of a paced run, begins late; never the first, which has none before it.
+    fn begins_late(&mut self, tick: u32) -> bool {
+        let now = !timer::CLOCK.value();
+        if tick == 1 {
+            self.interval = TickInterval::new(self.period, now);
+        }
+        self.interval.is_late(now)
     }
 
     /// Cycles between two ticks.

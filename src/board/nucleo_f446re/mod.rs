@@ -40,6 +40,7 @@ mod tick;
 mod watchdog;
 mod wiring;
 
+use cortex_m_rt::exception;
 use defmt_rtt as _;
 use stm32f4xx_hal::gpio::{Input, PC13};
 use stm32f4xx_hal::pac::{self, PWR};
@@ -54,10 +55,12 @@ pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
+use quadrant::app::crash_record::CrashCause;
 use quadrant::command::Command;
 use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
 
+use super::fault::fail;
 use super::{Finished, Outcome};
 
 /// Clock of the processor.
@@ -90,7 +93,7 @@ pub(crate) struct Board {
 
 impl Board {
     /// Starts the board, but for the control tick and the watchdog.
-    pub(crate) fn init(_core: cortex_m::Peripherals) -> Self {
+    pub(crate) fn init(core: cortex_m::Peripherals) -> Self {
         let Some(chip) = pac::Peripherals::take() else {
             panic!("the board is started twice");
         };
@@ -101,6 +104,9 @@ impl Board {
             .bypass_hse_oscillator()
             .sysclk(CORE_HZ.Hz());
         let mut rcc = chip.RCC.freeze(clocks);
+        // Should that clock fail, the processor runs on from one of its own, at another speed, and takes
+        // `NonMaskableInt`.
+        rcc.cr().modify(|_, w| w.csson().set_bit());
         let port_a = chip.GPIOA.split(&mut rcc);
         let port_b = chip.GPIOB.split(&mut rcc);
         let port_c = chip.GPIOC.split(&mut rcc);
@@ -150,7 +156,7 @@ impl Board {
             button: port_c.pc13.into_input(),
             hold: HoldButton::new(),
         };
-        let tick = Tick::new(chip.TIM7, &mut rcc);
+        let tick = Tick::new(chip.TIM7, core.DCB, core.DWT, &mut rcc);
         Self {
             encoders,
             operator,
@@ -196,6 +202,15 @@ impl Operator {
         // Pressed is low.
         self.hold.step(self.button.is_low())
     }
+}
+
+// SAFETY: it assumes nothing of what it interrupts, and never returns to it.
+#[exception]
+unsafe fn NonMaskableInt() -> ! {
+    fail(
+        CrashCause::ClockFailed,
+        format_args!("the 8 MHz of the debug probe have stopped"),
+    )
 }
 
 /// The work of the idle loop.

@@ -1,5 +1,7 @@
 //! The control tick: basic timer 7, which counts up and interrupts when it starts over.
 
+use cortex_m::peripheral::{DCB, DWT};
+use quadrant::drivers::tick_interval::TickInterval;
 use stm32f4xx_hal::pac::TIM7;
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
@@ -8,17 +10,23 @@ pub(crate) struct Tick {
     timer: TIM7,
     clock_hz: u32,
     period: u32,
+    core_hz: u32,
+    interval: TickInterval,
 }
 
 impl Tick {
-    /// The timer, not counting.
-    pub(super) fn new(timer: TIM7, rcc: &mut Rcc) -> Self {
+    /// The timer, not counting; starts the core's counter of cycles.
+    pub(super) fn new(timer: TIM7, mut trace: DCB, mut counter: DWT, rcc: &mut Rcc) -> Self {
+        trace.enable_trace();
+        counter.enable_cycle_counter();
         TIM7::enable(rcc);
         TIM7::reset(rcc);
         Self {
             timer,
             clock_hz: rcc.clocks.timclk1().raw(),
             period: u32::MAX,
+            core_hz: rcc.clocks.sysclk().raw(),
+            interval: TickInterval::new(u32::MAX, 0),
         }
     }
 
@@ -29,6 +37,7 @@ impl Tick {
             panic!("{rate_hz} Hz is too slow for a 16-bit timer without a prescaler");
         };
         self.timer.arr().write(|w| w.arr().set(reload));
+        self.interval = TickInterval::new(self.core_hz / rate_hz, DWT::cycle_count());
         self.timer.dier().write(|w| w.uie().enabled());
         self.timer.cr1().write(|w| w.cen().enabled());
     }
@@ -38,10 +47,12 @@ impl Tick {
         self.clock_hz
     }
 
-    /// Begins a tick: clears its interrupt.
+    /// Begins a tick: clears its interrupt. Returns true if it begins late.
     #[inline(always)]
-    pub(crate) fn acknowledge(&mut self) {
+    pub(crate) fn begin(&mut self) -> bool {
         self.timer.sr().write(|w| w.uif().clear());
+        // The timer itself does not know how often it has started over.
+        self.interval.is_late(DWT::cycle_count())
     }
 
     /// Cycles of the timer between two ticks.

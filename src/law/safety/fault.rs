@@ -24,7 +24,7 @@ pub enum FaultCode {
     FollowingError = 1,
     /// The encoder moved further in one tick than the axis can.
     EncoderJump = 2,
-    /// A control tick ended too late.
+    /// A control tick began or ended too late.
     DeadlineMissed = 3,
     /// The emergency stop is pressed.
     EmergencyStop = 4,
@@ -148,7 +148,7 @@ impl FaultCode {
                 "check the encoder's cable, shield and supply; check max_velocity_mm_s and resolution_mm",
             ],
             Self::DeadlineMissed => [
-                "a control tick ended after its deadline",
+                "a control tick began late, or ended after its deadline",
                 "lower the control rate, or remove load above the control interrupt's priority",
             ],
             Self::EmergencyStop => [

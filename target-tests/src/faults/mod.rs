@@ -111,7 +111,7 @@ fn inject(image: &Image, code: FaultCode) -> Result<Vec<Finding>> {
         return Ok(vec![finding]);
     }
     Ok(match code {
-        FaultCode::DeadlineMissed => vec![paced::deadline_missed(image)?],
+        FaultCode::DeadlineMissed => paced::deadlines_missed(image)?,
         FaultCode::WatchdogReset => {
             let (finding, periods) = paced::watchdog(image)?;
             println!(

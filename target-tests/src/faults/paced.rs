@@ -67,17 +67,39 @@ impl Run {
     }
 }
 
-/// An encoder interface that takes a whole control period to be read, once.
-pub(crate) fn deadline_missed(image: &Image) -> Result<Finding> {
-    let slow = SETTLING_TICKS as usize;
-    let run = Run::of(image, |inputs| inputs[slow].slow = true, |_| Ok(()))?;
+/// A tick that ends too late, and one that begins too late.
+pub(crate) fn deadlines_missed(image: &Image) -> Result<Vec<Finding>> {
+    let at = SETTLING_TICKS;
+    Ok(vec![
+        late_tick(
+            "reading the encoders takes a control period, once, 15 mm/s",
+            &Run::of(image, |inputs| inputs[at as usize].slow = true, |_| Ok(()))?,
+        )?,
+        late_tick(
+            "interrupts are masked for a period and a half, once, 15 mm/s",
+            &Run::of(
+                image,
+                |_| {},
+                |memory| {
+                    memory.set_word(INJECTED_FAULT, InjectedFault::LateTick as u32)?;
+                    memory.set_word(INJECTED_FAULT_TICK, at)?;
+                    Ok(())
+                },
+            )?,
+        )?,
+    ])
+}
+
+/// The finding of a run in which the tick of index [`SETTLING_TICKS`] is late.
+fn late_tick(how: &'static str, run: &Run) -> Result<Finding> {
+    let late = SETTLING_TICKS as usize;
     let outputs = run.outputs(0)?;
     let found = outputs
         .iter()
-        .skip(slow)
+        .skip(late)
         .position(|outputs| !outputs.enabled)
         .context("the outputs stay enabled")?
-        + slow;
+        + late;
     let (before, after) = outputs.split_at(found);
     ensure!(
         before == &run.expected[..found],
@@ -92,9 +114,8 @@ pub(crate) fn deadline_missed(image: &Image) -> Result<Finding> {
         ),
     )?;
     log_contains(&run.log, " 1 overruns")?;
-    let how = "reading the encoders takes a control period, once, 15 mm/s";
     Ok(Finding {
-        ticks: Some(u32::try_from(found - slow)? + 1),
+        ticks: Some(u32::try_from(found - late)? + 1),
         compared: (3 * u64::from(TICKS), 0),
         ..Finding::at_start(how, FaultCode::DeadlineMissed)
     })
