@@ -1,10 +1,13 @@
 //! The monitors of an axis at their very limits.
 
 use quadrant::admission::{Refusal, refusal};
+use quadrant::app::Snapshot;
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::safety::monitor::{SignalLoss, SignalLossState};
-use quadrant::settings::StageSettings;
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant::stage::{Inputs, Stage, StageState};
 
 use crate::common::Rig;
 
@@ -72,4 +75,21 @@ fn a_jump_of_the_counter_however_far_is_motion_until_the_filter_has_forgotten_it
         }
         assert_eq!(said(&rig), None, "{jump}");
     }
+}
+
+#[test]
+fn the_index_pulse_that_an_encoder_has_shown_is_told_of_that_axis_alone() {
+    let settings = StageSettings::simulated();
+    let stage: Stage<f32, FIRMWARE_ELEMENTS> = settings.build().expect("valid settings");
+    let plan = PlanSettings::default().build(&settings).expect("no motion");
+    let mut state = StageState::default();
+    let mut inputs = Inputs::default();
+    let mut shown = |index: Option<u32>| {
+        inputs.readings[1].index = index;
+        stage.tick(&plan, &mut state, &inputs);
+        *Snapshot::of(&stage.as_ref(), &state).indexed
+    };
+    assert_eq!(shown(None), [false; 3]);
+    assert_eq!(shown(Some(0)), [false, true, false]);
+    assert_eq!(shown(None), [false, true, false]);
 }

@@ -52,7 +52,7 @@ impl BrakeState {
 
     /// Begins to apply it; returns false if there is no time to wait for.
     pub(crate) const fn apply(&mut self, brake: Brake) -> bool {
-        if brake.apply_ticks > 0 && !matches!(self, Self::Applying(_)) {
+        if !matches!(self, Self::Applying(_)) {
             *self = Self::Applying(brake.apply_ticks);
         }
         brake.apply_ticks > 0
