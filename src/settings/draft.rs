@@ -9,7 +9,7 @@ use core::fmt;
 use super::error::SettingsError;
 use super::leaves::rules::{SAFETY_OF_AN_AXIS, SAFETY_OF_THE_STAGE};
 use super::stage::StageSettings;
-use super::tree::{TreeError, same_in};
+use super::tree::{MAX_VALUE_BYTES, TreeError, same_in};
 use crate::law::axes::AxisName;
 
 /// A set of settings that is edited leaf by leaf, and the one in force.
@@ -169,6 +169,14 @@ impl<'a> Draft<'a> {
         self.touched.contains(&true)
     }
 
+    /// True if the value at a path of the draft is not the one in force.
+    pub fn differs_at(&self, path: &str) -> bool {
+        let mut edited = [0; MAX_VALUE_BYTES];
+        let mut acting = [0; MAX_VALUE_BYTES];
+        let edited = value_in(self.settings, path, &mut edited);
+        edited != value_in(self.in_force, path, &mut acting)
+    }
+
     /// The first setting by which the draft differs and on which safety depends: the outputs have to be off for it.
     pub fn safety_change(&self) -> Option<SafetyLeaf> {
         self.settings.safety_change(self.in_force)
@@ -202,4 +210,14 @@ impl<'a> Draft<'a> {
         self.touched = [false; 3];
         Ok(rebuild)
     }
+}
+
+/// The kind and bytes of a value; none where the settings have no such path.
+fn value_in<'b>(
+    settings: &StageSettings,
+    path: &str,
+    buffer: &'b mut [u8],
+) -> Option<(u8, &'b [u8])> {
+    let (kind, length) = settings.get_bytes(path, buffer).ok()?;
+    Some((kind, buffer.get(..length)?))
 }

@@ -28,7 +28,10 @@ pub(crate) fn pieces(text: &str, first_line: usize) -> Pieces {
             end_paragraph(&mut paragraph, start, &mut found);
             fence = match fence {
                 Some(_) => None,
-                None => Some(["", "sh", "console"].contains(&language)),
+                // A second word says how long it takes: `sh long`.
+                None => {
+                    Some(["", "sh", "console"].contains(&language.split(' ').next().unwrap_or("")))
+                }
             };
         } else if let Some(shell) = fence {
             if shell {

@@ -139,6 +139,14 @@ fn requests() -> Vec<(Body, &'static str)> {
         (settings(SettingsRequest::Store(short("me"))), "0d06026d65"),
         (settings(SettingsRequest::Provenance), "0d07"),
         (
+            settings(SettingsRequest::Edited { cursor: 200 }),
+            "0d08c801",
+        ),
+        (
+            settings(SettingsRequest::GetInForce(short("/a"))),
+            "0d09022f61",
+        ),
+        (
             Body::Telemetry(TelemetryRequest::Select {
                 channels: channels(),
                 decimation: 10,

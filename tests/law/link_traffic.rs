@@ -138,7 +138,7 @@ impl Requests<'_> {
     }
 
     fn settings(&mut self) -> SettingsRequest {
-        match self.below(8) {
+        match self.below(10) {
             0 => SettingsRequest::Get(self.text()),
             1 => SettingsRequest::Set {
                 path: self.text(),
@@ -151,7 +151,11 @@ impl Requests<'_> {
             4 => SettingsRequest::Revert,
             5 => SettingsRequest::Defaults,
             6 => SettingsRequest::Store(self.text()),
-            _ => SettingsRequest::Provenance,
+            7 => SettingsRequest::Provenance,
+            8 => SettingsRequest::Edited {
+                cursor: self.bits() as u16,
+            },
+            _ => SettingsRequest::GetInForce(self.text()),
         }
     }
 

@@ -2,6 +2,7 @@
 //! package `target-tests` what runs an image.
 #![forbid(unsafe_code)]
 
+mod documented;
 mod frames;
 mod layout;
 mod modules;
@@ -64,6 +65,8 @@ enum Verb {
     Saturation(Forwarded),
     /// Build the page of the bench, which a browser opens
     Web(WebArgs),
+    /// Run the commands that README and docs show, in folders below target/documented
+    Documented(documented::Options),
     /// Set up, then run every check there is
     Test {
         /// Only the firmware's own: lints, images, proofs
@@ -171,6 +174,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Count(args) => forward(toolchain()?, "count", args)?,
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
+        Verb::Documented(options) => documented::run(&options)?,
         Verb::Web(args) => {
             let page = web::build(toolchain()?)?;
             if args.check {

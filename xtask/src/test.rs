@@ -13,7 +13,7 @@ use xtask::image::{self, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{layout, setup, transcript, web};
+use crate::{documented, layout, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -76,6 +76,9 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     let firmware = Beside::start(toolchain)?;
     host(&mut report)?;
     firmware.finish(&mut report)?;
+    report.step("the commands that the documentation shows", || {
+        documented::run(&documented::Options::default())
+    });
     report.step("every converter word in a browser", || {
         web::check(&web::build(toolchain)?)
     });

@@ -93,6 +93,11 @@ pub(super) enum Command {
         #[arg(default_value = "")]
         prefix: String,
     },
+    /// Show what the edited settings, or a file's, have other than those that act.
+    Diff {
+        /// The file: TOML, as for `load`; without it, what `apply` would change.
+        file: Option<PathBuf>,
+    },
     /// Write all settings to a file that every other command reads.
     Dump {
         /// The file: TOML.
@@ -472,6 +477,7 @@ impl Command {
             Self::Get { .. } => "get",
             Self::Set { .. } => "set",
             Self::List { .. } => "list",
+            Self::Diff { .. } => "diff",
             Self::Dump { .. } => "dump",
             Self::Load { .. } => "load",
             Self::Apply => "apply",

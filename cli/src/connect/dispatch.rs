@@ -54,6 +54,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         Command::Get { path } => settings::get(client, path),
         Command::Set { path, value } => settings::set(client, path, value),
         Command::List { prefix } => settings::list(client, prefix),
+        Command::Diff { file } => settings::diff(client, file.as_deref()),
         Command::Dump { file } => settings::dump(client, file),
         Command::Load { file } => settings::load(client, file),
         Command::Apply => settings::apply(client),

@@ -4,11 +4,12 @@ use clap::Parser;
 use clap::error::ErrorKind;
 
 use super::command::Command;
+use super::help;
 
 /// Grammar of a line.
 #[derive(Debug, Parser)]
 #[command(name = "", no_binary_name = true, disable_version_flag = true)]
-struct Line {
+pub(super) struct Line {
     #[command(subcommand)]
     command: Command,
 }
@@ -28,7 +29,9 @@ pub(super) enum Said {
 /// # Errors
 /// A command that there is not, or one that lacks something.
 pub(super) fn parse(line: &str) -> Result<Said, String> {
-    let line = if line.trim() == "?" { "help" } else { line };
+    if matches!(line.trim(), "?" | "help") {
+        return Ok(Said::Show(help::text()));
+    }
     let Some(words) = shlex::split(line) else {
         return Err("a quotation mark is not closed".to_owned());
     };

@@ -6,6 +6,7 @@ mod commission;
 mod completion;
 mod dispatch;
 mod flash;
+mod help;
 mod identify;
 mod inputs;
 mod line;

@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
 use quadrant_sim::client::Client;
-use quadrant_sim::client::settings::{self, whole_path};
+use quadrant_sim::client::settings::{self, Difference, whole_path};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
@@ -55,6 +55,32 @@ pub(super) fn list(client: &mut Client, prefix: &str) -> anyhow::Result<Answer> 
         bail!("list: no setting is at or below {path}; `list` shows all paths");
     }
     Ok(Answer::new(paths.join("\n"), json!(paths)))
+}
+
+pub(super) fn diff(client: &mut Client, file: Option<&Path>) -> anyhow::Result<Answer> {
+    let differences = match file {
+        Some(file) => settings::against(client, &SettingsFile::read(file)?.stage)?,
+        None => settings::edited(client)?,
+    };
+    let shown = |value: &Option<Value>| value.as_ref().map_or("-".to_owned(), Value::to_string);
+    let mut lines: Vec<String> = differences
+        .iter()
+        .map(|difference| {
+            let Difference {
+                path,
+                acting,
+                other,
+            } = difference;
+            format!("{path} {} -> {}", shown(acting), shown(other))
+        })
+        .collect();
+    if lines.is_empty() {
+        lines.push(match file {
+            Some(file) => format!("what acts is what {} says", file.display()),
+            None => "nothing is edited that does not act".to_owned(),
+        });
+    }
+    Ok(Answer::new(lines.join("\n"), json!(differences)))
 }
 
 pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {

@@ -1,11 +1,10 @@
 //! The machine's settings: leaf by leaf, and as a file.
 
 use heapless::{String as Bounded, Vec as Bytes};
-use quadrant::link::message::{
-    Applied, Body, Path as LeafPath, Reply, SettingsRequest, Value as LeafValue,
-};
+use quadrant::link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
 use quadrant::settings::tree::{TreeError, expand, is_part};
 use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
+use serde::Serialize;
 use serde_json::Value;
 
 use super::error::ClientError;
@@ -26,6 +25,11 @@ pub fn whole_path(path: &str) -> String {
 /// A path that there is not, or a connection that is broken.
 pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
     let value = get_bytes(client, path)?;
+    decode(path, &value)
+}
+
+/// The bytes of a value as JSON.
+fn decode(path: &str, value: &LeafValue) -> Result<Value, ClientError> {
     let unknown = |source| ClientError::Setting {
         path: path.to_owned(),
         source,
@@ -41,10 +45,78 @@ pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
 }
 
 fn get_bytes(client: &mut Client, path: &str) -> Result<LeafValue, ClientError> {
-    let request = SettingsRequest::Get(bounded("path", path)?);
+    request_value(client, SettingsRequest::Get(bounded("path", path)?))
+}
+
+fn request_value(client: &mut Client, request: SettingsRequest) -> Result<LeafValue, ClientError> {
     match client.request(Body::Settings(request))? {
         Reply::Value(value) => Ok(value),
         other => Err(client.unexpected("get", &other)),
+    }
+}
+
+/// A setting of which one side has another value than the other.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// Its path.
+    pub path: String,
+    /// The value that acts now; none where what acts lacks the part.
+    pub acting: Option<Value>,
+    /// The other value: the draft's, or a file's.
+    pub other: Option<Value>,
+}
+
+/// What the machine's draft has other than what acts: what `apply` would change.
+///
+/// # Errors
+/// A connection that is broken.
+pub fn edited(client: &mut Client) -> Result<Vec<Difference>, ClientError> {
+    let paths = paths(client, "edited", |cursor| SettingsRequest::Edited {
+        cursor,
+    })?;
+    let mut differences = Vec::new();
+    for path in paths {
+        differences.push(Difference {
+            acting: acting(client, &path)?,
+            other: Some(get(client, &path)?),
+            path,
+        });
+    }
+    Ok(differences)
+}
+
+/// What a file has other than what acts: what loading it would change.
+///
+/// # Errors
+/// A connection that is broken.
+pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Difference>, ClientError> {
+    let mut paths = Vec::new();
+    // Every setting of every part is in one of the two; of the firmware's own lists that of the file has them all.
+    let _ = file.list("", &mut |path| paths.push(path.to_owned()));
+    let mut differences = Vec::new();
+    for path in paths {
+        let Ok(wanted) = bytes_of(file, &path) else {
+            continue;
+        };
+        let acting = acting(client, &path)?;
+        let other = decode(&path, &wanted)?;
+        if acting.as_ref() != Some(&other) {
+            differences.push(Difference {
+                path,
+                acting,
+                other: Some(other),
+            });
+        }
+    }
+    Ok(differences)
+}
+
+/// The value that acts at a path, if what acts has it.
+fn acting(client: &mut Client, path: &str) -> Result<Option<Value>, ClientError> {
+    match request_value(client, SettingsRequest::GetInForce(bounded("path", path)?)) {
+        Ok(value) => decode(path, &value).map(Some),
+        Err(ClientError::Refused { .. }) => Ok(None),
+        Err(error) => Err(error),
     }
 }
 
@@ -86,23 +158,29 @@ fn set_bytes(client: &mut Client, path: &str, value: LeafValue) -> Result<(), Cl
 /// # Errors
 /// A connection that is broken.
 pub fn list(client: &mut Client, prefix: &str) -> Result<Vec<String>, ClientError> {
+    let mut paths = paths(client, "list", |cursor| SettingsRequest::List { cursor })?;
+    paths.retain(|path| path.starts_with(prefix));
+    Ok(paths)
+}
+
+/// All paths of a request that is answered page by page.
+fn paths(
+    client: &mut Client,
+    name: &'static str,
+    page_from: impl Fn(u16) -> SettingsRequest,
+) -> Result<Vec<String>, ClientError> {
     let mut paths = Vec::new();
     let mut cursor = 0;
     loop {
-        match client.request(Body::Settings(SettingsRequest::List { cursor }))? {
+        match client.request(Body::Settings(page_from(cursor)))? {
             Reply::Paths(page) => {
-                let found = page.paths.iter().map(LeafPath::as_str);
-                paths.extend(
-                    found
-                        .filter(|path| path.starts_with(prefix))
-                        .map(str::to_owned),
-                );
+                paths.extend(page.paths.iter().map(|path| path.as_str().to_owned()));
                 match page.next {
                     Some(next) if next > cursor => cursor = next,
                     _ => return Ok(paths),
                 }
             }
-            other => return Err(client.unexpected("list", &other)),
+            other => return Err(client.unexpected(name, &other)),
         }
     }
 }

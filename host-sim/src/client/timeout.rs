@@ -41,7 +41,11 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Fault
         | Body::Inputs
         | Body::Settings(
-            SettingsRequest::Get(_) | SettingsRequest::List { .. } | SettingsRequest::Provenance,
+            SettingsRequest::Get(_)
+            | SettingsRequest::GetInForce(_)
+            | SettingsRequest::List { .. }
+            | SettingsRequest::Edited { .. }
+            | SettingsRequest::Provenance,
         )
         | Body::Capture(CaptureRequest::State | CaptureRequest::Read { .. }) => Idempotency::Query,
         // A later selection outdates an earlier one, whose blocks have another generation.

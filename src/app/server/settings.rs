@@ -8,8 +8,8 @@ use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::scalar::Scalar;
-use crate::settings::MAX_VALUE_BYTES;
 use crate::settings::draft::ApplyError;
+use crate::settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_link::message::{
     Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,
     Value, text,
@@ -19,24 +19,17 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
         match request {
-            SettingsRequest::Get(path) => {
-                let mut bytes = heapless::Vec::new();
-                // Cannot fail: that is its capacity.
-                let _ = bytes.resize_default(MAX_VALUE_BYTES);
-                let (kind, length) = self
-                    .draft
-                    .settings()
-                    .get_bytes(&path, &mut bytes)
-                    .map_err(|error| invalid(format_args!("{path}: {error}")))?;
-                bytes.truncate(length);
-                Ok(Reply::Value(Value { kind, bytes }))
-            }
+            SettingsRequest::Get(path) => value(self.draft.settings(), &path),
+            SettingsRequest::GetInForce(path) => value(self.draft.in_force(), &path),
             SettingsRequest::Set { path, value } => self
                 .draft
                 .set_bytes(&path, value.kind, &value.bytes)
                 .map(|()| Reply::Done)
                 .map_err(|error| invalid(format_args!("{path}: {error}"))),
-            SettingsRequest::List { cursor } => self.list(cursor),
+            SettingsRequest::List { cursor } => self.list(cursor, |_| true),
+            SettingsRequest::Edited { cursor } => {
+                self.list(cursor, |path| self.draft.differs_at(path))
+            }
             SettingsRequest::Apply => self.apply(),
             SettingsRequest::Revert => {
                 self.draft.revert();
@@ -51,11 +44,15 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         }
     }
 
+    /// A page of the draft's paths that are asked for.
     #[inline(never)]
-    fn list(&self, cursor: u16) -> Result<Reply, LinkError> {
+    fn list(&self, cursor: u16, wanted: impl Fn(&str) -> bool) -> Result<Reply, LinkError> {
         let mut page = PathPage::default();
         let mut number = 0;
         let visited = self.draft.settings().list("", &mut |path| {
+            if !wanted(path) {
+                return;
+            }
             if number >= usize::from(cursor) {
                 if page.paths.len() < PAGE_PATHS {
                     let _ = page.paths.push(text(format_args!("{path}")));
@@ -181,4 +178,17 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         self.push_event(self.seen.tick, Event::SettingsStored);
         Ok(Reply::Done)
     }
+}
+
+/// The value at a path.
+#[inline(never)]
+fn value(settings: &StageSettings, path: &str) -> Result<Reply, LinkError> {
+    let mut bytes = heapless::Vec::new();
+    // Cannot fail: that is its capacity.
+    let _ = bytes.resize_default(MAX_VALUE_BYTES);
+    let (kind, length) = settings
+        .get_bytes(path, &mut bytes)
+        .map_err(|error| invalid(format_args!("{path}: {error}")))?;
+    bytes.truncate(length);
+    Ok(Reply::Value(Value { kind, bytes }))
 }

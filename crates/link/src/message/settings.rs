@@ -56,6 +56,13 @@ pub enum SettingsRequest {
     Store(Provenance),
     /// Asks for the origin of the stored settings: a [`Provenance`].
     Provenance,
+    /// Asks for the paths at which the draft differs from the settings in force, from a cursor on: a [`PathPage`].
+    Edited {
+        /// Zero, or [`PathPage::next`].
+        cursor: u16,
+    },
+    /// Asks for the value at a path of the settings in force: a [`Value`].
+    GetInForce(Path),
 }
 
 /// A page of the list of paths.

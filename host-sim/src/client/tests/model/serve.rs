@@ -136,15 +136,9 @@ impl Model {
     fn settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
         let invalid = |why: String| LinkError::Invalid(text(format_args!("{why}")));
         Ok(match request {
-            SettingsRequest::Get(path) => {
-                let mut bytes = heapless::Vec::new();
-                bytes.resize_default(MAX_VALUE_BYTES).unwrap();
-                let (kind, length) = self
-                    .draft
-                    .get_bytes(&path, &mut bytes)
-                    .map_err(|error| invalid(format!("{path}: {error}")))?;
-                bytes.truncate(length);
-                Reply::Value(Value { kind, bytes })
+            SettingsRequest::Get(path) => value(&self.draft, &path).map_err(invalid)?,
+            SettingsRequest::GetInForce(path) => {
+                value(&self.bench.borrow().in_force, &path).map_err(invalid)?
             }
             SettingsRequest::Set { path, value } => {
                 self.draft
@@ -152,19 +146,12 @@ impl Model {
                     .map_err(|error| invalid(format!("{path}: {error}")))?;
                 Reply::Done
             }
-            SettingsRequest::List { cursor } => {
-                let mut all = Vec::new();
-                let visited = self.draft.list("", &mut |path| all.push(path.to_owned()));
-                visited.map_err(|error| invalid(error.to_string()))?;
-                let from = usize::from(cursor);
-                let to = all.len().min(from + PAGE_PATHS);
-                Reply::Paths(PathPage {
-                    paths: all[from..to]
-                        .iter()
-                        .map(|path| Path::try_from(path.as_str()).unwrap())
-                        .collect(),
-                    next: (to < all.len()).then_some(to as u16),
-                })
+            SettingsRequest::List { cursor } => page(&paths(&self.draft), cursor),
+            SettingsRequest::Edited { cursor } => {
+                let in_force = &self.bench.borrow().in_force;
+                let mut edited = paths(&self.draft);
+                edited.retain(|path| value(&self.draft, path) != value(in_force, path));
+                page(&edited, cursor)
             }
             SettingsRequest::Apply => {
                 let settings = self.draft.clone();
@@ -298,4 +285,34 @@ impl Model {
             },
         }))
     }
+}
+
+fn value(settings: &StageSettings, path: &str) -> Result<Reply, String> {
+    let mut bytes = heapless::Vec::new();
+    bytes.resize_default(MAX_VALUE_BYTES).unwrap();
+    let (kind, length) = settings
+        .get_bytes(path, &mut bytes)
+        .map_err(|error| format!("{path}: {error}"))?;
+    bytes.truncate(length);
+    Ok(Reply::Value(Value { kind, bytes }))
+}
+
+fn paths(settings: &StageSettings) -> Vec<String> {
+    let mut all = Vec::new();
+    settings
+        .list("", &mut |path| all.push(path.to_owned()))
+        .unwrap();
+    all
+}
+
+fn page(all: &[String], cursor: u16) -> Reply {
+    let from = usize::from(cursor);
+    let to = all.len().min(from + PAGE_PATHS);
+    Reply::Paths(PathPage {
+        paths: all[from..to]
+            .iter()
+            .map(|path| Path::try_from(path.as_str()).unwrap())
+            .collect(),
+        next: (to < all.len()).then_some(to as u16),
+    })
 }
