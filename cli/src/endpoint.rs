@@ -6,7 +6,9 @@ use std::str::FromStr;
 use anyhow::Context;
 use quadrant_cli::warn;
 use quadrant_sim::client::{Client, Interrupt};
-use quadrant_sim::machine::{LawStage, Machine, SerialTransport, SimulatedLink, TcpTransport};
+use quadrant_sim::machine::{
+    LawStage, Machine, SerialTransport, Shared, SimulatedLink, TcpTransport, Transport,
+};
 
 /// Image that `cargo xtask build --board mps2` leaves, from the workspace's folder.
 pub(super) const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
@@ -31,6 +33,8 @@ pub(super) enum LinkEndpoint {
     Serial(String),
     /// A machine behind a socket.
     Tcp(String),
+    /// A machine that another program holds and shares.
+    Look(String),
 }
 
 impl FromStr for Endpoint {
@@ -61,23 +65,29 @@ impl Endpoint {
     pub(super) fn open(&self, seed: u64) -> anyhow::Result<Box<dyn Machine>> {
         Ok(match self {
             Self::Law => Box::new(LawStage::new(seed)),
-            Self::Link(link) => Box::new(link.connect(seed, None)?),
+            Self::Link(link) => Box::new(link.connect(seed, None, None)?),
         })
     }
 }
 
 impl LinkEndpoint {
-    /// Opens a session; `seed` decides the noise of a simulated stage, and a file keeps the flash of its machine.
-    pub(super) fn connect(&self, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
-        let client = self.open(seed, flash)?;
+    /// Opens a session; `seed` decides the noise of a simulated stage, a file keeps the flash of its machine, and others may
+    /// look at the address `share`.
+    pub(super) fn connect(
+        &self,
+        seed: u64,
+        flash: Option<&Path>,
+        share: Option<&str>,
+    ) -> anyhow::Result<Client> {
+        let client = self.open(seed, flash, share)?;
         heed_signals(client.interrupt())?;
         Ok(client)
     }
 
-    fn open(&self, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
-        let client = match self {
-            Self::Simulated => Client::open(SimulatedLink::start(seed, flash)?),
-            Self::Emulated(image) => return emulated(image, seed, flash),
+    fn open(&self, seed: u64, flash: Option<&Path>, share: Option<&str>) -> anyhow::Result<Client> {
+        match self {
+            Self::Simulated => session(SimulatedLink::start(seed, flash)?, share),
+            Self::Emulated(image) => emulated(image, seed, flash, share),
             Self::Serial(path) => {
                 let port = SerialTransport::open(path).with_context(|| {
                     format!(
@@ -85,7 +95,7 @@ impl LinkEndpoint {
                          /dev/ttyUSB*`), that no other program has it, and that you may use it (group dialout)"
                     )
                 })?;
-                Client::open(port)
+                session(port, share)
             }
             Self::Tcp(address) => {
                 let socket = TcpTransport::connect(address).with_context(|| {
@@ -93,11 +103,32 @@ impl LinkEndpoint {
                         "tcp:{address} does not answer; check the address and that the machine runs"
                     )
                 })?;
-                Client::open(socket)
+                session(socket, share)
             }
-        };
-        Ok(client?)
+            Self::Look(address) => {
+                let socket = TcpTransport::look(address).with_context(|| {
+                    format!(
+                        "nobody shares a machine at {address}; whoever holds it gives `quadrant connect --share {address}`"
+                    )
+                })?;
+                session(socket, share)
+            }
+        }
     }
+}
+
+/// A session over a connection that others may look at.
+fn session(transport: impl Transport + 'static, share: Option<&str>) -> anyhow::Result<Client> {
+    let Some(address) = share else {
+        return Ok(Client::open(transport)?);
+    };
+    let shared = Shared::listen(transport, address)
+        .with_context(|| format!("--share {address}: nobody can be listened to there"))?;
+    warn!(
+        "others may look: quadrant connect --look {}",
+        shared.address()
+    );
+    Ok(Client::open(shared)?)
 }
 
 /// Signals after which this program ends, heeded or not: the machine stops what its host has started when that is gone.
@@ -117,13 +148,18 @@ fn heed_signals(interrupt: Interrupt) -> anyhow::Result<()> {
 }
 
 #[cfg(all(unix, feature = "emulated"))]
-fn emulated(image: &Path, seed: u64, flash: Option<&Path>) -> anyhow::Result<Client> {
+fn emulated(
+    image: &Path,
+    seed: u64,
+    flash: Option<&Path>,
+    share: Option<&str>,
+) -> anyhow::Result<Client> {
     let link = quadrant_sim::machine::EmulatedLink::start(image, seed, flash)?;
-    Ok(Client::open(link)?)
+    session(link, share)
 }
 
 #[cfg(not(all(unix, feature = "emulated")))]
-fn emulated(_: &Path, _: u64, _: Option<&Path>) -> anyhow::Result<Client> {
+fn emulated(_: &Path, _: u64, _: Option<&Path>, _: Option<&str>) -> anyhow::Result<Client> {
     anyhow::bail!(if cfg!(unix) {
         "emulated: this program was built without QEMU's side; build it with `--features emulated`, as in `cargo run \
          --release --features emulated -- connect --emulated`"

@@ -7,7 +7,7 @@ use quadrant::command::Command;
 use quadrant::link::message::{AxisName as WireAxis, Body, LinkError, Provenance, SettingsRequest};
 use quadrant::reference::{MotionScale, Velocity};
 use quadrant::safety::{FaultCode, SafetyState, Switches};
-use quadrant::settings::StageSettings;
+use quadrant::settings::{EmergencyReaction, StageSettings};
 use quadrant::stage::Outputs;
 
 use crate::common::{Rig, repeatable, sine_on_x};
@@ -122,6 +122,24 @@ fn a_stop_ends_with_the_brake_and_a_fault_that_switches_off_does_not_wait_for_it
     let mut rig = released();
     rig.inputs.switches = Switches::EMERGENCY_STOP;
     assert!(off(rig.tick()));
+}
+
+#[test]
+fn a_stop_at_rest_takes_the_200_ticks_of_settling_and_the_brake_s_time() {
+    for (apply_s, ticks) in [(0.0, 200), (0.0001, 202), (0.02, 401)] {
+        let mut settings = settings();
+        settings.brake.apply_s = apply_s;
+        settings.operation.emergency_stop = EmergencyReaction::Stop;
+        let mut rig = Rig::<f32>::new(&settings, &sine_on_x(1.0, 10.0));
+        rig.tick();
+        rig.command(Command::Enable);
+        for _ in 0..=RELEASE {
+            rig.tick();
+        }
+        rig.inputs.switches = Switches::EMERGENCY_STOP;
+        assert!(!off(rig.tick()));
+        assert_eq!(ticks_until(&mut rig, off), ticks, "{apply_s} s");
+    }
 }
 
 #[test]

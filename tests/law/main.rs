@@ -54,6 +54,7 @@ mod operation;
 mod overload;
 mod parameter_trace;
 mod pid;
+mod plausibility;
 mod preemption;
 mod provocations;
 mod rate_limiter;

@@ -5,7 +5,7 @@ use quadrant::app::Snapshot;
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::safety::monitor::{SignalLoss, SignalLossState};
+use quadrant::safety::monitor::{Following, FollowingState, SignalLoss, SignalLossState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Stage, StageState};
 
@@ -51,29 +51,39 @@ fn an_output_below_the_level_is_no_reason_to_move_and_one_at_it_is() {
     }
 }
 
-#[test]
-fn a_jump_of_the_counter_however_far_is_motion_until_the_filter_has_forgotten_it() {
-    for jump in [1 << 17, 1 << 24, i32::MAX, -(1 << 17), -(1 << 24), i32::MIN] {
-        let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &Default::default());
-        rig.stand();
-        let said = |rig: &Rig<f32>| refusal(rig.stage.as_ref().view(&rig.state), Command::Enable);
-        assert_eq!(said(&rig), None);
-        rig.inputs.readings[1].count = jump as u32;
+/// Ticks from a jump of y's counter until nothing keeps the outputs from being enabled any more.
+fn ticks_of_unrest(jump: i32) -> u32 {
+    let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &Default::default());
+    rig.stand();
+    let said = |rig: &Rig<f32>| refusal(rig.stage.as_ref().view(&rig.state), Command::Enable);
+    assert_eq!(said(&rig), None);
+    rig.inputs.readings[1].count = jump as u32;
+    for ticks in 0..1000 {
         rig.tick();
-        // A jump of 2^16 counts and more counts as one of 2^16, of which an eighth a tick is forgotten: to 1.5 counts a tick
-        // in ln(8192 / 1.5) / ln(8 / 7) = 64 ticks.
-        for tick in 0..60 {
-            assert_eq!(
-                said(&rig),
-                Some(Refusal::NotAtStandstill(AxisName::Y)),
-                "{jump}, {tick} ticks after"
-            );
-            rig.tick();
+        match said(&rig) {
+            None => return ticks,
+            refused => assert_eq!(refused, Some(Refusal::NotAtStandstill(AxisName::Y))),
         }
-        for _ in 0..10 {
-            rig.tick();
-        }
-        assert_eq!(said(&rig), None, "{jump}");
+    }
+    panic!("{jump}: never at rest");
+}
+
+#[test]
+fn a_jump_of_the_counter_is_motion_until_the_filter_has_forgotten_it() {
+    // The filter takes an eighth of a step, and forgets an eighth a tick: down to the 1.5 counts a tick of standstill.
+    let expected = |counts: f64| (counts / 8.0 / 1.5).ln() / (8.0_f64 / 7.0).ln();
+    for jump in [100, -100, 9_000, 40_000, -40_000, 65_535, -65_536] {
+        let ticks = f64::from(ticks_of_unrest(jump));
+        let expected = expected(f64::from(jump).abs());
+        assert!(
+            (ticks - expected).abs() < 1.5,
+            "{jump}: {ticks}, {expected}"
+        );
+    }
+    // One that is longer counts as one of 2^16.
+    for jump in [1 << 17, 1 << 24, i32::MAX, -(1 << 17), -(1 << 24), i32::MIN] {
+        let ticks = f64::from(ticks_of_unrest(jump));
+        assert!((ticks - expected(65536.0)).abs() < 1.5, "{jump}: {ticks}");
     }
 }
 
@@ -92,4 +102,24 @@ fn the_index_pulse_that_an_encoder_has_shown_is_told_of_that_axis_alone() {
     assert_eq!(shown(None), [false; 3]);
     assert_eq!(shown(Some(0)), [false, true, false]);
     assert_eq!(shown(None), [false, true, false]);
+}
+
+#[test]
+fn the_high_mark_is_the_largest_error_as_a_share_of_the_limit_of_its_time() {
+    assert_eq!(FollowingState::<f32>::default().high_mark(), 0.0);
+    // 0.5 mm at rest, 0.01 s times the speed more, at most 2 mm.
+    let following = Following::<f32>::new(0.5, 0.01, 2.0);
+    let mut state = following.start();
+    assert_eq!(state.high_mark(), 0.0);
+    let mut mark = |error, speed| {
+        let follows = following.step(&mut state, error, speed);
+        (follows, state.high_mark())
+    };
+    assert_eq!(mark(0.125, 0.0), (true, 0.25));
+    // A larger error, but a smaller share.
+    assert_eq!(mark(0.25, 100.0), (true, 0.25));
+    assert_eq!(mark(-0.75, 100.0), (true, 0.5));
+    assert_eq!(mark(-1.5, 1e6), (true, 0.75));
+    assert_eq!(mark(0.5, 0.0), (true, 1.0));
+    assert_eq!(mark(0.625, 0.0), (false, 1.25));
 }

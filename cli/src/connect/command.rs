@@ -93,7 +93,7 @@ pub(super) enum Command {
         #[arg(default_value = "")]
         prefix: String,
     },
-    /// Show what the edited settings, or a file's, have other than those that act.
+    /// Show what `apply` would change, or what loading a file would.
     Diff {
         /// The file: TOML, as for `load`; without it, what `apply` would change.
         file: Option<PathBuf>,

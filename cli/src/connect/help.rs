@@ -46,7 +46,10 @@ const GROUPS: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// The list: each command with the first sentence of what it does.
+/// Characters of a line that are left for what a command does.
+const ROOM: usize = 64;
+
+/// The list: each command with the beginning of what it does.
 pub(super) fn text() -> String {
     let mut grammar = Line::command();
     grammar.build();
@@ -59,7 +62,7 @@ pub(super) fn text() -> String {
                 .and_then(|command| command.get_about())
                 .map(ToString::to_string)
                 .unwrap_or_default();
-            text.push_str(&format!("  {name:<12} {}\n", first_sentence(&about)));
+            text.push_str(&format!("  {name:<12} {}\n", beginning(&about)));
         }
         text.push('\n');
     }
@@ -67,14 +70,23 @@ pub(super) fn text() -> String {
     text
 }
 
-/// As much of a text as a line of a terminal has room for.
-fn first_sentence(text: &str) -> &str {
+/// As much of a text as a line of a terminal has room for: its first clause, or whole words of it.
+fn beginning(text: &str) -> String {
     let end = [". ", ": ", "; "]
         .iter()
         .filter_map(|end| text.find(end))
         .min()
         .unwrap_or(text.len());
-    text[..end].trim_end_matches('.')
+    let clause = text[..end].trim_end_matches('.');
+    if clause.len() <= ROOM {
+        return clause.to_owned();
+    }
+    let within = &clause[..=clause.floor_char_boundary(ROOM - 2)];
+    match (within.rfind(", "), within.rfind(' ')) {
+        (Some(comma), _) => within[..comma].to_owned(),
+        (None, Some(space)) => format!("{} ...", &within[..space]),
+        (None, None) => within.to_owned(),
+    }
 }
 
 #[cfg(test)]

@@ -44,11 +44,15 @@ pub(super) struct Arguments {
     #[command(flatten)]
     machine: MachineOptions,
     /// Seed of the simulated stage's noise; the same seed gives the same results.
-    #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp"])]
+    #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp", "look"])]
     seed: u64,
     /// Keep the flash of the simulated or emulated machine in a file, so that what is stored survives this command.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "tcp"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "tcp", "look"])]
     flash: Option<PathBuf>,
+    /// Let others look at the machine meanwhile, with `quadrant connect --look HOST:PORT`: states, inputs, faults, events. They
+    /// may stop the axes and disable the outputs, and nothing else. 127.0.0.1 is this computer, 0.0.0.0 its network.
+    #[arg(long, value_name = "HOST:PORT", conflicts_with = "look")]
+    share: Option<String>,
     /// Print one JSON object a line: {"command": ..., "result": ...} or {"command": ..., "error": ...}.
     #[arg(long)]
     json: bool,
@@ -72,6 +76,9 @@ struct MachineOptions {
     /// A machine behind a socket: a port that is shared over a network, or an emulator's.
     #[arg(long, value_name = "HOST:PORT")]
     tcp: Option<String>,
+    /// A machine that another program holds and shares: look at it, stop it, and no more.
+    #[arg(long, value_name = "HOST:PORT")]
+    look: Option<String>,
     /// The firmware's own code on the simulated stage, in this process. Its time passes as fast as it can, only while it is
     /// waited for.
     #[arg(long)]
@@ -137,15 +144,20 @@ fn stay(client: &mut Client) -> anyhow::Result<bool> {
 
 fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
     let named = &arguments.machine;
-    let endpoint = match (&named.port, &named.tcp, &named.emulated, named.simulated) {
+    let endpoint = match (&named.port, &named.tcp, &named.look, &named.emulated) {
         (Some(path), ..) => LinkEndpoint::Serial(path.clone()),
         (_, Some(address), ..) => LinkEndpoint::Tcp(address.clone()),
-        (_, _, Some(image), _) => LinkEndpoint::Emulated(image.clone()),
-        (.., true) => LinkEndpoint::Simulated,
+        (_, _, Some(address), _) => LinkEndpoint::Look(address.clone()),
+        (.., Some(image)) => LinkEndpoint::Emulated(image.clone()),
+        _ if named.simulated => LinkEndpoint::Simulated,
         _ => anyhow::bail!(
             "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \
              without one"
         ),
     };
-    endpoint.connect(arguments.seed, arguments.flash.as_deref())
+    endpoint.connect(
+        arguments.seed,
+        arguments.flash.as_deref(),
+        arguments.share.as_deref(),
+    )
 }

@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use quadrant::link::message::Channel;
 use quadrant_sim::client::samples::{Samples, TelemetryRecorder, least_decimation};
 use quadrant_sim::client::{columns, plot, settings};
-use quadrant_sim::report::{Figure, Lines, Plot, Series, Style};
+use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, stacked_svg};
 use serde_json::json;
 
 use super::answer::{Answer, seconds};
@@ -32,19 +32,6 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
     if !(20..=MOST_SIZE).contains(&width) || !(1..=MOST_SIZE).contains(&height) {
         bail!(
             "--size {width} {height}: give 20 to {MOST_SIZE} characters and 1 to {MOST_SIZE} lines"
-        );
-    }
-    let unit = columns::unit(options.channels[0]);
-    if options.svg.is_some()
-        && let Some(other) = options
-            .channels
-            .iter()
-            .find(|channel| columns::unit(**channel) != unit)
-    {
-        bail!(
-            "--svg: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
-            options.channels[0],
-            columns::unit(*other)
         );
     }
     let live = stdout().is_terminal() && !session.printer.json;
@@ -76,7 +63,8 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
         files.extend(columns::write(&samples, path, &resolutions_mm)?);
     }
     if let Some(path) = &options.svg {
-        write(path, figure(&samples, &resolutions_mm).to_svg()?.as_bytes())?;
+        let image = stacked_svg(&figures(&samples, &resolutions_mm))?;
+        write(path, image.as_bytes())?;
         files.push(path.clone());
     }
     let data = json!({
@@ -137,31 +125,34 @@ fn heading(channel: Channel, values: &[f64]) -> String {
     )
 }
 
-fn figure(samples: &Samples, resolutions_mm: &[f64; 3]) -> Figure {
+/// A figure for each unit, in the order of the channels.
+fn figures(samples: &Samples, resolutions_mm: &[f64; 3]) -> Vec<Figure> {
     let time_s = samples.time_s();
-    let series = samples
-        .channels
-        .iter()
-        .enumerate()
-        .map(|(index, channel)| Series {
+    let mut units: Vec<(&str, Vec<Series>)> = Vec::new();
+    for (index, &channel) in samples.channels.iter().enumerate() {
+        let series = Series {
             name: channel.to_string(),
             x: time_s.clone(),
             y: columns::values_mm(samples, index, resolutions_mm),
             style: Style::nth(index),
-        });
-    Figure {
-        id: "scope".to_owned(),
-        caption: "Sampled by telemetry.".to_owned(),
-        plot: Plot::Lines(Lines {
-            x_label: "Time, s".to_owned(),
-            y_label: samples
-                .channels
-                .first()
-                .map(|&channel| columns::unit(channel))
-                .unwrap_or_default()
-                .to_owned(),
-            series: series.collect(),
-            ..Lines::default()
-        }),
+        };
+        let unit = columns::unit(channel);
+        match units.iter_mut().find(|(known, _)| *known == unit) {
+            Some((_, of_unit)) => of_unit.push(series),
+            None => units.push((unit, vec![series])),
+        }
     }
+    units
+        .into_iter()
+        .map(|(unit, series)| Figure {
+            id: "scope".to_owned(),
+            caption: "Sampled by telemetry.".to_owned(),
+            plot: Plot::Lines(Lines {
+                x_label: "Time, s".to_owned(),
+                y_label: unit.to_owned(),
+                series,
+                ..Lines::default()
+            }),
+        })
+        .collect()
 }

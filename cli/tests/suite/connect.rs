@@ -283,6 +283,50 @@ fn an_axis_of_unknown_travel_is_not_excited() {
 }
 
 #[test]
+fn what_is_edited_and_does_not_act_yet_is_shown_and_what_a_file_would_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = succeeds(
+        folder.path(),
+        &["--json"],
+        "diff\nset x/feedback/pid/kp_v_per_mm 1.0\ndiff\ndump draft.toml\nrevert\ndiff\ndiff draft.toml\nload draft.toml\ndiff draft.toml\n",
+    );
+    let results: Vec<serde_json::Value> = said
+        .lines()
+        .map(|line| serde_json::from_str::<serde_json::Value>(line).unwrap())
+        .filter(|line| line["command"] == "diff")
+        .map(|line| line["result"].clone())
+        .collect();
+    let [at_first, edited, reverted, file, loaded] = &results[..] else {
+        panic!("{said}");
+    };
+    for nothing in [at_first, reverted, loaded] {
+        assert_eq!(nothing, &serde_json::json!([]));
+    }
+    assert_eq!(edited.as_array().map(Vec::len), Some(1), "{edited}");
+    let only = &edited[0];
+    assert_eq!(only["path"], "/axes/0/feedback/pid/kp_v_per_mm");
+    assert_eq!(only["other"], 1.0);
+    assert_eq!(only["acting"], 1.118);
+    assert_eq!(file, edited);
+}
+
+#[test]
+fn a_scope_of_several_units_has_a_chart_for_each() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(
+        folder.path(),
+        &[],
+        "enable\njog x 5\nscope x.error,x.output,y.error --seconds 0.2 --svg scope.svg\nstop\n",
+    );
+    let svg = std::fs::read_to_string(folder.path().join("scope.svg")).unwrap();
+    // One around the charts of mm and of V.
+    assert_eq!(svg.matches("<svg").count(), 3);
+    for text in ["x.error", "x.output", "y.error", "\nmm\n", "\nV\n"] {
+        assert!(svg.contains(text), "{text}");
+    }
+}
+
+#[test]
 fn a_scope_draws_and_keeps_what_it_drew() {
     let folder = tempfile::tempdir().unwrap();
     let said = succeeds(

@@ -53,6 +53,7 @@ pub use lines::{Band, Lines, Series};
 pub use page::{Block, Page, Provenance, Section};
 pub use palette::Colour;
 pub use polar::{DeviationTrace, Magnification, PolarDeviation};
+pub use print::stacked_svg;
 pub use scale::Scale;
 pub use style::{Dash, Style};
 pub use table::{Cell, Column, Table};

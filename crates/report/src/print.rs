@@ -40,6 +40,11 @@ impl Figure {
     /// # Errors
     /// Data that do not fit together.
     pub fn to_svg(&self) -> Result<String, ReportError> {
+        Ok(self.print()?.0)
+    }
+
+    /// The image, and its height, px.
+    fn print(&self) -> Result<(String, f64), ReportError> {
         self.check()?;
         let drawing = self.decimated(POINTS).drawing();
         let height = match &self.plot {
@@ -51,7 +56,25 @@ impl Figure {
     }
 }
 
-fn draw(drawing: &Drawing, chart_height: f64) -> Result<String, Box<dyn Error>> {
+/// Figures one below the other, as one stand-alone SVG image: what has several units over one time.
+///
+/// # Errors
+/// As for [`Figure::to_svg`].
+pub fn stacked_svg(figures: &[Figure]) -> Result<String, ReportError> {
+    let mut below = String::new();
+    let mut height = 0.0;
+    for figure in figures {
+        let (image, own) = figure.print()?;
+        below.push_str(&image.replacen("<svg ", &format!("<svg y=\"{height:.1}\" "), 1));
+        height += own;
+    }
+    Ok(format!(
+        "<svg width=\"{WIDTH}\" height=\"{height:.1}\" xmlns=\"http://www.w3.org/2000/svg\">\n{below}</svg>\n"
+    ))
+}
+
+/// The image of a drawing, and its height, px.
+fn draw(drawing: &Drawing, chart_height: f64) -> Result<(String, f64), Box<dyn Error>> {
     let entries = legend_places(&drawing.curves);
     let legend_height = entries.last().map_or(6.0, |&(_, y)| y + 14.0);
     let height = legend_height + chart_height;
@@ -69,7 +92,7 @@ fn draw(drawing: &Drawing, chart_height: f64) -> Result<String, Box<dyn Error>> 
     }
     let in_steps = format!("width=\"{}\" height=\"{}\"", steps(WIDTH), steps(height));
     let in_px = format!("width=\"{WIDTH}\" height=\"{height:.1}\"");
-    Ok(image.replacen(&in_steps, &in_px, 1))
+    Ok((image.replacen(&in_steps, &in_px, 1), height))
 }
 
 fn steps(px: f64) -> i32 {

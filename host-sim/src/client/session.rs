@@ -13,7 +13,7 @@ use quadrant::link::message::{MachineState, TelemetryBlock};
 use super::error::ClientError;
 use super::interrupt::Interrupt;
 use super::timeout::{ANSWER, BUSY, BUSY_PAUSE, Idempotency, answer_timeout, idempotency};
-use crate::machine::{SimulatedIo, Transport};
+use crate::machine::{SimulatedIo, Transport, VIEWER_ID};
 
 /// Notices that are kept until someone asks for them; of more, the oldest are dropped.
 const MOST_NOTICES: usize = 1 << 14;
@@ -69,6 +69,9 @@ impl Client {
         // Ends whatever the other end takes for a frame's beginning.
         client.send(&[DELIMITER])?;
         client.greet()?;
+        if client.transport.is_shared() {
+            client.look()?;
+        }
         Ok(client)
     }
 
@@ -247,17 +250,29 @@ impl Client {
     }
 
     /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
-    /// its host has started when that falls silent. Whoever lets time pass without [`wait`](Self::wait) calls this a few
+    /// its host has started when that falls silent. Asks for what others see, if they may look. Whoever lets time pass without [`wait`](Self::wait) calls this a few
     /// times a second.
     ///
     /// # Errors
     /// As [`request`](Self::request).
     pub fn keep_alive(&mut self) -> Result<(), ClientError> {
         self.heed_interrupt()?;
-        if self.moves && self.now().saturating_sub(self.asked) >= ALIVE {
-            let status = self.status()?;
-            self.moves = !status.is_at_rest();
+        let shared = self.transport.is_shared();
+        if !(self.moves || shared) || self.now().saturating_sub(self.asked) < ALIVE {
+            return Ok(());
         }
+        if shared {
+            self.look()?;
+        }
+        self.moves &= !self.status()?.is_at_rest();
+        Ok(())
+    }
+
+    /// Asks for what others see who look at the machine.
+    fn look(&mut self) -> Result<(), ClientError> {
+        self.status()?;
+        self.inputs()?;
+        self.fault()?;
         Ok(())
     }
 
@@ -345,7 +360,7 @@ impl Client {
     /// answer to the first is an answer.
     fn ask(&mut self, body: &Body) -> Result<Result<Reply, LinkError>, ClientError> {
         let id = self.next_id;
-        self.next_id = self.next_id.wrapping_add(1);
+        self.next_id = (self.next_id + 1) % VIEWER_ID;
         let request = Request {
             id,
             body: body.clone(),

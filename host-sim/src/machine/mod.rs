@@ -19,7 +19,7 @@
 //! - [`emulated`], [`emulator`] (feature `emulated`): the firmware's image in QEMU; [`benchmark_job`]: the motion that it is
 //!   counted with;
 //! - [`Transport`], [`SerialTransport`], [`TcpTransport`], [`Loopback`]: bytes to a machine and back; `claim`: one program
-//!   at a time;
+//!   at a time; [`Shared`]: others may look;
 //! - [`simulated_io`]: fault injection at machines that are not real: inputs, supply, log.
 //!
 //! Nothing here knows the client: [`client`](crate::client) is built on this.
@@ -42,6 +42,7 @@ pub mod law;
 mod loopback;
 pub mod memory_flash;
 mod serial;
+mod shared;
 pub mod simulated;
 pub mod simulated_io;
 mod simulated_link;
@@ -60,6 +61,7 @@ pub use journal::Journal;
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
 pub use loopback::{Loopback, SimulatedPeer};
 pub use serial::{BAUD, SerialTransport, serial_ports};
+pub use shared::{Shared, VIEWER_ID};
 pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;

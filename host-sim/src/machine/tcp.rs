@@ -13,7 +13,7 @@ pub struct TcpTransport {
     stream: TcpStream,
     address: String,
     opened: Instant,
-    _claim: Claim,
+    _claim: Option<Claim>,
 }
 
 impl TcpTransport {
@@ -23,6 +23,18 @@ impl TcpTransport {
     /// An address that is none, where nobody answers within 5 s, or to which another program talks.
     pub fn connect(address: &str) -> io::Result<Self> {
         let claim = Claim::take(address)?;
+        Self::open(address, Some(claim))
+    }
+
+    /// Connects to `host:port`, where another program lets others look at its machine.
+    ///
+    /// # Errors
+    /// An address that is none, or where nobody answers within 5 s.
+    pub fn look(address: &str) -> io::Result<Self> {
+        Self::open(address, None)
+    }
+
+    fn open(address: &str, claim: Option<Claim>) -> io::Result<Self> {
         let mut last = io::Error::new(io::ErrorKind::InvalidInput, "no such host");
         for candidate in address.to_socket_addrs()? {
             match TcpStream::connect_timeout(&candidate, TIMEOUT) {

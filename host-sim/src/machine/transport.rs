@@ -29,6 +29,11 @@ pub trait Transport {
     /// Returns the remedy if the other end is silent.
     fn remedy(&self) -> &'static str;
 
+    /// True if others look at the machine, and are told what this end hears.
+    fn is_shared(&self) -> bool {
+        false
+    }
+
     /// Inputs, supply and log of the machine, where a program can have them: of a simulated one.
     fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
         None

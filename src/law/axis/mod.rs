@@ -199,7 +199,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.bumpless_decay = S::ZERO;
         axis.overspeed = Overspeed::UNLIMITED;
         axis.signal_loss = SignalLoss::off();
-        axis.plausibility = Plausibility::off();
+        axis.plausibility = Plausibility::default();
         axis.overload = Overload::UNLIMITED;
         axis.index_spacing = IndexSpacing::default();
         axis.following = Following::unlimited();
@@ -597,7 +597,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             bumpless_decay: S::ZERO,
             overspeed: Overspeed::default(),
             signal_loss: SignalLoss::default(),
-            plausibility: Plausibility::off(),
+            plausibility: Plausibility::default(),
             overload: Overload::UNLIMITED,
             index_spacing: IndexSpacing::default(),
             following: Following::default(),

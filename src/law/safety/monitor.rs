@@ -68,7 +68,7 @@ impl OverspeedState {
         let mut counts = counts;
         if counts.wrapping_add(1 << STEP_BITS) as u32 >> (STEP_BITS + 1) != 0 {
             cold_path();
-            counts = counts.clamp(-1 << STEP_BITS, 1 << STEP_BITS);
+            counts = counts.signum() << STEP_BITS;
         }
         let speed = counts << SPEED_FRACTION_BITS;
         self.filtered += (speed - self.filtered) >> SPEED_FILTER_BITS;

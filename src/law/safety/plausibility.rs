@@ -96,7 +96,7 @@ pub struct PlausibilityModel {
     pub velocity_mm_s: f64,
 }
 
-/// Compares the encoder's motion with what the output must have caused.
+/// Compares the encoder's motion with what the output must have caused; the default finds nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Plausibility {
     /// The axis is known by a model; else there is only the budget of the open loop.
@@ -213,11 +213,6 @@ impl Plausibility {
             push: rounding::round(per_volt / words.per_volt * scale) as i32,
             ..Self::default()
         }
-    }
-
-    /// A comparison that finds nothing.
-    pub fn off() -> Self {
-        Self::default()
     }
 
     /// A memory of an axis whose outputs are off until now: anything may have moved it.

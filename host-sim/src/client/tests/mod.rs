@@ -5,6 +5,7 @@ mod lines;
 mod model;
 mod observe;
 mod session;
+mod shared;
 
 use std::cell::RefCell;
 use std::rc::Rc;

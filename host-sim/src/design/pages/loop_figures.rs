@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 
-use crate::design::OpenLoop;
 use crate::design::step_response::StepResponse;
+use crate::design::{Margins, OpenLoop, margins};
 use crate::pages::{lines, series};
 use crate::report::{Block, Colour, Figure, Plot, Scale, Series, Style};
 
@@ -71,29 +71,79 @@ fn over_frequency(id: &str, caption: &str, y_label: &str, curves: Vec<Series>) -
     Block::Figure(figure)
 }
 
-/// Bode plot of the open loops (thesis, Fig 4.2): gain and phase.
+/// A point that marks a margin of a loop, with its figures in the legend.
+fn mark<L: OpenLoop>(drawn: &DrawnLoop<'_, L>, figures: &str, (x, y): (f64, f64)) -> Series {
+    series(
+        &format!("{}: {figures}", drawn.name),
+        vec![x],
+        vec![y],
+        Style::points(drawn.style.colour),
+    )
+}
+
+fn gain_margin_text(margins: &Margins) -> String {
+    format!(
+        "gain margin {:.1} dB at {:.0} Hz",
+        margins.gain_margin_db, margins.phase_crossover_hz
+    )
+}
+
+fn phase_margin_text(margins: &Margins) -> String {
+    format!(
+        "phase margin {:.1} deg at {:.0} Hz",
+        margins.phase_margin_deg, margins.gain_crossover_hz
+    )
+}
+
+/// Bode plot of the open loops (thesis, Fig 4.2): gain and phase, with the margin that each shows.
 pub(super) fn bode_blocks<L: OpenLoop>(loops: &[DrawnLoop<'_, L>]) -> [Block; 2] {
-    let curves = |ordinate: &dyn Fn(&[Complex64]) -> Vec<f64>| -> Vec<Series> {
-        loops
-            .iter()
-            .map(|drawn| {
-                let (frequencies, responses) = sampled(drawn.open_loop);
-                series(drawn.name, frequencies, ordinate(&responses), drawn.style)
-            })
-            .collect()
-    };
+    let (mut gains, mut phases) = (Vec::new(), Vec::new());
+    let (mut gain_marks, mut phase_marks) = (Vec::new(), Vec::new());
+    for drawn in loops {
+        let (frequencies, responses) = sampled(drawn.open_loop);
+        let decibels = responses.iter().copied().map(decibels).collect();
+        let degrees = unwrapped_deg(&responses);
+        // A loop without margins is drawn without marks: the table says why.
+        if let Ok(margins) = margins(drawn.open_loop) {
+            gain_marks.push(mark(
+                drawn,
+                &gain_margin_text(&margins),
+                (margins.phase_crossover_hz, -margins.gain_margin_db),
+            ));
+            let drawn_deg = frequencies
+                .iter()
+                .position(|&hz| hz >= margins.gain_crossover_hz)
+                .map(|index| degrees[index]);
+            if let Some(drawn_deg) = drawn_deg {
+                phase_marks.push(mark(
+                    drawn,
+                    &phase_margin_text(&margins),
+                    (margins.gain_crossover_hz, drawn_deg),
+                ));
+            }
+        }
+        gains.push(series(
+            drawn.name,
+            frequencies.clone(),
+            decibels,
+            drawn.style,
+        ));
+        phases.push(series(drawn.name, frequencies, degrees, drawn.style));
+    }
+    gains.extend(gain_marks);
+    phases.extend(phase_marks);
     [
         over_frequency(
             "open-loop-gain",
-            "Open loop, position over error: gain",
+            "Open loop, position over error: gain; a point marks how far below 0 dB it is where the phase is -180 deg",
             "gain (dB)",
-            curves(&|responses| responses.iter().copied().map(decibels).collect()),
+            gains,
         ),
         over_frequency(
             "open-loop-phase",
-            "Open loop: phase",
+            "Open loop: phase; a point marks how far above -180 deg it is where the gain is 0 dB",
             "phase (deg)",
-            curves(&unwrapped_deg),
+            phases,
         ),
     ]
 }
@@ -125,6 +175,18 @@ pub(super) fn nyquist_block<L: OpenLoop>(loops: &[DrawnLoop<'_, L>]) -> Block {
             drawn.style,
         )
     }));
+    for drawn in loops {
+        let Ok(margins) = margins(drawn.open_loop) else {
+            continue;
+        };
+        for (text, hz) in [
+            (gain_margin_text(&margins), margins.phase_crossover_hz),
+            (phase_margin_text(&margins), margins.gain_crossover_hz),
+        ] {
+            let response = drawn.open_loop.response(TAU * hz);
+            curves.push(mark(drawn, &text, (response.re, response.im)));
+        }
+    }
     Block::Figure(plane(
         "nyquist",
         "Nyquist plot of the open loop",

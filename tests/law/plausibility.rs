@@ -1,0 +1,296 @@
+//! The comparison of encoder and plant, against its definition in seconds, volts and millimetres.
+//!
+//! What is expected is integrated here in f64 from the description: no line of it is shared with the law.
+
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
+use quadrant::reference::Velocity;
+use quadrant::safety::FaultCode;
+use quadrant::safety::plausibility::{
+    Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
+};
+use quadrant::settings::StageSettings;
+use quadrant_fault_bench::plant::{MODEL, Plant, Truth};
+
+use crate::common::Rig;
+
+const PERIOD_S: f64 = 1e-4;
+const COUNT_MM: f64 = 5e-4;
+/// Ticks from one comparison to the next.
+const INTERVAL: u32 = 4;
+const INTERVAL_S: f64 = INTERVAL as f64 * PERIOD_S;
+/// Time in which a distance is forgotten: the largest power of two of comparisons within 0.3 s.
+const FORGET_S: f64 = 512.0 * INTERVAL_S;
+/// Time by which the filtered speed lags: its 8 ticks, and half an interval.
+const FILTER_S: f64 = 10.0 * PERIOD_S;
+/// A filtered speed of 1 mm/s.
+const SPEED: f64 = PERIOD_S / COUNT_MM * 256.0;
+
+const AMPLIFIERS: [Words; 3] = [
+    Words {
+        per_volt: 3276.7,
+        offset: 0,
+    },
+    Words {
+        per_volt: 3276.7,
+        offset: 250,
+    },
+    Words {
+        per_volt: -1638.35,
+        offset: -40,
+    },
+];
+
+fn model() -> PlausibilityModel {
+    PlausibilityModel {
+        gain_mm_per_v_s2: 2000.0,
+        damping_per_s: 20.0,
+        delay_s: 1e-3,
+        limit_v: 10.0,
+        largest_mm_s: 300.0,
+        held_v: 0.6,
+        breakaway_v: 0.8,
+        load_v: 3.0,
+        first_load_v: 1.0,
+        proving_mm: 1e9,
+        distance_mm: 0.3,
+        velocity_mm_s: 60.0,
+    }
+}
+
+/// Shows comparisons until one fails; gives the time, s, at most 3.
+fn time_until_found(
+    plausibility: &Plausibility,
+    words: Words,
+    open: bool,
+    volts: impl Fn(f64) -> f64,
+    motion: impl Fn(f64) -> (f64, f64),
+) -> Option<f64> {
+    let mut state = PlausibilityState::default();
+    let mut sum = 0_i32;
+    for tick in 1..30_000_u32 {
+        let time_s = f64::from(tick) * PERIOD_S;
+        let word = (volts(time_s) * words.per_volt).round() as i32 + words.offset;
+        sum = sum.wrapping_add(word);
+        if !tick.is_multiple_of(INTERVAL) {
+            continue;
+        }
+        let (position_mm, velocity_mm_s) = motion(time_s);
+        let shown = Shown {
+            count: (position_mm / COUNT_MM).round() as i32,
+            speed: (velocity_mm_s * SPEED).round() as i32,
+            words: sum,
+            open,
+        };
+        if !plausibility.step(&mut state, shown) {
+            return Some(time_s);
+        }
+    }
+    None
+}
+
+/// Steps of an interval until `step` says that it is found; gives the time, s.
+fn expected(mut step: impl FnMut(f64) -> bool) -> Option<f64> {
+    (1..7500)
+        .map(|index| f64::from(index) * INTERVAL_S)
+        .find(|&time_s| step(time_s))
+}
+
+fn near(what: &str, found: Option<f64>, expected: Option<f64>) {
+    match (found, expected) {
+        (Some(found), Some(expected)) => assert!(
+            (found - expected).abs() <= 0.02 * expected + 2.0 * INTERVAL_S,
+            "{what}: {found} s, expected {expected} s"
+        ),
+        _ => assert_eq!(found, expected, "{what}"),
+    }
+}
+
+#[test]
+fn an_axis_without_a_model_has_its_budget_in_volt_seconds_in_open_loop_and_none_in_closed_loop() {
+    for words in AMPLIFIERS {
+        for (budget_v_s, breakaway_v, volts) in [
+            (0.02, 0.5, 1.0),
+            (0.02, 0.5, -1.0),
+            (0.05, 0.2, 3.0),
+            (0.05, 0.0, 0.4),
+            (0.02, 0.5, 0.49),
+            // As much is forgotten in time as comes: it is never spent.
+            (0.2, 0.5, 0.9),
+        ] {
+            let axis = Plausibility::without_model(budget_v_s, breakaway_v, words, PERIOD_S);
+            let mut spent = 0.0;
+            let beyond = (f64::abs(volts) - breakaway_v).max(0.0);
+            let budget = expected(|_| {
+                spent += (beyond - spent / FORGET_S) * INTERVAL_S;
+                spent > budget_v_s
+            });
+            let what = format!("{words:?}, {budget_v_s} V s, {volts} V of {breakaway_v}");
+            let stands = |_| (0.0, 0.0);
+            let found = |open| time_until_found(&axis, words, open, |_| volts, stands);
+            near(&what, found(true), budget);
+            assert_eq!(found(false), None, "{what}");
+        }
+    }
+}
+
+#[test]
+fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
+    let model = model();
+    for words in AMPLIFIERS {
+        let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
+        for (open, holds_v) in [(true, model.held_v), (false, model.held_v)] {
+            for volts in [0.55, 0.7, 1.0, -1.5, 4.0] {
+                let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
+                let found = expected(|_| {
+                    force += (volts - force) * INTERVAL_S / (model.delay_s + FILTER_S);
+                    let beyond = |limit: f64| (force.abs() - limit).max(0.0) * force.signum();
+                    let mut moves = beyond(holds_v);
+                    if open && moves == 0.0 {
+                        moves = beyond(model.breakaway_v);
+                    }
+                    velocity += (model.gain_mm_per_v_s2 * moves - model.damping_per_s * velocity)
+                        * INTERVAL_S;
+                    distance += velocity * INTERVAL_S - distance * INTERVAL_S / FORGET_S;
+                    distance.abs() > model.distance_mm
+                });
+                let what = format!("{words:?}, {volts} V, open: {open}");
+                let stands = |_| (0.0, 0.0);
+                near(
+                    &what,
+                    time_until_found(&axis, words, open, |_| volts, stands),
+                    found,
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_speed_that_no_load_explains_is_found_when_it_has_gained_the_bound() {
+    for (proving_mm, of_load) in [(1e9, 1.0), (0.0, 3.0)] {
+        let model = PlausibilityModel {
+            proving_mm,
+            ..model()
+        };
+        let load_v = if of_load == 1.0 {
+            model.first_load_v
+        } else {
+            model.load_v
+        };
+        for words in AMPLIFIERS {
+            let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
+            for (volts, acceleration) in [
+                (0.0, 8000.0),
+                (0.0, -12_000.0),
+                (0.5, 12_000.0),
+                (-0.5, 9000.0),
+                (2.0, -9000.0),
+                (0.0, 1500.0),
+            ] {
+                let speed_at = |time_s: f64| (acceleration * time_s).clamp(-290.0, 290.0);
+                let (mut force, mut least, mut most) = (0.0_f64, 0.0_f64, 0.0_f64);
+                let found = expected(|time_s| {
+                    let speed = speed_at(time_s);
+                    force += (volts - force) * INTERVAL_S / (model.delay_s + FILTER_S);
+                    let load = load_v + force.abs() * (0.25 + 0.0625);
+                    let push = |volts: f64| model.gain_mm_per_v_s2 * volts * INTERVAL_S;
+                    let gained = push(force) - model.damping_per_s * speed * INTERVAL_S;
+                    let (low, high) = (least + gained - push(load), most + gained + push(load));
+                    let gap = (low - speed).max(speed - high);
+                    (least, most) = (low.max(speed), high.min(speed));
+                    gap > model.velocity_mm_s
+                });
+                let what =
+                    format!("{words:?}, {volts} V, {acceleration} mm/s2, {load_v} V of load");
+                let moves = |time_s: f64| {
+                    // Far enough in the first comparison, where that is asked for.
+                    let way = if proving_mm == 0.0 { 1.0 } else { 0.0 };
+                    (way + 0.5 * acceleration * time_s * time_s, speed_at(time_s))
+                };
+                near(
+                    &what,
+                    time_until_found(&axis, words, false, |_| volts, moves),
+                    found,
+                );
+            }
+        }
+    }
+}
+
+/// The stage with a plant as its x axis, whose counter began at `origin`.
+struct Moved {
+    rig: Rig<f32>,
+    plant: Plant,
+    origin: i64,
+}
+
+impl Moved {
+    fn new(truth: &Truth, origin: i64) -> Self {
+        Self {
+            rig: Rig::with_plant(&StageSettings::simulated(), &Default::default()),
+            plant: Plant::new(truth),
+            origin,
+        }
+    }
+
+    fn run(&mut self, ticks: u32) {
+        for _ in 0..ticks {
+            let count = (self.plant.position_mm / COUNT_MM).floor() as i64 + self.origin;
+            self.rig.inputs.readings[0].count = count as u32;
+            let outputs = self.rig.tick();
+            let volts = f64::from(outputs.codes[0].0) / 32767.0 * 10.0;
+            self.plant.step(if outputs.enabled { volts } else { 0.0 });
+        }
+    }
+
+    fn command(&mut self, command: Command) {
+        self.rig.inputs.command = Some(command);
+        self.run(1);
+    }
+
+    fn fault(&self) -> Option<FaultCode> {
+        self.rig.state.safety().fault().map(|fault| fault.code)
+    }
+}
+
+#[test]
+fn an_axis_that_is_enabled_again_is_compared_from_then_on() {
+    let mut axis = Moved::new(&MODEL, 1_000_000);
+    axis.run(100);
+    for _ in 0..4 {
+        axis.command(Command::Enable);
+        axis.plant.load_v = 0.4;
+        axis.run(5000);
+        assert_eq!(axis.fault(), None);
+        assert!(axis.rig.state.safety().is_enabled());
+        axis.command(Command::Disable);
+        axis.plant.load_v = 0.0;
+        axis.run(500);
+    }
+}
+
+#[test]
+fn a_wrong_sign_is_found_as_soon_wherever_the_counter_began() {
+    let reversed = Truth {
+        reversed: true,
+        ..MODEL
+    };
+    let found = [0, 1_000_000, -40_000_000].map(|origin| {
+        let mut axis = Moved::new(&reversed, origin);
+        axis.run(100);
+        axis.command(Command::Enable);
+        axis.run(100);
+        let scale = StageSettings::simulated().motion_scale(0);
+        axis.command(Command::Jog(AxisName::X, Velocity::from_mm_s(20.0, scale)));
+        let ticks = (0..3000)
+            .find(|_| {
+                axis.run(1);
+                axis.fault().is_some()
+            })
+            .expect("found");
+        assert_eq!(axis.fault(), Some(FaultCode::EncoderImplausible));
+        ticks
+    });
+    assert_eq!(found, [found[0]; 3]);
+}
