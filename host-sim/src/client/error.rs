@@ -137,6 +137,9 @@ pub enum ClientError {
         /// Remedy, for the message.
         remedy: String,
     },
+    /// A motion is under way, which a measurement would mistake for its own.
+    #[error("an axis moves: `stop`, and measure when all axes stand")]
+    Moving,
     /// A condition was not met in time.
     #[error("{what}: not after {waited_s} s; {remedy}")]
     TimedOut {

@@ -184,6 +184,20 @@ fn an_injection_that_is_closed_holds_where_the_axis_stands() {
 }
 
 #[test]
+fn an_axis_that_moves_is_not_measured() {
+    let mut client = enabled();
+    client.order(jog(5.0)).unwrap();
+    client.wait(Duration::from_millis(100)).unwrap();
+    let Err(refused) = ConnectedAxis::new(&mut client, AxisName::X, 5.0) else {
+        panic!("measured");
+    };
+    assert!(refused.to_string().contains("`stop`"), "{refused}");
+    client.order(Body::Stop).unwrap();
+    client.wait(Duration::from_secs(1)).unwrap();
+    assert!(ConnectedAxis::new(&mut client, AxisName::X, 5.0).is_ok());
+}
+
+#[test]
 fn what_cannot_be_injected_is_refused_in_words() {
     let refused = |client: &mut Client, request: InjectRequest| {
         inject(client, request).unwrap_err().to_string()

@@ -45,14 +45,18 @@ impl<'a> ConnectedAxis<'a> {
     /// way.
     ///
     /// # Errors
-    /// A connection that is broken, or a machine of another release.
+    /// A motion that is under way, a connection that is broken, or a machine of another release.
     pub fn new(
         client: &'a mut Client,
         axis: AxisName,
         travel_mm: f64,
     ) -> Result<Self, ClientError> {
         let stage = settings::dump(client)?;
-        let origin_mm = client.status()?.axes[axis as usize].position_mm;
+        let status = client.status()?;
+        if !status.is_at_rest() {
+            return Err(ClientError::Moving);
+        }
+        let origin_mm = status.axes[axis as usize].position_mm;
         Ok(Self {
             client,
             axis,
