@@ -34,17 +34,17 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
             "--size {width} {height}: give 20 to {MOST_SIZE} characters and 1 to {MOST_SIZE} lines"
         );
     }
-    let unit = columns::unit(options.channels[0]);
+    let unit = options.channels[0].physical_unit();
     if options.svg.is_some()
         && let Some(other) = options
             .channels
             .iter()
-            .find(|channel| columns::unit(**channel) != unit)
+            .find(|channel| channel.physical_unit() != unit)
     {
         bail!(
             "--svg: {} is in {unit:?} and {other} in {:?}; give channels of one unit for one figure",
             options.channels[0],
-            columns::unit(*other)
+            other.physical_unit()
         );
     }
     let live = stdout().is_terminal() && !session.printer.json;
@@ -133,7 +133,7 @@ fn heading(channel: Channel, values: &[f64]) -> String {
     let last = values.last().copied().unwrap_or(f64::NAN);
     format!(
         "{channel}, {unit}: now {last:.5}, RMS {rms:.5}\n",
-        unit = columns::unit(channel)
+        unit = channel.physical_unit()
     )
 }
 
@@ -157,7 +157,7 @@ fn figure(samples: &Samples, resolutions_mm: &[f64; 3]) -> Figure {
             y_label: samples
                 .channels
                 .first()
-                .map(|&channel| columns::unit(channel))
+                .map(|&channel| channel.physical_unit())
                 .unwrap_or_default()
                 .to_owned(),
             series: series.collect(),

@@ -229,11 +229,8 @@ impl TelemetryRecorder {
         if self.samples.is_empty() {
             self.samples.first_tick = block.tick;
         }
-        let words: Vec<u32> = block.words.iter().collect();
-        for (index, sample) in words.chunks_exact(channels).enumerate() {
-            let number = block.sequence.wrapping_add(index as u32);
-            self.samples
-                .push(number.wrapping_sub(first), sample.iter().copied());
+        for (number, words) in block.samples() {
+            self.samples.push(number.wrapping_sub(first), words);
         }
     }
 }

@@ -24,8 +24,8 @@ pub use channel::{AxisSignal, Channel, StageSignal, UnknownChannel, WordKind};
 pub use error::LinkError;
 pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
 pub use machine::{
-    AxisMode, AxisStatus, FaultReport, Identity, Inputs, LimitedBy, MachineState, NumberType,
-    Status,
+    AxisMode, AxisStatus, FaultReport, INPUTS, Identity, Inputs, LimitedBy, MachineState,
+    NumberType, Status,
 };
 pub use motion::{
     AxisPoint, Harmonic, Motion, Plan, PointToPoint, STREAM_POINTS, SetPoint, StreamRequest,

@@ -73,6 +73,17 @@ pub struct TelemetryBlock {
     pub words: Words,
 }
 
+impl TelemetryBlock {
+    /// Its samples in order: the number of each since the selection was made, and its words, a channel each.
+    pub fn samples(&self) -> impl Iterator<Item = (u32, impl Iterator<Item = u32> + '_)> + '_ {
+        let channels = usize::from(self.channels).max(1);
+        (0..self.words.len() / channels).map(move |index| {
+            let words = self.words.iter().skip(index * channels).take(channels);
+            (self.sequence.wrapping_add(index as u32), words)
+        })
+    }
+}
+
 /// A request about the telemetry.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum TelemetryRequest {
