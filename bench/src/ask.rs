@@ -2,15 +2,13 @@
 
 use quadrant::link::heapless::{String as Bounded, Vec as BoundedList};
 use quadrant::link::message::{
-    AxisName, Body, Channel, MAX_CHANNELS, SettingsRequest, TelemetryRequest,
+    AxisName, Body, Channel, MAX_CHANNELS, SERIAL_VALUES_PER_S, SettingsRequest, TelemetryRequest,
 };
 use quadrant::settings::tree::expand;
 use quadrant_simulation::setting_value;
 use serde::Deserialize;
 use serde_json::Value;
 
-/// Values a second that a serial port carries in blocks: `docs/link.md`, Telemetry.
-const VALUES_PER_S: f64 = 21_500.0;
 /// Samples across a strip chart at most.
 const MOST_SAMPLES: f64 = 3000.0;
 
@@ -93,7 +91,8 @@ pub enum Ask {
 
 /// Control ticks from one sample to the next: few enough samples for the chart and for a serial port.
 fn decimation(channels: usize, window_s: f64, rate_hz: f64) -> u16 {
-    let ticks = (window_s * rate_hz / MOST_SAMPLES).max(channels as f64 * rate_hz / VALUES_PER_S);
+    let ticks =
+        (window_s * rate_hz / MOST_SAMPLES).max(channels as f64 * rate_hz / SERIAL_VALUES_PER_S);
     ticks.ceil().clamp(1.0, f64::from(u16::MAX)) as u16
 }
 

@@ -33,8 +33,8 @@ pub use motion::{
 };
 pub use notice::{Event, Notice};
 pub use observe::{
-    BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, TelemetryBlock,
-    TelemetryRequest, WordPage, Words,
+    BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, SERIAL_VALUES_PER_S,
+    TelemetryBlock, TelemetryRequest, WordPage, Words,
 };
 pub use settings::{
     Applied, MAX_VALUE_BYTES, PAGE_PATHS, Path, PathPage, Provenance, SettingsRequest, Value,

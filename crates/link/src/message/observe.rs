@@ -15,6 +15,9 @@ pub const BLOCK_WORDS: usize = 112;
 /// Capacity of a block in bytes.
 pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 
+/// Values a second that a serial port carries in blocks: `docs/link.md`, Telemetry.
+pub const SERIAL_VALUES_PER_S: f64 = 21_500.0;
+
 /// Words of samples, little-endian, four bytes each.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Words(Vec<u8, BLOCK_BYTES>);
