@@ -24,6 +24,10 @@ const PATIENCE: Duration = Duration::from_secs(20);
 const STOPPED_TICKS: u32 = 4000;
 /// Way of an axis at rest at most, mm: its law holds it against noise.
 const REST_MM: f64 = 0.01;
+/// Hides the page, and shows it again, as far as it can tell.
+const HIDE: &str = "Object.defineProperty(document, 'hidden', { configurable: true, get: () => true }); \
+    document.dispatchEvent(new Event('visibilitychange'))";
+const SHOW: &str = "delete document.hidden; document.dispatchEvent(new Event('visibilitychange'))";
 /// The button that jogs x towards larger positions.
 const JOG: &str = "[data-jog='x+']";
 
@@ -276,16 +280,13 @@ fn a_jog_stops_when_its_button_is_let_go_or_its_user_is_gone() {
     }
 
     let place = wired.jog();
-    wired.evaluate(
-        "Object.defineProperty(document, 'hidden', { configurable: true, get: () => true }); \
-         document.dispatchEvent(new Event('visibilitychange'))",
-    );
+    wired.evaluate(HIDE);
     wired.assert_stops("hidden");
     let sent = wired.sent;
     wired.pass(5000);
     assert_eq!(wired.sent, sent, "a hidden page goes on asking");
     wired.mouse("mouseReleased", place);
-    wired.evaluate("delete document.hidden; document.dispatchEvent(new Event('visibilitychange'))");
+    wired.evaluate(SHOW);
     wired.wait_for("document.documentElement.dataset.live === 'true'");
     wired.assert_stops("seen again");
     wired.assert_no_problems();
@@ -293,27 +294,27 @@ fn a_jog_stops_when_its_button_is_let_go_or_its_user_is_gone() {
 
 #[test]
 #[ignore = "needs the built page: cargo xtask web --check"]
-fn homing_that_a_press_began_stops_at_the_button_and_when_the_page_is_hidden() {
+fn homing_stops_at_the_button_at_escape_and_when_the_page_is_hidden() {
     let Some(mut wired) = Wired::enabled(TABLET) else {
         return;
     };
-    for way in ["#m-stop", ""] {
+    for way in ["button", "Escape", "hidden"] {
         wired.click("[data-home='x y z']");
         wired.wait_for("machineView.status?.state === 'homing'");
         let began = Instant::now();
         while wired.way_mm(200) < 0.02 {
             assert!(began.elapsed() < PATIENCE, "nothing moves");
         }
-        if way.is_empty() {
-            wired.evaluate(
-                "Object.defineProperty(document, 'hidden', { configurable: true, get: () => true }); \
-                 document.dispatchEvent(new Event('visibilitychange')); delete document.hidden",
-            );
-        } else {
-            wired.click(way);
+        match way {
+            "button" => wired.click("#m-stop"),
+            "Escape" => wired.press_escape(),
+            _ => {
+                wired.evaluate(HIDE);
+            }
         }
         wired.assert_stops(way);
     }
+    wired.evaluate(SHOW);
     wired.assert_no_problems();
 }
 
