@@ -420,7 +420,7 @@ function connect() {
   }));
 }
 
-async function open() {
+async function openBenchView() {
   bench = await openBench();
   form = bench.request("describe");
   const names = [...form.signals, ...AXES.flatMap((name) => form.axis_signals.map((signal) => `${name}.${signal}`))];
@@ -434,5 +434,3 @@ async function open() {
   goTo(0);
   requestAnimationFrame(frame);
 }
-
-open();

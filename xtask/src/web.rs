@@ -17,7 +17,17 @@ const FETCHED: &str = "target/web/npm";
 /// Its sources.
 const SOURCES: &str = "bench/page";
 /// Its scripts, in the order in which they name each other.
-const SCRIPTS: [&str; 4] = ["machine.js", "tour.js", "plots.js", "bench.js"];
+const SCRIPTS: [&str; 9] = [
+    "machine.js",
+    "tour.js",
+    "plots.js",
+    "bench.js",
+    "link.js",
+    "strips.js",
+    "draft.js",
+    "board.js",
+    "start.js",
+];
 /// Largest page, bytes.
 const MOST_BYTES: usize = 3_000_000;
 /// Path of the page, for the test that opens it.
@@ -55,7 +65,7 @@ pub(crate) fn build(toolchain: Toolchain) -> Result<PathBuf> {
     let path = root.join(PAGE);
     fs::write(&path, &page).with_context(|| format!("cannot write {}", path.display()))?;
     println!(
-        "{}: {} kB, of which the law and the stage {} kB",
+        "{}: {} kB, of which WebAssembly {} kB",
         path.display(),
         page.len() / 1000,
         wasm.len() / 1000
@@ -63,7 +73,7 @@ pub(crate) fn build(toolchain: Toolchain) -> Result<PathBuf> {
     Ok(path)
 }
 
-/// Compares the page's converter words with the host's, in a browser.
+/// Compares the page's converter words with the host's, and tries its view of a machine, in a browser.
 pub(crate) fn check(page: &Path) -> Result<()> {
     // Of the whole workspace, like the other tests: else the libraries would be built once more.
     command::run(
@@ -97,8 +107,7 @@ fn reply(mut connection: TcpStream, page: &[u8]) -> std::io::Result<()> {
     while lines.read_line(&mut line)? > 2 {
         line.clear();
     }
-    let is_page = request.starts_with("GET / ");
-    let (status, body) = if is_page {
+    let (status, body) = if asks_for_page(&request) {
         ("200 OK", page)
     } else {
         ("404 Not Found", &[][..])
@@ -109,6 +118,13 @@ fn reply(mut connection: TcpStream, page: &[u8]) -> std::io::Result<()> {
         body.len()
     )?;
     connection.write_all(body)
+}
+
+/// True if the first line of a request asks for the page, in any of its views.
+fn asks_for_page(request: &str) -> bool {
+    ["GET / ", "GET /?"]
+        .iter()
+        .any(|start| request.starts_with(start))
 }
 
 /// Lets npm fetch the plotting library, unless it is there, and returns its folder.
@@ -165,6 +181,13 @@ fn base64(bytes: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn both_views_are_served_and_nothing_else() {
+        assert!(asks_for_page("GET / HTTP/1.1"));
+        assert!(asks_for_page("GET /?machine=serial HTTP/1.1"));
+        assert!(!asks_for_page("GET /favicon.ico HTTP/1.1"));
+    }
 
     #[test]
     fn bytes_become_the_text_of_the_standard() {

@@ -246,24 +246,8 @@ pub(super) fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
 
 /// An event in words.
 fn said(event: &Event) -> String {
-    let fault = |code: &u8, axis: &Option<quadrant::link::message::AxisName>| {
-        let axis = axis.map(|axis| format!(" of {axis}")).unwrap_or_default();
-        format!("fault {code}{axis}")
-    };
     match event {
-        Event::Started(text) => format!("started: {text}"),
-        Event::Enabled => "outputs on".to_owned(),
-        Event::Disabled => "outputs off".to_owned(),
-        Event::Fault { code, axis } => format!("{}; `fault` says more", fault(code, axis)),
-        Event::Stopping { code, axis } => format!("braking for {}", fault(code, axis)),
-        Event::Held { code, axis } => format!("braked and held for {}", fault(code, axis)),
-        Event::MotionStarted => "motion begins".to_owned(),
-        Event::MotionFinished => "motion ends".to_owned(),
-        Event::Refused(text) => format!("refused: {text}"),
-        Event::Homed(axis) => format!("{axis} is homed"),
-        Event::CaptureFrozen { number } => format!("capture {number} can be read"),
-        Event::SettingsApplied(_) => "settings act".to_owned(),
-        Event::SettingsStored => "settings are kept".to_owned(),
-        Event::MovedWhileOff(axis) => format!("{axis} moves though the outputs are off"),
+        Event::Fault { .. } => format!("{event}; `fault` says more"),
+        _ => event.to_string(),
     }
 }

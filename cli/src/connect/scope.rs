@@ -121,7 +121,7 @@ fn heading(channel: Channel, values: &[f64]) -> String {
     let last = values.last().copied().unwrap_or(f64::NAN);
     format!(
         "{channel}, {unit}: now {last:.5}, RMS {rms:.5}\n",
-        unit = columns::unit(channel)
+        unit = channel.physical_unit()
     )
 }
 
@@ -136,7 +136,7 @@ fn figures(samples: &Samples, resolutions_mm: &[f64; 3]) -> Vec<Figure> {
             y: columns::values_mm(samples, index, resolutions_mm),
             style: Style::nth(index),
         };
-        let unit = columns::unit(channel);
+        let unit = channel.physical_unit();
         match units.iter_mut().find(|(known, _)| *known == unit) {
             Some((_, of_unit)) => of_unit.push(series),
             None => units.push((unit, vec![series])),

@@ -3,6 +3,7 @@
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`law_machine`]: the control law and its supervisor, tick by tick;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
+//! - [`setting_value`]: a setting's value as it crosses the link, and as JSON;
 //! - [`held_plant`], [`loop_shape`], [`margins`]: the linear axis behind its converter, the open loop, its margins.
 //!
 //! No threads, no ports and no clock.
@@ -15,6 +16,7 @@ pub mod law_machine;
 pub mod loop_shape;
 pub mod margins;
 pub mod plant;
+pub mod setting_value;
 pub mod settings_file;
 
 #[cfg(test)]

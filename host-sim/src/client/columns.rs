@@ -7,9 +7,6 @@ use quadrant::link::message::{AxisName, AxisSignal, Channel, StageSignal};
 use super::samples::Samples;
 use crate::record::{TraceError, write_trace};
 
-/// Units of a reference word in a count.
-const UNITS_PER_COUNT: f64 = 256.0;
-
 /// The name of a channel's column, with its unit: of an axis as the other commands know it, `position_mm`.
 pub fn column(channel: Channel) -> String {
     match channel {
@@ -51,33 +48,14 @@ const fn axis_column(signal: AxisSignal) -> &'static str {
     }
 }
 
-/// The unit of a channel's [`values_mm`].
-pub const fn unit(channel: Channel) -> &'static str {
-    match channel {
-        Channel::Axis(_, AxisSignal::Reference | AxisSignal::Position) => "mm",
-        other => other.unit(),
-    }
-}
-
-/// The unit in which people read a channel, and how many of them its column's unit is: errors are told in um.
-pub const fn shown_unit(channel: Channel) -> (&'static str, f64) {
-    match channel {
-        Channel::Axis(_, AxisSignal::Error) => ("um", 1e3),
-        other => (unit(other), 1.0),
-    }
-}
-
 /// A channel's values in its column's unit: positions in mm, by the length of a count of each axis.
 pub fn values_mm(samples: &Samples, index: usize, resolution_mm: &[f64; 3]) -> Vec<f64> {
     let mut values = samples.values(index);
-    let scale = match samples.channels.get(index) {
-        Some(Channel::Axis(axis, AxisSignal::Position)) => resolution_mm[*axis as usize],
-        Some(Channel::Axis(axis, AxisSignal::Reference)) => {
-            resolution_mm[*axis as usize] / UNITS_PER_COUNT
+    if let Some(channel) = samples.channels.get(index) {
+        for value in &mut values {
+            *value = channel.physical(*value, resolution_mm);
         }
-        _ => return values,
-    };
-    values.iter_mut().for_each(|value| *value *= scale);
+    }
     values
 }
 

@@ -5,13 +5,12 @@ use std::time::Duration;
 use heapless::Vec as Bounded;
 use quadrant::link::message::{Body, CaptureRequest, CaptureStatus, Reply, TelemetryRequest};
 use quadrant::link::message::{CapturePhase, CaptureRecord, Trigger};
-use quadrant::link::message::{Channel, MAX_CHANNELS, TelemetryBlock, WordKind};
+use quadrant::link::message::{
+    Channel, MAX_CHANNELS, SERIAL_VALUES_PER_S, TelemetryBlock, WordKind,
+};
 
 use super::error::ClientError;
 use super::session::Client;
-
-/// Values a second that a serial port carries in blocks: `docs/link.md`, Telemetry.
-const VALUES_PER_S: f64 = 21_500.0;
 
 /// Time in which the control interrupt gives back a capture that is disarmed.
 const GIVE_BACK: Duration = Duration::from_millis(500);
@@ -135,7 +134,7 @@ impl Samples {
 
 /// The fewest control ticks between samples at which a serial port carries so many channels.
 pub fn least_decimation(channels: usize, rate_hz: f64) -> u16 {
-    let ticks = (channels as f64 * rate_hz / VALUES_PER_S).ceil();
+    let ticks = (channels as f64 * rate_hz / SERIAL_VALUES_PER_S).ceil();
     ticks.clamp(1.0, f64::from(u16::MAX)) as u16
 }
 
@@ -229,11 +228,8 @@ impl TelemetryRecorder {
         if self.samples.is_empty() {
             self.samples.first_tick = block.tick;
         }
-        let words: Vec<u32> = block.words.iter().collect();
-        for (index, sample) in words.chunks_exact(channels).enumerate() {
-            let number = block.sequence.wrapping_add(index as u32);
-            self.samples
-                .push(number.wrapping_sub(first), sample.iter().copied());
+        for (number, words) in block.samples() {
+            self.samples.push(number.wrapping_sub(first), words);
         }
     }
 }

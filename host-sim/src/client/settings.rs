@@ -1,17 +1,15 @@
 //! The machine's settings: leaf by leaf, and as a file.
 
-use heapless::{String as Bounded, Vec as Bytes};
+use heapless::String as Bounded;
 use quadrant::link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
-use quadrant::settings::tree::{TreeError, expand, is_part};
-use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
+use quadrant::settings::StageSettings;
+use quadrant::settings::tree::{expand, is_part};
+use quadrant_simulation::setting_value;
 use serde::Serialize;
 use serde_json::Value;
 
 use super::error::ClientError;
 use super::session::Client;
-
-/// Room for every value as JSON.
-const JSON_BYTES: usize = 2048;
 
 /// The whole path of what a person may write: `x/limits/max_velocity_mm_s` for `/axes/0/limits/max_velocity_mm_s`. What is
 /// longer than any path stays as it is.
@@ -30,17 +28,10 @@ pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
 
 /// The bytes of a value as JSON.
 fn decode(path: &str, value: &LeafValue) -> Result<Value, ClientError> {
-    let unknown = |source| ClientError::Setting {
+    let json = setting_value::to_json(path, value).map_err(|source| ClientError::Setting {
         path: path.to_owned(),
         source,
-    };
-    // Settings with every part, into which the value is put to read it as text.
-    let mut own = StageSettings::simulated();
-    own.set_bytes(path, value.kind, &value.bytes)
-        .map_err(unknown)?;
-    let mut json = [0; JSON_BYTES];
-    let length = own.get_json(path, &mut json).map_err(unknown)?;
-    let json = String::from_utf8_lossy(&json[..length]);
+    })?;
     Ok(serde_json::from_str(&json).unwrap_or_else(|_| Value::from(json)))
 }
 
@@ -95,7 +86,7 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
     let _ = file.list("", &mut |path| paths.push(path.to_owned()));
     let mut differences = Vec::new();
     for path in paths {
-        let Ok(wanted) = bytes_of(file, &path) else {
+        let Ok(wanted) = setting_value::of(file, &path) else {
             continue;
         };
         let acting = acting(client, &path)?;
@@ -130,22 +121,11 @@ pub fn set(client: &mut Client, path: &str, value: &str) -> Result<(), ClientErr
         Ok(_) => value.to_owned(),
         Err(_) => Value::from(value).to_string(),
     };
-    let wrong = |source| ClientError::Setting {
+    let value = setting_value::from_json(path, &json).map_err(|source| ClientError::Setting {
         path: format!("{path} = {json}"),
         source,
-    };
-    let mut own = StageSettings::simulated();
-    own.set_json(path, json.as_bytes()).map_err(wrong)?;
-    set_bytes(client, path, bytes_of(&own, path).map_err(wrong)?)
-}
-
-fn bytes_of(settings: &StageSettings, path: &str) -> Result<LeafValue, TreeError> {
-    let mut bytes = Bytes::new();
-    // Cannot fail: that is its capacity.
-    let _ = bytes.resize_default(MAX_VALUE_BYTES);
-    let (kind, length) = settings.get_bytes(path, &mut bytes)?;
-    bytes.truncate(length);
-    Ok(LeafValue { kind, bytes })
+    })?;
+    set_bytes(client, path, value)
 }
 
 fn set_bytes(client: &mut Client, path: &str, value: LeafValue) -> Result<(), ClientError> {
@@ -342,7 +322,7 @@ fn change(
     wanted: &StageSettings,
     changed: &mut Vec<String>,
 ) -> Result<bool, ClientError> {
-    let Ok(value) = bytes_of(wanted, path) else {
+    let Ok(value) = setting_value::of(wanted, path) else {
         return Ok(false);
     };
     if get_bytes(client, path)? != value {

@@ -2,8 +2,8 @@
 
 use std::io;
 
-use quadrant::axes::AxisName;
-use quadrant::safety::{AxisSwitches, Switches};
+use quadrant::link::message;
+use quadrant::safety::Switches;
 
 /// Inputs, supply and log of a machine that is not a real one.
 pub trait SimulatedIo {
@@ -24,52 +24,16 @@ pub trait SimulatedIo {
 }
 
 /// Digital inputs of a machine, by name; a simulated one's can be pressed.
-pub const INPUTS: [(&str, Switches); 13] = [
-    ("emergency-stop", Switches::EMERGENCY_STOP),
-    (
-        "x.negative-limit",
-        of(AxisName::X, AxisSwitches::NEGATIVE_LIMIT),
-    ),
-    (
-        "x.positive-limit",
-        of(AxisName::X, AxisSwitches::POSITIVE_LIMIT),
-    ),
-    ("x.home", of(AxisName::X, AxisSwitches::HOME)),
-    (
-        "x.amplifier-fault",
-        of(AxisName::X, AxisSwitches::AMPLIFIER_FAULT),
-    ),
-    (
-        "y.negative-limit",
-        of(AxisName::Y, AxisSwitches::NEGATIVE_LIMIT),
-    ),
-    (
-        "y.positive-limit",
-        of(AxisName::Y, AxisSwitches::POSITIVE_LIMIT),
-    ),
-    ("y.home", of(AxisName::Y, AxisSwitches::HOME)),
-    (
-        "y.amplifier-fault",
-        of(AxisName::Y, AxisSwitches::AMPLIFIER_FAULT),
-    ),
-    (
-        "z.negative-limit",
-        of(AxisName::Z, AxisSwitches::NEGATIVE_LIMIT),
-    ),
-    (
-        "z.positive-limit",
-        of(AxisName::Z, AxisSwitches::POSITIVE_LIMIT),
-    ),
-    ("z.home", of(AxisName::Z, AxisSwitches::HOME)),
-    (
-        "z.amplifier-fault",
-        of(AxisName::Z, AxisSwitches::AMPLIFIER_FAULT),
-    ),
-];
-
-const fn of(axis: AxisName, switches: AxisSwitches) -> Switches {
-    Switches::NONE.with_axis(axis, switches)
-}
+pub const INPUTS: [(&str, Switches); message::INPUTS.len()] = {
+    let mut inputs = [("", Switches::NONE); message::INPUTS.len()];
+    let mut index = 0;
+    while index < inputs.len() {
+        let (name, bit) = message::INPUTS[index];
+        inputs[index] = (name, Switches::from_bits(bit));
+        index += 1;
+    }
+    inputs
+};
 
 /// Returns `pressed` without `released`.
 pub const fn without(pressed: Switches, released: Switches) -> Switches {
@@ -78,6 +42,9 @@ pub const fn without(pressed: Switches, released: Switches) -> Switches {
 
 #[cfg(test)]
 mod tests {
+    use quadrant::axes::AxisName;
+    use quadrant::safety::AxisSwitches;
+
     use super::*;
 
     #[test]

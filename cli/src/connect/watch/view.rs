@@ -159,7 +159,7 @@ fn draw_charts(watch: &Watch, frame: &mut Frame, area: Rect) {
 fn draw_chart(watch: &Watch, index: usize, frame: &mut Frame, area: Rect) {
     let channel = watch.channels[index];
     let (samples, first) = watch.shown();
-    let (unit, scale) = columns::shown_unit(channel);
+    let (unit, scale) = channel.shown_unit();
     let values = columns::values_mm(samples, index, &watch.resolutions_mm);
     let end_s = samples
         .numbers
@@ -238,7 +238,7 @@ fn title(
 
 /// Smallest height of a chart: noise of a count fills no chart.
 fn least_span(channel: Channel) -> f64 {
-    match columns::shown_unit(channel).0 {
+    match channel.shown_unit().0 {
         "um" => 4.0,
         "mm" => 0.01,
         "V" => 0.02,

@@ -125,6 +125,8 @@ impl core::error::Error for UnknownChannel {}
 /// Largest number of signals of a source: the factor of its number.
 const SIGNALS_PER_SOURCE: u8 = 32;
 const STAGE_SOURCE: u8 = 3;
+/// Units of a reference word in a count.
+const REFERENCE_UNITS: f64 = 256.0;
 
 impl AxisSignal {
     /// Its name in a channel's, such as `error`.
@@ -190,6 +192,33 @@ impl Channel {
             Self::Axis(_, AxisSignal::Error) => "mm",
             Self::Axis(_, AxisSignal::Velocity) => "mm/s",
             Self::Axis(..) => "V",
+        }
+    }
+
+    /// The unit of its word as a physical quantity: of positions mm, by [`physical`](Self::physical).
+    pub const fn physical_unit(self) -> &'static str {
+        match self {
+            Self::Axis(_, AxisSignal::Reference | AxisSignal::Position) => "mm",
+            other => other.unit(),
+        }
+    }
+
+    /// A value in the channel's unit as one in its physical unit, by the length of a count of each axis, mm.
+    pub const fn physical(self, value: f64, resolution_mm: &[f64; 3]) -> f64 {
+        match self {
+            Self::Axis(axis, AxisSignal::Position) => value * resolution_mm[axis as usize],
+            Self::Axis(axis, AxisSignal::Reference) => {
+                value * (resolution_mm[axis as usize] / REFERENCE_UNITS)
+            }
+            _ => value,
+        }
+    }
+
+    /// The unit in which people read it, and how many of them its physical unit is: errors are told in um.
+    pub const fn shown_unit(self) -> (&'static str, f64) {
+        match self {
+            Self::Axis(_, AxisSignal::Error) => ("um", 1e3),
+            other => (other.physical_unit(), 1.0),
         }
     }
 

@@ -168,6 +168,23 @@ pub struct Inputs {
     pub refusal: Option<String<256>>,
 }
 
+/// The digital inputs that a machine has, by name, and the bit of each in [`Inputs::switches`].
+pub const INPUTS: [(&str, u16); 13] = [
+    ("emergency-stop", 1 << 15),
+    ("x.negative-limit", 1 << 0),
+    ("x.positive-limit", 1 << 1),
+    ("x.home", 1 << 2),
+    ("x.amplifier-fault", 1 << 3),
+    ("y.negative-limit", 1 << 5),
+    ("y.positive-limit", 1 << 6),
+    ("y.home", 1 << 7),
+    ("y.amplifier-fault", 1 << 8),
+    ("z.negative-limit", 1 << 10),
+    ("z.positive-limit", 1 << 11),
+    ("z.home", 1 << 12),
+    ("z.amplifier-fault", 1 << 13),
+];
+
 /// A latched fault.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct FaultReport {

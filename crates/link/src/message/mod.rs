@@ -24,8 +24,8 @@ pub use channel::{AxisSignal, Channel, StageSignal, UnknownChannel, WordKind};
 pub use error::LinkError;
 pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
 pub use machine::{
-    AxisMode, AxisStatus, FaultReport, Identity, Inputs, LimitedBy, MachineState, NumberType,
-    Status,
+    AxisMode, AxisStatus, FaultReport, INPUTS, Identity, Inputs, LimitedBy, MachineState,
+    NumberType, Status,
 };
 pub use motion::{
     AxisPoint, Harmonic, Motion, Plan, PointToPoint, STREAM_POINTS, SetPoint, StreamRequest,
@@ -33,8 +33,8 @@ pub use motion::{
 };
 pub use notice::{Event, Notice};
 pub use observe::{
-    BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, TelemetryBlock,
-    TelemetryRequest, WordPage, Words,
+    BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, SERIAL_VALUES_PER_S,
+    TelemetryBlock, TelemetryRequest, WordPage, Words,
 };
 pub use settings::{
     Applied, MAX_VALUE_BYTES, PAGE_PATHS, Path, PathPage, Provenance, SettingsRequest, Value,

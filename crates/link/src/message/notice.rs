@@ -1,5 +1,7 @@
 //! Notices: messages that a server sends of its own accord.
 
+use core::fmt;
+
 use serde::{Deserialize, Serialize};
 
 use super::axis::{AxisName, AxisSet};
@@ -75,4 +77,30 @@ pub enum Event {
     SettingsStored,
     /// An axis that stood was moved though the outputs are off.
     MovedWhileOff(AxisName),
+}
+
+impl fmt::Display for Event {
+    /// The event in a few words.
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let fault = |f: &mut fmt::Formatter<'_>, before, code: &u8, axis: &Option<AxisName>| {
+            write!(f, "{before}fault {code}")?;
+            axis.map_or(Ok(()), |axis| write!(f, " of {axis}"))
+        };
+        match self {
+            Self::Started(text) => write!(f, "started: {text}"),
+            Self::Enabled => f.write_str("outputs on"),
+            Self::Disabled => f.write_str("outputs off"),
+            Self::Fault { code, axis } => fault(f, "", code, axis),
+            Self::Stopping { code, axis } => fault(f, "braking for ", code, axis),
+            Self::Held { code, axis } => fault(f, "braked and held for ", code, axis),
+            Self::MotionStarted => f.write_str("motion begins"),
+            Self::MotionFinished => f.write_str("motion ends"),
+            Self::Refused(text) => write!(f, "refused: {text}"),
+            Self::Homed(axis) => write!(f, "{axis} is homed"),
+            Self::CaptureFrozen { number } => write!(f, "capture {number} can be read"),
+            Self::SettingsApplied(_) => f.write_str("settings act"),
+            Self::SettingsStored => f.write_str("settings are kept"),
+            Self::MovedWhileOff(axis) => write!(f, "{axis} moves though the outputs are off"),
+        }
+    }
 }

@@ -15,6 +15,9 @@ pub const BLOCK_WORDS: usize = 112;
 /// Capacity of a block in bytes.
 pub const BLOCK_BYTES: usize = 4 * BLOCK_WORDS;
 
+/// Values a second that a serial port carries in blocks: `docs/link.md`, Telemetry.
+pub const SERIAL_VALUES_PER_S: f64 = 21_500.0;
+
 /// Words of samples, little-endian, four bytes each.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Words(Vec<u8, BLOCK_BYTES>);
@@ -71,6 +74,17 @@ pub struct TelemetryBlock {
     pub channels: u8,
     /// The samples, one after the other.
     pub words: Words,
+}
+
+impl TelemetryBlock {
+    /// Its samples in order: the number of each since the selection was made, and its words, a channel each.
+    pub fn samples(&self) -> impl Iterator<Item = (u32, impl Iterator<Item = u32> + '_)> + '_ {
+        let channels = usize::from(self.channels).max(1);
+        (0..self.words.len() / channels).map(move |index| {
+            let words = self.words.iter().skip(index * channels).take(channels);
+            (self.sequence.wrapping_add(index as u32), words)
+        })
+    }
 }
 
 /// A request about the telemetry.

@@ -2,6 +2,8 @@
 //!
 //! `cargo xtask web --check` builds the page and runs these tests, as `cargo xtask test` does.
 
+mod serial;
+
 use std::path::PathBuf;
 
 use quadrant_bench::bench::Bench;
@@ -48,12 +50,16 @@ const READY: &str = "new Promise((done) => { \
     const look = () => document.querySelectorAll('#steps button').length === 6 ? done(true) : setTimeout(look, 20); \
     look(); })";
 
+/// The built page.
+fn page() -> PathBuf {
+    let page = std::env::var_os(PAGE);
+    PathBuf::from(page.expect("the page: run cargo xtask web --check"))
+}
+
 /// The built page, in a browser; `None`, with a message, where there is no browser and none is required.
 fn open(window: (u32, u32), is_dark: bool) -> Option<Browser> {
-    let page = std::env::var_os(PAGE);
-    let page = PathBuf::from(page.expect("the page: run cargo xtask web --check"));
     let mut browser = Browser::start()?;
-    browser.open(&page, window, is_dark);
+    browser.open(&page(), window, is_dark);
     browser.evaluate(READY);
     Some(browser)
 }
