@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::law::control::cascade::{Cascade, CascadeGains};
 use crate::law::control::feedback::{Feedback, LawKind};
+use crate::law::control::filter::{FilterList, Filters};
 use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
 use crate::law::control::npid::{NonlinearGain, NonlinearGainTable, NonlinearPid};
 use crate::law::control::pid::Pid;
@@ -39,6 +40,8 @@ pub struct FeedbackSettings {
     pub sliding_mode: Option<SlidingModeGains>,
     /// Nominal characteristic trajectory following.
     pub nctf: Option<NctfGains>,
+    /// Notches and low-passes behind the law, of any law.
+    pub filters: Option<FilterList>,
 }
 
 /// Output of sliding mode before anybody has chosen it, V: several times the friction of the axes this was written for.
@@ -126,6 +129,13 @@ impl FeedbackSettings {
             .map(|gains| gains.to_pid(filter_s))
             .into_iter()
             .collect()
+    }
+
+    /// The filters ready for the tick, for a control period. Settings time only.
+    pub fn build_filters<S: Scalar>(&self, period_s: f64) -> Filters<S> {
+        self.filters
+            .as_ref()
+            .map_or(Filters::NONE, |filters| Filters::build(filters, period_s))
     }
 
     /// The law ready for the tick, for a control period. Settings are validated before they come here: a law without its

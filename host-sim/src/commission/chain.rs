@@ -3,8 +3,8 @@
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::{
-    bootstrap_settings, low_bandwidth_settings, measuring_settings, with_rough_friction,
-    zero_gain_settings,
+    BOOTSTRAP_SHARES, low_bandwidth_settings_on, measuring_settings, soft_bootstrap_settings,
+    with_rough_friction, zero_gain_settings,
 };
 use super::commissioned::{CommissionSettings, Commissioned};
 use super::error::CommissionError;
@@ -12,7 +12,8 @@ use super::models::{self, Measurements, Models};
 use super::verify::verify;
 use crate::identify::excitation::Excitation;
 use crate::identify::frf::{self, FrfError, FrfMeasurement, FrfSettings};
-use crate::identify::motor_constant::{self, MotorConstantSettings};
+use crate::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
+use crate::identify::plant::PlantFit;
 use crate::identify::static_friction::{
     self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionSettings,
 };
@@ -63,20 +64,15 @@ pub fn commission(
     })?;
 
     step += 1;
-    let mut first = bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz);
-    if test_axis.info().travel_mm < SHORT_TRAVEL_MM {
-        first = with_rough_friction(first, motor.gain_mm_per_v_s2, motor.friction_v);
-    }
-    test_axis.apply(&first)?;
-    let gain = motor.gain_mm_per_v_s2;
-    let response = sliding_response(test_axis, gain, &mut |share| report(step, share))?;
-    let plant = models::plant(&response)?;
-    let pid = models::pid(&plant, base, request, rate_hz)?;
+    let (response, plant) = linear_model(test_axis, base, &motor, &mut |share| {
+        report(step, share);
+    })?;
+    let controller = models::controller(&plant, base, request, rate_hz)?;
 
     step += 1;
     let mut settings = base.clone();
     settings.plant = Some(plant.plant);
-    settings.feedback.pid = pid;
+    controller.put_into(&mut settings);
     test_axis.apply(&measuring_settings(&settings))?;
     approach(test_axis, HOME_MM)?;
     let runs = request.friction.fitted_to(test_axis.info().travel_mm);
@@ -85,7 +81,8 @@ pub fn commission(
     })?;
 
     step += 1;
-    let quiet = low_bandwidth_settings(&settings, &plant.plant, rate_hz);
+    let process = models::process(&plant, &controller.filters);
+    let quiet = low_bandwidth_settings_on(&settings, &plant.plant, &process, rate_hz);
     test_axis.apply(&quiet)?;
     let (_, breakaway_v) = friction.mean_levels_v();
     let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
@@ -102,7 +99,7 @@ pub fn commission(
     };
     let models = Models {
         plant,
-        pid,
+        controller,
         friction,
         gms,
     };
@@ -116,6 +113,35 @@ pub fn commission(
     found.settings = verification.settings(&found.settings);
     found.verification = Some(verification);
     Ok(found)
+}
+
+/// The response of the sliding axis under a first controller, and the linear model. A mode that the first controller excites
+/// spoils both: they are repeated with softer ones.
+fn linear_model(
+    test_axis: &mut dyn TestAxis,
+    base: &AxisSettings,
+    motor: &MotorConstant,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(FrfMeasurement, PlantFit), CommissionError> {
+    let rate_hz = test_axis.info().rate_hz;
+    let gain = motor.gain_mm_per_v_s2;
+    let mut attempt = |share: f64| -> Result<(FrfMeasurement, PlantFit), CommissionError> {
+        let mut settings = soft_bootstrap_settings(base, gain, rate_hz, share);
+        if share < 1.0 || test_axis.info().travel_mm < SHORT_TRAVEL_MM {
+            settings = with_rough_friction(settings, gain, motor.friction_v);
+        }
+        test_axis.apply(&settings)?;
+        let response = sliding_response(test_axis, gain, progress)?;
+        let plant = models::plant(&response)?;
+        Ok((response, plant))
+    };
+    let [usual, softer @ ..] = BOOTSTRAP_SHARES;
+    attempt(usual).or_else(|error| {
+        softer
+            .into_iter()
+            .find_map(|share| attempt(share).ok())
+            .ok_or(error)
+    })
 }
 
 /// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest.

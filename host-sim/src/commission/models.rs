@@ -1,8 +1,9 @@
 //! From the measurements of a commissioning to its models and settings: without an axis.
 
 use heapless::Vec as ShortVec;
+use quadrant::control::filter::FilterSettings;
 use quadrant::control::pid::PidGains;
-use quadrant::control::popov::sector_bound;
+use quadrant::control::popov::filtered_sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
@@ -12,7 +13,7 @@ use quadrant::settings::{AxisSettings, FeedbackSettings};
 use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
 use super::error::CommissionError;
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
-use crate::design::{Form, PidRequest, Process, best_pid, design_pid};
+use crate::design::{Form, PidRequest, Process, best_pid, design_pid, modal_pid};
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
@@ -49,9 +50,39 @@ pub struct Measurements {
 /// Models of the axis, and its PID.
 pub(super) struct Models {
     pub(super) plant: PlantFit,
-    pub(super) pid: PidGains,
+    pub(super) controller: Controller,
     pub(super) friction: FrictionFit,
     pub(super) gms: Result<GmsFit, VirginCurveError>,
+}
+
+/// PID and filters.
+#[derive(Clone, Debug)]
+pub(super) struct Controller {
+    pub(super) pid: PidGains,
+    pub(super) filters: Vec<FilterSettings>,
+    /// Largest gain in front of the PID that is shown to be stable with the modes; infinite without any.
+    circle_bound: f64,
+}
+
+impl Controller {
+    /// Takes gains and filters into settings.
+    pub(super) fn put_into(&self, settings: &mut AxisSettings) {
+        settings.feedback.pid = self.pid;
+        settings.feedback.filters =
+            (!self.filters.is_empty()).then(|| self.filters.iter().copied().collect());
+    }
+}
+
+/// Axis and filters as a design sees them.
+pub(super) fn process(plant: &PlantFit, filters: &[FilterSettings]) -> Process {
+    if plant.modes.is_empty() && filters.is_empty() {
+        return Process::Model(plant.plant);
+    }
+    Process::Modelled {
+        plant: plant.plant,
+        modes: plant.modes.clone(),
+        filters: filters.to_vec(),
+    }
 }
 
 /// Fits the linear model to the response.
@@ -65,17 +96,31 @@ pub(super) fn plant(response: &FrfMeasurement) -> Result<PlantFit, CommissionErr
     )?)
 }
 
-/// Designs the PID on the linear model.
-pub(super) fn pid(
+/// Designs the PID, and filters where modes want them, on the linear model.
+pub(super) fn controller(
     plant: &PlantFit,
     base: &AxisSettings,
     request: &CommissionSettings,
     rate_hz: f64,
-) -> Result<PidGains, CommissionError> {
-    let process = Process::Model(plant.plant);
+) -> Result<Controller, CommissionError> {
+    let alone = |pid| Controller {
+        pid,
+        filters: Vec::new(),
+        circle_bound: f64::INFINITY,
+    };
     let filter_s = base.feedback.pid.derivative_filter_s;
     let Some(target) = request.target else {
-        return Ok(best_pid(&process, sampled(rate_hz), filter_s)?.gains);
+        let form = sampled(rate_hz);
+        if plant.modes.is_empty() {
+            let process = Process::Model(plant.plant);
+            return Ok(alone(best_pid(&process, form, filter_s)?.gains));
+        }
+        let found = modal_pid(&plant.plant, &plant.modes, form, filter_s)?;
+        return Ok(Controller {
+            pid: found.gains,
+            filters: found.filters,
+            circle_bound: found.circle_bound,
+        });
     };
     let design = PidRequest {
         target,
@@ -83,11 +128,11 @@ pub(super) fn pid(
         derivative_filter_s: filter_s,
         ki_v_per_mm_s: None,
     };
-    Ok(design_pid(&process, &design)?.gains)
+    Ok(alone(design_pid(&process(plant, &[]), &design)?.gains))
 }
 
 /// The loop as it runs.
-fn sampled(rate_hz: f64) -> Form {
+pub(super) fn sampled(rate_hz: f64) -> Form {
     Form::Sampled {
         sample_time_s: 1.0 / rate_hz,
         computation_delay_s: 0.0,
@@ -133,12 +178,12 @@ impl Measurements {
         rate_hz: f64,
     ) -> Result<Commissioned, CommissionError> {
         let plant = plant(&self.response)?;
-        let pid = pid(&plant, base, request, rate_hz)?;
+        let controller = controller(&plant, base, request, rate_hz)?;
         let friction = friction(&self.map)?;
         let gms = presliding(&self.presliding, &friction);
         let models = Models {
             plant,
-            pid,
+            controller,
             friction,
             gms,
         };
@@ -157,14 +202,17 @@ impl Models {
     ) -> Commissioned {
         let Self {
             plant,
-            pid,
+            controller,
             friction,
             gms,
         } = self;
+        let Controller { pid, filters, .. } = &controller;
         let (_, breakaway_v) = friction.mean_levels_v();
-        let bound = sector_bound(&plant.plant, &pid, 1.0 / rate_hz);
+        // The rigid model's bound is what the firmware checks; with modes the circle criterion must hold, too.
+        let bound = filtered_sector_bound(&plant.plant, pid, filters, 1.0 / rate_hz)
+            .min(controller.circle_bound);
         let nonlinear = choose_nonlinear(
-            &pid,
+            pid,
             bound,
             &NonlinearRule {
                 sector_share: request.sector_share,
@@ -177,8 +225,9 @@ impl Models {
         settings.feedback = FeedbackSettings {
             integral_limit_v: base.feedback.integral_limit_v,
             transfer_s: base.feedback.transfer_s,
-            ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
+            ..FeedbackSettings::all_laws(*pid, nonlinear, base.limits.max_velocity_mm_s)
         };
+        controller.put_into(&mut settings);
         let elements = gms
             .as_ref()
             .map_or_else(|_| assumed(breakaway_v), |found| found.gms.clone());
@@ -191,7 +240,7 @@ impl Models {
             inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
         };
         settings.feedforward.preview_s = plant.plant.delay_s;
-        let margins = Process::Model(plant.plant).margins(&pid, sampled(rate_hz));
+        let margins = process(&plant, filters).margins(pid, sampled(rate_hz));
         Commissioned {
             motor: measurements.motor,
             response: measurements.response,

@@ -2,7 +2,10 @@
 //!
 //! The voltage steps between two levels of one sign, so that the axis slides on and its friction stays the same: then
 //! `y'' = A (u(t - Td) - F) - B y'`, which integrated twice is linear in A, B and A F. Nothing is differentiated. Passes
-//! in both directions bring the axis back; their scatter is the uncertainty. With the moving mass, `k_f = m A`.
+//! in both directions bring the axis back; their scatter is the uncertainty. An axis that rings with a structural mode of the
+//! order of the levels' frequency scatters too much: then the motion of an oscillator is fitted with the rest. With the moving mass, `k_f = m A`.
+
+use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -214,6 +217,7 @@ pub fn evaluate(
     let sliding_mm = (SLIDING_COUNTS * resolution_mm)
         .min((LEAST_COUNTS * resolution_mm).max(SLIDING_MM * short));
     let mut found: Vec<Pass> = Vec::new();
+    let mut spans = Vec::new();
     let mut begin = 0;
     while begin < recording.len() {
         let sign = recording.voltage_v[begin].signum();
@@ -238,6 +242,7 @@ pub fn evaluate(
             }
             if slowest > sliding_mm {
                 found.push(fit_pass(&recording, begin, from, end, dwell));
+                spans.push([begin, from, end]);
             }
         }
         begin = end;
@@ -247,12 +252,16 @@ pub fn evaluate(
             passes: found.len(),
         });
     }
+    let (mut gain, mut standard_error) = gain_of(&found);
+    if is_uncertain(gain, standard_error)
+        && let Some(resonant) = with_mode(&recording, &spans, dwell)
+    {
+        found = resonant;
+        (gain, standard_error) = gain_of(&found);
+    }
     let count = found.len() as f64;
     let mean = |read: fn(&Pass) -> f64| found.iter().map(read).sum::<f64>() / count;
-    let gain = mean(|pass| pass.gain);
-    let squares: f64 = found.iter().map(|pass| (pass.gain - gain).powi(2)).sum();
-    let standard_error = (squares / (count - 1.0) / count).sqrt();
-    if gain <= 0.0 || standard_error > MOST_UNCERTAIN * gain {
+    if is_uncertain(gain, standard_error) {
         return Err(MotorConstantError::Uncertain {
             gain,
             standard_error,
@@ -336,6 +345,129 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
         }
     }
     best.1
+}
+
+/// Mean of A over the passes, and its standard deviation.
+fn gain_of(passes: &[Pass]) -> (f64, f64) {
+    let count = passes.len() as f64;
+    let gain = passes.iter().map(|pass| pass.gain).sum::<f64>() / count;
+    let squares: f64 = passes.iter().map(|pass| (pass.gain - gain).powi(2)).sum();
+    (gain, (squares / (count - 1.0) / count).sqrt())
+}
+
+/// True for an A that no controller can be made with.
+fn is_uncertain(gain: f64, standard_error: f64) -> bool {
+    !(gain > 0.0 && standard_error <= MOST_UNCERTAIN * gain)
+}
+
+/// Frequencies of a mode that are tried, Hz, even on a log scale; its damping ratio, and dead times, s.
+const MODES_HZ: (f64, f64) = (20.0, 250.0);
+const MODES: usize = 45;
+const MODE_DAMPING: f64 = 0.03;
+const MODE_DELAYS_S: [f64; 5] = [0.2e-3, 0.8e-3, 1.5e-3, 2.3e-3, 3.3e-3];
+/// Every so many samples count: they are much denser than what the passes hold.
+const THINNED: usize = 5;
+
+/// The passes of an axis that rings with a structural mode: what an oscillator does under the same voltage is a further part
+/// of the motion, with the frequency that leaves the least over all passes.
+fn with_mode(recording: &Recording, spans: &[[usize; 3]], lag: usize) -> Option<Vec<Pass>> {
+    let mut best: Option<(f64, Vec<Pass>)> = None;
+    for index in 0..MODES {
+        let share = index as f64 / (MODES - 1) as f64;
+        let omega = TAU * MODES_HZ.0 * (MODES_HZ.1 / MODES_HZ.0).powf(share);
+        let rings: Vec<[Vec<f64>; 2]> = spans
+            .iter()
+            .map(|&[begin, _, end]| {
+                ringing(
+                    &recording.voltage_v[begin..end],
+                    omega,
+                    recording.sample_time_s,
+                )
+            })
+            .collect();
+        for delay_s in MODE_DELAYS_S {
+            let delay = (delay_s / recording.sample_time_s).round() as usize;
+            let fits: Option<Vec<(f64, Pass)>> = spans
+                .iter()
+                .zip(&rings)
+                .map(|(span, ring)| fit_ringing(recording, *span, lag, delay, ring))
+                .collect();
+            let Some(fits) = fits else { continue };
+            let cost: f64 = fits.iter().map(|(cost, _)| cost).sum();
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, fits.into_iter().map(|(_, pass)| pass).collect()));
+            }
+        }
+    }
+    best.map(|(_, passes)| passes)
+}
+
+/// Deflection and its rate, over the frequency, of an oscillator that rests before the voltage begins.
+fn ringing(voltage_v: &[f64], omega: f64, step_s: f64) -> [Vec<f64>; 2] {
+    let (mut deflection, mut rate) = (0.0, 0.0);
+    let states: Vec<(f64, f64)> = voltage_v
+        .iter()
+        .map(|voltage| {
+            let before = (deflection, rate);
+            let turn = omega * step_s;
+            rate += turn * (voltage - deflection - 2.0 * MODE_DAMPING * rate);
+            deflection += turn * rate;
+            before
+        })
+        .collect();
+    let part = |read: fn(&(f64, f64)) -> f64| states.iter().map(read).collect();
+    [part(|state| state.0), part(|state| state.1)]
+}
+
+/// A pass with a mode in it, and what is left of its motion, squared.
+fn fit_ringing(
+    recording: &Recording,
+    [begin, from, end]: [usize; 3],
+    lag: usize,
+    delay: usize,
+    ring: &[Vec<f64>; 2],
+) -> Option<(f64, Pass)> {
+    let step_s = recording.sample_time_s;
+    let positions = &recording.position_mm[from..end];
+    let second = |signal: &[f64]| -> Vec<f64> {
+        signal
+            .windows(2 * lag + 1)
+            .step_by(THINNED)
+            .map(|window| window[2 * lag] - 2.0 * window[lag] + window[0])
+            .collect()
+    };
+    let start = from.checked_sub(begin + delay)?;
+    let push = integral(&recording.voltage_v[from - delay..end - delay], 0.0, step_s);
+    let middle: Vec<f64> = push
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0] + pair[1]))
+        .collect();
+    let right = second(positions);
+    let columns = [
+        second(&integral(&middle, 0.0, step_s)),
+        vec![1.0; right.len()],
+        second(&integral(positions, positions[0], step_s)),
+        second(&ring[0][start..start + positions.len()]),
+        second(&ring[1][start..start + positions.len()]),
+    ];
+    let count = columns.iter().map(Vec::len).fold(right.len(), usize::min);
+    let norms = columns.each_ref().map(|column| {
+        let square: f64 = column.iter().map(|value| value * value).sum();
+        square.sqrt().max(1e-12)
+    });
+    let matrix = DMatrix::from_fn(count, 5, |row, column| columns[column][row] / norms[column]);
+    let right = DVector::from_column_slice(&right[..count]);
+    let solution = matrix.clone().svd(true, true).solve(&right, 1e-12).ok()?;
+    let cost = (&matrix * &solution - right).norm_squared();
+    let gain = solution[0] / norms[0];
+    let sign = recording.voltage_v[begin].signum();
+    let slowing = -sign * solution[1] / norms[1] / (lag as f64 * step_s).powi(2);
+    let pass = Pass {
+        gain,
+        damping_per_s: -solution[2] / norms[2],
+        friction_v: slowing / gain,
+    };
+    Some((cost, pass))
 }
 
 /// The running integral of held samples over `base`, beginning at zero.
