@@ -14,7 +14,7 @@ use quadrant::settings::AxisSettings;
 use crate::design::{Form, Process};
 
 /// Crossover frequency of the first controller, Hz: a dead time of 5 ms still leaves it a phase margin of 30 deg.
-const CROSSOVER_HZ: f64 = 15.0;
+pub const CROSSOVER_HZ: f64 = 15.0;
 /// Crossover frequency over the frequency from which the derivative acts.
 const LEAD: f64 = 3.0;
 /// Frequency below which the integral acts, over the crossover frequency.
@@ -25,7 +25,9 @@ const FILTER: f64 = 0.03;
 const FOLLOWING_ERROR_MM: f64 = 10.0;
 
 /// Crossovers of the first controller over the usual one: less where a structural mode does not bear it.
-pub const BOOTSTRAP_SHARES: [f64; 3] = [1.0, 0.5, 0.25];
+pub const BOOTSTRAP_SHARES: [f64; 4] = [1.0, 0.5, 0.25, SOFTEST];
+/// The last of them.
+pub const SOFTEST: f64 = 0.15;
 /// Corner of the low-pass over the crossover where that is below the usual one.
 const LOW_PASS: f64 = 4.0;
 const LOW_PASS_DAMPING: f64 = 0.7;
@@ -78,14 +80,15 @@ fn bootstrap_at(
     settings
 }
 
-/// `settings` with a friction that is roughly known fed forward, so that a soft controller does not lag by it: on a short travel
+/// `settings` with a friction that is roughly known fed forward, so that a soft controller does not lag by it: in positive and in
+/// negative direction, V. On a short travel
 /// the lag would take a good part of the way.
 pub fn with_rough_friction(
     mut settings: AxisSettings,
     gain_mm_per_v_s2: f64,
-    friction_v: f64,
+    friction_v: [f64; 2],
 ) -> AxisSettings {
-    let sliding = StaticFriction {
+    let sliding = |friction_v: f64| StaticFriction {
         curve: StribeckCurve {
             coulomb_v: friction_v.max(1e-6),
             breakaway_v: friction_v.max(1e-6),
@@ -95,8 +98,8 @@ pub fn with_rough_friction(
         viscous_v_s_per_mm: 0.0,
     };
     settings.friction.sliding = PerDirection {
-        positive: sliding,
-        negative: sliding,
+        positive: sliding(friction_v[0]),
+        negative: sliding(friction_v[1]),
     };
     settings.feedforward.kind = FeedforwardKind::Static;
     settings.feedforward.gains = FeedforwardGains {

@@ -91,6 +91,7 @@ pub(super) fn plant(response: &FrfMeasurement) -> Result<PlantFit, CommissionErr
         &response.estimate.response,
         &PlantFitSettings {
             stiffness: Stiffness::Zero,
+            negligible_damping: true,
             ..PlantFitSettings::default()
         },
     )?)
@@ -250,6 +251,7 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
+            ran: Vec::new(),
             verification: None,
         }
     }

@@ -57,6 +57,8 @@ pub struct PlantFitSettings {
     pub band_hz: (f64, f64),
     /// Treatment of C, the spring to ground.
     pub stiffness: Stiffness,
+    /// True if a damping whose corner lies below the band may stay unknown: an axis that friction governs has as good as none.
+    pub negligible_damping: bool,
 }
 
 impl Default for PlantFitSettings {
@@ -65,6 +67,7 @@ impl Default for PlantFitSettings {
             least_coherence: 0.9,
             band_hz: (0.0, f64::INFINITY),
             stiffness: Stiffness::Free,
+            negligible_damping: false,
         }
     }
 }
@@ -166,6 +169,8 @@ const DELAYS: usize = 500;
 const TRIED_DELAYS: usize = 30;
 /// Largest relative standard error of A and B.
 const MOST_UNCERTAIN: f64 = 0.25;
+/// Corner of a damping that may stay unknown, over the lowest frequency.
+const NEGLIGIBLE: f64 = 0.7;
 /// A misfit that no noise explains.
 const MOST_GAIN_DB: f64 = 3.0;
 const MOST_PHASE_DEG: f64 = 20.0;
@@ -210,7 +215,7 @@ pub fn fit_plant(
             worst_hz: worst_hz(&lines, &model),
         });
     }
-    check_support(&lines, &plant, &found)?;
+    check_support(&lines, &plant, &found, settings.negligible_damping)?;
     Ok(PlantFit {
         plant,
         modes: model.modes,
@@ -522,6 +527,7 @@ fn check_support(
     lines: &[ResponsePoint],
     plant: &PlantModel,
     found: &Fit,
+    negligible_damping: bool,
 ) -> Result<(), PlantError> {
     let low_hz = lines.first().map_or(0.0, |line| line.frequency_hz);
     let high_hz = lines.last().map_or(0.0, |line| line.frequency_hz);
@@ -531,11 +537,9 @@ fn check_support(
         let deviation = relative(index);
         deviation.is_nan() || deviation > MOST_UNCERTAIN
     };
-    if uncertain(0)
-        || uncertain(1)
-        || high_hz < 1.5 * corner_hz
-        || low_hz > 1.5 * corner_hz.max(0.1)
-    {
+    let negligible = negligible_damping && corner_hz < NEGLIGIBLE * low_hz;
+    let told_apart = !uncertain(1) && low_hz <= 1.5 * corner_hz.max(0.1);
+    if uncertain(0) || high_hz < 1.5 * corner_hz || !(negligible || told_apart) {
         return Err(PlantError::MissesCorner {
             low_hz,
             high_hz,
@@ -606,6 +610,7 @@ mod tests {
         least_coherence: 0.9,
         band_hz: (0.0, f64::INFINITY),
         stiffness: Stiffness::Zero,
+        negligible_damping: false,
     };
 
     /// Lines every 2 Hz from 4 to 400 Hz, with errors of one percent.
