@@ -81,7 +81,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if *seeds > 1 {
         command += &format!(" --seeds {seeds}");
     }
-    let page = comparison_page(&comparison, &honest, &circles, provenance(&command, output.seed));
+    let page = comparison_page(
+        &comparison,
+        &honest,
+        &circles,
+        provenance(&command, output.seed),
+    );
     output.page(&page, "comparison.html")
 }
 

@@ -4,8 +4,8 @@ use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::{
-    BOOTSTRAP_SHARES, CROSSOVER_HZ, low_bandwidth_settings_on, measuring_settings, soft_bootstrap_settings,
-    with_rough_friction, zero_gain_settings,
+    BOOTSTRAP_SHARES, CROSSOVER_HZ, low_bandwidth_settings_on, measuring_settings,
+    soft_bootstrap_settings, with_rough_friction, zero_gain_settings,
 };
 use super::commissioned::{CommissionSettings, Commissioned};
 use super::error::CommissionError;
@@ -115,7 +115,9 @@ fn guarded(
         approach(test_axis, HOME_MM)?;
     }
     let mut sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
-    sine.amplitude_mm = sine.amplitude_mm.min(SINE_SHARE * test_axis.info().travel_mm);
+    sine.amplitude_mm = sine
+        .amplitude_mm
+        .min(SINE_SHARE * test_axis.info().travel_mm);
     let recording = virgin_curve::measure(test_axis, &sine, &mut |share| report(step, share))?;
     let gms = models::presliding(&recording, &friction);
 
@@ -209,9 +211,8 @@ fn next_share(share: f64, error: &CommissionError, rings: Option<Ringing>) -> Op
         return Some(STIFFER * share).filter(|share| *share <= STIFFEST);
     }
     // A mode is left alone by a loop that is slow enough.
-    let bears = |share: f64| {
-        rings.is_none_or(|seen| share * CROSSOVER_HZ * FAR_BELOW <= seen.frequency_hz)
-    };
+    let bears =
+        |share: f64| rings.is_none_or(|seen| share * CROSSOVER_HZ * FAR_BELOW <= seen.frequency_hz);
     let softer: Vec<f64> = BOOTSTRAP_SHARES
         .into_iter()
         .filter(|next| *next < share.min(1.0))

@@ -179,9 +179,7 @@ fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {
         MotionSettings::Harmonic(sine) if sine.phase_rad == 0.0 => {
             Some(-sine.amplitude_mm..sine.amplitude_mm)
         }
-        MotionSettings::Harmonic(sine) => {
-            Some(-2.0 * sine.amplitude_mm..2.0 * sine.amplitude_mm)
-        }
+        MotionSettings::Harmonic(sine) => Some(-2.0 * sine.amplitude_mm..2.0 * sine.amplitude_mm),
     }
 }
 
@@ -237,7 +235,9 @@ mod tests {
 
     use super::*;
     use crate::machine::SimulatedTestAxis;
-    use crate::plant::{AxisParameters, Backlash, Drive as DriveTrain, EncoderSide, StageParameters};
+    use crate::plant::{
+        AxisParameters, Backlash, Drive as DriveTrain, EncoderSide, StageParameters,
+    };
 
     const TRAVEL_MM: f64 = 10.0;
 
@@ -298,7 +298,10 @@ mod tests {
             guard.apply(&measured(&base)).unwrap();
             let outcome = guard.perform(&to(6.0), &mut |_| {});
             let rings = guard.ringing();
-            assert!(outcome.is_err(), "{frequency_hz} Hz bears the rigid axis' PID");
+            assert!(
+                outcome.is_err(),
+                "{frequency_hz} Hz bears the rigid axis' PID"
+            );
             let seen_hz = rings.unwrap().frequency_hz;
             let ratio = seen_hz / frequency_hz;
             assert!((0.7..1.5).contains(&ratio), "{frequency_hz}: {seen_hz}");

@@ -42,7 +42,9 @@ pub fn ringing(recording: &Recording) -> Option<Ringing> {
             .zip(&recording.reference_mm[begin..])
             .map(|(position, reference)| position - reference)
             .collect();
-        let farthest_mm = errors.iter().fold(0.0_f64, |most, error| most.max(error.abs()));
+        let farthest_mm = errors
+            .iter()
+            .fold(0.0_f64, |most, error| most.max(error.abs()));
         let growths = GROWTHS_PER_S.iter();
         growths
             .filter_map(|&growth_per_s| largest(&errors, growth_per_s, recording.sample_time_s))

@@ -97,7 +97,9 @@ impl MotorConstantSettings {
         let pass: Vec<f64> = first.take_while(drives).map(|volts| volts.abs()).collect();
         // Every other level is the upper one, which comes first.
         let between = 0.5 * (1.0 + UPPER) / UPPER * pass.iter().copied().fold(0.0, f64::max);
-        let changes = pass.windows(2).filter(|pair| (pair[0] > between) != (pair[1] > between));
+        let changes = pass
+            .windows(2)
+            .filter(|pair| (pair[0] > between) != (pair[1] > between));
         let levels = changes.count() + 1;
         Self {
             dwell_s: pass.len() as f64 * recording.sample_time_s / levels as f64,
@@ -208,7 +210,10 @@ pub fn measure(
     let mut ahead = 1.0;
     let mut shortenings = 0;
     let (mut others, usual_s) = (0, settings.dwell_s);
-    while levels_v.iter().all(|level_v| *level_v <= settings.most_level_v) {
+    while levels_v
+        .iter()
+        .all(|level_v| *level_v <= settings.most_level_v)
+    {
         let outcome = test_axis.perform(
             &Experiment {
                 name: test_name(levels_v),

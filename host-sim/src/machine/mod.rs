@@ -63,5 +63,7 @@ pub use serial::{BAUD, SerialTransport, serial_ports};
 pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;
-pub use test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, open_loop_mm, usable_mm};
+pub use test_axis::{
+    AxisInfo, Drive, Experiment, ExperimentError, TestAxis, open_loop_mm, usable_mm,
+};
 pub use transport::Transport;

@@ -75,14 +75,26 @@ fn what_was_said_before_it_moved_is_what_it_did() {
         let said_s: f64 = planned.iter().map(|step| step.lasts_s).sum();
         let took_s: f64 = found.ran.iter().map(|run| run.lasted_s).sum();
         let ratio = took_s / said_s;
-        assert!((0.7..1.4).contains(&ratio), "{travel_mm}: {took_s} of {said_s} s");
-        let within_mm = planned.iter().map(|step| step.within_mm).fold(0.0, f64::max);
+        assert!(
+            (0.7..1.4).contains(&ratio),
+            "{travel_mm}: {took_s} of {said_s} s"
+        );
+        let within_mm = planned
+            .iter()
+            .map(|step| step.within_mm)
+            .fold(0.0, f64::max);
         let stray_mm = (0.25 * travel_mm).min(10.0);
-        assert!(test_axis.farthest_mm() < within_mm + stray_mm, "{travel_mm}");
+        assert!(
+            test_axis.farthest_mm() < within_mm + stray_mm,
+            "{travel_mm}"
+        );
         let most_mm_s = |mm_s: f64, step: &Planned| mm_s.max(step.fastest_mm_s.unwrap_or(30.0));
         let said_mm_s = planned.iter().fold(0.0, most_mm_s);
         for run in &found.ran {
-            assert!(run.planned_mm_s.unwrap_or(0.0) <= said_mm_s + 1e-9, "{run:?}");
+            assert!(
+                run.planned_mm_s.unwrap_or(0.0) <= said_mm_s + 1e-9,
+                "{run:?}"
+            );
         }
     }
 }

@@ -12,9 +12,7 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::commission::verify::run_sine;
-use quadrant_sim::commission::{
-    CommissionError, CommissionSettings, Commissioned, commission,
-};
+use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
 use quadrant_sim::design::DesignError;
 use quadrant_sim::experiment::metrics::worst_and_mean;
 use quadrant_sim::experiment::sine_test::SineTest;

@@ -11,10 +11,7 @@ fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse
         assert_ne!(line.outcome, Outcome::WorseThanPid, "{line:?}");
         assert_ne!(line.outcome, Outcome::LeftTravel, "{line:?}");
         let refused = [Outcome::Refused, Outcome::RefusedWrongly].contains(&line.outcome);
-        assert!(
-            !refused || !line.reason.is_empty(),
-            "{line:?}"
-        );
+        assert!(!refused || !line.reason.is_empty(), "{line:?}");
     }
     let rigid = lines
         .iter()

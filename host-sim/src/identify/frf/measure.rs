@@ -327,7 +327,8 @@ fn settling_s(short: bool) -> f64 {
 /// The distance in which so many blocks fit: a period more, because blocks begin where a period does.
 fn pass_length_mm(settings: &FrfSettings, periods: usize) -> f64 {
     let speed = settings.bias_velocity_mm_s.abs();
-    let steady_s = settling_s(settings.two_sided) + (periods + BLOCK_PERIODS) as f64 * settings.excitation.period_s;
+    let steady_s = settling_s(settings.two_sided)
+        + (periods + BLOCK_PERIODS) as f64 * settings.excitation.period_s;
     let ramp_s = speed / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
     speed * (steady_s + ramp_s)
 }

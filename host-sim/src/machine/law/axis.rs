@@ -136,7 +136,9 @@ impl SimulatedTestAxis {
         let mut watch = Watch::new(experiment, self.info());
         let mut recorder = Recorder::new(experiment.decimation, self.stage.rate_hz);
         let outcome = self.run(experiment, &mut law, &mut watch, &mut recorder, progress);
-        self.interrupted = outcome.is_err().then(|| recorder.latest(self.stage.rate_hz));
+        self.interrupted = outcome
+            .is_err()
+            .then(|| recorder.latest(self.stage.rate_hz));
         outcome.map(|()| recorder.finish())
     }
 
