@@ -264,13 +264,14 @@ fn friction(
         approach(test_axis, start_mm).map_err(StaticFrictionError::from)?;
         let (map, recordings) = static_friction::measure(test_axis, &runs, progress)?;
         let (slowest, fastest) = &mut runs.velocities_mm_s;
-        match models::friction(&map) {
-            Err(CommissionError::FrictionFit(FrictionFitError::TooFewRuns { .. }))
-                if FASTER * *slowest < *fastest / FASTER =>
-            {
+        match models::even_friction(&map) {
+            Err(FrictionFitError::TooFewRuns { .. }) if FASTER * *slowest < *fastest / FASTER => {
                 *slowest *= FASTER;
             }
-            found => return Ok((map, recordings, found?)),
+            _ => {
+                let found = models::friction(&map)?;
+                return Ok((map, recordings, found));
+            }
         }
     }
 }

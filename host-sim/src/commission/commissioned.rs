@@ -108,6 +108,14 @@ impl Commissioned {
         if !self.ran.is_empty() {
             notes.push(self.account());
         }
+        let runs = &self.friction.0.runs;
+        let uneven = runs.iter().filter(|run| run.stick_slip).count();
+        if 2 * uneven > runs.len() {
+            notes.push(format!(
+                "The axis stuck and slipped in {uneven} of {} runs at constant velocity: its friction is known by their means.",
+                runs.len()
+            ));
+        }
         match &self.presliding.0 {
             Ok(gms) if gms.prediction.relative_error > NOTED_HYSTERESIS_ERROR => {
                 notes.push(format!(

@@ -18,7 +18,9 @@ use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
 use crate::identify::single_state::with_all_models;
-use crate::identify::static_friction::{Exponent, FrictionFit, FrictionMap, fit_map};
+use crate::identify::static_friction::{
+    Exponent, FrictionFit, FrictionFitError, FrictionMap, fit_map,
+};
 use crate::identify::virgin_curve::{
     self, ASSUMED_ATTRACTION_V_S, GmsFit, Knots, VirginCurveError,
 };
@@ -140,9 +142,24 @@ pub(super) fn sampled(rate_hz: f64) -> Form {
     }
 }
 
-/// Fits the static friction model to the map.
+/// Fits the static friction model to the runs of the map that moved evenly.
+pub(super) fn even_friction(map: &FrictionMap) -> Result<FrictionFit, FrictionFitError> {
+    fit_map(map, Exponent::Fixed(1.0))
+}
+
+/// Fits the static friction model to the map. Where too few runs moved evenly the mean voltages of the others count, too: of an
+/// axis that sticks and slips they are what there is, and the trials judge what comes of them.
 pub(super) fn friction(map: &FrictionMap) -> Result<FrictionFit, CommissionError> {
-    Ok(fit_map(map, Exponent::Fixed(1.0))?)
+    match even_friction(map) {
+        Err(FrictionFitError::TooFewRuns { .. }) => {
+            let mut all = map.clone();
+            for run in &mut all.runs {
+                run.stick_slip = false;
+            }
+            Ok(even_friction(&all)?)
+        }
+        found => Ok(found?),
+    }
 }
 
 /// Identifies the GMS model from the slow sine.
@@ -288,4 +305,31 @@ fn identify_elements(
         Ok(many) if many.prediction.relative_error < few.prediction.relative_error => many,
         _ => few,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::static_friction::FrictionRun;
+
+    #[test]
+    fn the_means_of_runs_that_stuck_and_slipped_count_where_there_are_no_others() {
+        let velocities = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+        let runs = velocities.iter().flat_map(|speed| {
+            [1.0, -1.0].map(|sign| FrictionRun {
+                velocity_mm_s: sign * speed,
+                voltage_v: sign * (0.1 + 0.001 * speed),
+                deviation_v: 1e-3,
+                stick_slip: true,
+            })
+        });
+        let mut map = FrictionMap {
+            runs: runs.collect(),
+        };
+        map.runs
+            .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+        assert!(even_friction(&map).is_err());
+        let (coulomb_v, _) = friction(&map).unwrap().mean_levels_v();
+        assert!((coulomb_v - 0.1).abs() < 0.01, "{coulomb_v}");
+    }
 }
