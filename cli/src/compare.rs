@@ -6,6 +6,7 @@ use quadrant_cli::output::{Output, share};
 use quadrant_cli::say;
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::comparison::{Comparison, Request};
+use quadrant_sim::compare::honest::{self, with_best_pid};
 use quadrant_sim::compare::page::{comparison_page, comparison_tables};
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use quadrant_sim::experiment::configuration::Configuration;
@@ -42,14 +43,24 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let configurations = Configuration::all();
     let bar = share("comparing on the simulated stage");
     bar.set_length(STEPS);
-    let comparison = Request {
-        setups: &setups,
-        configurations: &configurations,
+    let best = RunConfiguration::both(&with_best_pid(&settings.stage)?);
+    let request = |setups, configurations| Request {
+        setups,
+        configurations,
         amplitudes_mm: &[AMPLITUDE_MM],
         seed: output.seed,
         seeds: *seeds,
-    }
-    .run(&|done| bar.inc((done * STEPS as f64) as u64))?;
+    };
+    let requests = [
+        request(&setups, &configurations),
+        request(&best, &honest::CONFIGURATIONS),
+    ];
+    let whole_s: f64 = requests.iter().map(Request::expected_s).sum();
+    let [comparison, honest] = requests.each_ref().map(|request| {
+        let share = request.expected_s() / whole_s;
+        request.run(&|done| bar.inc((done * share * STEPS as f64) as u64))
+    });
+    let (comparison, honest) = (comparison?, honest?);
     let [_, identified] = &setups;
     let circles = run_circles(&configurations, identified, output.seed)?;
     bar.finish_and_clear();
@@ -57,7 +68,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "Simulated, not measured. x axis, sine of 30 mm; 10 kHz, f32; seed {}\n",
         output.seed
     );
-    for table in comparison_tables(&comparison, &circles) {
+    for table in comparison_tables(&comparison, &honest, &circles) {
         output.table(&table)?;
     }
     for knowledge in ModelKnowledge::ALL {
@@ -70,7 +81,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if *seeds > 1 {
         command += &format!(" --seeds {seeds}");
     }
-    let page = comparison_page(&comparison, &circles, provenance(&command, output.seed));
+    let page = comparison_page(
+        &comparison,
+        &honest,
+        &circles,
+        provenance(&command, output.seed),
+    );
     output.page(&page, "comparison.html")
 }
 

@@ -172,6 +172,7 @@ impl AxisSettings {
                 amplifier.reversed,
             )
             .feedback(feedback.build(period_s))
+            .filters(feedback.build_filters(period_s))
             .feedforward(
                 feedforward.kind,
                 &feedforward.gains,

@@ -169,6 +169,7 @@ impl Default for FeedbackSettings {
             cascade: None,
             sliding_mode: None,
             nctf: None,
+            filters: None,
         }
     }
 }

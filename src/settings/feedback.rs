@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::law::control::cascade::{Cascade, CascadeGains};
 use crate::law::control::feedback::{Feedback, LawKind};
+use crate::law::control::filter::{FilterList, Filters};
 use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
 use crate::law::control::npid::{NonlinearGain, NonlinearGainTable, NonlinearPid};
 use crate::law::control::pid::Pid;
@@ -39,10 +40,16 @@ pub struct FeedbackSettings {
     pub sliding_mode: Option<SlidingModeGains>,
     /// Nominal characteristic trajectory following.
     pub nctf: Option<NctfGains>,
+    /// Notches and low-passes behind the law, of any law.
+    pub filters: Option<FilterList>,
 }
 
 /// Output of sliding mode before anybody has chosen it, V: several times the friction of the axes this was written for.
 const SWITCHING_V: f64 = 1.0;
+
+/// Widest boundary layer, mm/s, and largest error on a trajectory, mm, that settings may have.
+const WIDEST_MM_S: f64 = 1e3;
+const LARGEST_MM: f64 = 30.0;
 
 /// Of the schedule before anybody has chosen it: the integral's share at rest, and the speed from which it is one, mm/s.
 const INTEGRAL_AT_REST: (f64, f64) = (4.0, 5.0);
@@ -56,6 +63,11 @@ impl FeedbackSettings {
         max_velocity_mm_s: f64,
     ) -> Self {
         let surface = SurfaceGains::from_pid(&pid);
+        let switching_v =
+            |surface: &SurfaceGains| SWITCHING_V.min(WIDEST_MM_S * surface.gain_v_s_per_mm);
+        // The trajectory of a slow loop ends at the largest error that it may have.
+        let trajectory_mm_s =
+            |surface: &SurfaceGains| max_velocity_mm_s.min(LARGEST_MM * surface.slope_per_s);
         let (at_rest, speed_mm_s) = INTEGRAL_AT_REST;
         let point = |speed_mm_s, integral| SchedulePoint {
             speed_mm_s,
@@ -84,15 +96,15 @@ impl FeedbackSettings {
             }),
             sliding_mode: surface.map(|surface| SlidingModeGains {
                 slope_per_s: surface.slope_per_s,
-                switching_v: SWITCHING_V,
-                boundary_mm_s: SWITCHING_V / surface.gain_v_s_per_mm,
+                switching_v: switching_v(&surface),
+                boundary_mm_s: switching_v(&surface) / surface.gain_v_s_per_mm,
                 integral_per_s: surface.integral_per_s,
             }),
             // A straight line up to the largest velocity, until a trajectory is measured.
             nctf: surface.map(|surface| NctfGains {
                 characteristic: Vec::from_iter([CharacteristicPoint {
-                    error_mm: max_velocity_mm_s / surface.slope_per_s,
-                    velocity_mm_s: max_velocity_mm_s,
+                    error_mm: trajectory_mm_s(&surface) / surface.slope_per_s,
+                    velocity_mm_s: trajectory_mm_s(&surface),
                 }]),
                 gain_v_s_per_mm: surface.gain_v_s_per_mm,
                 integral_per_s: surface.integral_per_s,
@@ -126,6 +138,13 @@ impl FeedbackSettings {
             .map(|gains| gains.to_pid(filter_s))
             .into_iter()
             .collect()
+    }
+
+    /// The filters ready for the tick, for a control period. Settings time only.
+    pub fn build_filters<S: Scalar>(&self, period_s: f64) -> Filters<S> {
+        self.filters
+            .as_ref()
+            .map_or(Filters::NONE, |filters| Filters::build(filters, period_s))
     }
 
     /// The law ready for the tick, for a control period. Settings are validated before they come here: a law without its

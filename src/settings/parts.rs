@@ -7,6 +7,7 @@ use super::homing::{HomeSwitch, HomingSettings};
 use super::leaves::default;
 use super::limits::TravelSettings;
 use crate::law::control::cascade::CascadeGains;
+use crate::law::control::filter::FilterSettings;
 use crate::law::control::nctf::{CharacteristicPoint, NctfGains};
 use crate::law::control::npid::NonlinearGain;
 use crate::law::control::plant_model::PlantModel;
@@ -41,7 +42,7 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub(crate) static PARTS: [Part; 13] = [
+pub(crate) static PARTS: [Part; 14] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
@@ -97,6 +98,16 @@ pub(crate) static PARTS: [Part; 13] = [
             gain_v_s_per_mm: default!("feedback.nctf.gain_v_s_per_mm"),
             integral_per_s: default!("feedback.nctf.integral_per_s"),
         }
+    ),
+    part!(
+        "/feedback/filters",
+        feedback.filters,
+        Vec::from_iter([FilterSettings {
+            frequency_hz: default!("feedback.filters.frequency_hz"),
+            damping: default!("feedback.filters.damping"),
+            centre_gain: default!("feedback.filters.centre_gain"),
+            high_frequency_gain: default!("feedback.filters.high_frequency_gain"),
+        }])
     ),
     part!(
         "/friction/dahl",

@@ -8,6 +8,7 @@ use core::any::Any;
 use super::homing::HomeSwitch;
 use super::operation::{EmergencyReaction, LossReaction};
 use crate::law::control::feedback::LawKind;
+use crate::law::control::filter::FilterList;
 use crate::law::control::nctf::Characteristic;
 use crate::law::control::schedule::GainSchedule;
 use crate::law::feedforward::FeedforwardKind;
@@ -138,7 +139,7 @@ pub(crate) fn number(leaf: &dyn Any) -> Option<f64> {
 }
 
 // A leaf of another type is to be added to both lists, with a kind of its own that stays.
-plain!(1 GmsElements, 1 GainSchedule, 1 Characteristic, 2 bool, 4 f64, 5 u8, 7 u32);
+plain!(1 GmsElements, 1 GainSchedule, 1 Characteristic, 1 FilterList, 2 bool, 4 f64, 5 u8, 7 u32);
 name!(
     3 LawKind, 3 FeedforwardKind, 3 Direction, 3 HomeSwitch, 3 LossReaction, 3 EmergencyReaction, 3 EnabledBy,
     3 HostNeeded
@@ -158,5 +159,6 @@ each!(
     FeedforwardKind,
     GmsElements,
     GainSchedule,
-    Characteristic
+    Characteristic,
+    FilterList
 );

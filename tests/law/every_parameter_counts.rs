@@ -2,7 +2,8 @@
 //! are accepted.
 
 use quadrant::control::feedback::LawKind;
-use quadrant::control::popov::sector_bound;
+use quadrant::control::filter::FilterSettings;
+use quadrant::control::popov::filtered_sector_bound;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::Scalar;
@@ -158,9 +159,17 @@ fn with_kind(kind: FeedforwardKind) -> StageSettings {
             travel_mm: 0.2,
             ..axis.homing.expect("by default")
         });
+        let filters = [FilterSettings {
+            frequency_hz: 900.0,
+            damping: 0.3,
+            centre_gain: 0.3,
+            high_frequency_gain: 0.9,
+        }];
+        axis.feedback.filters = Some(filters.into_iter().collect());
         // As much nonlinear gain as the plant bears, so that less damping bears less.
         let plant = axis.plant.expect("a plant by default");
-        let bound = sector_bound(&plant, &axis.feedback.pid, 1.0 / settings.rate_hz);
+        let period_s = 1.0 / settings.rate_hz;
+        let bound = filtered_sector_bound(&plant, &axis.feedback.pid, &filters, period_s);
         let gain = axis
             .feedback
             .nonlinear

@@ -86,6 +86,7 @@ mod store;
 mod store_power_cut;
 mod stored_bytes;
 mod stream_refusals;
+mod structural_filters;
 mod supervisor;
 mod surface_laws;
 mod telemetry;

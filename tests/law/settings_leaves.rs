@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use quadrant::control::filter::{FilterList, FilterSettings};
 use quadrant::learning::LearningSettings;
 use quadrant::settings::leaves::{LeafInfo, Range, all, find};
 use quadrant::settings::tree::{TreeError, is_part};
@@ -12,10 +13,14 @@ use crate::settings_tree::{get, paths};
 
 const ELEMENTS: usize = 8;
 
+/// The simulated stage's, with the list that it leaves out.
 fn settings() -> StageSettings {
     let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.feedforward.learning = Some(LearningSettings::default());
+        axis.feedback.filters = Some(FilterList::from_iter([FilterSettings::notch(
+            1000.0, 0.2, 0.5,
+        )]));
     }
     settings
 }
@@ -211,7 +216,7 @@ fn each_list_has_the_room_that_is_said() {
             assert_eq!(too_many, !fits, "{path}: {count} points");
         }
     }
-    assert_eq!(lists, 3);
+    assert_eq!(lists, 4);
 }
 
 #[test]

@@ -12,7 +12,7 @@ use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
 use quadrant_sim::commission::{
-    CommissionError, CommissionSettings, Commissioned, CrossCheck, commission,
+    CommissionError, CommissionSettings, Commissioned, CrossCheck, commission, plan, plan_table,
 };
 use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
@@ -28,7 +28,7 @@ use super::endpoint::Endpoint;
 use super::subject::{travel, travel_mm};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
-use quadrant_cli::{say, terminal};
+use quadrant_cli::{say, terminal, warn};
 
 /// Options of `quadrant commission`.
 #[derive(Clone, Debug, Args)]
@@ -321,6 +321,9 @@ impl Request {
         seed: u64,
     ) -> anyhow::Result<Found> {
         let request = self.settings();
+        let info = test_axis.info();
+        // Before anything moves, and not among the results.
+        warn!("{}\n", plan_table(&info, &plan(&info, &request)).to_text());
         let bar = share("commissioning");
         let mut report = |step, done: f64| {
             bar.set_message(step);

@@ -126,6 +126,7 @@ impl Measurement {
             periods: self.averages,
             bias_velocity_mm_s: self.velocity_mm_s(),
             open_loop: self.open_loop,
+            two_sided: false,
         }
     }
 }

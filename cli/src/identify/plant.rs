@@ -50,7 +50,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         Some(path) => {
             let response = FrequencyResponse::read_csv(path)?;
             let found = fit_plant(&response, &settings)?;
-            let section = fitted_response_section(&response, &found.plant);
+            let section = fitted_response_section(&response, &found);
             let title = recorded::title(std::slice::from_ref(path));
             (found, section, title, None)
         }
@@ -59,7 +59,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             let measured = arguments.measurement.run(subject, start.as_ref(), output)?;
             let response = &measured.found;
             let found = fit_plant(&response.estimate.response, &settings)?;
-            let section = response_section(response, Some(&found.plant));
+            let section = response_section(response, Some(&found));
             (found, section, measured.title, Some(measured.stage))
         }
     };

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::feedback::LawKind;
+use quadrant::control::filter::{FilterList, FilterSettings};
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -10,8 +11,10 @@ use quadrant::friction::PerDirection;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::AxisSettings;
 
+use crate::design::{Form, Process};
+
 /// Crossover frequency of the first controller, Hz: a dead time of 5 ms still leaves it a phase margin of 30 deg.
-const CROSSOVER_HZ: f64 = 15.0;
+pub const CROSSOVER_HZ: f64 = 15.0;
 /// Crossover frequency over the frequency from which the derivative acts.
 const LEAD: f64 = 3.0;
 /// Frequency below which the integral acts, over the crossover frequency.
@@ -21,6 +24,32 @@ const FILTER: f64 = 0.03;
 /// Tracking error allowed while the axis is measured, mm: the first controller is soft.
 const FOLLOWING_ERROR_MM: f64 = 10.0;
 
+/// Crossovers of the first controller over the usual one: less where a structural mode does not bear it.
+pub const BOOTSTRAP_SHARES: [f64; 4] = [1.0, 0.5, 0.25, SOFTEST];
+/// The last of them.
+pub const SOFTEST: f64 = 0.15;
+/// Corner of the low-pass over the crossover where that is below the usual one.
+const LOW_PASS: f64 = 4.0;
+const LOW_PASS_DAMPING: f64 = 0.7;
+
+/// [`bootstrap_settings`] at a share of the usual crossover. Below one, a low-pass is behind the PID, so that the loop's gain is
+/// small at any mode from three times the crossover on.
+pub fn soft_bootstrap_settings(
+    base: &AxisSettings,
+    gain_mm_per_v_s2: f64,
+    rate_hz: f64,
+    share: f64,
+) -> AxisSettings {
+    let mut settings = bootstrap_at(base, gain_mm_per_v_s2, rate_hz, share * CROSSOVER_HZ);
+    settings.feedback.filters = (share < 1.0).then(|| {
+        FilterList::from_iter([FilterSettings::low_pass(
+            LOW_PASS * share * CROSSOVER_HZ,
+            LOW_PASS_DAMPING,
+        )])
+    });
+    settings
+}
+
 /// The settings with which an axis is measured first: `base` with a controller that needs nothing but A,
 /// `gain_mm_per_v_s2`, within a factor of two; no nonlinear gain, no feedforward, no model.
 pub fn bootstrap_settings(
@@ -28,8 +57,17 @@ pub fn bootstrap_settings(
     gain_mm_per_v_s2: f64,
     rate_hz: f64,
 ) -> AxisSettings {
+    bootstrap_at(base, gain_mm_per_v_s2, rate_hz, CROSSOVER_HZ)
+}
+
+fn bootstrap_at(
+    base: &AxisSettings,
+    gain_mm_per_v_s2: f64,
+    rate_hz: f64,
+    crossover_hz: f64,
+) -> AxisSettings {
     let mut settings = measuring_settings(base);
-    let crossover = TAU * CROSSOVER_HZ;
+    let crossover = TAU * crossover_hz;
     // |L| = A Kp sqrt(1 + lead^2) / w^2 = 1 on the double integrator that every axis is above its damping's corner.
     let kp_v_per_mm = crossover * crossover / (gain_mm_per_v_s2 * LEAD.hypot(1.0));
     settings.plant = None;
@@ -42,14 +80,15 @@ pub fn bootstrap_settings(
     settings
 }
 
-/// `settings` with a friction that is roughly known fed forward, so that a soft controller does not lag by it: on a short travel
+/// `settings` with a friction that is roughly known fed forward, so that a soft controller does not lag by it: in positive and in
+/// negative direction, V. On a short travel
 /// the lag would take a good part of the way.
 pub fn with_rough_friction(
     mut settings: AxisSettings,
     gain_mm_per_v_s2: f64,
-    friction_v: f64,
+    friction_v: [f64; 2],
 ) -> AxisSettings {
-    let sliding = StaticFriction {
+    let sliding = |friction_v: f64| StaticFriction {
         curve: StribeckCurve {
             coulomb_v: friction_v.max(1e-6),
             breakaway_v: friction_v.max(1e-6),
@@ -59,8 +98,8 @@ pub fn with_rough_friction(
         viscous_v_s_per_mm: 0.0,
     };
     settings.friction.sliding = PerDirection {
-        positive: sliding,
-        negative: sliding,
+        positive: sliding(friction_v[0]),
+        negative: sliding(friction_v[1]),
     };
     settings.feedforward.kind = FeedforwardKind::Static;
     settings.feedforward.gains = FeedforwardGains {
@@ -108,9 +147,45 @@ pub fn low_bandwidth_settings(
     plant: &PlantModel,
     rate_hz: f64,
 ) -> AxisSettings {
+    low_bandwidth_settings_by(base, plant, rate_hz, 1.0)
+}
+
+/// As [`low_bandwidth_settings`], with as much less bandwidth as structural modes demand: `process` is the axis with them and
+/// with the filters of `base`. Where none will do, the PID of `base` is kept.
+pub fn low_bandwidth_settings_on(
+    base: &AxisSettings,
+    plant: &PlantModel,
+    process: &Process,
+    rate_hz: f64,
+) -> AxisSettings {
+    let form = Form::Sampled {
+        sample_time_s: 1.0 / rate_hz,
+        computation_delay_s: 0.0,
+    };
+    (0..NARROWINGS)
+        .map(|step| low_bandwidth_settings_by(base, plant, rate_hz, NARROWING.powi(step)))
+        .find(|settings| {
+            matches!(process, Process::Model(_))
+                || process
+                    .margins(&settings.feedback.pid, form)
+                    .is_ok_and(|margins| margins.sensitivity_peak < QUIET_PEAK)
+        })
+        .unwrap_or_else(|| AxisSettings {
+            plant: None,
+            ..measuring_settings(base)
+        })
+}
+
+/// As [`low_bandwidth_settings`], at a share of the usual crossover.
+fn low_bandwidth_settings_by(
+    base: &AxisSettings,
+    plant: &PlantModel,
+    rate_hz: f64,
+    share: f64,
+) -> AxisSettings {
     let mut settings = measuring_settings(base);
     let crossover =
-        (QUIET_PHASE_RAD / plant.delay_s.max(1.0 / rate_hz)).min(TAU * QUIET_CROSSOVER_HZ);
+        share * (QUIET_PHASE_RAD / plant.delay_s.max(1.0 / rate_hz)).min(TAU * QUIET_CROSSOVER_HZ);
     let kp_v_per_mm = crossover * crossover.hypot(plant.damping_per_s)
         / (plant.gain_mm_per_v_s2 * QUIET_LEAD.hypot(1.0));
     settings.plant = None;
@@ -125,6 +200,10 @@ pub fn low_bandwidth_settings(
 
 /// The low-bandwidth controller: phase that the dead time may turn at its crossover, rad; highest crossover, Hz; crossover over the
 /// frequency from which the derivative acts; integral over proportional gain, 1/s; filter over the inverse crossover.
+/// Factor on that crossover while modes do not bear it, its repetitions, and the bound on `|S|`.
+const NARROWING: f64 = 0.85;
+const NARROWINGS: i32 = 12;
+const QUIET_PEAK: f64 = 1.8;
 const QUIET_PHASE_RAD: f64 = 0.27;
 const QUIET_CROSSOVER_HZ: f64 = 60.0;
 const QUIET_LEAD: f64 = 1.4;
@@ -152,6 +231,25 @@ mod tests {
                     let settings =
                         bootstrap_settings(&x_axis(), wrong * plant.gain_mm_per_v_s2, 1e4);
                     let open_loop = SampledLoop::new(&plant, &settings.feedback.pid, 1e-4, 0.0);
+                    for share in BOOTSTRAP_SHARES {
+                        let gain = wrong * plant.gain_mm_per_v_s2;
+                        let soft = soft_bootstrap_settings(&x_axis(), gain, 1e4, share);
+                        let process = Process::Modelled {
+                            plant,
+                            modes: Vec::new(),
+                            filters: soft.feedback.filters.unwrap_or_default().to_vec(),
+                        };
+                        let form = Form::Sampled {
+                            sample_time_s: 1e-4,
+                            computation_delay_s: 0.0,
+                        };
+                        let margins = process.margins(&soft.feedback.pid, form);
+                        assert_ne!(
+                            margins.err(),
+                            Some(crate::design::MarginError::Unstable),
+                            "{share}: B {damping_per_s}, Td {delay_s}, A wrong by {wrong}"
+                        );
+                    }
                     // Without a delay nothing above makes it unstable, which the margins report as an error too.
                     if delay_s > 0.0 {
                         let margins = margins(&open_loop);

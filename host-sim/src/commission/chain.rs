@@ -1,23 +1,27 @@
 //! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
 
+use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::{
-    bootstrap_settings, low_bandwidth_settings, measuring_settings, with_rough_friction,
-    zero_gain_settings,
+    BOOTSTRAP_SHARES, CROSSOVER_HZ, low_bandwidth_settings_on, measuring_settings,
+    soft_bootstrap_settings, with_rough_friction, zero_gain_settings,
 };
 use super::commissioned::{CommissionSettings, Commissioned};
 use super::error::CommissionError;
+use super::guard::Guard;
 use super::models::{self, Measurements, Models};
+use super::ringing::Ringing;
 use super::verify::verify;
 use crate::identify::excitation::Excitation;
 use crate::identify::frf::{self, FrfError, FrfMeasurement, FrfSettings};
-use crate::identify::motor_constant::{self, MotorConstantSettings};
+use crate::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};
+use crate::identify::plant::PlantFit;
 use crate::identify::static_friction::{
-    self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionSettings,
+    self, FrictionFit, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings,
 };
 use crate::identify::virgin_curve::{self, VirginCurveSettings};
-use crate::machine::{ExperimentError, TestAxis, approach};
+use crate::machine::{AxisInfo, ExperimentError, TestAxis, approach};
 use crate::record::Recording;
 
 /// The steps, for progress: name and share of the whole.
@@ -49,6 +53,27 @@ pub fn commission(
     request: &CommissionSettings,
     progress: &mut dyn FnMut(&'static str, f64),
 ) -> Result<Commissioned, CommissionError> {
+    let mut guard = Guard::new(test_axis);
+    match guarded(&mut guard, base, request, progress) {
+        Ok(found) => Ok(Commissioned {
+            ran: guard.runs,
+            ..found
+        }),
+        Err(error) => Err(match guard.ringing() {
+            Some(ringing) if !matches!(error, CommissionError::Rings { .. }) => {
+                CommissionError::rings(ringing, error)
+            }
+            _ => error,
+        }),
+    }
+}
+
+fn guarded(
+    test_axis: &mut Guard<'_>,
+    base: &AxisSettings,
+    request: &CommissionSettings,
+    progress: &mut dyn FnMut(&'static str, f64),
+) -> Result<Commissioned, CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
     let mut step = 0;
     let mut report = |step: usize, share: f64| {
@@ -62,33 +87,37 @@ pub fn commission(
         report(step, share);
     })?;
 
+    let [ahead_v, back_v] = motor.directed_v;
+    test_axis.slowed_by(motor.gain_mm_per_v_s2 * ahead_v.min(back_v));
+
     step += 1;
-    let mut first = bootstrap_settings(base, motor.gain_mm_per_v_s2, rate_hz);
-    if test_axis.info().travel_mm < SHORT_TRAVEL_MM {
-        first = with_rough_friction(first, motor.gain_mm_per_v_s2, motor.friction_v);
-    }
-    test_axis.apply(&first)?;
-    let gain = motor.gain_mm_per_v_s2;
-    let response = sliding_response(test_axis, gain, &mut |share| report(step, share))?;
-    let plant = models::plant(&response)?;
-    let pid = models::pid(&plant, base, request, rate_hz)?;
+    let (response, plant) = linear_model(test_axis, base, &motor, &mut |share| {
+        report(step, share);
+    })?;
+    let controller = models::controller(&plant, base, request, rate_hz)?;
 
     step += 1;
     let mut settings = base.clone();
     settings.plant = Some(plant.plant);
-    settings.feedback.pid = pid;
+    controller.put_into(&mut settings);
     test_axis.apply(&measuring_settings(&settings))?;
-    approach(test_axis, HOME_MM)?;
-    let runs = request.friction.fitted_to(test_axis.info().travel_mm);
+    let runs = request.friction.fitted_to(&test_axis.info());
     let (map, recordings, friction) = friction(test_axis, runs, &mut |share| {
         report(step, share);
     })?;
 
     step += 1;
-    let quiet = low_bandwidth_settings(&settings, &plant.plant, rate_hz);
+    let process = models::process(&plant, &controller.filters);
+    let quiet = low_bandwidth_settings_on(&settings, &plant.plant, &process, rate_hz);
     test_axis.apply(&quiet)?;
     let (_, breakaway_v) = friction.mean_levels_v();
-    let sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
+    if runs.two_sided {
+        approach(test_axis, HOME_MM)?;
+    }
+    let mut sine = VirginCurveSettings::outrunning(quiet.feedback.pid.kp_v_per_mm, breakaway_v);
+    sine.amplitude_mm = sine
+        .amplitude_mm
+        .min(SINE_SHARE * test_axis.info().travel_mm);
     let recording = virgin_curve::measure(test_axis, &sine, &mut |share| report(step, share))?;
     let gms = models::presliding(&recording, &friction);
 
@@ -102,7 +131,7 @@ pub fn commission(
     };
     let models = Models {
         plant,
-        pid,
+        controller,
         friction,
         gms,
     };
@@ -118,6 +147,112 @@ pub fn commission(
     Ok(found)
 }
 
+/// The response of the sliding axis under a first controller, and the linear model. A mode that the first controller excites
+/// spoils both: they are repeated with softer ones, as soft as the frequency demands that was seen.
+fn linear_model(
+    test_axis: &mut Guard<'_>,
+    base: &AxisSettings,
+    motor: &MotorConstant,
+    progress: &mut dyn FnMut(f64),
+) -> Result<(FrfMeasurement, PlantFit), CommissionError> {
+    let rate_hz = test_axis.info().rate_hz;
+    let gain = motor.gain_mm_per_v_s2;
+    let attempt = |test_axis: &mut Guard<'_>,
+                   share: f64,
+                   progress: &mut dyn FnMut(f64)|
+     -> Result<(FrfMeasurement, PlantFit), CommissionError> {
+        let mut settings = soft_bootstrap_settings(base, gain, rate_hz, share);
+        if share < 1.0 || test_axis.info().travel_mm < SHORT_TRAVEL_MM {
+            settings = with_rough_friction(settings, gain, motor.directed_v);
+        }
+        test_axis.apply(&settings)?;
+        let response = sliding_response(test_axis, gain, progress)?;
+        let plant = models::plant(&response)?;
+        Ok((response, plant))
+    };
+    let first = match attempt(test_axis, 1.0, progress) {
+        Ok(found) => return Ok(found),
+        Err(error) => error,
+    };
+    let mut seen = rings(test_axis, &first);
+    let mut next = next_share(1.0, &first, seen);
+    for _ in 1..ATTEMPTS {
+        let Some(share) = next else { break };
+        match attempt(test_axis, share, progress) {
+            Ok(found) => return Ok(found),
+            Err(error) => {
+                let now = rings(test_axis, &error);
+                next = next_share(share, &error, now);
+                seen = now.or(seen);
+            }
+        }
+    }
+    Err(match seen {
+        Some(seen) => CommissionError::rings(seen, first),
+        None => first,
+    })
+}
+
+/// The oscillation behind a failed attempt, if it was one.
+fn rings(test_axis: &Guard<'_>, error: &CommissionError) -> Option<Ringing> {
+    let slowed = matches!(
+        error,
+        CommissionError::Response(FrfError::NotSliding { .. })
+    );
+    // A limit cycle stops nothing.
+    let at_end = || slowed.then(|| test_axis.ringing_at_end()).flatten();
+    test_axis.ringing().or_else(at_end)
+}
+
+/// Share of the usual crossover that is tried after one that failed; none if there is none left.
+fn next_share(share: f64, error: &CommissionError, rings: Option<Ringing>) -> Option<f64> {
+    if rings.is_none() && share >= 1.0 && is_stuck(error) {
+        // The axis is held by more than so soft a controller overcomes.
+        return Some(STIFFER * share).filter(|share| *share <= STIFFEST);
+    }
+    // A mode is left alone by a loop that is slow enough.
+    let bears =
+        |share: f64| rings.is_none_or(|seen| share * CROSSOVER_HZ * FAR_BELOW <= seen.frequency_hz);
+    let softer: Vec<f64> = BOOTSTRAP_SHARES
+        .into_iter()
+        .filter(|next| *next < share.min(1.0))
+        .collect();
+    let bearing = softer.iter().copied().find(|next| bears(*next));
+    bearing.or(softer.last().copied())
+}
+
+/// True if the tracking error stopped the axis.
+fn is_stuck(error: &CommissionError) -> bool {
+    matches!(
+        error,
+        CommissionError::Response(FrfError::Experiment(ExperimentError::Fault {
+            fault: Fault {
+                code: FaultCode::FollowingError,
+                ..
+            },
+            ..
+        }))
+    )
+}
+
+/// First controllers that are tried.
+const ATTEMPTS: usize = 6;
+/// Factor on the crossover of one that does not move the axis, and the largest share of the usual crossover.
+const STIFFER: f64 = 1.7;
+const STIFFEST: f64 = 5.0;
+/// Parameters of the response that suit an axis, without its gain.
+pub(super) fn response_settings(info: &AxisInfo) -> FrfSettings {
+    let mut settings = FrfSettings::default().fitted_to(info.travel_mm);
+    let most_mm_s = BIAS_SHARE * info.max_velocity_mm_s;
+    settings.bias_velocity_mm_s = settings.bias_velocity_mm_s.min(most_mm_s);
+    settings
+}
+
+/// Frequency of an oscillation over the crossover of a loop that bears it.
+const FAR_BELOW: f64 = 6.0;
+/// Share of the largest velocity that the bias of the response takes at most: the excitation comes on top.
+const BIAS_SHARE: f64 = 0.4;
+
 /// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest.
 fn friction(
     test_axis: &mut dyn TestAxis,
@@ -125,20 +260,24 @@ fn friction(
     progress: &mut dyn FnMut(f64),
 ) -> Result<(FrictionMap, Vec<Recording>, FrictionFit), CommissionError> {
     loop {
+        let start_mm = runs.start_mm(test_axis.info().travel_mm);
+        approach(test_axis, start_mm).map_err(StaticFrictionError::from)?;
         let (map, recordings) = static_friction::measure(test_axis, &runs, progress)?;
         let (slowest, fastest) = &mut runs.velocities_mm_s;
-        match models::friction(&map) {
-            Err(CommissionError::FrictionFit(FrictionFitError::TooFewRuns { .. }))
-                if FASTER * *slowest < *fastest / FASTER =>
-            {
+        match models::even_friction(&map) {
+            Err(FrictionFitError::TooFewRuns { .. }) if FASTER * *slowest < *fastest / FASTER => {
                 *slowest *= FASTER;
-                approach(test_axis, HOME_MM)?;
             }
-            found => return Ok((map, recordings, found?)),
+            _ => {
+                let found = models::friction(&map)?;
+                return Ok((map, recordings, found));
+            }
         }
     }
 }
 
+/// Share of the travel that the slow sine takes at most.
+pub(super) const SINE_SHARE: f64 = 0.1;
 /// Factor by which the slowest velocity is raised where the axis sticks and slips.
 const FASTER: f64 = 3.0;
 
@@ -149,19 +288,30 @@ fn sliding_response(
     progress: &mut dyn FnMut(f64),
 ) -> Result<FrfMeasurement, CommissionError> {
     let usual = FrfSettings::default();
-    let mut settings = usual.fitted_to(test_axis.info().travel_mm);
+    let info = test_axis.info();
+    let mut settings = response_settings(&info);
     // As large a share of the velocity as on the simulated stage.
     let slower = settings.bias_velocity_mm_s / usual.bias_velocity_mm_s;
     let lighter = gain_mm_per_v_s2 / USUAL_GAIN_MM_PER_V_S2;
     settings.excitation.rms_v *= (slower / lighter).min(1.0);
+    let start_mm = settings.start_mm(info.travel_mm);
     for _ in 0..HALVINGS {
         // A pass that was given up ended somewhere on its way.
-        approach(test_axis, HOME_MM)?;
+        approach(test_axis, start_mm).map_err(FrfError::from)?;
         match frf::measure(test_axis, &settings, progress) {
             Err(
                 FrfError::NotSliding { .. }
                 | FrfError::Experiment(
-                    ExperimentError::Travel { .. } | ExperimentError::Overspeed { .. },
+                    ExperimentError::Travel { .. }
+                    | ExperimentError::Overspeed { .. }
+                    | ExperimentError::Fault {
+                        fault:
+                            Fault {
+                                code: FaultCode::Overspeed,
+                                ..
+                            },
+                        ..
+                    },
                 ),
             ) => {
                 settings.excitation = Excitation {
@@ -172,6 +322,6 @@ fn sliding_response(
             outcome => return Ok(outcome?),
         }
     }
-    approach(test_axis, HOME_MM)?;
+    approach(test_axis, start_mm).map_err(FrfError::from)?;
     Ok(frf::measure(test_axis, &settings, progress)?)
 }

@@ -2,6 +2,7 @@
 
 use quadrant::settings::AxisSettings;
 
+use super::guard::Run;
 use super::verify::Verification;
 use crate::design::{MarginError, Margins, Target};
 use crate::identify::frf::FrfMeasurement;
@@ -74,6 +75,8 @@ pub struct Commissioned {
     pub sector_bound: f64,
     /// Settings of the axis, finished.
     pub settings: AxisSettings,
+    /// What was run on the axis, in order; nothing of a commissioning from saved recordings.
+    pub ran: Vec<Run>,
     /// Trials on the axis; none of a commissioning from saved recordings, or where none were asked for.
     pub verification: Option<Verification>,
 }
@@ -84,9 +87,35 @@ const NOTED_HYSTERESIS_ERROR: f64 = 0.10;
 const NOTED_DRIFT: f64 = 0.10;
 
 impl Commissioned {
+    /// The time for which the axis was used, and where it went, in a sentence.
+    fn account(&self) -> String {
+        let minutes = self.ran.iter().map(|run| run.lasted_s).sum::<f64>() / 60.0;
+        let low_mm = self.ran.iter().map(|run| run.span_mm.0);
+        let high_mm = self.ran.iter().map(|run| run.span_mm.1);
+        let stopped = self.ran.iter().filter(|run| !run.ended).count();
+        format!(
+            "{minutes:.1} minutes of axis time: {} experiments between {:.1} and {:.1} mm, {stopped} of which were stopped by \
+             their limits and repeated more gently.",
+            self.ran.len(),
+            low_mm.fold(f64::INFINITY, f64::min),
+            high_mm.fold(f64::NEG_INFINITY, f64::max),
+        )
+    }
+
     /// Remarks on the result beside its tables, in sentences.
     pub fn notes(&self) -> Vec<String> {
         let mut notes = Vec::new();
+        if !self.ran.is_empty() {
+            notes.push(self.account());
+        }
+        let runs = &self.friction.0.runs;
+        let uneven = runs.iter().filter(|run| run.stick_slip).count();
+        if 2 * uneven > runs.len() {
+            notes.push(format!(
+                "The axis stuck and slipped in {uneven} of {} runs at constant velocity: its friction is known by their means.",
+                runs.len()
+            ));
+        }
         match &self.presliding.0 {
             Ok(gms) if gms.prediction.relative_error > NOTED_HYSTERESIS_ERROR => {
                 notes.push(format!(

@@ -2,6 +2,7 @@
 
 use quadrant::settings::SettingsError;
 
+use super::ringing::Ringing;
 use super::verify::VerifyError;
 use crate::design::DesignError;
 use crate::identify::frf::FrfError;
@@ -52,7 +53,29 @@ pub enum CommissionError {
     /// The ordinary motion gave no model.
     #[error("ordinary motion: {0}")]
     Motion(#[from] MotionFitError),
+    /// The axis oscillated.
+    #[error(
+        "the axis oscillated at {frequency_hz:.0} Hz ({amplitude_um:.0} um) when it was stopped, under controllers of any bandwidth that \
+         the step allows: what resonates there is to be stiffened or damped, or the encoder to be read at the motor ({source})"
+    )]
+    Rings {
+        frequency_hz: f64,
+        amplitude_um: f64,
+        /// What stopped it.
+        source: Box<CommissionError>,
+    },
     /// The sine could not be run.
     #[error("verdict: {0}")]
     Verify(#[from] VerifyError),
+}
+
+impl CommissionError {
+    /// A step that failed because the axis oscillated.
+    pub(super) fn rings(ringing: Ringing, error: Self) -> Self {
+        Self::Rings {
+            frequency_hz: ringing.frequency_hz,
+            amplitude_um: 1e3 * ringing.amplitude_mm,
+            source: Box::new(error),
+        }
+    }
 }

@@ -10,12 +10,18 @@ mod chain;
 mod commissioned;
 mod cross_check;
 mod error;
+mod guard;
 mod models;
 pub mod page;
+mod plan;
+mod ringing;
 pub mod verify;
 
 pub use chain::commission;
 pub use commissioned::{CommissionSettings, Commissioned};
 pub use cross_check::CrossCheck;
 pub use error::CommissionError;
+pub use guard::{Guard, Run};
 pub use models::Measurements;
+pub use plan::{Planned, plan, plan_table};
+pub use ringing::{Ringing, ringing};

@@ -1,8 +1,9 @@
 //! From the measurements of a commissioning to its models and settings: without an axis.
 
 use heapless::Vec as ShortVec;
+use quadrant::control::filter::FilterSettings;
 use quadrant::control::pid::PidGains;
-use quadrant::control::popov::sector_bound;
+use quadrant::control::popov::filtered_sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
@@ -12,12 +13,14 @@ use quadrant::settings::{AxisSettings, FeedbackSettings};
 use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
 use super::error::CommissionError;
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
-use crate::design::{Form, PidRequest, Process, best_pid, design_pid};
+use crate::design::{Form, PidRequest, Process, best_pid, design_pid, modal_pid};
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
 use crate::identify::single_state::with_all_models;
-use crate::identify::static_friction::{Exponent, FrictionFit, FrictionMap, fit_map};
+use crate::identify::static_friction::{
+    Exponent, FrictionFit, FrictionFitError, FrictionMap, fit_map,
+};
 use crate::identify::virgin_curve::{
     self, ASSUMED_ATTRACTION_V_S, GmsFit, Knots, VirginCurveError,
 };
@@ -49,9 +52,39 @@ pub struct Measurements {
 /// Models of the axis, and its PID.
 pub(super) struct Models {
     pub(super) plant: PlantFit,
-    pub(super) pid: PidGains,
+    pub(super) controller: Controller,
     pub(super) friction: FrictionFit,
     pub(super) gms: Result<GmsFit, VirginCurveError>,
+}
+
+/// PID and filters.
+#[derive(Clone, Debug)]
+pub(super) struct Controller {
+    pub(super) pid: PidGains,
+    pub(super) filters: Vec<FilterSettings>,
+    /// Largest gain in front of the PID that is shown to be stable with the modes; infinite without any.
+    circle_bound: f64,
+}
+
+impl Controller {
+    /// Takes gains and filters into settings.
+    pub(super) fn put_into(&self, settings: &mut AxisSettings) {
+        settings.feedback.pid = self.pid;
+        settings.feedback.filters =
+            (!self.filters.is_empty()).then(|| self.filters.iter().copied().collect());
+    }
+}
+
+/// Axis and filters as a design sees them.
+pub(super) fn process(plant: &PlantFit, filters: &[FilterSettings]) -> Process {
+    if plant.modes.is_empty() && filters.is_empty() {
+        return Process::Model(plant.plant);
+    }
+    Process::Modelled {
+        plant: plant.plant,
+        modes: plant.modes.clone(),
+        filters: filters.to_vec(),
+    }
 }
 
 /// Fits the linear model to the response.
@@ -60,22 +93,37 @@ pub(super) fn plant(response: &FrfMeasurement) -> Result<PlantFit, CommissionErr
         &response.estimate.response,
         &PlantFitSettings {
             stiffness: Stiffness::Zero,
+            negligible_damping: true,
             ..PlantFitSettings::default()
         },
     )?)
 }
 
-/// Designs the PID on the linear model.
-pub(super) fn pid(
+/// Designs the PID, and filters where modes want them, on the linear model.
+pub(super) fn controller(
     plant: &PlantFit,
     base: &AxisSettings,
     request: &CommissionSettings,
     rate_hz: f64,
-) -> Result<PidGains, CommissionError> {
-    let process = Process::Model(plant.plant);
+) -> Result<Controller, CommissionError> {
+    let alone = |pid| Controller {
+        pid,
+        filters: Vec::new(),
+        circle_bound: f64::INFINITY,
+    };
     let filter_s = base.feedback.pid.derivative_filter_s;
     let Some(target) = request.target else {
-        return Ok(best_pid(&process, sampled(rate_hz), filter_s)?.gains);
+        let form = sampled(rate_hz);
+        if plant.modes.is_empty() {
+            let process = Process::Model(plant.plant);
+            return Ok(alone(best_pid(&process, form, filter_s)?.gains));
+        }
+        let found = modal_pid(&plant.plant, &plant.modes, form, filter_s)?;
+        return Ok(Controller {
+            pid: found.gains,
+            filters: found.filters,
+            circle_bound: found.circle_bound,
+        });
     };
     let design = PidRequest {
         target,
@@ -83,20 +131,35 @@ pub(super) fn pid(
         derivative_filter_s: filter_s,
         ki_v_per_mm_s: None,
     };
-    Ok(design_pid(&process, &design)?.gains)
+    Ok(alone(design_pid(&process(plant, &[]), &design)?.gains))
 }
 
 /// The loop as it runs.
-fn sampled(rate_hz: f64) -> Form {
+pub(super) fn sampled(rate_hz: f64) -> Form {
     Form::Sampled {
         sample_time_s: 1.0 / rate_hz,
         computation_delay_s: 0.0,
     }
 }
 
-/// Fits the static friction model to the map.
+/// Fits the static friction model to the runs of the map that moved evenly.
+pub(super) fn even_friction(map: &FrictionMap) -> Result<FrictionFit, FrictionFitError> {
+    fit_map(map, Exponent::Fixed(1.0))
+}
+
+/// Fits the static friction model to the map. Where too few runs moved evenly the mean voltages of the others count, too: of an
+/// axis that sticks and slips they are what there is, and the trials judge what comes of them.
 pub(super) fn friction(map: &FrictionMap) -> Result<FrictionFit, CommissionError> {
-    Ok(fit_map(map, Exponent::Fixed(1.0))?)
+    match even_friction(map) {
+        Err(FrictionFitError::TooFewRuns { .. }) => {
+            let mut all = map.clone();
+            for run in &mut all.runs {
+                run.stick_slip = false;
+            }
+            Ok(even_friction(&all)?)
+        }
+        found => Ok(found?),
+    }
 }
 
 /// Identifies the GMS model from the slow sine.
@@ -133,12 +196,12 @@ impl Measurements {
         rate_hz: f64,
     ) -> Result<Commissioned, CommissionError> {
         let plant = plant(&self.response)?;
-        let pid = pid(&plant, base, request, rate_hz)?;
+        let controller = controller(&plant, base, request, rate_hz)?;
         let friction = friction(&self.map)?;
         let gms = presliding(&self.presliding, &friction);
         let models = Models {
             plant,
-            pid,
+            controller,
             friction,
             gms,
         };
@@ -157,14 +220,17 @@ impl Models {
     ) -> Commissioned {
         let Self {
             plant,
-            pid,
+            controller,
             friction,
             gms,
         } = self;
+        let Controller { pid, filters, .. } = &controller;
         let (_, breakaway_v) = friction.mean_levels_v();
-        let bound = sector_bound(&plant.plant, &pid, 1.0 / rate_hz);
+        // The rigid model's bound is what the firmware checks; with modes the circle criterion must hold, too.
+        let bound = filtered_sector_bound(&plant.plant, pid, filters, 1.0 / rate_hz)
+            .min(controller.circle_bound);
         let nonlinear = choose_nonlinear(
-            &pid,
+            pid,
             bound,
             &NonlinearRule {
                 sector_share: request.sector_share,
@@ -177,8 +243,9 @@ impl Models {
         settings.feedback = FeedbackSettings {
             integral_limit_v: base.feedback.integral_limit_v,
             transfer_s: base.feedback.transfer_s,
-            ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
+            ..FeedbackSettings::all_laws(*pid, nonlinear, base.limits.max_velocity_mm_s)
         };
+        controller.put_into(&mut settings);
         let elements = gms
             .as_ref()
             .map_or_else(|_| assumed(breakaway_v), |found| found.gms.clone());
@@ -191,7 +258,7 @@ impl Models {
             inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
         };
         settings.feedforward.preview_s = plant.plant.delay_s;
-        let margins = Process::Model(plant.plant).margins(&pid, sampled(rate_hz));
+        let margins = process(&plant, filters).margins(pid, sampled(rate_hz));
         Commissioned {
             motor: measurements.motor,
             response: measurements.response,
@@ -201,6 +268,7 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
+            ran: Vec::new(),
             verification: None,
         }
     }
@@ -237,4 +305,31 @@ fn identify_elements(
         Ok(many) if many.prediction.relative_error < few.prediction.relative_error => many,
         _ => few,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identify::static_friction::FrictionRun;
+
+    #[test]
+    fn the_means_of_runs_that_stuck_and_slipped_count_where_there_are_no_others() {
+        let velocities = [0.5, 1.0, 2.0, 4.0, 8.0, 16.0];
+        let runs = velocities.iter().flat_map(|speed| {
+            [1.0, -1.0].map(|sign| FrictionRun {
+                velocity_mm_s: sign * speed,
+                voltage_v: sign * (0.1 + 0.001 * speed),
+                deviation_v: 1e-3,
+                stick_slip: true,
+            })
+        });
+        let mut map = FrictionMap {
+            runs: runs.collect(),
+        };
+        map.runs
+            .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+        assert!(even_friction(&map).is_err());
+        let (coulomb_v, _) = friction(&map).unwrap().mean_levels_v();
+        assert!((coulomb_v - 0.1).abs() < 0.01, "{coulomb_v}");
+    }
 }

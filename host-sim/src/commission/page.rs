@@ -157,7 +157,7 @@ pub fn commission_page(
     let [parameters, bands] = plant_tables(&found.plant);
     let (map, friction, _) = &found.friction;
     let (gms, _) = &found.presliding;
-    let mut response = response_section(&found.response, Some(&found.plant.plant));
+    let mut response = response_section(&found.response, Some(&found.plant));
     response
         .blocks
         .insert(0, Block::Table(motor_constant_table(&found.motor, None)));

@@ -1,6 +1,8 @@
 //! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: nothing is handed over
 //! that is worse than the PID alone on any of the sines.
 
+use std::f64::consts::TAU;
+
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::AxisSettings;
@@ -233,6 +235,23 @@ pub fn verify(
         chosen,
         drift,
     })
+}
+
+/// Time that trials take on sines where no share of the friction is to be tried, s.
+pub(super) fn lasts_s(sines: &[SineTest]) -> f64 {
+    let runs = |index: usize| {
+        let compared = if index < COMPARED { KINDS.len() } else { 1 };
+        // The PID and the N-PID alone, and the PID again at the end.
+        2 + compared + usize::from(index == 0)
+    };
+    sines
+        .iter()
+        .enumerate()
+        .map(|(index, sine)| {
+            let frequency_hz = sine.velocity_mm_s / (TAU * sine.amplitude_mm);
+            runs(index) as f64 * (CYCLES / frequency_hz + 2.0 * LEAD_S)
+        })
+        .sum()
 }
 
 /// Runs that all trials make at most, for progress.

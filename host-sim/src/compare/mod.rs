@@ -2,5 +2,6 @@
 
 pub mod comparison;
 pub mod headlines;
+pub mod honest;
 pub mod page;
 pub mod sine;

@@ -6,6 +6,7 @@ use crate::circle::CircleOutcome;
 use crate::circle::single_page::{circle_figures, circle_table, polar_figure};
 use crate::compare::comparison::Comparison;
 use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
+use crate::compare::honest::honest_table;
 use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::{GLITCH_WINDOW, Metric};
@@ -25,11 +26,18 @@ const IDS: [&str; 3] = [
     "quadrant-glitch",
 ];
 
-/// The comparison's tables: one for each score, the headlines, the circles.
-pub fn comparison_tables(comparison: &Comparison, circles: &[CircleOutcome]) -> Vec<Table> {
-    IDS.into_iter()
+/// The comparison's tables: that against the best PID, one for each score, the headlines, the circles.
+pub fn comparison_tables(
+    comparison: &Comparison,
+    honest: &Comparison,
+    circles: &[CircleOutcome],
+) -> Vec<Table> {
+    let scores = IDS
+        .into_iter()
         .zip(Metric::ALL)
-        .map(|(id, metric)| score_table(id, metric, comparison))
+        .map(|(id, metric)| score_table(id, metric, comparison));
+    std::iter::once(honest_table(comparison, honest))
+        .chain(scores)
         .chain([headline_table(comparison), circle_table(circles)])
         .collect()
 }
@@ -86,10 +94,11 @@ fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
 /// The comparison's page.
 pub fn comparison_page(
     comparison: &Comparison,
+    honest: &Comparison,
     circles: &[CircleOutcome],
     provenance: Provenance,
 ) -> Page {
-    let mut tables = comparison_tables(comparison, circles).into_iter();
+    let mut tables = comparison_tables(comparison, honest, circles).into_iter();
     let mut next_tables = |count| {
         tables
             .by_ref()
@@ -97,6 +106,7 @@ pub fn comparison_page(
             .map(Block::Table)
             .collect::<Vec<_>>()
     };
+    let against_best = next_tables(1);
     let scores = next_tables(IDS.len());
     let headlines = next_tables(1);
     let circle_tables = next_tables(1);
@@ -123,6 +133,13 @@ pub fn comparison_page(
                 .chain(reversal_figure(comparison))
                 .map(Block::Figure)
                 .collect(),
+            },
+            Section {
+                provenance: None,
+                id: "against-best-pid".to_owned(),
+                heading: "Against the best PID".to_owned(),
+                prose: vec![BEST_PID_PROSE.to_owned()],
+                blocks: against_best,
             },
             Section {
                 provenance: None,
@@ -233,6 +250,11 @@ fn reversal_figure(comparison: &Comparison) -> Option<Figure> {
         }),
     })
 }
+
+/// Said with the table against the best PID.
+const BEST_PID_PROSE: &str = "The PID of the settings has the thesis' margins, which leave its integral weak. The best PID is the one that \
+     commissioning designs: as much is asked of its loop as of any, and the rest of its freedom goes into a small error. What friction's \
+     feedforward is worth on a well-tuned axis is the change against it.";
 
 fn experiment_prose() -> String {
     format!(

@@ -69,7 +69,7 @@ pub fn load_step_error(process: &Process, gains: &PidGains, form: Form) -> f64 {
             let omega = (first + spacing * index as f64).exp();
             let open = open_loop.response(omega);
             let compliance =
-                open / form.controller(gains, omega) / (Complex64::new(1.0, 0.0) + open);
+                open / process.controller(gains, form, omega) / (Complex64::new(1.0, 0.0) + open);
             // d omega = omega d ln(omega), and the step's spectrum is 1 / omega.
             compliance.norm_sqr() / omega
         })

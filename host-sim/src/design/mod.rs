@@ -9,6 +9,7 @@ pub mod best;
 mod form;
 pub mod integral_gain;
 pub mod measured;
+pub mod modal;
 pub mod npid;
 pub mod pages;
 pub mod pid;
@@ -28,6 +29,7 @@ pub use integral_gain::{
 };
 pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
+pub use modal::{ModalDesign, modal_pid};
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
 pub use process::Process;
 pub use quadrant_simulation::{held_plant, loop_shape, margins};

@@ -96,6 +96,15 @@ pub enum DesignError {
         /// Margin asked for, dB.
         least_db: f64,
     },
+    /// No loop bears a structural mode.
+    #[error(
+        "no PID, with or without notch and low-pass, keeps |S| and |T| within their bounds with the mode at {frequency_hz:.0} Hz: a stiffer \
+         coupling or guide, more damping, or the encoder on the motor would help; by hand, settings with less bandwidth"
+    )]
+    Mode {
+        /// Frequency of the lowest mode, Hz.
+        frequency_hz: f64,
+    },
     /// No crossover meets the bounds.
     #[error(
         "no PID keeps |S| within {sensitivity_peak} and |T| within {complementary_peak}: the nearest exceeds one of them by {percent:.1} %"

@@ -1,18 +1,25 @@
 //! Process that a controller is designed on: a model of the axis or its measured response, closed in continuous time or
 //! as it runs.
 
-use quadrant::control::{pid::PidGains, plant_model::PlantModel};
+use quadrant::control::{filter::FilterSettings, pid::PidGains, plant_model::PlantModel};
 
 use super::form::Form;
 use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 use super::margins::{MarginError, Margins, bisect, margins};
 use super::measured::{MeasuredLoop, MeasuredResponse};
+use crate::identify::mode::{self, Mode};
 use num_complex::Complex64;
 
 /// The axis, as far as a design knows it.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Process {
     Model(PlantModel),
+    /// The model with its structural modes, and the filters behind the law.
+    Modelled {
+        plant: PlantModel,
+        modes: Vec<Mode>,
+        filters: Vec<FilterSettings>,
+    },
     /// Its measured frequency response.
     Measured(MeasuredResponse),
 }
@@ -26,6 +33,38 @@ pub enum AnyLoop<'a> {
     Sampled(SampledLoop),
     /// Measured response and PID, in either form.
     Measured(MeasuredLoop<'a>),
+    /// Model with modes, PID and filters, in either form.
+    Modal(ModalLoop<'a>),
+}
+
+/// A loop of the rigid model, times modes and filters. Through the converter's hold the product is that of the responses:
+/// modes lie far below the control rate.
+#[derive(Clone, Debug)]
+pub struct ModalLoop<'a> {
+    rigid: Box<AnyLoop<'a>>,
+    modes: &'a [Mode],
+    filters: &'a [FilterSettings],
+    form: Form,
+}
+
+/// The response of all filters at a frequency in rad/s.
+fn filters_at(filters: &[FilterSettings], form: Form, omega_rad_s: f64) -> Complex64 {
+    let each = filters.iter().map(|filter| match form {
+        Form::Continuous => filter.response(omega_rad_s),
+        Form::Sampled { sample_time_s, .. } => filter.sampled_response(omega_rad_s, sample_time_s),
+    });
+    each.product()
+}
+
+impl OpenLoop for ModalLoop<'_> {
+    fn response(&self, omega_rad_s: f64) -> Complex64 {
+        let filters = filters_at(self.filters, self.form, omega_rad_s);
+        self.rigid.response(omega_rad_s) * mode::response_of(self.modes, omega_rad_s) * filters
+    }
+
+    fn band_rad_s(&self) -> (f64, f64) {
+        self.rigid.band_rad_s()
+    }
 }
 
 impl OpenLoop for AnyLoop<'_> {
@@ -34,6 +73,7 @@ impl OpenLoop for AnyLoop<'_> {
             Self::Continuous(open_loop) => open_loop.response(omega_rad_s),
             Self::Sampled(open_loop) => open_loop.response(omega_rad_s),
             Self::Measured(open_loop) => open_loop.response(omega_rad_s),
+            Self::Modal(open_loop) => open_loop.response(omega_rad_s),
         }
     }
 
@@ -42,7 +82,27 @@ impl OpenLoop for AnyLoop<'_> {
             Self::Continuous(open_loop) => open_loop.band_rad_s(),
             Self::Sampled(open_loop) => open_loop.band_rad_s(),
             Self::Measured(open_loop) => open_loop.band_rad_s(),
+            Self::Modal(open_loop) => open_loop.band_rad_s(),
         }
+    }
+}
+
+/// The loop that a PID closes around the rigid model.
+fn rigid_loop(plant: &PlantModel, gains: &PidGains, form: Form) -> AnyLoop<'static> {
+    match form {
+        Form::Continuous => AnyLoop::Continuous(ContinuousLoop {
+            plant: *plant,
+            gains: *gains,
+        }),
+        Form::Sampled {
+            sample_time_s,
+            computation_delay_s,
+        } => AnyLoop::Sampled(SampledLoop::new(
+            plant,
+            gains,
+            sample_time_s,
+            computation_delay_s,
+        )),
     }
 }
 
@@ -50,25 +110,32 @@ impl Process {
     /// The loop that a PID closes around the process.
     pub fn open_loop(&self, gains: &PidGains, form: Form) -> AnyLoop<'_> {
         match (self, form) {
-            (Self::Model(plant), Form::Continuous) => AnyLoop::Continuous(ContinuousLoop {
-                plant: *plant,
-                gains: *gains,
-            }),
             (
-                Self::Model(plant),
-                Form::Sampled {
-                    sample_time_s,
-                    computation_delay_s,
+                Self::Modelled {
+                    plant,
+                    modes,
+                    filters,
                 },
-            ) => AnyLoop::Sampled(SampledLoop::new(
-                plant,
-                gains,
-                sample_time_s,
-                computation_delay_s,
-            )),
+                form,
+            ) => AnyLoop::Modal(ModalLoop {
+                rigid: Box::new(rigid_loop(plant, gains, form)),
+                modes,
+                filters,
+                form,
+            }),
+            (Self::Model(plant), form) => rigid_loop(plant, gains, form),
             (Self::Measured(response), form) => {
                 AnyLoop::Measured(MeasuredLoop::new(response, gains, form))
             }
+        }
+    }
+
+    /// The response of a PID and of the filters behind it, V/mm, at a frequency in rad/s.
+    pub(super) fn controller(&self, gains: &PidGains, form: Form, omega_rad_s: f64) -> Complex64 {
+        let pid = form.controller(gains, omega_rad_s);
+        match self {
+            Self::Modelled { filters, .. } => pid * filters_at(filters, form, omega_rad_s),
+            Self::Model(_) | Self::Measured(_) => pid,
         }
     }
 
@@ -87,10 +154,10 @@ impl Process {
     }
 
     /// The frequency at which the phase of the process alone reaches -180 degrees, Hz: without derivative action no
-    /// crossover lies above it. Nothing when the band does not hold it.
+    /// crossover lies above it; of the rigid axis where there are modes. Nothing when the band does not hold it.
     pub fn half_turn_hz(&self) -> Option<f64> {
         match self {
-            Self::Model(plant) => {
+            Self::Model(plant) | Self::Modelled { plant, .. } => {
                 // Above the resonance, where delay and inertia turn on: from there the phase only falls.
                 let lag = |omega: f64| {
                     (-plant.denominator(omega).arg()) - omega * plant.delay_s

@@ -49,6 +49,7 @@ impl AtRest {
             periods,
             bias_velocity_mm_s: 0.0,
             open_loop: false,
+            two_sided: false,
         };
         let rate_hz = test_axis.info().rate_hz;
         let mut experiment = standstill(&request, rate_hz);

@@ -9,6 +9,7 @@
 //! - [`frf`]: that response, measured;
 //! - [`fit`]: bounded, robust nonlinear least squares with standard errors, which the steps share;
 //! - [`measured_table`]: frequency responses and friction maps as CSV;
+//! - [`mode`]: a structural mode, a resonance of the drive train;
 //! - [`motion`]: inertia and friction from an ordinary motion record;
 //! - [`motor_constant`]: acceleration per volt from a square wave;
 //! - [`pages`]: the steps' tables and figures;
@@ -26,6 +27,7 @@ pub mod excitation;
 pub mod fit;
 pub mod frf;
 pub mod measured_table;
+pub mod mode;
 pub mod motion;
 pub mod motor_constant;
 pub mod pages;

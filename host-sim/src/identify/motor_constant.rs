@@ -2,9 +2,13 @@
 //!
 //! The voltage steps between two levels of one sign, so that the axis slides on and its friction stays the same: then
 //! `y'' = A (u(t - Td) - F) - B y'`, which integrated twice is linear in A, B and A F. Nothing is differentiated. Passes
-//! in both directions bring the axis back; their scatter is the uncertainty. With the moving mass, `k_f = m A`.
+//! in both directions bring the axis back; their scatter is the uncertainty. An axis that rings with a structural mode of the
+//! order of the levels' frequency scatters too much: then the motion of an oscillator is fitted with the rest. With the moving mass, `k_f = m A`.
+
+use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
+use quadrant::safety::FaultCode;
 
 use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;
@@ -39,6 +43,16 @@ impl Default for MotorConstantSettings {
 /// Travel that the usual test needs at most, mm, and the shortest dwell over the usual one.
 const ROOM_MM: f64 = 40.0;
 const SHORTEST: f64 = 0.4;
+/// Fewest levels, a multiple of two, and factor on the dwell of a test that was stopped for its way; most such tests, and the
+/// shortest dwell, s.
+const LEAST_LEVELS: usize = 14;
+const SHORTENED: f64 = 0.75;
+const SHORTENINGS: usize = 14;
+const LEAST_DWELL_S: f64 = 0.0015;
+/// Dwells that are tried over the usual one where a test is too uncertain.
+const OTHER_DWELLS: [f64; 3] = [1.7, 0.6, 2.4];
+/// Share of the travel beyond which the next test begins towards the middle.
+const OUTSIDE: f64 = 0.25;
 
 impl MotorConstantSettings {
     /// Shorter levels where the travel, either way, is short: the way goes with the square of the time.
@@ -51,7 +65,28 @@ impl MotorConstantSettings {
         }
     }
 
-    /// The settings of a recorded test with the usual number of levels: its first pass shows how long each lasted.
+    /// Time of one test, s.
+    pub fn lasts_s(&self) -> f64 {
+        self.passes as f64 * (self.levels as f64 * self.dwell_s + REST_S)
+    }
+
+    /// Fewer levels, down to those that a pass takes, then shorter ones: after a test that was stopped for its way.
+    #[must_use]
+    fn shortened(self) -> Self {
+        let levels = (self.levels * 2 / 3).max(LEAST_LEVELS);
+        let dwell_s = if levels == self.levels {
+            (SHORTENED * self.dwell_s).max(LEAST_DWELL_S)
+        } else {
+            self.dwell_s
+        };
+        Self {
+            levels,
+            dwell_s,
+            ..self
+        }
+    }
+
+    /// The settings of a recorded test: its first pass shows how many levels it has, and how long each lasted.
     pub fn of(recording: &Recording) -> Self {
         let usual = Self::default();
         let drives = |volts: &&f64| volts.abs() > DRIVING_V;
@@ -59,9 +94,16 @@ impl MotorConstantSettings {
             .voltage_v
             .iter()
             .skip_while(|volts| !drives(volts));
-        let samples = first.take_while(drives).count();
+        let pass: Vec<f64> = first.take_while(drives).map(|volts| volts.abs()).collect();
+        // Every other level is the upper one, which comes first.
+        let between = 0.5 * (1.0 + UPPER) / UPPER * pass.iter().copied().fold(0.0, f64::max);
+        let changes = pass
+            .windows(2)
+            .filter(|pair| (pair[0] > between) != (pair[1] > between));
+        let levels = changes.count() + 1;
         Self {
-            dwell_s: samples as f64 * recording.sample_time_s / usual.levels as f64,
+            dwell_s: pass.len() as f64 * recording.sample_time_s / levels as f64,
+            levels,
             ..usual
         }
     }
@@ -78,6 +120,9 @@ pub struct MotorConstant {
     pub damping_per_s: f64,
     /// Friction in motion, V; rough, and zero or more.
     pub friction_v: f64,
+    /// The same in positive and in negative direction, V, within shares of the level that it slides at: what hangs pulls one
+    /// way. The mean where a direction is missing.
+    pub directed_v: [f64; 2],
     /// Lower level of the voltage, V.
     pub level_v: f64,
     pub recording: Recording,
@@ -125,6 +170,11 @@ pub enum MotorConstantError {
 const UPPER: f64 = 2.5;
 /// Factor by which the levels rise from test to test.
 const RAISE: f64 = 1.3;
+/// Friction in motion over the lower level, at least and at most: the mean is 1.75 times that, and some of it accelerates.
+const LEAST_FRICTION: f64 = 0.8;
+const MOST_FRICTION: f64 = 1.5;
+/// Factor by which the level is lowered of a direction in which the axis went too far.
+const LOWER: f64 = 1.2;
 /// Levels at the beginning of a pass that do not count: the axis breaks away.
 const BREAKING_AWAY: usize = 6;
 /// Voltage from which on a sample belongs to a pass, V.
@@ -154,21 +204,59 @@ pub fn measure(
     progress: &mut dyn FnMut(f64),
 ) -> Result<MotorConstant, MotorConstantError> {
     let axis = test_axis.info();
-    let mut level_v = settings.first_level_v;
-    while level_v <= settings.most_level_v {
-        let recording = test_axis.perform(
+    let mut settings = *settings;
+    // In positive and in negative direction: friction may differ, and what hangs pulls one way.
+    let mut levels_v = [settings.first_level_v; 2];
+    let mut ahead = 1.0;
+    let mut shortenings = 0;
+    let (mut others, usual_s) = (0, settings.dwell_s);
+    while levels_v
+        .iter()
+        .all(|level_v| *level_v <= settings.most_level_v)
+    {
+        let outcome = test_axis.perform(
             &Experiment {
-                name: format!("steps between {level_v:.3} and {:.3} V", UPPER * level_v),
+                name: test_name(levels_v),
                 drive: Drive::OpenLoop,
-                injection_v: steps(settings, level_v, axis.rate_hz),
+                injection_v: steps(&settings, levels_v, ahead, axis.rate_hz),
                 decimation: 1,
                 time_limit_s: 60.0,
             },
             progress,
-        )?;
-        match evaluate(recording, settings, axis.resolution_mm) {
-            // Friction still holds it.
-            Err(MotorConstantError::NoPasses { .. }) => level_v *= RAISE,
+        );
+        let recording = match outcome {
+            Err(error) if shortenings < SHORTENINGS && went_too_far(&error) => {
+                shortenings += 1;
+                settings = settings.shortened();
+                if let Some(stopped) = test_axis.interrupted() {
+                    ahead = inwards(stopped, 0.0, ahead);
+                    let mut driven = stopped.voltage_v.iter().rev();
+                    let last_v = driven.find(|volts| volts.abs() > DRIVING_V);
+                    let too_far = usize::from(last_v.is_some_and(|volts| *volts < 0.0));
+                    levels_v[too_far] /= LOWER;
+                }
+                continue;
+            }
+            outcome => outcome?,
+        };
+        ahead = inwards(&recording, OUTSIDE * axis.travel_mm, ahead);
+        let slid = find_passes(&recording, &settings, axis.resolution_mm)?;
+        let held = [1.0, -1.0].map(|sign| !slid.iter().any(|(pass, _)| pass.sign == sign));
+        if held.contains(&true) {
+            for (level_v, held) in levels_v.iter_mut().zip(held) {
+                // Friction still holds it.
+                if held {
+                    *level_v *= RAISE;
+                }
+            }
+            continue;
+        }
+        match evaluate(recording, &settings, axis.resolution_mm) {
+            // A mode near the levels' frequency: at another one it shows less.
+            Err(MotorConstantError::Uncertain { .. }) if others < OTHER_DWELLS.len() => {
+                settings.dwell_s = OTHER_DWELLS[others] * usual_s;
+                others += 1;
+            }
             outcome => return outcome,
         }
     }
@@ -181,13 +269,54 @@ fn dwell(settings: &MotorConstantSettings, rate_hz: f64) -> usize {
     ((settings.dwell_s * rate_hz).round() as usize).max(4)
 }
 
-/// The voltage of all passes, V.
-fn steps(settings: &MotorConstantSettings, level_v: f64, rate_hz: f64) -> Vec<f64> {
+/// Name of a test at these levels.
+fn test_name([positive_v, negative_v]: [f64; 2]) -> String {
+    let between = |level_v: f64| format!("{level_v:.3} and {:.3} V", UPPER * level_v);
+    if positive_v == negative_v {
+        format!("steps between {}", between(positive_v))
+    } else {
+        format!(
+            "steps between {}, back between {}",
+            between(positive_v),
+            between(negative_v)
+        )
+    }
+}
+
+/// True if a test was stopped for its way or its velocity.
+fn went_too_far(error: &ExperimentError) -> bool {
+    match error {
+        ExperimentError::Travel { .. } | ExperimentError::Overspeed { .. } => true,
+        ExperimentError::Fault { fault, .. } => fault.code == FaultCode::InjectionBounds,
+        _ => false,
+    }
+}
+
+/// Direction of the first pass after a recording: towards the middle from beyond a distance, mm, else as before.
+fn inwards(recording: &Recording, beyond_mm: f64, before: f64) -> f64 {
+    match recording.position_mm.last() {
+        Some(position_mm) if position_mm.abs() > beyond_mm => -position_mm.signum(),
+        _ => before,
+    }
+}
+
+/// The voltage of all passes, V; the first goes `ahead`, 1 or -1.
+fn steps(
+    settings: &MotorConstantSettings,
+    levels_v: [f64; 2],
+    ahead: f64,
+    rate_hz: f64,
+) -> Vec<f64> {
     let dwell = dwell(settings, rate_hz);
     let rest = (REST_S * rate_hz) as usize;
     (0..settings.passes)
         .flat_map(|pass| {
-            let sign = if pass.is_multiple_of(2) { 1.0 } else { -1.0 };
+            let sign = if pass.is_multiple_of(2) {
+                ahead
+            } else {
+                -ahead
+            };
+            let level_v = if sign > 0.0 { levels_v[0] } else { levels_v[1] };
             let level = move |index: usize| {
                 let factor = if index.is_multiple_of(2) { UPPER } else { 1.0 };
                 sign * factor * level_v
@@ -199,21 +328,18 @@ fn steps(settings: &MotorConstantSettings, level_v: f64, rate_hz: f64) -> Vec<f6
         .collect()
 }
 
-/// Evaluates a recorded test.
-///
-/// # Errors
-/// A recording without passes, of an axis that moves the wrong way, or too uncertain.
-pub fn evaluate(
-    recording: Recording,
+/// The passes in which the axis slid, with where each begins, counts from, and ends.
+fn find_passes(
+    recording: &Recording,
     settings: &MotorConstantSettings,
     resolution_mm: f64,
-) -> Result<MotorConstant, MotorConstantError> {
+) -> Result<Vec<(Pass, [usize; 3])>, MotorConstantError> {
     let dwell = dwell(settings, 1.0 / recording.sample_time_s);
     // The way goes with the square of the time.
     let short = (settings.dwell_s / MotorConstantSettings::default().dwell_s).powi(2);
     let sliding_mm = (SLIDING_COUNTS * resolution_mm)
         .min((LEAST_COUNTS * resolution_mm).max(SLIDING_MM * short));
-    let mut found: Vec<Pass> = Vec::new();
+    let mut found = Vec::new();
     let mut begin = 0;
     while begin < recording.len() {
         let sign = recording.voltage_v[begin].signum();
@@ -237,28 +363,74 @@ pub fn evaluate(
                 return Err(MotorConstantError::Reversed);
             }
             if slowest > sliding_mm {
-                found.push(fit_pass(&recording, begin, from, end, dwell));
+                let pass = fit_pass(recording, begin, from, end, dwell);
+                found.push((pass, [begin, from, end]));
             }
         }
         begin = end;
     }
+    Ok(found)
+}
+
+/// Evaluates a recorded test.
+///
+/// # Errors
+/// A recording without passes, of an axis that moves the wrong way, or too uncertain.
+pub fn evaluate(
+    recording: Recording,
+    settings: &MotorConstantSettings,
+    resolution_mm: f64,
+) -> Result<MotorConstant, MotorConstantError> {
+    let dwell = dwell(settings, 1.0 / recording.sample_time_s);
+    let (mut found, spans): (Vec<Pass>, Vec<[usize; 3]>) =
+        find_passes(&recording, settings, resolution_mm)?
+            .into_iter()
+            .unzip();
     if found.len() < 2 {
         return Err(MotorConstantError::NoPasses {
             passes: found.len(),
         });
     }
+    let (mut gain, mut standard_error) = gain_of(&found);
+    if is_uncertain(gain, standard_error)
+        && let Some(resonant) = with_mode(&recording, &spans, dwell)
+    {
+        found = resonant;
+        (gain, standard_error) = gain_of(&found);
+    }
     let count = found.len() as f64;
     let mean = |read: fn(&Pass) -> f64| found.iter().map(read).sum::<f64>() / count;
-    let gain = mean(|pass| pass.gain);
-    let squares: f64 = found.iter().map(|pass| (pass.gain - gain).powi(2)).sum();
-    let standard_error = (squares / (count - 1.0) / count).sqrt();
-    if gain <= 0.0 || standard_error > MOST_UNCERTAIN * gain {
+    if is_uncertain(gain, standard_error) {
         return Err(MotorConstantError::Uncertain {
             gain,
             standard_error,
         });
     }
+    let directed = |sign: f64| {
+        let values: Vec<f64> = found
+            .iter()
+            .filter(|pass| pass.sign == sign)
+            .map(|pass| pass.friction_v)
+            .collect();
+        let count = values.len();
+        if count == 0 {
+            return mean(|pass| pass.friction_v);
+        }
+        values.iter().sum::<f64>() / count as f64
+    };
+    // The axis slid on through the lower level, so that the mean overcame its friction.
+    let level_of = |sign: f64| {
+        let most = |most: f64, volts: &f64| most.max(sign * volts);
+        recording.voltage_v.iter().fold(0.0, most) / UPPER
+    };
+    let believable = |sign: f64| {
+        let level_v = level_of(sign);
+        directed(sign)
+            .max(LEAST_FRICTION * level_v)
+            .min(MOST_FRICTION * level_v)
+    };
     Ok(MotorConstant {
+        directed_v: [1.0, -1.0].map(believable),
         gain_mm_per_v_s2: gain,
         standard_error,
         damping_per_s: mean(|pass| pass.damping_per_s),
@@ -275,6 +447,8 @@ pub fn evaluate(
 /// A, B and friction of one pass.
 #[derive(Clone, Copy)]
 struct Pass {
+    /// Direction, 1 or -1.
+    sign: f64,
     gain: f64,
     damping_per_s: f64,
     friction_v: f64,
@@ -296,6 +470,7 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
     let right = DVector::from_vec(second(positions));
     let path = second(&integral(positions, positions[0], step_s));
     let none = Pass {
+        sign,
         gain: f64::NAN,
         damping_per_s: f64::NAN,
         friction_v: f64::NAN,
@@ -328,6 +503,7 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
             let gain = solution[0] / norms[0];
             let slowing = -sign * solution[1] / norms[1] / (lag as f64 * step_s).powi(2);
             let pass = Pass {
+                sign,
                 gain,
                 damping_per_s: -solution[2] / norms[2],
                 friction_v: slowing / gain,
@@ -336,6 +512,130 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
         }
     }
     best.1
+}
+
+/// Mean of A over the passes, and its standard deviation.
+fn gain_of(passes: &[Pass]) -> (f64, f64) {
+    let count = passes.len() as f64;
+    let gain = passes.iter().map(|pass| pass.gain).sum::<f64>() / count;
+    let squares: f64 = passes.iter().map(|pass| (pass.gain - gain).powi(2)).sum();
+    (gain, (squares / (count - 1.0) / count).sqrt())
+}
+
+/// True for an A that no controller can be made with.
+fn is_uncertain(gain: f64, standard_error: f64) -> bool {
+    !(gain > 0.0 && standard_error <= MOST_UNCERTAIN * gain)
+}
+
+/// Frequencies of a mode that are tried, Hz, even on a log scale; its damping ratio, and dead times, s.
+const MODES_HZ: (f64, f64) = (20.0, 250.0);
+const MODES: usize = 45;
+const MODE_DAMPING: f64 = 0.03;
+const MODE_DELAYS_S: [f64; 5] = [0.2e-3, 0.8e-3, 1.5e-3, 2.3e-3, 3.3e-3];
+/// Every so many samples count: they are much denser than what the passes hold.
+const THINNED: usize = 5;
+
+/// The passes of an axis that rings with a structural mode: what an oscillator does under the same voltage is a further part
+/// of the motion, with the frequency that leaves the least over all passes.
+fn with_mode(recording: &Recording, spans: &[[usize; 3]], lag: usize) -> Option<Vec<Pass>> {
+    let mut best: Option<(f64, Vec<Pass>)> = None;
+    for index in 0..MODES {
+        let share = index as f64 / (MODES - 1) as f64;
+        let omega = TAU * MODES_HZ.0 * (MODES_HZ.1 / MODES_HZ.0).powf(share);
+        let rings: Vec<[Vec<f64>; 2]> = spans
+            .iter()
+            .map(|&[begin, _, end]| {
+                ringing(
+                    &recording.voltage_v[begin..end],
+                    omega,
+                    recording.sample_time_s,
+                )
+            })
+            .collect();
+        for delay_s in MODE_DELAYS_S {
+            let delay = (delay_s / recording.sample_time_s).round() as usize;
+            let fits: Option<Vec<(f64, Pass)>> = spans
+                .iter()
+                .zip(&rings)
+                .map(|(span, ring)| fit_ringing(recording, *span, lag, delay, ring))
+                .collect();
+            let Some(fits) = fits else { continue };
+            let cost: f64 = fits.iter().map(|(cost, _)| cost).sum();
+            if best.as_ref().is_none_or(|(least, _)| cost < *least) {
+                best = Some((cost, fits.into_iter().map(|(_, pass)| pass).collect()));
+            }
+        }
+    }
+    best.map(|(_, passes)| passes)
+}
+
+/// Deflection and its rate, over the frequency, of an oscillator that rests before the voltage begins.
+fn ringing(voltage_v: &[f64], omega: f64, step_s: f64) -> [Vec<f64>; 2] {
+    let (mut deflection, mut rate) = (0.0, 0.0);
+    let states: Vec<(f64, f64)> = voltage_v
+        .iter()
+        .map(|voltage| {
+            let before = (deflection, rate);
+            let turn = omega * step_s;
+            rate += turn * (voltage - deflection - 2.0 * MODE_DAMPING * rate);
+            deflection += turn * rate;
+            before
+        })
+        .collect();
+    let part = |read: fn(&(f64, f64)) -> f64| states.iter().map(read).collect();
+    [part(|state| state.0), part(|state| state.1)]
+}
+
+/// A pass with a mode in it, and what is left of its motion, squared.
+fn fit_ringing(
+    recording: &Recording,
+    [begin, from, end]: [usize; 3],
+    lag: usize,
+    delay: usize,
+    ring: &[Vec<f64>; 2],
+) -> Option<(f64, Pass)> {
+    let step_s = recording.sample_time_s;
+    let positions = &recording.position_mm[from..end];
+    let second = |signal: &[f64]| -> Vec<f64> {
+        signal
+            .windows(2 * lag + 1)
+            .step_by(THINNED)
+            .map(|window| window[2 * lag] - 2.0 * window[lag] + window[0])
+            .collect()
+    };
+    let start = from.checked_sub(begin + delay)?;
+    let push = integral(&recording.voltage_v[from - delay..end - delay], 0.0, step_s);
+    let middle: Vec<f64> = push
+        .windows(2)
+        .map(|pair| 0.5 * (pair[0] + pair[1]))
+        .collect();
+    let right = second(positions);
+    let columns = [
+        second(&integral(&middle, 0.0, step_s)),
+        vec![1.0; right.len()],
+        second(&integral(positions, positions[0], step_s)),
+        second(&ring[0][start..start + positions.len()]),
+        second(&ring[1][start..start + positions.len()]),
+    ];
+    let count = columns.iter().map(Vec::len).fold(right.len(), usize::min);
+    let norms = columns.each_ref().map(|column| {
+        let square: f64 = column.iter().map(|value| value * value).sum();
+        square.sqrt().max(1e-12)
+    });
+    let matrix = DMatrix::from_fn(count, 5, |row, column| columns[column][row] / norms[column]);
+    let right = DVector::from_column_slice(&right[..count]);
+    let solution = matrix.clone().svd(true, true).solve(&right, 1e-12).ok()?;
+    let cost = (&matrix * &solution - right).norm_squared();
+    let gain = solution[0] / norms[0];
+    let sign = recording.voltage_v[begin].signum();
+    let slowing = -sign * solution[1] / norms[1] / (lag as f64 * step_s).powi(2);
+    let pass = Pass {
+        sign,
+        gain,
+        damping_per_s: -solution[2] / norms[2],
+        friction_v: slowing / gain,
+    };
+    Some((cost, pass))
 }
 
 /// The running integral of held samples over `base`, beginning at zero.

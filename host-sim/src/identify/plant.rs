@@ -1,8 +1,13 @@
-//! The linear model fitted to a frequency response (thesis, Table 3.1): `A exp(-s Td) / (s^2 + B s + C)`.
+//! The linear model fitted to a frequency response (thesis, Table 3.1): `A exp(-s Td) / (s^2 + B s + C)`, times a factor
+//! for each structural mode ([`Mode`]) that the response shows.
 //!
 //! Nonlinear least squares in the frequency domain, each line weighted by its own deviation, from a linear
 //! least-squares start. Source: Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2nd ed.,
 //! 2012, ch. 9 (maximum likelihood for a known noise model).
+//!
+//! A mode is taken into the model if it makes the weighted squares of the residuals smaller by a factor, much more than a
+//! handful of parameters would by chance ([`LEAST_DROP`]), and if its own parameters are determined; starts are tried over
+//! the band. Friction bends a response, too, but slowly over the frequency: no fit calls that a lightly damped mode.
 
 use std::f64::consts::TAU;
 
@@ -10,7 +15,8 @@ use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
 use quadrant::control::plant_model::PlantModel;
 
-use super::fit::{Fit, FitError, Loss, Parameter, fit};
+use super::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
+use super::mode::{self, Mode};
 use super::response::{FrequencyResponse, ResponsePoint};
 
 /// Spring to ground in the model.
@@ -21,6 +27,16 @@ pub enum Stiffness {
     Free,
     /// C is zero: a sliding axis has no spring.
     Zero,
+}
+
+impl Stiffness {
+    /// Unknowns of the linear start: A, B, and C if it is free.
+    const fn unknowns(self) -> usize {
+        match self {
+            Self::Free => 3,
+            Self::Zero => 2,
+        }
+    }
 }
 
 impl std::fmt::Display for Stiffness {
@@ -41,6 +57,8 @@ pub struct PlantFitSettings {
     pub band_hz: (f64, f64),
     /// Treatment of C, the spring to ground.
     pub stiffness: Stiffness,
+    /// True if a damping whose corner lies below the band may stay unknown: an axis that friction governs has as good as none.
+    pub negligible_damping: bool,
 }
 
 impl Default for PlantFitSettings {
@@ -49,6 +67,7 @@ impl Default for PlantFitSettings {
             least_coherence: 0.9,
             band_hz: (0.0, f64::INFINITY),
             stiffness: Stiffness::Free,
+            negligible_damping: false,
         }
     }
 }
@@ -56,11 +75,21 @@ impl Default for PlantFitSettings {
 #[derive(Clone, Debug)]
 pub struct PlantFit {
     pub plant: PlantModel,
-    /// A, B, Td and, if it was free, C, with standard errors and correlations; Td in s.
+    /// Structural modes, the one that explains most first; none of a rigid axis.
+    pub modes: Vec<Mode>,
+    /// A, B, Td and, if it was free, C, and for each mode its frequency, its damping and those of its anti-resonance, with
+    /// standard errors and correlations; Td in s, frequencies in Hz.
     pub fit: Fit,
     /// Distance of the model from the response, by thirds of the lines from low to high frequency.
     pub bands: Vec<BandMisfit>,
     pub lines: usize,
+}
+
+impl PlantFit {
+    /// The response of axis and modes at a frequency in rad/s, mm/V.
+    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
+        self.plant.response(omega_rad_s) * mode::response_of(&self.modes, omega_rad_s)
+    }
 }
 
 /// Distance of a model from a response over a band, RMS.
@@ -72,6 +101,13 @@ pub struct BandMisfit {
     pub gain_db: f64,
     /// Of the phase, deg.
     pub phase_deg: f64,
+}
+
+impl BandMisfit {
+    /// True if no mode is worth a look.
+    fn is_small(&self) -> bool {
+        self.gain_db < SMALL_GAIN_DB && self.phase_deg < SMALL_PHASE_DEG
+    }
 }
 
 /// Reasons for which a response supports no model.
@@ -107,14 +143,17 @@ pub enum PlantError {
     },
     /// The model is not what was measured.
     #[error(
-        "the model misses the response by {gain_db:.1} dB and {phase_deg:.0} deg RMS: this is not a second-order axis with a dead \
-         time, or friction distorts the response (measure at a bias velocity or a larger amplitude)"
+        "the model misses the response by {gain_db:.1} dB and {phase_deg:.0} deg RMS, most at {worst_hz:.0} Hz: this is not a \
+         second-order axis with a dead time and two modes at most (look for a loose part that resonates there, for play in the \
+         drive), or friction distorts the response (measure at a bias velocity or a larger amplitude)"
     )]
     Misfit {
         /// RMS of the gain's error.
         gain_db: f64,
         /// RMS of the phase's error.
         phase_deg: f64,
+        /// Frequency of the largest error.
+        worst_hz: f64,
     },
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -126,11 +165,18 @@ const LEAST_LINES: usize = 10;
 const LONGEST_DELAY_S: f64 = 0.05;
 /// Dead times tried by the linear start.
 const DELAYS: usize = 500;
+/// Dead times tried for each start of a mode.
+const TRIED_DELAYS: usize = 30;
 /// Largest relative standard error of A and B.
 const MOST_UNCERTAIN: f64 = 0.25;
+/// Corner of a damping that may stay unknown, over the lowest frequency.
+const NEGLIGIBLE: f64 = 0.7;
 /// A misfit that no noise explains.
 const MOST_GAIN_DB: f64 = 3.0;
 const MOST_PHASE_DEG: f64 = 20.0;
+/// A misfit in each band behind which no mode is looked for.
+const SMALL_GAIN_DB: f64 = 0.4;
+const SMALL_PHASE_DEG: f64 = 3.0;
 /// A relative deviation below which a line is not believed to be: some error does not scatter.
 const LEAST_DEVIATION: f64 = 1e-4;
 
@@ -158,20 +204,21 @@ pub fn fit_plant(
             least_coherence: settings.least_coherence,
         });
     }
-    let start = linear_start(&lines, settings.stiffness);
-    let found = refine(&lines, settings.stiffness, &start)?;
-    let plant = model(&found.values);
-    let bands = bands(&lines, &plant);
-    let all = band_misfit(&lines, &plant);
+    let (found, model) = with_modes(&lines, settings.stiffness)?;
+    let plant = model.plant;
+    let bands = bands(&lines, &model);
+    let all = band_misfit(&lines, &model);
     if all.gain_db > MOST_GAIN_DB || all.phase_deg > MOST_PHASE_DEG {
         return Err(PlantError::Misfit {
             gain_db: all.gain_db,
             phase_deg: all.phase_deg,
+            worst_hz: worst_hz(&lines, &model),
         });
     }
-    check_support(&lines, &plant, &found)?;
+    check_support(&lines, &plant, &found, settings.negligible_damping)?;
     Ok(PlantFit {
         plant,
+        modes: model.modes,
         fit: found,
         bands,
         lines: lines.len(),
@@ -188,15 +235,16 @@ fn model(values: &[f64]) -> PlantModel {
     }
 }
 
-/// For each dead time of a grid, A, B and C by linear least squares on relative errors; the best.
 fn linear_start(lines: &[ResponsePoint], stiffness: Stiffness) -> PlantModel {
-    let unknowns = match stiffness {
-        Stiffness::Free => 3,
-        Stiffness::Zero => 2,
-    };
+    linear_start_of(lines, stiffness, DELAYS)
+}
+
+/// For each of so many dead times, A, B and C by linear least squares on relative errors; the best.
+fn linear_start_of(lines: &[ResponsePoint], stiffness: Stiffness, delays: usize) -> PlantModel {
+    let unknowns = stiffness.unknowns();
     let mut best = (f64::INFINITY, model(&[1.0, 0.0, 0.0]));
-    for step in 0..DELAYS {
-        let delay_s = LONGEST_DELAY_S * (step as f64 / DELAYS as f64).powi(2);
+    for step in 0..delays {
+        let delay_s = LONGEST_DELAY_S * (step as f64 / delays as f64).powi(2);
         let mut matrix = DMatrix::zeros(2 * lines.len(), unknowns);
         let mut right = DVector::zeros(2 * lines.len());
         for (index, line) in lines.iter().enumerate() {
@@ -232,12 +280,193 @@ fn linear_start(lines: &[ResponsePoint], stiffness: Stiffness) -> PlantModel {
     best.1
 }
 
+/// Rigid axis and modes.
+#[derive(Clone, Debug)]
+struct Model {
+    plant: PlantModel,
+    modes: Vec<Mode>,
+}
+
+impl Model {
+    /// The model of the values in the order A, B, Td, perhaps C, and those of its modes.
+    fn of(values: &[f64], stiffness: Stiffness, anti: &[bool]) -> Self {
+        let (rigid, mut rest) = values.split_at(stiffness.unknowns() + 1);
+        let mut next = || {
+            let (first, others) = rest.split_at(2);
+            rest = others;
+            (first[0], first[1])
+        };
+        let modes = anti.iter().map(|&anti| {
+            let (frequency_hz, damping) = next();
+            Mode {
+                frequency_hz,
+                damping,
+                anti: anti.then(&mut next),
+            }
+        });
+        Self {
+            modes: modes.collect(),
+            plant: model(rigid),
+        }
+    }
+
+    fn response(&self, omega: f64) -> Complex64 {
+        self.plant.response(omega) * mode::response_of(&self.modes, omega)
+    }
+}
+
+/// Most modes of a model.
+const MOST_MODES: usize = 2;
+/// Factor by which a mode makes the weighted squares smaller at least.
+pub const LEAST_DROP: f64 = 2.0;
+/// Lowest frequency of a mode, Hz, and the highest over that of the highest line.
+const LOWEST_MODE_HZ: f64 = 12.0;
+const HIGHEST_MODE: f64 = 1.05;
+/// Starts over the band, and the number of lines that they are tried on.
+const STARTS: usize = 14;
+const TRIED_LINES: usize = 160;
+/// Bounds of a damping ratio, and its start.
+const DAMPINGS: (f64, f64) = (1e-3, 0.5);
+const DAMPING_START: f64 = 0.03;
+/// Start of an anti-resonance over the mode's frequency: of equal masses.
+const ANTI_START: f64 = 0.7;
+/// Largest relative standard error of a mode's frequency.
+const MOST_UNCERTAIN_MODE: f64 = 0.05;
+
+/// The rigid model, and modes as long as they explain enough.
+fn with_modes(lines: &[ResponsePoint], stiffness: Stiffness) -> Result<(Fit, Model), FitError> {
+    let start = Model {
+        plant: linear_start(lines, stiffness),
+        modes: Vec::new(),
+    };
+    let rigid = refine(lines, stiffness, &start);
+    let thinned: Vec<ResponsePoint> = lines
+        .iter()
+        .step_by(lines.len().div_ceil(TRIED_LINES))
+        .copied()
+        .collect();
+    let mut modes = Vec::new();
+    let mut best = rigid;
+    let explained = |best: &Result<(Fit, Model), FitError>| {
+        let small =
+            |(_, model): &(Fit, Model)| bands(lines, model).iter().all(BandMisfit::is_small);
+        best.as_ref().is_ok_and(small)
+    };
+    while modes.len() < MOST_MODES && !explained(&best) {
+        let Some(found) = another_mode(lines, &thinned, stiffness, &modes) else {
+            break;
+        };
+        let Ok(fit) = refine(lines, stiffness, &found) else {
+            break;
+        };
+        let better = match &best {
+            Ok((_, before)) => LEAST_DROP * cost(lines, &fit.1) < cost(lines, before),
+            Err(_) => true,
+        };
+        let first = stiffness.unknowns() + 1;
+        let determined = (first..fit.0.values.len())
+            .step_by(2)
+            .all(|index| fit.0.standard_errors[index] < MOST_UNCERTAIN_MODE * fit.0.values[index]);
+        if !better || !determined {
+            break;
+        }
+        modes.clone_from(&fit.1.modes);
+        best = Ok(fit);
+    }
+    best
+}
+
+fn antis(modes: &[Mode]) -> Vec<bool> {
+    modes.iter().map(|mode| mode.anti.is_some()).collect()
+}
+
+/// The best model with one mode more than these, from starts over the band.
+fn another_mode(
+    lines: &[ResponsePoint],
+    thinned: &[ResponsePoint],
+    stiffness: Stiffness,
+    modes: &[Mode],
+) -> Option<Model> {
+    let highest_hz = HIGHEST_MODE * lines.last()?.frequency_hz;
+    let lowest_hz = LOWEST_MODE_HZ.max(lines.first()?.frequency_hz);
+    let mut tried: Vec<(f64, Model)> = Vec::new();
+    for index in 0..STARTS {
+        let share = (index as f64 + 0.5) / STARTS as f64;
+        let frequency_hz = lowest_hz * (highest_hz / lowest_hz).powf(share);
+        for anti in [None, Some((ANTI_START * frequency_hz, DAMPING_START))] {
+            let mode = Mode {
+                frequency_hz,
+                damping: DAMPING_START,
+                anti,
+            };
+            let mut modes = modes.to_vec();
+            modes.push(mode);
+            // The rigid axis that is left when the modes are divided out.
+            let divided: Vec<ResponsePoint> = thinned
+                .iter()
+                .map(|line| ResponsePoint {
+                    response: line.response / mode::response_of(&modes, TAU * line.frequency_hz),
+                    ..*line
+                })
+                .collect();
+            let plant = linear_start_of(&divided, stiffness, TRIED_DELAYS);
+            let start = Model { plant, modes };
+            if let Ok((_, found)) = search(thinned, stiffness, &start, true) {
+                tried.push((cost(thinned, &found), found));
+            }
+        }
+    }
+    tried.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // An anti-resonance costs two parameters: it must explain something, too.
+    let plain = tried
+        .iter()
+        .find(|(_, model)| model.modes.last().is_some_and(|mode| mode.anti.is_none()));
+    let (least, best) = tried.first()?;
+    match plain {
+        Some((cost, plain)) if *cost < LEAST_DROP.sqrt() * least => Some(plain.clone()),
+        _ => Some(best.clone()),
+    }
+}
+
+/// Weighted squares of the residuals.
+fn cost(lines: &[ResponsePoint], model: &Model) -> f64 {
+    residuals(lines, model).iter().map(|each| each * each).sum()
+}
+
+/// Relative errors of the lines over their deviations.
+fn residuals(lines: &[ResponsePoint], model: &Model) -> Vec<f64> {
+    lines
+        .iter()
+        .flat_map(|line| {
+            let ratio = model.response(TAU * line.frequency_hz) / line.response - 1.0;
+            let deviation = line.relative_deviation.max(LEAST_DEVIATION);
+            [ratio.re / deviation, ratio.im / deviation]
+        })
+        .collect()
+}
+
+/// Names of the parameters of each mode.
+const MODE_NAMES: [[&str; 4]; MOST_MODES] =
+    [["f1", "d1", "fa1", "da1"], ["f2", "d2", "fa2", "da2"]];
+
 /// Nonlinear least squares from the start.
 fn refine(
     lines: &[ResponsePoint],
     stiffness: Stiffness,
-    start: &PlantModel,
-) -> Result<Fit, FitError> {
+    start: &Model,
+) -> Result<(Fit, Model), FitError> {
+    let (found, model) = search(lines, stiffness, start, false)?;
+    Ok((found.no_better_than_stated(), model))
+}
+
+/// Nonlinear least squares; `nearest` takes the place where the search ends without having converged, too.
+fn search(
+    lines: &[ResponsePoint],
+    stiffness: Stiffness,
+    whole: &Model,
+    nearest: bool,
+) -> Result<(Fit, Model), FitError> {
+    let start = &whole.plant;
     let gain = start.gain_mm_per_v_s2;
     let highest = TAU * lines.last().map_or(1.0, |line| line.frequency_hz);
     let mut parameters = vec![
@@ -265,18 +494,32 @@ fn refine(
             bounds: (0.0, most),
         });
     }
-    let found = fit(&parameters, Loss::Squares, |values| {
-        let plant = model(values);
-        lines
-            .iter()
-            .flat_map(|line| {
-                let ratio = plant.response(TAU * line.frequency_hz) / line.response - 1.0;
-                let deviation = line.relative_deviation.max(LEAST_DEVIATION);
-                [ratio.re / deviation, ratio.im / deviation]
-            })
-            .collect()
-    })?;
-    Ok(found.no_better_than_stated())
+    let highest_hz = highest / TAU;
+    for (mode, names) in whole.modes.iter().zip(MODE_NAMES) {
+        let pairs = [Some((mode.frequency_hz, mode.damping)), mode.anti];
+        for ((frequency_hz, damping), names) in pairs.into_iter().flatten().zip(names.chunks(2)) {
+            let frequencies = (0.5 * LOWEST_MODE_HZ, 1.5 * highest_hz);
+            parameters.push(Parameter {
+                name: names[0],
+                start: frequency_hz.clamp(1.01 * frequencies.0, 0.99 * frequencies.1),
+                bounds: frequencies,
+            });
+            parameters.push(Parameter {
+                name: names[1],
+                start: damping.clamp(1.1 * DAMPINGS.0, 0.9 * DAMPINGS.1),
+                bounds: DAMPINGS,
+            });
+        }
+    }
+    let anti = antis(&whole.modes);
+    let of = |values: &[f64]| residuals(lines, &Model::of(values, stiffness, &anti));
+    let found = if nearest {
+        fit_nearest(&parameters, Loss::Squares, of)?
+    } else {
+        fit(&parameters, Loss::Squares, of)?
+    };
+    let model = Model::of(&found.values, stiffness, &anti);
+    Ok((found, model))
 }
 
 /// Checks that the data determine what was fitted.
@@ -284,6 +527,7 @@ fn check_support(
     lines: &[ResponsePoint],
     plant: &PlantModel,
     found: &Fit,
+    negligible_damping: bool,
 ) -> Result<(), PlantError> {
     let low_hz = lines.first().map_or(0.0, |line| line.frequency_hz);
     let high_hz = lines.last().map_or(0.0, |line| line.frequency_hz);
@@ -293,11 +537,9 @@ fn check_support(
         let deviation = relative(index);
         deviation.is_nan() || deviation > MOST_UNCERTAIN
     };
-    if uncertain(0)
-        || uncertain(1)
-        || high_hz < 1.5 * corner_hz
-        || low_hz > 1.5 * corner_hz.max(0.1)
-    {
+    let negligible = negligible_damping && corner_hz < NEGLIGIBLE * low_hz;
+    let told_apart = !uncertain(1) && low_hz <= 1.5 * corner_hz.max(0.1);
+    if uncertain(0) || high_hz < 1.5 * corner_hz || !(negligible || told_apart) {
         return Err(PlantError::MissesCorner {
             low_hz,
             high_hz,
@@ -318,17 +560,30 @@ fn check_support(
     Ok(())
 }
 
-fn bands(lines: &[ResponsePoint], plant: &PlantModel) -> Vec<BandMisfit> {
+fn bands(lines: &[ResponsePoint], model: &Model) -> Vec<BandMisfit> {
     lines
         .chunks(lines.len().div_ceil(3))
-        .map(|band| band_misfit(band, plant))
+        .map(|band| band_misfit(band, model))
         .collect()
 }
 
-fn band_misfit(lines: &[ResponsePoint], plant: &PlantModel) -> BandMisfit {
+/// The frequency of the line that the model misses most.
+fn worst_hz(lines: &[ResponsePoint], model: &Model) -> f64 {
+    let distance = |line: &ResponsePoint| {
+        (model.response(TAU * line.frequency_hz) / line.response)
+            .ln()
+            .norm()
+    };
+    lines
+        .iter()
+        .max_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .map_or(f64::NAN, |line| line.frequency_hz)
+}
+
+fn band_misfit(lines: &[ResponsePoint], model: &Model) -> BandMisfit {
     let (mut gain, mut phase) = (0.0, 0.0);
     for line in lines {
-        let ratio = plant.response(TAU * line.frequency_hz) / line.response;
+        let ratio = model.response(TAU * line.frequency_hz) / line.response;
         gain += (20.0 * ratio.norm().log10()).powi(2);
         phase += ratio.arg().to_degrees().powi(2);
     }
@@ -338,5 +593,91 @@ fn band_misfit(lines: &[ResponsePoint], plant: &PlantModel) -> BandMisfit {
         band_hz: (frequency(lines.first()), frequency(lines.last())),
         gain_db: (gain / count).sqrt(),
         phase_deg: (phase / count).sqrt(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RIGID: PlantModel = PlantModel {
+        gain_mm_per_v_s2: 60_000.0,
+        damping_per_s: 120.0,
+        stiffness_per_s2: 0.0,
+        delay_s: 1.2e-3,
+    };
+    const SLIDING: PlantFitSettings = PlantFitSettings {
+        least_coherence: 0.9,
+        band_hz: (0.0, f64::INFINITY),
+        stiffness: Stiffness::Zero,
+        negligible_damping: false,
+    };
+
+    /// Lines every 2 Hz from 4 to 400 Hz, with errors of one percent.
+    fn response(modes: &[Mode]) -> FrequencyResponse {
+        let mut state = 1u64;
+        let mut noise = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1);
+            0.01 * 3.0_f64.sqrt() * ((state >> 33) as f64 / f64::from(1u32 << 30) - 1.0)
+        };
+        let line = |index: usize| {
+            let frequency_hz = 2.0 * index as f64;
+            let omega = TAU * frequency_hz;
+            let exact = RIGID.response(omega) * mode::response_of(modes, omega);
+            ResponsePoint {
+                frequency_hz,
+                response: exact * Complex64::new(1.0 + noise(), noise()),
+                coherence: 0.99,
+                relative_deviation: 0.01,
+            }
+        };
+        FrequencyResponse {
+            points: (2..=200).map(line).collect(),
+        }
+    }
+
+    fn check(mode: Mode) {
+        let found = fit_plant(&response(&[mode]), &SLIDING).unwrap();
+        let [fitted] = found.modes[..] else {
+            panic!("{:?} for {mode:?}", found.modes);
+        };
+        let near = |value: f64, expected: f64, tolerance: f64| {
+            assert!(
+                (value / expected - 1.0).abs() < tolerance,
+                "{fitted:?} for {mode:?}"
+            );
+        };
+        near(fitted.frequency_hz, mode.frequency_hz, 0.01);
+        near(fitted.damping, mode.damping, 0.2);
+        assert_eq!(fitted.anti.is_some(), mode.anti.is_some());
+        near(found.plant.gain_mm_per_v_s2, RIGID.gain_mm_per_v_s2, 0.02);
+        let error_hz = found.fit.standard_errors[3];
+        assert!(
+            error_hz > 0.0 && error_hz < 0.01 * mode.frequency_hz,
+            "{error_hz} Hz"
+        );
+    }
+
+    #[test]
+    fn a_mode_is_found_with_the_encoder_on_either_side() {
+        for (frequency_hz, damping) in [(35.0, 0.02), (90.0, 0.05), (250.0, 0.02)] {
+            let anti = Some((0.7 * frequency_hz, 0.7 * damping));
+            for anti in [None, anti] {
+                check(Mode {
+                    frequency_hz,
+                    damping,
+                    anti,
+                });
+            }
+        }
+    }
+
+    #[test]
+    fn a_rigid_axis_has_no_mode() {
+        let found = fit_plant(&response(&[]), &SLIDING).unwrap();
+        assert_eq!(found.modes, []);
+        assert_eq!(found.fit.names, ["A", "B", "Td"]);
     }
 }

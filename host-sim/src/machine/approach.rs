@@ -8,6 +8,13 @@ use super::test_axis::{Drive, Experiment, ExperimentError, TestAxis};
 const VELOCITY_MM_S: f64 = 30.0;
 const ACCELERATION_MM_S2: f64 = 300.0;
 const JERK_MM_S3: f64 = 5e3;
+/// Share of the largest velocity that it takes at most.
+const MOST_VELOCITY: f64 = 0.5;
+/// Time in which it goes through the travel either way at least, s: on a short one a soft controller has no way to lag by.
+const TRAVEL_S: f64 = 2.0;
+/// Moves at most, and the share of the travel within which a soft controller comes near enough: further moves follow otherwise.
+const APPROACHES: usize = 4;
+const NEAR: f64 = 0.02;
 /// Distance that is not worth a move, mm.
 const NEAR_MM: f64 = 0.05;
 /// Time for which the position is read, s.
@@ -18,7 +25,23 @@ const LOOK_S: f64 = 0.01;
 /// # Errors
 /// A move that is stopped.
 pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), ExperimentError> {
-    let rate_hz = test_axis.info().rate_hz;
+    let near_mm = NEAR_MM.max(NEAR * test_axis.info().travel_mm);
+    for _ in 1..APPROACHES {
+        if approach_once(test_axis, target_mm)? < near_mm {
+            return Ok(());
+        }
+    }
+    approach_once(test_axis, target_mm)?;
+    Ok(())
+}
+
+/// One move towards the target; the distance that is left, mm.
+fn approach_once(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<f64, ExperimentError> {
+    let info = test_axis.info();
+    let rate_hz = info.rate_hz;
+    let velocity_mm_s = VELOCITY_MM_S
+        .min(MOST_VELOCITY * info.max_velocity_mm_s)
+        .min(info.travel_mm / TRAVEL_S);
     let look = Experiment {
         name: "reading the position".to_owned(),
         drive: Drive::ClosedLoop(MotionSettings::Hold),
@@ -30,22 +53,23 @@ pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), Expe
     let position_mm = recording.position_mm.last().copied().unwrap_or(target_mm);
     let distance_mm = target_mm - position_mm;
     if distance_mm.abs() < NEAR_MM {
-        return Ok(());
+        return Ok(0.0);
     }
-    test_axis.perform(
+    let recording = test_axis.perform(
         &Experiment {
             name: format!("moving to {target_mm:.1} mm"),
             drive: Drive::ClosedLoop(MotionSettings::PointToPoint(PointToPointSettings {
                 distance_mm,
-                max_velocity_mm_s: VELOCITY_MM_S,
+                max_velocity_mm_s: velocity_mm_s,
                 max_acceleration_mm_s2: ACCELERATION_MM_S2,
                 max_jerk_mm_s3: JERK_MM_S3,
             })),
             injection_v: Vec::new(),
             decimation: 100,
-            time_limit_s: 10.0 + 2.0 * distance_mm.abs() / VELOCITY_MM_S,
+            time_limit_s: 10.0 + 2.0 * distance_mm.abs() / velocity_mm_s,
         },
         &mut |_| {},
     )?;
-    Ok(())
+    let reached_mm = recording.position_mm.last();
+    Ok(reached_mm.map_or(0.0, |reached_mm| (target_mm - reached_mm).abs()))
 }

@@ -140,6 +140,10 @@ impl TestAxis for Journal<'_> {
         })?;
         Ok(entry.recording)
     }
+
+    fn interrupted(&self) -> Option<&Recording> {
+        self.axis.interrupted()
+    }
 }
 
 #[cfg(test)]

@@ -65,5 +65,7 @@ pub use shared::{Shared, VIEWER_ID};
 pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;
-pub use test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+pub use test_axis::{
+    AxisInfo, Drive, Experiment, ExperimentError, TestAxis, open_loop_mm, usable_mm,
+};
 pub use transport::Transport;

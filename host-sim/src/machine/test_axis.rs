@@ -77,6 +77,35 @@ pub trait TestAxis {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError>;
+
+    /// Returns the end of the last experiment's recording, up to where it was stopped; nothing if it was not, or nothing is left
+    /// of it.
+    fn interrupted(&self) -> Option<&Recording> {
+        None
+    }
+}
+
+/// Share of the travel that motions use: on a short one the tracking error takes a larger part.
+const USED: f64 = 0.9;
+const USED_OF_SHORT: f64 = 0.7;
+const SHORT_MM: f64 = 200.0;
+/// Share of the room in a direction after which an axis in open loop is stopped: it coasts on by as much again, and more.
+const OPEN_LOOP: f64 = 0.4;
+
+/// Returns the travel that planned motions use of a travel either way, mm.
+pub fn usable_mm(travel_mm: f64) -> f64 {
+    // Between the two, the rest to the ends is that of the longest travel.
+    let rest = (1.0 - USED) * SHORT_MM;
+    (USED * travel_mm).min((USED_OF_SHORT * travel_mm).max(travel_mm - rest))
+}
+
+/// Returns the positions between which an axis in open loop stays that stands at `here_mm`, mm.
+pub fn open_loop_mm(travel_mm: f64, here_mm: f64) -> (f64, f64) {
+    let room = |to_end_mm: f64| OPEN_LOOP * to_end_mm.max(0.0);
+    (
+        here_mm - room(travel_mm + here_mm),
+        here_mm + room(travel_mm - here_mm),
+    )
 }
 
 /// Reason why an experiment was stopped.

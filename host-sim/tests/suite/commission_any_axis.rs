@@ -3,8 +3,8 @@
 use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
 use quadrant::settings::StageSettings;
-use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
-use quadrant_sim::machine::SimulatedTestAxis;
+use quadrant_sim::commission::{CommissionSettings, Commissioned, Planned, commission, plan};
+use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::{AxisParameters, FrictionParameters, StageParameters};
 use rayon::prelude::*;
 
@@ -62,6 +62,59 @@ fn axes_unlike_the_simulated_stages_are_commissioned_and_beat_the_best_pid_every
         );
         assert!(worst <= 1.01 && mean < most, "{name}: {mean} {worst}");
     });
+}
+
+#[test]
+fn what_was_said_before_it_moved_is_what_it_did() {
+    for travel_mm in [8.0, 30.0, 200.0] {
+        let mut test_axis = SimulatedTestAxis::new(0, x(), 1).with_travel_mm(travel_mm);
+        let base = StageSettings::simulated().axes[0].clone();
+        let request = CommissionSettings::default();
+        let planned = plan(&test_axis.info(), &request);
+        let found = commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap();
+        let said_s: f64 = planned.iter().map(|step| step.lasts_s).sum();
+        let took_s: f64 = found.ran.iter().map(|run| run.lasted_s).sum();
+        let ratio = took_s / said_s;
+        assert!(
+            (0.7..1.4).contains(&ratio),
+            "{travel_mm}: {took_s} of {said_s} s"
+        );
+        let within_mm = planned
+            .iter()
+            .map(|step| step.within_mm)
+            .fold(0.0, f64::max);
+        let stray_mm = (0.25 * travel_mm).min(10.0);
+        assert!(
+            test_axis.farthest_mm() < within_mm + stray_mm,
+            "{travel_mm}"
+        );
+        let most_mm_s = |mm_s: f64, step: &Planned| mm_s.max(step.fastest_mm_s.unwrap_or(30.0));
+        let said_mm_s = planned.iter().fold(0.0, most_mm_s);
+        for run in &found.ran {
+            assert!(
+                run.planned_mm_s.unwrap_or(0.0) <= said_mm_s + 1e-9,
+                "{run:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_hanging_axis_that_its_friction_holds_is_commissioned_on_a_short_stroke_too() {
+    for travel_mm in [10.0, 200.0] {
+        let mut axis = x();
+        axis.imperfections.gravity_v = -0.06;
+        let mut test_axis = SimulatedTestAxis::new(0, axis, 1).with_travel_mm(travel_mm);
+        let base = StageSettings::simulated().axes[0].clone();
+        let request = CommissionSettings::default();
+        let found = commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap();
+        let sliding = &found.settings.friction.sliding;
+        let weight_v = 0.5 * (sliding.positive.curve.coulomb_v - sliding.negative.curve.coulomb_v);
+        assert!((weight_v - 0.06).abs() < 0.015, "{travel_mm}: {weight_v} V");
+        let verification = found.verification.as_ref().unwrap();
+        assert!(verification.is_better_than_pid(), "{:?}", found.notes());
+        assert!(test_axis.farthest_mm() < travel_mm);
+    }
 }
 
 #[test]

@@ -363,7 +363,8 @@ fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
         "{error}"
     );
     let position_mm = client.status().unwrap().axes[0].position_mm;
-    assert!((2.0..4.0).contains(&position_mm), "{position_mm}");
+    // Four tenths of the way to the end, and what it coasts.
+    assert!((0.8..2.0).contains(&position_mm), "{position_mm}");
 }
 
 #[test]

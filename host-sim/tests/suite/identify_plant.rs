@@ -10,6 +10,7 @@ const SLIDING: PlantFitSettings = PlantFitSettings {
     least_coherence: 0.9,
     band_hz: (0.0, f64::INFINITY),
     stiffness: Stiffness::Zero,
+    negligible_damping: false,
 };
 
 fn truth(axis: usize, noise: f64) -> AxisParameters {

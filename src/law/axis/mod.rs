@@ -31,6 +31,7 @@ use core::fmt;
 use self::telemetry::{AxisTelemetry, LimitedBy};
 use crate::law::command::Command;
 use crate::law::control::feedback::Feedback;
+use crate::law::control::filter::{Filters, FiltersState};
 use crate::law::control::pid::Pid;
 use crate::law::control::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::decimal::Decimal;
@@ -105,6 +106,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     travel: Travel,
     learns: bool,
     feedback: Feedback<S>,
+    filters: Filters<S>,
     feedforward: Feedforward<S, N>,
     /// A displacement in a tick as a velocity.
     unit_mm_s: S::Gain,
@@ -193,6 +195,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
         axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
         axis.feedback = Feedback::Pid(Pid::default());
+        axis.filters = Filters::NONE;
         axis.feedforward.switch_off();
         axis.preview_ticks = 0;
         axis.amplifier = Amplifier::default();
@@ -259,6 +262,13 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     #[must_use]
     pub fn feedback(self, feedback: Feedback<S>) -> Self {
         self.axis.feedback = feedback;
+        self
+    }
+
+    /// The filters behind the feedback law, built for the same control period.
+    #[must_use]
+    pub fn filters(self, filters: Filters<S>) -> Self {
+        self.axis.filters = filters;
         self
     }
 
@@ -416,6 +426,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     /// Voltage that a host adds to the output in this tick, V.
     injected: S,
     feedback: FeedbackState<S>,
+    filters: FiltersState<S>,
     friction: FeedforwardState<S, N>,
     generator: GeneratorState<S>,
     plausibility: PlausibilityState,
@@ -448,6 +459,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             preview: [Position::ZERO; PREVIEW_ROOM],
             reference_velocity: S::ZERO,
             feedback: FeedbackState::default(),
+            filters: FiltersState::default(),
             friction: FeedforwardState::default(),
             injected: S::ZERO,
             telemetry: AxisTelemetry::default(),
@@ -591,6 +603,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             unit_mm: S::Gain::default(),
             unit_mm_s: S::Gain::default(),
             feedback: Feedback::Pid(Pid::default()),
+            filters: Filters::NONE,
             feedforward: Feedforward::blank(),
             preview_ticks: 0,
             amplifier: Amplifier::default(),
@@ -1028,7 +1041,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             self.make_bumpless(state, input, total + state.injected);
         }
         let base = total + state.telemetry.bumpless_offset + state.injected;
-        let feedback = self.feed_back(&mut state.feedback, input, base);
+        let mut feedback = self.feed_back(&mut state.feedback, input, base);
+        feedback.output = self.filters.step(&mut state.filters, feedback.output);
         let output = (feedback.output + base).within(self.amplifier.limit);
         let seen = &mut state.telemetry;
         seen.feedback = feedback;
@@ -1103,6 +1117,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         // The output under the new settings, computed on a copy, decides the offset.
         let mut trial = state.feedback.clone();
         let terms = self.feed_back(&mut trial, input, base);
+        self.filters.settle(&mut state.filters, terms.output);
         state.telemetry.bumpless_offset = state.telemetry.output - (terms.output + base);
     }
 
@@ -1118,6 +1133,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if state.mode() == MotionMode::OpenLoop {
             // As after enabling: the law's memory is of before, and its error is zero now.
             state.feedback = FeedbackState::default();
+            state.filters = FiltersState::default();
             state.friction = FeedforwardState::default();
             state.telemetry.bumpless_offset = S::ZERO;
             self.stop(state);

@@ -15,11 +15,12 @@
 //! | NCTF | [`nctf`] | the distance from a measured trajectory in the phase plane |
 //!
 //! [`terms`] are the input, the output and the memory of a law, [`surface`] is the PI that the last three have in common, [`plant_model`] the linear model of the axis, and [`popov`] the
-//! bound of the nonlinear gain on it.
+//! bound of the nonlinear gain on it. [`filter`] is behind any law: notch and low-pass for axes with a resonance.
 
 pub mod cascade;
 mod derivative;
 pub mod feedback;
+pub mod filter;
 mod integrator;
 pub mod nctf;
 pub mod npid;

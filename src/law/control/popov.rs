@@ -28,6 +28,7 @@ use core::f64::consts::{FRAC_PI_2, PI};
 
 use num_complex::Complex64;
 
+use super::filter::FilterSettings;
 use super::pid::PidGains;
 use super::plant_model::PlantModel;
 
@@ -45,6 +46,16 @@ use super::plant_model::PlantModel;
 /// Settings time only: some 400,000 operations in double precision and 5 KiB of stack.
 pub fn sector_bound(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> f64 {
     sector_proof(plant, gains, sample_time_s).popov
+}
+
+/// [`sector_bound`] of a loop with filters behind the law, in their continuous form.
+pub fn filtered_sector_bound(
+    plant: &PlantModel,
+    gains: &PidGains,
+    filters: &[FilterSettings],
+    sample_time_s: f64,
+) -> f64 {
+    prove(plant, gains, filters, sample_time_s).popov
 }
 
 /// The gains up to which a loop with a varying gain in front of it is proven stable.
@@ -69,8 +80,18 @@ impl SectorProof {
 
 /// [`sector_bound`] with the line that proves it, and the bound for gains that vary with time.
 pub fn sector_proof(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) -> SectorProof {
+    prove(plant, gains, &[], sample_time_s)
+}
+
+fn prove(
+    plant: &PlantModel,
+    gains: &PidGains,
+    filters: &[FilterSettings],
+    sample_time_s: f64,
+) -> SectorProof {
     let sampling_valid = sample_time_s.is_finite() && sample_time_s >= 0.0;
-    if !(plant.is_valid() && gains.is_valid() && sampling_valid) {
+    let filters_valid = filters.iter().all(FilterSettings::is_valid);
+    if !(plant.is_valid() && gains.is_valid() && filters_valid && sampling_valid) {
         return SectorProof::NOTHING;
     }
     let held = PlantModel {
@@ -80,6 +101,7 @@ pub fn sector_proof(plant: &PlantModel, gains: &PidGains, sample_time_s: f64) ->
     let tested = Loop {
         plant: held,
         gains: *gains,
+        filters,
     };
     let mut plot = PopovPlot::EMPTY;
     if tested.tabulate(&mut plot).is_none() {
@@ -109,14 +131,15 @@ const LARGEST_TURN_RAD: f64 = 2.0;
 const BISECTIONS: usize = 48;
 
 /// The linear loop under test.
-struct Loop {
+struct Loop<'a> {
     plant: PlantModel,
     gains: PidGains,
+    filters: &'a [FilterSettings],
 }
 
-impl Loop {
+impl Loop<'_> {
     /// The numerator of `L` and the characteristic function, over the common denominator
-    /// `(s^2 + B s + C) (1 + tau s)`, times s when the controller integrates: finite at every frequency.
+    /// `(s^2 + B s + C) (1 + tau s)` and the filters', times s when the controller integrates: finite at every frequency.
     fn polynomials(&self, omega: f64) -> (Complex64, Complex64) {
         let s = Complex64::new(0.0, omega);
         let filter = s * self.gains.derivative_filter_s + 1.0;
@@ -127,6 +150,11 @@ impl Loop {
             denominator *= s;
         }
         numerator *= self.plant.delayed_gain(omega);
+        for filter in self.filters {
+            let (above, below) = filter.at(omega);
+            numerator *= above;
+            denominator *= below;
+        }
         (numerator, denominator + numerator)
     }
 
@@ -138,7 +166,12 @@ impl Loop {
     fn denominator_angle(&self, omega: f64) -> f64 {
         let plant = self.plant.denominator(omega);
         let integrator = if self.integrates() { FRAC_PI_2 } else { 0.0 };
+        let filters = self.filters.iter().map(|filter| {
+            let (_, denominator) = filter.at(omega);
+            libm::atan2(denominator.im, denominator.re)
+        });
         integrator
+            + filters.sum::<f64>()
             + libm::atan(omega * self.gains.derivative_filter_s)
             + libm::atan2(plant.im, plant.re)
     }
@@ -154,7 +187,10 @@ impl Loop {
         let filter = libm::hypot(1.0, omega * self.gains.derivative_filter_s);
         let proportional = self.gains.kp_v_per_mm + self.gains.ki_v_per_mm_s / omega;
         let derivative = self.gains.kd_v_s_per_mm * omega / filter;
-        self.plant.gain_mm_per_v_s2 * (proportional / damped + derivative / inertia)
+        let filters = self.filters.iter().map(FilterSettings::largest_gain);
+        self.plant.gain_mm_per_v_s2
+            * (proportional / damped + derivative / inertia)
+            * filters.product::<f64>()
     }
 
     /// Of the order of the crossover frequency, rad/s.

@@ -41,7 +41,7 @@ pub struct FeedbackTerms<S> {
     pub integral: S,
     /// The term that follows the error's filtered rate.
     pub derivative: S,
-    /// The sum, within the bounds given to the step.
+    /// The sum, within the bounds given to the step; in telemetry, behind the axis' filters.
     pub output: S,
     /// True if the bounds cut the output.
     pub saturated: bool,

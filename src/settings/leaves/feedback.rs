@@ -4,7 +4,7 @@ use strum::VariantNames;
 
 use super::row::{LeafInfo, UNSET, at, list, name, number, period_s, point, times};
 use crate::law::control::feedback::LawKind;
-use crate::law::control::{nctf, schedule};
+use crate::law::control::{filter, nctf, schedule};
 use crate::settings::axis::AxisSettings;
 
 /// Largest share of a schedule: what [`crate::law::scalar::Quantity::Multiplier`] holds.
@@ -12,6 +12,10 @@ const MOST_SHARE: f64 = 30.0;
 
 fn output_limit_v(axis: &AxisSettings, _: f64) -> f64 {
     axis.amplifier.output_limit_v
+}
+
+fn rate_hz(_: &AxisSettings, period_s: f64) -> f64 {
+    1.0 / period_s
 }
 
 /// cosh(3.4) is 15: within the fixed-point format, and far beyond any Popov bound met in practice.
@@ -85,4 +89,18 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "G, gain on the distance from the trajectory."),
     number("feedback.nctf.integral_per_s", "1/s", at(0.0), at(1e4), 0.0,
         "r, the integral's share."),
+    list("feedback.filters", filter::MAX_FILTERS,
+        "Notches and low-passes behind the law, for an axis with a resonance; every law's."),
+    point("feedback.filters.frequency_hz", "Hz", at(1.0), times(0.45, "the control rate", rate_hz), UNSET,
+        |a, i| Some(a.feedback.filters.as_ref()?.get(i)?.frequency_hz),
+        "Frequency of a notch, corner of a low-pass."),
+    point("feedback.filters.damping", "", at(0.1), at(2.0), 0.5,
+        |a, i| Some(a.feedback.filters.as_ref()?.get(i)?.damping),
+        "Damping ratio of the denominator: half the width of a notch over its frequency."),
+    point("feedback.filters.centre_gain", "", at(0.0), at(1.0), 0.1,
+        |a, i| Some(a.feedback.filters.as_ref()?.get(i)?.centre_gain),
+        "Gain of a notch at its frequency; 0 for a low-pass."),
+    point("feedback.filters.high_frequency_gain", "", at(0.0), at(1.0), 1.0,
+        |a, i| Some(a.feedback.filters.as_ref()?.get(i)?.high_frequency_gain),
+        "Gain far above the frequency: 1 for a notch, 0 for a low-pass."),
 ];

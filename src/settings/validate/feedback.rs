@@ -2,9 +2,10 @@
 
 use super::Place;
 use crate::law::control::feedback::LawKind;
+use crate::law::control::filter;
 use crate::law::control::nctf::{self, CharacteristicPoint};
 use crate::law::control::npid::NonlinearGain;
-use crate::law::control::popov::sector_bound;
+use crate::law::control::popov::filtered_sector_bound;
 use crate::law::control::schedule::{self, SchedulePoint};
 use crate::settings::axis::AxisSettings;
 use crate::settings::error::{Reason, SettingsError};
@@ -12,6 +13,7 @@ use crate::settings::error::{Reason, SettingsError};
 /// Paths of the lists and of their numbers that must rise.
 const SCHEDULE: &str = "feedback.schedule";
 const SPEED: &str = "feedback.schedule.speed_mm_s";
+const FILTERS: &str = "feedback.filters";
 const CHARACTERISTIC: &str = "feedback.nctf.characteristic";
 const ERROR: &str = "feedback.nctf.characteristic.error_mm";
 const VELOCITY: &str = "feedback.nctf.characteristic.velocity_mm_s";
@@ -23,6 +25,14 @@ impl AxisSettings {
         }
         if let Some(gains) = &self.feedback.nctf {
             at.validate_characteristic(&gains.characteristic)?;
+        }
+        if let Some(filters) = &self.feedback.filters {
+            at.within(
+                FILTERS,
+                filters.len() as f64,
+                1.0,
+                filter::MAX_FILTERS as f64,
+            )?;
         }
         self.validate_law(at, period_s)
     }
@@ -48,8 +58,9 @@ impl AxisSettings {
             LawKind::Pd | LawKind::Pid | LawKind::NPid => "feedback.pid.kp_v_per_mm",
             _ => field,
         };
+        let filters = feedback.filters.as_deref().unwrap_or_default();
         for gains in feedback.linear_gains() {
-            let bound = sector_bound(plant, &gains, period_s);
+            let bound = filtered_sector_bound(plant, &gains, filters, period_s);
             if bound <= 1.0 {
                 return at.refuse(linear, gains.kp_v_per_mm, Reason::Unstable);
             }

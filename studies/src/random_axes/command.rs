@@ -55,6 +55,7 @@ fn summary(lines: &BTreeMap<u64, Line>) {
         Outcome::PidAlone,
         Outcome::WorseThanPid,
         Outcome::Refused,
+        Outcome::RefusedWrongly,
         Outcome::LeftTravel,
     ] {
         let count = lines

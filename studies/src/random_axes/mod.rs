@@ -12,13 +12,13 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::commission::verify::run_sine;
-use quadrant_sim::commission::{CommissionSettings, Commissioned, commission};
+use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
+use quadrant_sim::design::DesignError;
 use quadrant_sim::experiment::metrics::worst_and_mean;
 use quadrant_sim::experiment::sine_test::SineTest;
 use quadrant_sim::machine::{
     AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach,
 };
-use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::record::Recording;
 use serde::{Deserialize, Serialize};
 
@@ -35,8 +35,10 @@ pub enum Outcome {
     PidAlone,
     /// Settings were handed over that are worse than the PID on a motion that the commissioning did not see.
     WorseThanPid,
-    /// The commissioning ended early, with a reason.
+    /// The commissioning ended early, and its reason names the resonance that the axis has.
     Refused,
+    /// It ended early for another reason, though every axis of the campaign can be controlled.
+    RefusedWrongly,
     /// The axis left its travel while it was commissioned, whatever became of it.
     LeftTravel,
 }
@@ -82,14 +84,14 @@ const WORSE: f64 = 1.02;
 /// Share of the travel that a judging sine takes at most.
 const MOST_TRAVEL: f64 = 0.4;
 
-/// An axis that counts the time for which it is used, and notices when it leaves its travel.
-struct Timed {
+/// An axis that counts the time for which it is used, and warms meanwhile.
+struct Timed<'a> {
+    random: &'a RandomAxis,
     test_axis: SimulatedTestAxis,
     used_s: f64,
-    left_travel: bool,
 }
 
-impl TestAxis for Timed {
+impl TestAxis for Timed<'_> {
     fn info(&self) -> AxisInfo {
         self.test_axis.info()
     }
@@ -108,10 +110,16 @@ impl TestAxis for Timed {
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
         let outcome = self.test_axis.perform(experiment, progress);
-        self.left_travel |= matches!(outcome, Err(ExperimentError::Travel { .. }));
         let recording = outcome?;
         self.used_s += recording.len() as f64 * recording.sample_time_s;
+        if let Some(warmed) = self.random.warmed(self.used_s) {
+            self.test_axis.change(warmed);
+        }
         Ok(recording)
+    }
+
+    fn interrupted(&self) -> Option<&Recording> {
+        self.test_axis.interrupted()
     }
 }
 
@@ -123,10 +131,10 @@ pub fn judge(seed: u64) -> Line {
     base.encoder.resolution_mm = random.parameters.resolution_mm;
     base.amplifier.full_scale_v = random.parameters.full_scale_v;
     let mut axis = Timed {
+        random: &random,
         test_axis: SimulatedTestAxis::new(0, random.parameters.clone(), seed)
             .with_travel_mm(random.travel_mm),
         used_s: 0.0,
-        left_travel: false,
     };
     let found = commission(
         &mut axis,
@@ -136,7 +144,7 @@ pub fn judge(seed: u64) -> Line {
     );
     let mut line = Line {
         seed,
-        outcome: Outcome::Refused,
+        outcome: Outcome::RefusedWrongly,
         worst_ratio: None,
         mean_ratio: None,
         feedforward: String::new(),
@@ -147,14 +155,34 @@ pub fn judge(seed: u64) -> Line {
     };
     match found {
         Ok(found) => line.fill(&found, &random),
+        Err(error) if names_resonance(&error, &random) => {
+            line.outcome = Outcome::Refused;
+            line.reason = quadrant_cli::explained(&error.into());
+        }
         Err(error) => line.reason = quadrant_cli::explained(&error.into()),
     }
-    if axis.left_travel {
+    if axis.test_axis.farthest_mm() > random.travel_mm {
         line.outcome = Outcome::LeftTravel;
     }
     line.computed_s = began.elapsed().as_secs_f64();
     line
 }
+
+/// True if a refusal names the frequency of the axis' resonance.
+fn names_resonance(error: &CommissionError, random: &RandomAxis) -> bool {
+    let named_hz = match error {
+        CommissionError::Rings { frequency_hz, .. }
+        | CommissionError::Pid(DesignError::Mode { frequency_hz }) => *frequency_hz,
+        _ => return false,
+    };
+    random.resonance_hz().is_some_and(|true_hz| {
+        let ratio = named_hz / true_hz;
+        ratio.max(1.0 / ratio) < NAMED
+    })
+}
+
+/// Ratio of two frequencies that are the same: a loop moves a mode, and play lowers it.
+const NAMED: f64 = 1.5;
 
 impl Line {
     fn fill(&mut self, found: &Commissioned, random: &RandomAxis) {
@@ -171,11 +199,12 @@ impl Line {
             return;
         }
         let pid = measuring_settings(&found.settings);
+        let used_s = 60.0 * self.axis_min;
         let ratios: Result<Vec<f64>, String> = SINES
             .iter()
             .map(|sine| {
-                let reference = largest(&pid, random, sine)?;
-                Ok(largest(&found.settings, random, sine)? / reference)
+                let reference = largest(&pid, random, used_s, sine)?;
+                Ok(largest(&found.settings, random, used_s, sine)? / reference)
             })
             .collect();
         match ratios {
@@ -198,8 +227,15 @@ impl Line {
 }
 
 /// Largest error on a sine, mm, of a fresh axis with other noise.
-fn largest(settings: &AxisSettings, random: &RandomAxis, sine: &SineTest) -> Result<f64, String> {
-    let parameters: AxisParameters = random.parameters.clone();
+fn largest(
+    settings: &AxisSettings,
+    random: &RandomAxis,
+    used_s: f64,
+    sine: &SineTest,
+) -> Result<f64, String> {
+    let parameters = random
+        .warmed(used_s)
+        .unwrap_or_else(|| random.parameters.clone());
     let mut axis =
         SimulatedTestAxis::new(0, parameters, !random.seed).with_travel_mm(random.travel_mm);
     axis.apply(settings).map_err(|error| error.to_string())?;

@@ -28,6 +28,8 @@ pub struct RandomAxis {
     /// Frequency of the resonance, Hz, and the encoder's side, where there is one.
     resonance: Option<(f64, EncoderSide)>,
     backlash_mm: f64,
+    /// Relative change of friction when the axis is warm, and the time in which it warms, s.
+    warming: (f64, f64),
 }
 
 /// Uniform on a logarithmic scale.
@@ -38,7 +40,7 @@ fn log_uniform(random: &mut Xoshiro256PlusPlus, low: f64, high: f64) -> f64 {
 impl RandomAxis {
     /// Mass x 0.3 to 3, delay 0.3 to 3 ms, five kinds of friction with asymmetry, a resonance of 30 to 500 Hz in half of
     /// the axes, encoders of 0.05 to 2 um with noise, backlash up to 10 um and cogging in some, ripple, friction that varies
-    /// along the travel, strokes of 10 to 500 mm.
+    /// along the travel and as the axis warms, gravity in some, strokes of 10 to 500 mm.
     pub fn new(seed: u64) -> Self {
         let mut random = Xoshiro256PlusPlus::seed_from_u64(seed);
         let mass = log_uniform(&mut random, 0.3, 3.0);
@@ -136,7 +138,18 @@ impl RandomAxis {
             });
         }
         let travel_mm = log_uniform(&mut random, 5.0, 250.0);
+        let warms: f64 = random.random();
+        let most = if warms < 0.5 { 0.25 } else { 0.0 };
+        let warming = (
+            most * random.random_range(-1.0..1.0),
+            log_uniform(&mut random, 120.0, 1200.0),
+        );
+        if random.random::<f64>() < 0.2 {
+            // What hangs, and friction holds.
+            parameters.imperfections.gravity_v = level_v * random.random_range(-0.6..0.6);
+        }
         Self {
+            warming,
             seed,
             parameters,
             travel_mm,
@@ -145,6 +158,18 @@ impl RandomAxis {
             resonance,
             backlash_mm,
         }
+    }
+
+    /// Frequency of the resonance, Hz, if there is one.
+    pub fn resonance_hz(&self) -> Option<f64> {
+        self.resonance.map(|(frequency_hz, _)| frequency_hz)
+    }
+
+    /// The parameters after the axis was used for a time, s; nothing of one that does not warm.
+    pub fn warmed(&self, used_s: f64) -> Option<AxisParameters> {
+        let (change, warms_s) = self.warming;
+        let factor = 1.0 + change * (1.0 - (-used_s / warms_s).exp());
+        (change != 0.0).then(|| self.parameters.clone().with_friction(factor))
     }
 
     /// True if motor and table move as one.
@@ -174,6 +199,12 @@ impl fmt::Display for RandomAxis {
         }
         if self.backlash_mm > 0.0 {
             write!(f, ", backlash {:.1} um", 1e3 * self.backlash_mm)?;
+        }
+        if self.warming.0 != 0.0 {
+            write!(f, ", friction {:+.0} % when warm", 100.0 * self.warming.0)?;
+        }
+        if parameters.imperfections.gravity_v != 0.0 {
+            write!(f, ", gravity {:.3} V", parameters.imperfections.gravity_v)?;
         }
         if let Drive::Direct(cogging) = parameters.drive {
             write!(f, ", cogging {:.3} V", cogging.amplitude_v[0])?;

@@ -43,7 +43,7 @@ pub fn chapter3_sections(found: &Commissioned, checked: &CrossCheck) -> Vec<Sect
     let (gms, slow_sine) = &found.presliding;
     let plant = &found.plant.plant;
 
-    let mut response = response_section(&found.response, Some(plant));
+    let mut response = response_section(&found.response, Some(&found.plant));
     response
         .blocks
         .extend(plant_tables(&found.plant).map(Block::Table));

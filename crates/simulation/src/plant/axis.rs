@@ -136,6 +136,12 @@ impl SimulatedAxis {
             0.0
         };
         let external = self.load_v - ripple + truth.drive.force_v(self.position_mm);
+        // Without gravity the sum is the one above, to the bit.
+        let external = if imperfections.gravity_v == 0.0 {
+            external
+        } else {
+            external + imperfections.gravity_v
+        };
         for _ in 0..SUBSTEPS {
             self.pipeline.push_back(driven);
             let arriving = self.pipeline.pop_front().unwrap_or(driven);

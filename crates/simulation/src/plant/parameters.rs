@@ -60,6 +60,9 @@ pub struct AxisParameters {
 /// Imperfections of a real axis that its model leaves out; all zero for an ideal one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Imperfections {
+    /// Constant force along the axis, V at the amplifier's input: the weight of what hangs, less its counterweight; negative towards
+    /// smaller positions.
+    pub gravity_v: f64,
     /// Standard deviation of the encoder's noise, mm, before it is quantised.
     pub encoder_noise_mm: f64,
     /// Offset of converter and amplifier, V.

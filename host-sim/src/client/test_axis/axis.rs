@@ -5,17 +5,20 @@ use std::time::Duration;
 use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
 use quadrant::reference::MotionSettings;
+use quadrant::safety::FaultCode;
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 
 use super::injection::Injection;
 use super::recording::Shape;
-use super::stop::Stop;
+use super::stop::{Injected, Stop};
 use crate::client::error::ClientError;
 use crate::client::samples::{TelemetryRecorder, least_decimation};
 use crate::client::session::Client;
 use crate::client::settings;
 use crate::client::settle;
-use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis};
+use crate::machine::{
+    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, open_loop_mm,
+};
 use crate::record::Recording;
 
 /// Time from one look at the telemetry to the next.
@@ -24,6 +27,14 @@ const LOOK: Duration = Duration::from_millis(50);
 const TAIL: Duration = Duration::from_millis(30);
 /// Time for whatever moves to come to rest before an experiment.
 const BEFORE: Duration = Duration::from_secs(60);
+/// Faults that end an experiment, and no more.
+const ENDS_EXPERIMENTS: [FaultCode; 3] = [
+    FaultCode::FollowingError,
+    FaultCode::Overspeed,
+    FaultCode::InjectionBounds,
+];
+/// Time in which the axis comes to rest after one of them.
+const COASTING: Duration = Duration::from_millis(500);
 /// Time in which the outputs come on.
 const ENABLING: Duration = Duration::from_millis(100);
 
@@ -38,6 +49,8 @@ pub struct ConnectedAxis<'a> {
     stage: StageSettings,
     travel_mm: f64,
     origin_mm: f64,
+    /// What was recorded of the last experiment, if that was stopped.
+    interrupted: Option<Recording>,
 }
 
 impl<'a> ConnectedAxis<'a> {
@@ -63,6 +76,7 @@ impl<'a> ConnectedAxis<'a> {
             stage,
             travel_mm,
             origin_mm,
+            interrupted: None,
         })
     }
 
@@ -92,11 +106,60 @@ impl<'a> ConnectedAxis<'a> {
         let every = wanted.max(least_decimation(channels.len(), rate_hz));
         let injects = motion.is_none() || experiment.injection_v.iter().any(|volts| *volts != 0.0);
 
-        let began = self.client.now();
         let mut telemetry = TelemetryRecorder::start(self.client, &channels, every)?;
+        let followed = self.follow(experiment, &mut telemetry, here, [injects, moves], progress);
+        let samples = telemetry.finish(self.client);
+        let lasts = experiment.injection_v.len();
+        let injected = match followed {
+            Ok(injected) => injected,
+            Err(stop) => {
+                let shape = Shape {
+                    settings: self.settings(),
+                    origin_mm: self.origin_mm,
+                    lasts: 0,
+                    moves: false,
+                    injected: None,
+                };
+                self.interrupted = samples.ok().and_then(|samples| shape.recording(&samples));
+                return Err(stop);
+            }
+        };
+        let samples = samples?;
+        progress(1.0);
+        if samples.lost() > 0 {
+            return Err(Stop::Lost(samples.lost()));
+        }
+        let shape = Shape {
+            settings: self.settings(),
+            origin_mm: self.origin_mm,
+            lasts,
+            moves,
+            injected: injected.as_ref(),
+        };
+        shape.recording(&samples).ok_or(Stop::Short)
+    }
+
+    /// Runs an experiment on the enabled axis, which stands at `here_mm`, and waits for its end.
+    fn follow(
+        &mut self,
+        experiment: &Experiment,
+        telemetry: &mut TelemetryRecorder,
+        here_mm: f64,
+        [injects, moves]: [bool; 2],
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Option<Injected>, Stop> {
+        let began = self.client.now();
+        let rate_hz = self.client.identity().rate_hz;
         let mut injection = None;
         if injects {
-            let room_mm = self.travel_mm - if moves { 0.0 } else { here.abs() };
+            let room_mm = match experiment.drive {
+                Drive::OpenLoop => {
+                    let (low_mm, high_mm) = open_loop_mm(self.travel_mm, here_mm);
+                    (here_mm - low_mm).min(high_mm - here_mm)
+                }
+                Drive::ClosedLoop(_) if moves => self.travel_mm,
+                Drive::ClosedLoop(_) => self.travel_mm - here_mm.abs(),
+            };
             let mut plan = Injection::new(
                 experiment,
                 self.settings(),
@@ -104,7 +167,7 @@ impl<'a> ConnectedAxis<'a> {
                 room_mm,
                 moves,
             );
-            plan.send(self.client, &mut telemetry)?;
+            plan.send(self.client, telemetry)?;
             injection = Some(plan);
         } else if moves {
             self.client.order(Body::Run)?;
@@ -128,23 +191,22 @@ impl<'a> ConnectedAxis<'a> {
             }
         }
         telemetry.gather(self.client, TAIL)?;
-        let injected = match injection {
-            Some(injection) => Some(injection.finish(self.client)?),
-            None => None,
-        };
-        let samples = telemetry.finish(self.client)?;
-        progress(1.0);
-        if samples.lost() > 0 {
-            return Err(Stop::Lost(samples.lost()));
+        match injection {
+            Some(injection) => Ok(Some(injection.finish(self.client)?)),
+            None => Ok(None),
         }
-        let shape = Shape {
-            settings: self.settings(),
-            origin_mm: self.origin_mm,
-            lasts,
-            moves,
-            injected: injected.as_ref(),
+    }
+
+    /// Resets a fault that the limits of an experiment are for, once the axis has come to rest: the next experiment may go on.
+    fn reset(&mut self, error: &ExperimentError) {
+        let ExperimentError::Fault { fault, .. } = error else {
+            return;
         };
-        shape.recording(&samples).ok_or(Stop::Short)
+        if ENDS_EXPERIMENTS.contains(&fault.code) {
+            // Where it cannot be reset, the next experiment says so.
+            let _ = self.client.wait(COASTING);
+            let _ = self.client.order(Body::ResetFault);
+        }
     }
 
     /// Waits for rest and switches the outputs off, if settings are to change on which safety depends.
@@ -209,7 +271,15 @@ impl TestAxis for ConnectedAxis<'_> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        self.run(experiment, progress)
-            .map_err(|stop| stop.into_error(experiment))
+        self.interrupted = None;
+        self.run(experiment, progress).map_err(|stop| {
+            let error = stop.into_error(experiment);
+            self.reset(&error);
+            error
+        })
+    }
+
+    fn interrupted(&self) -> Option<&Recording> {
+        self.interrupted.as_ref()
     }
 }

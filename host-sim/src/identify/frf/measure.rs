@@ -7,7 +7,7 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 use super::estimate::{Estimate, Estimator, estimate};
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::setting::SettingError;
-use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::machine::{Drive, Experiment, ExperimentError, TestAxis, approach, usable_mm};
 use crate::record::Recording;
 
 /// Parameters of a frequency response measurement.
@@ -20,6 +20,8 @@ pub struct FrfSettings {
     pub bias_velocity_mm_s: f64,
     /// The feedback is off: the excitation alone drives the amplifier.
     pub open_loop: bool,
+    /// Passes go through both sides of a short travel, from where the axis is taken before each.
+    pub two_sided: bool,
 }
 
 impl Default for FrfSettings {
@@ -37,6 +39,7 @@ impl Default for FrfSettings {
             periods: 40,
             bias_velocity_mm_s: 37.0,
             open_loop: false,
+            two_sided: false,
         }
     }
 }
@@ -92,26 +95,64 @@ pub enum FrfError {
 
 /// Time at constant velocity before the first block, s: transients have died away.
 const SETTLING_S: f64 = 0.7;
+/// The same where periods are short, s.
+const SHORT_SETTLING_S: f64 = 0.4;
 /// Periods in a block.
 const BLOCK_PERIODS: usize = 2;
 /// Acceleration and jerk of the passes.
 const ACCELERATION_MM_S2: f64 = 500.0;
 const JERK_MM_S3: f64 = 2e4;
+/// Travel either way below which both sides are used and periods are shorter by a factor, mm.
+const SHORT_MM: f64 = 60.0;
+const SHORT_PERIOD: f64 = 0.5;
+/// Share of what is used of both sides: a pass begins somewhat beside its place.
+const OF_BOTH: f64 = 0.92;
 /// Slowest pass that is chosen for a short travel, mm/s.
 const SLOWEST_MM_S: f64 = 0.5;
-/// Share of the travel that passes use.
-const TRAVEL_SHARE: f64 = 0.9;
 
 impl FrfSettings {
     /// Slower passes where the travel, either way, does not hold one at the velocity.
     #[must_use]
     pub fn fitted_to(mut self, travel_mm: f64) -> Self {
-        while pass_length_mm(&self, 1) > TRAVEL_SHARE * travel_mm
+        if travel_mm < SHORT_MM {
+            self.two_sided = true;
+            self.excitation.period_s *= SHORT_PERIOD;
+            self.excitation.band_hz.0 /= SHORT_PERIOD;
+        }
+        while pass_length_mm(&self, 1) > self.room_mm(travel_mm)
             && self.bias_velocity_mm_s > SLOWEST_MM_S
         {
             self.bias_velocity_mm_s *= 0.9;
         }
         self
+    }
+
+    /// Length of a pass at most, mm.
+    fn room_mm(&self, travel_mm: f64) -> f64 {
+        usable_mm(travel_mm) * if self.two_sided { 2.0 * OF_BOTH } else { 1.0 }
+    }
+
+    /// Position at which the axis stands before the first pass, mm.
+    pub fn start_mm(&self, travel_mm: f64) -> f64 {
+        if self.two_sided {
+            -OF_BOTH * usable_mm(travel_mm)
+        } else {
+            0.0
+        }
+    }
+
+    /// Passes, the longest of them in mm, and the time that all take, s; nothing if a pass does not fit the travel.
+    pub fn extent(&self, travel_mm: f64, rate_hz: f64) -> Option<(usize, f64, f64)> {
+        let (mut passes, mut longest_mm, mut lasts_s) = (0, 0.0_f64, 0.0);
+        let mut missing = self.periods;
+        while missing > 0 {
+            let (experiment, blocks) = pass(self, travel_mm, rate_hz, missing, 1.0).ok()?;
+            longest_mm = longest_mm.max(pass_length_mm(self, blocks));
+            lasts_s += experiment.injection_v.len() as f64 / rate_hz;
+            passes += 1;
+            missing -= blocks;
+        }
+        Some((passes, longest_mm, lasts_s))
     }
 
     fn check(&self, rate_hz: f64) -> Result<(), FrfError> {
@@ -190,11 +231,16 @@ pub fn measure(
             (standstill(settings, axis.rate_hz), settings.periods)
         };
         let done = blocks.len() as f64;
+        if settings.two_sided {
+            let forward = recordings.len().is_multiple_of(2);
+            let start_mm = settings.start_mm(axis.travel_mm);
+            approach(test_axis, if forward { start_mm } else { -start_mm })?;
+        }
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);
         })?;
         let period = in_samples(period, &recording, axis.rate_hz)?;
-        let steady = steady_range(&recording, settings.bias_velocity_mm_s);
+        let steady = steady_range(&recording, settings);
         check_sliding(&recording, &steady, settings)?;
         // Blocks begin where a period does, so that the excitation is the same in each; they overlap by half.
         let first = steady.start.div_ceil(period);
@@ -253,7 +299,7 @@ fn too_short(settings: &FrfSettings, travel_mm: f64) -> FrfError {
     FrfError::Travel {
         velocity_mm_s,
         needed_mm: pass_length_mm(settings, 1),
-        travel_mm: TRAVEL_SHARE * travel_mm,
+        travel_mm: settings.room_mm(travel_mm),
         period_s: settings.excitation.period_s,
     }
 }
@@ -274,10 +320,15 @@ pub fn standstill(settings: &FrfSettings, rate_hz: f64) -> Experiment {
     }
 }
 
+fn settling_s(short: bool) -> f64 {
+    if short { SHORT_SETTLING_S } else { SETTLING_S }
+}
+
 /// The distance in which so many blocks fit: a period more, because blocks begin where a period does.
 fn pass_length_mm(settings: &FrfSettings, periods: usize) -> f64 {
     let speed = settings.bias_velocity_mm_s.abs();
-    let steady_s = SETTLING_S + (periods + BLOCK_PERIODS) as f64 * settings.excitation.period_s;
+    let steady_s = settling_s(settings.two_sided)
+        + (periods + BLOCK_PERIODS) as f64 * settings.excitation.period_s;
     let ramp_s = speed / ACCELERATION_MM_S2 + ACCELERATION_MM_S2 / JERK_MM_S3;
     speed * (steady_s + ramp_s)
 }
@@ -290,7 +341,7 @@ fn pass(
     missing: usize,
     direction: f64,
 ) -> Result<(Experiment, usize), FrfError> {
-    let room_mm = TRAVEL_SHARE * travel_mm;
+    let room_mm = settings.room_mm(travel_mm);
     let periods = (1..=missing)
         .rev()
         .find(|&periods| pass_length_mm(settings, periods) <= room_mm)
@@ -319,7 +370,8 @@ fn pass(
 
 /// The samples at which the axis has settled: all but the first period at standstill, those at constant reference velocity
 /// otherwise.
-fn steady_range(recording: &Recording, bias_velocity_mm_s: f64) -> Range<usize> {
+fn steady_range(recording: &Recording, settings: &FrfSettings) -> Range<usize> {
+    let bias_velocity_mm_s = settings.bias_velocity_mm_s;
     if bias_velocity_mm_s == 0.0 {
         return 1..recording.len();
     }
@@ -333,7 +385,7 @@ fn steady_range(recording: &Recording, bias_velocity_mm_s: f64) -> Range<usize> 
         span == STEADY_SAMPLES
             && (moved - span as f64 * step_mm).abs() < 1e-3 * span as f64 * step_mm
     };
-    let settling = (SETTLING_S / recording.sample_time_s) as usize;
+    let settling = (settling_s(settings.two_sided) / recording.sample_time_s) as usize;
     let first = (0..reference.len()).find(steady);
     let last = (0..reference.len()).rev().find(steady);
     match (first, last) {

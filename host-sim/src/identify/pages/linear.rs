@@ -2,8 +2,6 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::plant_model::PlantModel;
-
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::pages::bode::{Curve, bode_figures};
@@ -37,7 +35,7 @@ pub fn motor_constant_table(motor: &MotorConstant, moving_mass_kg: Option<f64>) 
 }
 
 /// The measured response: its section, under feedback with the plain H1 estimate, which that biases, beside it.
-pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>) -> Section {
+pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantFit>) -> Section {
     let measured = &measurement.estimate.response;
     let modelled = model.map(|model| modelled(model, measured));
     let mut curves = Vec::new();
@@ -81,7 +79,7 @@ pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantModel>
 }
 
 /// A saved response and the model fitted to it.
-pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantModel) -> Section {
+pub fn fitted_response_section(response: &FrequencyResponse, model: &PlantFit) -> Section {
     let modelled = modelled(model, response);
     let curves = [
         Curve {
@@ -148,7 +146,7 @@ fn quality_figure(response: &FrequencyResponse) -> Figure {
 }
 
 /// The response of a model at the lines of a measured one.
-fn modelled(model: &PlantModel, measured: &FrequencyResponse) -> FrequencyResponse {
+fn modelled(model: &PlantFit, measured: &FrequencyResponse) -> FrequencyResponse {
     let points = measured.points.iter().map(|point| ResponsePoint {
         response: model.response(TAU * point.frequency_hz),
         ..*point
@@ -160,7 +158,14 @@ fn modelled(model: &PlantModel, measured: &FrequencyResponse) -> FrequencyRespon
 
 /// The linear model (thesis, Table 3.1), with standard errors, correlation with A, and fit by band.
 pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
-    let units = ["mm/(V s²)", "1/s", "s", "1/s²"];
+    let unit = |name: &str| match name {
+        "A" => "mm/(V s²)",
+        "B" => "1/s",
+        "Td" => "s",
+        "C" => "1/s²",
+        frequency if frequency.starts_with('f') => "Hz",
+        _ => "",
+    };
     let rows = found
         .fit
         .names
@@ -171,7 +176,7 @@ pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
             let decimals = if *name == "Td" { 7 } else { 2 };
             vec![
                 Cell::text(*name),
-                Cell::text(units[index]),
+                Cell::text(unit(name)),
                 Cell::number(value, decimals),
                 Cell::number(found.fit.standard_errors[index], decimals),
                 Cell::number(100.0 * found.fit.standard_errors[index] / value, 3),
@@ -183,7 +188,13 @@ pub fn plant_tables(found: &PlantFit) -> [Table; 2] {
     let parameters = Table {
         id: "linear-model".to_owned(),
         caption: format!(
-            "Linear model A exp(-s Td) / (s² + B s + C), fitted to {} lines; ± is one standard deviation",
+            "Linear model A exp(-s Td) / (s² + B s + C){}, fitted to {} lines; ± is one standard deviation",
+            match found.modes.len() {
+                0 => "",
+                1 => " times a mode (frequency f, damping ratio d; fa, da of the anti-resonance)",
+                _ =>
+                    " times two modes (frequency f, damping ratio d; fa, da of the anti-resonance)",
+            },
             found.lines
         ),
         columns: columns(&[

@@ -4,7 +4,7 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::map::{FrictionMap, FrictionRun};
 use crate::identify::setting::SettingError;
-use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
+use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, usable_mm};
 use crate::record::Recording;
 
 /// Parameters of the measurement of the friction-velocity map.
@@ -18,6 +18,8 @@ pub struct StaticFrictionSettings {
     pub stretch_mm: f64,
     /// Time after which a run's beginning is over, s: the slowest mode of the loop has died away.
     pub settling_s: f64,
+    /// Runs go through both sides of the travel: the axis stands at its negative end.
+    pub two_sided: bool,
 }
 
 impl Default for StaticFrictionSettings {
@@ -27,6 +29,7 @@ impl Default for StaticFrictionSettings {
             count: 16,
             stretch_mm: 10.0,
             settling_s: 2.5,
+            two_sided: false,
         }
     }
 }
@@ -58,9 +61,13 @@ const ACCELERATION_MM_S2: f64 = 500.0;
 const JERK_MM_S3: f64 = 2e4;
 /// Share of a short travel that is the stretch, and the settling time there, s.
 const STRETCH_SHARE: f64 = 0.4;
-const SHORT_SETTLING_S: f64 = 1.0;
-/// Share of the travel that runs use.
-const TRAVEL_SHARE: f64 = 0.9;
+const SHORT_SETTLING_S: f64 = 0.6;
+/// Travel either way below which both sides are used, mm.
+const SHORT_MM: f64 = 60.0;
+/// Share of what is used of both sides: a run begins somewhat beside its place.
+const OF_BOTH: f64 = 0.92;
+/// Share of the largest velocity that a run takes at most.
+const MOST_VELOCITY: f64 = 0.6;
 /// Samples of a run's recording at least: about one a count of the encoder at the slowest velocities.
 const SAMPLES: f64 = 20_000.0;
 /// Parts into which the stretch is cut to see its scatter.
@@ -72,20 +79,48 @@ const STICKING: f64 = 0.3;
 const SLIPPING: f64 = 2.0;
 
 impl StaticFrictionSettings {
-    /// A shorter stretch, less settling and slower runs where the travel, either way, does not hold the fastest.
+    /// A shorter stretch, less settling and slower runs where travel or limits do not hold the fastest.
     #[must_use]
-    pub fn fitted_to(mut self, travel_mm: f64) -> Self {
-        let room_mm = TRAVEL_SHARE * travel_mm;
+    pub fn fitted_to(mut self, axis: &AxisInfo) -> Self {
+        self.two_sided = axis.travel_mm < SHORT_MM;
+        let room_mm = self.room_mm(axis.travel_mm);
         if self.stretch_mm > STRETCH_SHARE * room_mm {
             self.stretch_mm = STRETCH_SHARE * room_mm;
             self.settling_s = self.settling_s.min(SHORT_SETTLING_S);
         }
-        let (slowest, mut fastest) = self.velocities_mm_s;
+        let (slowest, fastest) = self.velocities_mm_s;
+        let mut fastest = fastest.min(MOST_VELOCITY * axis.max_velocity_mm_s);
         while self.length_mm(fastest) > room_mm && fastest > 2.0 * slowest {
             fastest *= 0.9;
         }
         self.velocities_mm_s = (slowest, fastest);
         self
+    }
+
+    /// Length of a run at most, mm.
+    fn room_mm(&self, travel_mm: f64) -> f64 {
+        usable_mm(travel_mm) * if self.two_sided { 2.0 * OF_BOTH } else { 1.0 }
+    }
+
+    /// Position at which the axis stands before the first run, mm.
+    pub fn start_mm(&self, travel_mm: f64) -> f64 {
+        if self.two_sided {
+            -OF_BOTH * usable_mm(travel_mm)
+        } else {
+            0.0
+        }
+    }
+
+    /// The longest run, mm, and the time that all take, s.
+    pub fn extent(&self) -> (f64, f64) {
+        let longest_mm = self.velocities().map(|velocity| self.length_mm(velocity));
+        (longest_mm.fold(0.0, f64::max), self.lasts_s())
+    }
+
+    /// The time of all runs, both ways, s.
+    fn lasts_s(&self) -> f64 {
+        let duration = |velocity: f64| 2.0 * self.length_mm(velocity) / velocity;
+        self.velocities().map(duration).sum()
     }
 
     fn check(&self) -> Result<(), StaticFrictionError> {
@@ -159,7 +194,7 @@ pub fn measure(
     progress: &mut dyn FnMut(f64),
 ) -> Result<(FrictionMap, Vec<Recording>), StaticFrictionError> {
     settings.check()?;
-    let travel_mm = TRAVEL_SHARE * test_axis.info().travel_mm;
+    let travel_mm = settings.room_mm(test_axis.info().travel_mm);
     for velocity_mm_s in settings.velocities() {
         let needed_mm = settings.length_mm(velocity_mm_s);
         if needed_mm > travel_mm {
@@ -170,8 +205,7 @@ pub fn measure(
             });
         }
     }
-    let duration = |velocity: f64| 2.0 * settings.length_mm(velocity) / velocity;
-    let all_s: f64 = settings.velocities().map(duration).sum();
+    let all_s = settings.lasts_s();
     let mut done_s = 0.0;
     let mut map = FrictionMap::default();
     let mut recordings = Vec::new();

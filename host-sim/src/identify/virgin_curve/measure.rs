@@ -42,6 +42,13 @@ impl VirginCurveSettings {
     }
 }
 
+impl VirginCurveSettings {
+    /// Time of the run, s.
+    pub fn lasts_s(&self) -> f64 {
+        (self.cycles + 1.0) / self.frequency_hz
+    }
+}
+
 /// Rate of the recording, Hz.
 const RATE_HZ: f64 = 1000.0;
 
@@ -55,7 +62,7 @@ pub fn measure(
     progress: &mut dyn FnMut(f64),
 ) -> Result<Recording, ExperimentError> {
     let lead_s = 0.5 / settings.frequency_hz;
-    let duration_s = settings.cycles / settings.frequency_hz + 2.0 * lead_s;
+    let duration_s = settings.lasts_s();
     test_axis.perform(
         &Experiment {
             name: format!("hysteresis over {:.1} um", 1e3 * settings.amplitude_mm),

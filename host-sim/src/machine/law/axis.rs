@@ -26,6 +26,10 @@ pub(super) const TRAVEL_MM: f64 = 200.0;
 const ENABLE_TICKS: usize = 1000;
 /// Control periods between two reports of progress.
 const PROGRESS_TICKS: usize = 20_000;
+/// Control periods in which an axis without its outputs comes to rest, those for which it must stand, and the velocity that counts as rest, mm/s.
+const COASTING_TICKS: usize = 20_000;
+const REST_TICKS: usize = 300;
+const AT_REST_MM_S: f64 = 0.01;
 /// Names of the axes.
 const NAMES: [&str; 3] = ["x", "y", "z"];
 
@@ -41,6 +45,10 @@ pub struct SimulatedTestAxis {
     resolution_mm: f64,
     /// Travel either way, mm.
     travel_mm: f64,
+    /// Largest distance of the table from zero so far, mm.
+    farthest_mm: f64,
+    /// What was recorded last of an experiment that was stopped.
+    interrupted: Option<Recording>,
     /// The axis under test is the first; the others stand still.
     stage: StageSettings,
 }
@@ -59,6 +67,8 @@ impl SimulatedTestAxis {
             full_scale_v: truth.full_scale_v,
             resolution_mm: truth.resolution_mm,
             travel_mm: TRAVEL_MM,
+            farthest_mm: 0.0,
+            interrupted: None,
             plant: SimulatedAxis::new(truth, stage.rate_hz, seed),
             stage,
         }
@@ -74,6 +84,38 @@ impl SimulatedTestAxis {
     /// The axis itself, with its truth: for judging, not for identifying.
     pub fn plant(&self) -> &SimulatedAxis {
         &self.plant
+    }
+
+    /// Gives the axis other parameters while it stands, as warming does.
+    pub fn change(&mut self, truth: AxisParameters) {
+        self.plant.change(truth);
+    }
+
+    /// The largest distance from zero at which the table was so far, mm: for judging.
+    pub fn farthest_mm(&self) -> f64 {
+        self.farthest_mm
+    }
+
+    /// One control period of the plant.
+    fn move_on(&mut self, code: DacCode, enabled: bool) {
+        self.plant.step(code, enabled);
+        self.farthest_mm = self.farthest_mm.max(self.plant.position_mm().abs());
+    }
+
+    /// Lets the axis come to rest without its outputs, as after a fault.
+    fn coast(&mut self) {
+        let mut rested = 0;
+        for _ in 0..COASTING_TICKS {
+            self.move_on(DacCode::ZERO, false);
+            rested = if self.plant.velocity_mm_s().abs() < AT_REST_MM_S {
+                rested + 1
+            } else {
+                0
+            };
+            if rested == REST_TICKS {
+                break;
+            }
+        }
     }
 
     fn volts(&self, code: DacCode) -> f64 {
@@ -93,24 +135,48 @@ impl SimulatedTestAxis {
         let mut law = self.law(experiment)?;
         let mut watch = Watch::new(experiment, self.info());
         let mut recorder = Recorder::new(experiment.decimation, self.stage.rate_hz);
+        let outcome = self.run(experiment, &mut law, &mut watch, &mut recorder, progress);
+        self.interrupted = outcome
+            .is_err()
+            .then(|| recorder.latest(self.stage.rate_hz));
+        outcome.map(|()| recorder.finish())
+    }
+
+    fn run(
+        &mut self,
+        experiment: &Experiment,
+        law: &mut Law,
+        watch: &mut Watch<'_>,
+        recorder: &mut Recorder,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(), ExperimentError> {
         let expected = experiment.injection_v.len().max(1);
         let mut waited = 0;
+        let mut rested = false;
         loop {
             let raw = self.plant.read_counter();
             let position_mm = f64::from(raw as i32) * self.resolution_mm;
             let Some(step) = law.step(raw, experiment)? else {
+                if waited == ENABLE_TICKS && !rested {
+                    // As a person would, who is told that the axis still moves.
+                    rested = true;
+                    waited = 0;
+                    self.coast();
+                    *law = self.law(experiment)?;
+                    continue;
+                }
                 if waited == ENABLE_TICKS {
                     return Err(law.not_enabled(experiment));
                 }
                 waited += 1;
-                self.plant.step(DacCode::ZERO, false);
+                self.move_on(DacCode::ZERO, false);
                 continue;
             };
             let done = recorder.ticks();
             let injection_v = experiment.injection_v.get(done).copied();
             if injection_v.is_none() && step.motion_ended {
                 progress(1.0);
-                return Ok(recorder.finish());
+                return Ok(());
             }
             let waits_for = if step.motion_ended {
                 "the injection has not ended"
@@ -130,7 +196,7 @@ impl SimulatedTestAxis {
                 voltage_v: self.volts(code),
                 injection_v,
             });
-            self.plant.step(code, true);
+            self.move_on(code, true);
         }
     }
 
@@ -265,7 +331,14 @@ impl TestAxis for SimulatedTestAxis {
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
         let outcome = self.drive(experiment, progress);
-        self.plant.step(DacCode::ZERO, false);
+        self.move_on(DacCode::ZERO, false);
+        if outcome.is_err() {
+            self.coast();
+        }
         outcome
+    }
+
+    fn interrupted(&self) -> Option<&Recording> {
+        self.interrupted.as_ref()
     }
 }

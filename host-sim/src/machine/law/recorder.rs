@@ -1,6 +1,11 @@
 //! Gathers control periods into the samples of a recording.
 
+use std::collections::VecDeque;
+
 use crate::record::Recording;
+
+/// Control periods at the end that are kept as they were.
+const LATEST: usize = 5000;
 
 /// A recording in the making.
 pub(super) struct Recorder {
@@ -9,9 +14,11 @@ pub(super) struct Recorder {
     ticks: usize,
     voltage_v: f64,
     injection_v: f64,
+    latest: VecDeque<Period>,
 }
 
 /// Signals of one control period.
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Period {
     pub(super) reference_mm: f64,
     pub(super) position_mm: f64,
@@ -32,6 +39,7 @@ impl Recorder {
             ticks: 0,
             voltage_v: 0.0,
             injection_v: 0.0,
+            latest: VecDeque::with_capacity(LATEST),
         }
     }
 
@@ -50,6 +58,10 @@ impl Recorder {
             recording.reference_mm.push(period.reference_mm);
             recording.position_mm.push(period.position_mm);
         }
+        if self.latest.len() == LATEST {
+            self.latest.pop_front();
+        }
+        self.latest.push_back(period);
         self.voltage_v += period.voltage_v;
         self.injection_v += period.injection_v;
         self.ticks += 1;
@@ -59,6 +71,18 @@ impl Recorder {
             recording.injection_v.push(self.injection_v / count);
             self.voltage_v = 0.0;
             self.injection_v = 0.0;
+        }
+    }
+
+    /// The last control periods at `rate_hz`, each a sample.
+    pub(super) fn latest(&self, rate_hz: f64) -> Recording {
+        let all = |read: fn(&Period) -> f64| self.latest.iter().map(read).collect();
+        Recording {
+            sample_time_s: 1.0 / rate_hz,
+            reference_mm: all(|period| period.reference_mm),
+            position_mm: all(|period| period.position_mm),
+            voltage_v: all(|period| period.voltage_v),
+            injection_v: all(|period| period.injection_v),
         }
     }
 

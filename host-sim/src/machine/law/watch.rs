@@ -1,6 +1,6 @@
 //! Limits that stop an experiment: travel, speed, time.
 
-use crate::machine::test_axis::{AxisInfo, Experiment, ExperimentError};
+use crate::machine::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, open_loop_mm};
 
 /// Control periods over which the velocity is watched.
 const SPEED_TICKS: usize = 20;
@@ -10,6 +10,8 @@ pub(super) struct Watch<'a> {
     experiment: &'a Experiment,
     axis: AxisInfo,
     watched_mm: Option<f64>,
+    /// Positions between which an axis in open loop stays, mm.
+    open_loop_mm: Option<(f64, f64)>,
 }
 
 impl<'a> Watch<'a> {
@@ -18,6 +20,7 @@ impl<'a> Watch<'a> {
             experiment,
             axis,
             watched_mm: None,
+            open_loop_mm: None,
         }
     }
 
@@ -29,7 +32,13 @@ impl<'a> Watch<'a> {
         waits_for: &'static str,
     ) -> Result<(), ExperimentError> {
         let time_s = ticks as f64 / self.axis.rate_hz;
-        if position_mm.abs() > self.axis.travel_mm {
+        let (low_mm, high_mm) = match self.experiment.drive {
+            Drive::ClosedLoop(_) => (-self.axis.travel_mm, self.axis.travel_mm),
+            Drive::OpenLoop => *self
+                .open_loop_mm
+                .get_or_insert_with(|| open_loop_mm(self.axis.travel_mm, position_mm)),
+        };
+        if !(low_mm..=high_mm).contains(&position_mm) {
             return Err(ExperimentError::Travel {
                 experiment: self.experiment.name.clone(),
                 travel_mm: self.axis.travel_mm,

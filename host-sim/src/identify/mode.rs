@@ -1,0 +1,83 @@
+//! A structural mode of an axis: the resonance of a drive train between motor and table, and how it shows at the encoder.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+/// A resonance, with the anti-resonance below it where the encoder is on the motor: the factor
+/// `(s^2 + 2 d_a w_a s + w_a^2) / (s^2 + 2 d w s + w^2) (w / w_a)^2` on the response of the rigid axis, or
+/// `w^2 / (s^2 + 2 d w s + w^2)` without one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Mode {
+    /// w / (2 pi), Hz.
+    pub frequency_hz: f64,
+    /// d, damping ratio.
+    pub damping: f64,
+    /// Frequency, Hz, and damping ratio of the anti-resonance.
+    pub anti: Option<(f64, f64)>,
+}
+
+impl Mode {
+    /// The factor at a frequency in rad/s; one at rest.
+    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
+        let second_order = |frequency_hz: f64, damping: f64| {
+            let ratio = omega_rad_s / (TAU * frequency_hz);
+            Complex64::new(1.0 - ratio * ratio, 2.0 * damping * ratio)
+        };
+        let above = self
+            .anti
+            .map_or(Complex64::new(1.0, 0.0), |(frequency_hz, damping)| {
+                second_order(frequency_hz, damping)
+            });
+        above / second_order(self.frequency_hz, self.damping)
+    }
+
+    /// The mode at other frequencies by a factor, as when a mass on the axis has changed.
+    #[must_use]
+    pub fn shifted(&self, factor: f64) -> Self {
+        Self {
+            frequency_hz: factor * self.frequency_hz,
+            anti: self.anti.map(|(hz, damping)| (factor * hz, damping)),
+            ..*self
+        }
+    }
+}
+
+/// The factor of all modes at a frequency in rad/s.
+pub fn response_of(modes: &[Mode], omega_rad_s: f64) -> Complex64 {
+    modes
+        .iter()
+        .map(|mode| mode.response(omega_rad_s))
+        .product()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_mode_is_one_at_rest_and_peaks_at_its_frequency() {
+        let mode = Mode {
+            frequency_hz: 100.0,
+            damping: 0.01,
+            anti: None,
+        };
+        assert_eq!(mode.response(0.0), Complex64::new(1.0, 0.0));
+        assert!((mode.response(TAU * 100.0).norm() - 50.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn an_anti_resonance_leaves_the_motors_own_mass_above() {
+        // Equal halves: the anti-resonance lies at 1/sqrt(2) of the resonance, and the motor alone is half the mass.
+        let anti = Some((100.0 / 2.0_f64.sqrt(), 0.01));
+        let mode = Mode {
+            frequency_hz: 100.0,
+            damping: 0.01,
+            anti,
+        };
+        assert!((mode.response(TAU * 1e5).norm() - 2.0).abs() < 1e-3);
+        assert!(
+            (mode.shifted(1.1).response(TAU * 110.0) - mode.response(TAU * 100.0)).norm() < 1e-9
+        );
+    }
+}
