@@ -14,8 +14,11 @@ use quadrant::app::crash_record::{CrashCause, CrashRecord};
 use super::{Outcome, crash_record, halt, outputs_off, stack};
 use crate::app::TICK;
 
+/// Number of the non-maskable interrupt. On a board that has no handler for it, its clock security raises it.
+const NON_MASKABLE: i16 = -14;
+
 /// Makes the machine safe, records the cause, and ends.
-pub(super) fn fail(cause: CrashCause, text: fmt::Arguments) -> ! {
+fn fail(cause: CrashCause, text: fmt::Arguments) -> ! {
     // A second fault comes from the explanation itself: by then the outputs are off, so stay silent.
     static EXPLAINING: AtomicBool = AtomicBool::new(false);
 
@@ -71,5 +74,9 @@ extern "C" fn hard_fault(frame: usize) -> ! {
 // SAFETY: `cortex-m-rt` calls this; nothing is assumed of the interrupted code, and it is never returned to.
 #[exception]
 unsafe fn DefaultHandler(number: i16) -> ! {
-    fail(CrashCause::StrayInterrupt, format_args!("number {number}"))
+    let cause = match number {
+        NON_MASKABLE => CrashCause::ClockFailed,
+        _ => CrashCause::StrayInterrupt,
+    };
+    fail(cause, format_args!("number {number}"))
 }

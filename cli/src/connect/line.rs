@@ -1,7 +1,7 @@
 //! One line of a script, or what a person types at the prompt.
 
-use clap::Parser;
 use clap::error::ErrorKind;
+use clap::{CommandFactory, Parser};
 
 use super::command::Command;
 use super::help;
@@ -9,7 +9,7 @@ use super::help;
 /// Grammar of a line.
 #[derive(Debug, Parser)]
 #[command(name = "", no_binary_name = true, disable_version_flag = true)]
-pub(super) struct Line {
+struct Line {
     #[command(subcommand)]
     command: Command,
 }
@@ -30,7 +30,7 @@ pub(super) enum Said {
 /// A command that there is not, or one that lacks something.
 pub(super) fn parse(line: &str) -> Result<Said, String> {
     if matches!(line.trim(), "?" | "help") {
-        return Ok(Said::Show(help::text()));
+        return Ok(Said::Show(help::text(&Line::command())));
     }
     let Some(words) = shlex::split(line) else {
         return Err("a quotation mark is not closed".to_owned());
@@ -62,7 +62,9 @@ pub(super) fn parse(line: &str) -> Result<Said, String> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Command, Said, parse};
+    use clap::CommandFactory;
+
+    use super::{Command, Line, Said, help, parse};
 
     #[test]
     fn comments_and_empty_lines_say_nothing() {
@@ -112,5 +114,32 @@ mod tests {
         assert!(matches!(parse("?"), Ok(Said::Show(_))));
         assert!(matches!(parse("help"), Ok(Said::Show(text)) if text.contains("record")));
         assert!(matches!(parse("move --help"), Ok(Said::Show(text)) if text.contains("mm/s")));
+    }
+
+    #[test]
+    fn every_command_of_the_prompt_is_in_one_group_of_the_help() {
+        let mut grouped: Vec<&str> = help::GROUPS
+            .iter()
+            .flat_map(|(_, names)| *names)
+            .copied()
+            .collect();
+        grouped.sort_unstable();
+        let grammar = Line::command();
+        let mut known: Vec<&str> = grammar
+            .get_subcommands()
+            .map(|command| command.get_name())
+            // For the shell alone.
+            .filter(|name| !["-", "flash"].contains(name))
+            .collect();
+        known.sort_unstable();
+        assert_eq!(grouped, known);
+    }
+
+    #[test]
+    fn a_terminal_of_eighty_columns_has_room_for_the_help() {
+        for line in help::text(&Line::command()).lines() {
+            assert!(line.chars().count() <= 80, "{line}");
+            assert!(!line.ends_with(' '), "{line:?}: says nothing");
+        }
     }
 }

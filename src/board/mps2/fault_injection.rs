@@ -75,7 +75,7 @@ fn hang() -> ! {
 fn mask_interrupts() {
     cortex_m::interrupt::free(|_| {
         let from = timer::CLOCK.value();
-        let cycles = super::PERIOD.load(Ordering::Relaxed) / 2 * 3;
+        let cycles = timer::PERIOD.load(Ordering::Relaxed) / 2 * 3;
         // The clock counts down.
         while from.wrapping_sub(timer::CLOCK.value()) < cycles {}
     });

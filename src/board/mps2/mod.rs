@@ -43,9 +43,6 @@ static INPUTS: AtomicU32 = AtomicU32::new(lockstep::INPUT as u32);
 /// Cycles from the start of the control timer to the last tick of a paced run.
 static PACED_CYCLES: AtomicU32 = AtomicU32::new(0);
 
-/// Cycles between two control ticks.
-static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
-
 /// The machine, started, in pieces.
 pub(crate) struct Board {
     /// Three position encoders.
@@ -270,7 +267,7 @@ impl Tick {
     /// Sets `rate_hz` ticks per second.
     pub(crate) fn start(&mut self, rate_hz: u32) {
         self.period = timer::CLOCK_HZ / rate_hz;
-        PERIOD.store(self.period, Ordering::Relaxed);
+        timer::PERIOD.store(self.period, Ordering::Relaxed);
     }
 
     /// Rate of the timer, Hz; zero, if none measures the ticks, as in lockstep.
@@ -364,7 +361,7 @@ impl Idle {
                 if !self.started {
                     self.started = true;
                     timer::CLOCK.start(u32::MAX, false);
-                    timer::CONTROL.start(PERIOD.load(Ordering::Relaxed) - 1, true);
+                    timer::CONTROL.start(timer::PERIOD.load(Ordering::Relaxed) - 1, true);
                 }
                 let ticks = TICKS.load(Ordering::Relaxed);
                 fault_injection::act_on(ticks);

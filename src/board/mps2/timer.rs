@@ -1,7 +1,12 @@
 //! The CMSDK APB timers: 32-bit down-counters with reload.
 
+use core::sync::atomic::AtomicU32;
+
 /// Clock of the timers and of the processor.
 pub(super) const CLOCK_HZ: u32 = 25_000_000;
+
+/// Cycles between two control ticks.
+pub(super) static PERIOD: AtomicU32 = AtomicU32::new(u32::MAX);
 
 /// Control register: count.
 const CTRL_ENABLE: u32 = 1;

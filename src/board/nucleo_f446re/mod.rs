@@ -40,7 +40,6 @@ mod tick;
 mod watchdog;
 mod wiring;
 
-use cortex_m_rt::exception;
 use defmt_rtt as _;
 use stm32f4xx_hal::gpio::{Input, PC13};
 use stm32f4xx_hal::pac::{self, PWR};
@@ -55,12 +54,10 @@ pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
-use quadrant::app::crash_record::CrashCause;
 use quadrant::command::Command;
 use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
 
-use super::fault::fail;
 use super::{Finished, Outcome};
 
 /// Clock of the processor.
@@ -104,8 +101,8 @@ impl Board {
             .bypass_hse_oscillator()
             .sysclk(CORE_HZ.Hz());
         let mut rcc = chip.RCC.freeze(clocks);
-        // Should that clock fail, the processor runs on from one of its own, at another speed, and takes
-        // `NonMaskableInt`.
+        // Should that clock fail, the processor runs on from one of its own, at another speed, and takes the
+        // non-maskable interrupt, which is the end (`fault::DefaultHandler`).
         rcc.cr().modify(|_, w| w.csson().set_bit());
         let port_a = chip.GPIOA.split(&mut rcc);
         let port_b = chip.GPIOB.split(&mut rcc);
@@ -202,15 +199,6 @@ impl Operator {
         // Pressed is low.
         self.hold.step(self.button.is_low())
     }
-}
-
-// SAFETY: it assumes nothing of what it interrupts, and never returns to it.
-#[exception]
-unsafe fn NonMaskableInt() -> ! {
-    fail(
-        CrashCause::ClockFailed,
-        format_args!("the 8 MHz of the debug probe have stopped"),
-    )
 }
 
 /// The work of the idle loop.
