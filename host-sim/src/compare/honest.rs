@@ -42,10 +42,9 @@ pub fn with_best_pid(stage: &StageSettings) -> Result<StageSettings, DesignError
     Ok(stage)
 }
 
-/// The largest errors of the comparison's PID and full law beside those of the best PID, alone and with feedforward; changes
-/// against the best PID alone.
-pub fn honest_table(comparison: &Comparison, honest: &Comparison) -> Table {
-    let mut columns = vec![Column::new("Law")];
+/// Columns of errors with each knowledge at each velocity, and of their mean change, beside a column of names.
+pub(super) fn error_columns(names: &str) -> Vec<Column> {
+    let mut columns = vec![Column::new(names)];
     for knowledge in ModelKnowledge::ALL {
         for velocity in VELOCITIES_MM_S {
             let heading = format!("{} {velocity} mm/s", knowledge.short());
@@ -54,6 +53,12 @@ pub fn honest_table(comparison: &Comparison, honest: &Comparison) -> Table {
         let heading = format!("{} mean change", knowledge.short());
         columns.push(Column::with_unit(heading, "%"));
     }
+    columns
+}
+
+/// The largest errors of the comparison's PID and full law beside those of the best PID, alone and with feedforward; changes
+/// against the best PID alone.
+pub fn honest_table(comparison: &Comparison, honest: &Comparison) -> Table {
     let [alone, fed] = CONFIGURATIONS;
     let laws = [
         ("PID of the settings", comparison, Configuration::PID),
@@ -97,7 +102,7 @@ pub fn honest_table(comparison: &Comparison, honest: &Comparison) -> Table {
         caption: "Largest tracking error against the best PID: least error after a load step with |S| up to 1.7 and |T| up to 1.5 \
                   on the sampled loop"
             .to_owned(),
-        columns,
+        columns: error_columns("Law"),
         rows,
     }
 }

@@ -6,15 +6,13 @@ use crate::circle::CircleOutcome;
 use crate::circle::single_page::{circle_figures, circle_table, polar_figure};
 use crate::compare::comparison::Comparison;
 use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
-use crate::compare::honest::honest_table;
+use crate::compare::honest::{error_columns, honest_table};
 use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::{GLITCH_WINDOW, Metric};
 use crate::experiment::run_configuration::ModelKnowledge;
 use crate::pages::{UM_PER_MM, error_curve};
-use crate::report::{
-    Block, Cell, Column, Figure, Lines, Page, Plot, Provenance, Section, Style, Table,
-};
+use crate::report::{Block, Cell, Figure, Lines, Page, Plot, Provenance, Section, Style, Table};
 
 /// Control period of the outcomes' traces, s.
 const PERIOD_S: f64 = 1e-4;
@@ -43,15 +41,6 @@ pub fn comparison_tables(
 }
 
 fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
-    let mut columns = vec![Column::new("Configuration")];
-    for knowledge in ModelKnowledge::ALL {
-        for velocity in VELOCITIES_MM_S {
-            let heading = format!("{} {velocity} mm/s", knowledge.short());
-            columns.push(Column::with_unit(heading, "um"));
-        }
-        let heading = format!("{} mean change", knowledge.short());
-        columns.push(Column::with_unit(heading, "%"));
-    }
     let value = |configuration, knowledge, velocity| {
         comparison
             .find(configuration, knowledge, AMPLITUDE_MM, velocity)
@@ -86,7 +75,7 @@ fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
     Table {
         id: id.to_owned(),
         caption: format!("{} over two cycles; change against PID alone", metric.title),
-        columns,
+        columns: error_columns("Configuration"),
         rows,
     }
 }

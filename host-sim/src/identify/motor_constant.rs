@@ -489,10 +489,7 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
         let double_push = second(&integral(&middle, 0.0, step_s));
         let count = right.len().min(double_push.len());
         let columns = [double_push, vec![1.0; count], path.clone()];
-        let norms = columns.each_ref().map(|column| {
-            let square: f64 = column.iter().map(|value| value * value).sum();
-            square.sqrt().max(1e-12)
-        });
+        let norms = columns.each_ref().map(|column| norm(column));
         let matrix = DMatrix::from_fn(count, 3, |row, column| columns[column][row] / norms[column]);
         let right = right.rows(0, count);
         let Ok(solution) = matrix.clone().svd(true, true).solve(&right, 1e-12) else {
@@ -618,10 +615,7 @@ fn fit_ringing(
         second(&ring[1][start..start + positions.len()]),
     ];
     let count = columns.iter().map(Vec::len).fold(right.len(), usize::min);
-    let norms = columns.each_ref().map(|column| {
-        let square: f64 = column.iter().map(|value| value * value).sum();
-        square.sqrt().max(1e-12)
-    });
+    let norms = columns.each_ref().map(|column| norm(column));
     let matrix = DMatrix::from_fn(count, 5, |row, column| columns[column][row] / norms[column]);
     let right = DVector::from_column_slice(&right[..count]);
     let solution = matrix.clone().svd(true, true).solve(&right, 1e-12).ok()?;
@@ -636,6 +630,12 @@ fn fit_ringing(
         friction_v: slowing / gain,
     };
     Some((cost, pass))
+}
+
+/// Length of a column of a least-squares problem, above zero.
+fn norm(column: &[f64]) -> f64 {
+    let square: f64 = column.iter().map(|value| value * value).sum();
+    square.sqrt().max(1e-12)
 }
 
 /// The running integral of held samples over `base`, beginning at zero.

@@ -66,6 +66,6 @@ pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;
 pub use test_axis::{
-    AxisInfo, Drive, Experiment, ExperimentError, TestAxis, open_loop_mm, usable_mm,
+    AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, open_loop_mm, usable_mm,
 };
 pub use transport::Transport;

@@ -99,6 +99,42 @@ pub fn usable_mm(travel_mm: f64) -> f64 {
     (USED * travel_mm).min((USED_OF_SHORT * travel_mm).max(travel_mm - rest))
 }
 
+/// Sides of the travel that passes go through, there and back.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// The positive one, from the middle.
+    Positive,
+    /// Both, from the negative end: of a short travel.
+    Both,
+}
+
+/// Share of what is used of both sides: a pass begins somewhat beside its place.
+const OF_BOTH: f64 = 0.92;
+
+impl Sides {
+    /// Both, or the positive one.
+    pub const fn of(both: bool) -> Self {
+        if both { Self::Both } else { Self::Positive }
+    }
+
+    /// Length of a pass at most on a travel either way, mm.
+    pub fn room_mm(self, travel_mm: f64) -> f64 {
+        usable_mm(travel_mm)
+            * match self {
+                Self::Positive => 1.0,
+                Self::Both => 2.0 * OF_BOTH,
+            }
+    }
+
+    /// Position at which the axis stands before the first pass, mm.
+    pub fn start_mm(self, travel_mm: f64) -> f64 {
+        match self {
+            Self::Positive => 0.0,
+            Self::Both => -OF_BOTH * usable_mm(travel_mm),
+        }
+    }
+}
+
 /// Returns the positions between which an axis in open loop stays that stands at `here_mm`, mm.
 pub fn open_loop_mm(travel_mm: f64, here_mm: f64) -> (f64, f64) {
     let room = |to_end_mm: f64| OPEN_LOOP * to_end_mm.max(0.0);

@@ -7,7 +7,7 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 use super::estimate::{Estimate, Estimator, estimate};
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::setting::SettingError;
-use crate::machine::{Drive, Experiment, ExperimentError, TestAxis, approach, usable_mm};
+use crate::machine::{Drive, Experiment, ExperimentError, Sides, TestAxis, approach};
 use crate::record::Recording;
 
 /// Parameters of a frequency response measurement.
@@ -105,8 +105,6 @@ const JERK_MM_S3: f64 = 2e4;
 /// Travel either way below which both sides are used and periods are shorter by a factor, mm.
 const SHORT_MM: f64 = 60.0;
 const SHORT_PERIOD: f64 = 0.5;
-/// Share of what is used of both sides: a pass begins somewhat beside its place.
-const OF_BOTH: f64 = 0.92;
 /// Slowest pass that is chosen for a short travel, mm/s.
 const SLOWEST_MM_S: f64 = 0.5;
 
@@ -129,16 +127,12 @@ impl FrfSettings {
 
     /// Length of a pass at most, mm.
     fn room_mm(&self, travel_mm: f64) -> f64 {
-        usable_mm(travel_mm) * if self.two_sided { 2.0 * OF_BOTH } else { 1.0 }
+        Sides::of(self.two_sided).room_mm(travel_mm)
     }
 
     /// Position at which the axis stands before the first pass, mm.
     pub fn start_mm(&self, travel_mm: f64) -> f64 {
-        if self.two_sided {
-            -OF_BOTH * usable_mm(travel_mm)
-        } else {
-            0.0
-        }
+        Sides::of(self.two_sided).start_mm(travel_mm)
     }
 
     /// Passes, the longest of them in mm, and the time that all take, s; nothing if a pass does not fit the travel.

@@ -4,7 +4,7 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::map::{FrictionMap, FrictionRun};
 use crate::identify::setting::SettingError;
-use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis, usable_mm};
+use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis};
 use crate::record::Recording;
 
 /// Parameters of the measurement of the friction-velocity map.
@@ -64,8 +64,6 @@ const STRETCH_SHARE: f64 = 0.4;
 const SHORT_SETTLING_S: f64 = 0.6;
 /// Travel either way below which both sides are used, mm.
 const SHORT_MM: f64 = 60.0;
-/// Share of what is used of both sides: a run begins somewhat beside its place.
-const OF_BOTH: f64 = 0.92;
 /// Share of the largest velocity that a run takes at most.
 const MOST_VELOCITY: f64 = 0.6;
 /// Samples of a run's recording at least: about one a count of the encoder at the slowest velocities.
@@ -99,16 +97,12 @@ impl StaticFrictionSettings {
 
     /// Length of a run at most, mm.
     fn room_mm(&self, travel_mm: f64) -> f64 {
-        usable_mm(travel_mm) * if self.two_sided { 2.0 * OF_BOTH } else { 1.0 }
+        Sides::of(self.two_sided).room_mm(travel_mm)
     }
 
     /// Position at which the axis stands before the first run, mm.
     pub fn start_mm(&self, travel_mm: f64) -> f64 {
-        if self.two_sided {
-            -OF_BOTH * usable_mm(travel_mm)
-        } else {
-            0.0
-        }
+        Sides::of(self.two_sided).start_mm(travel_mm)
     }
 
     /// The longest run, mm, and the time that all take, s.
