@@ -25,7 +25,7 @@ pub trait Amplifiers {
     fn write(&mut self, outputs: &Outputs);
 
     /// Whose converters held something else than they were told when the last call of [`write`](Self::write) looked.
-    /// Where any did, that call has disabled the amplifiers.
+    /// If any did, that call has disabled the amplifiers.
     fn mismatches(&self) -> [bool; 3] {
         [false; 3]
     }

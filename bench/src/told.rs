@@ -1,4 +1,4 @@
-//! What a machine tells, as JSON for the page: names instead of numbers, times in s, errors in um.
+//! The machine's answers as JSON for the page: names instead of numbers, times in s, errors in um.
 
 use quadrant::link::message::{
     AxisName, AxisSet, AxisStatus, Event, FaultReport, INPUTS, Inputs, LimitedBy, Status,

@@ -16,7 +16,7 @@
 //! `crash_record` keeps the cause of a panic or a fault until the next start, and `start_record` how many starts in a row
 //! have not lasted, on any board.
 //!
-//! How to add a board: `docs/porting.md`.
+//! `docs/porting.md` tells how a board is added.
 
 #[cfg(all(feature = "board-mps2", feature = "board-nucleo-f446re"))]
 compile_error!("choose one board: `board-mps2` or `board-nucleo-f446re`, not both");

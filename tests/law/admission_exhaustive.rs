@@ -1,4 +1,4 @@
-//! What must be so before anything is enabled or moved: proved by trying every view of the stage there is.
+//! The conditions of enabling and of motion: proved by trying every view of the stage there is.
 //!
 //! A view is finite. Of the three axes y stands for all: what is asked of an axis depends on that axis and on what holds for
 //! the whole stage.

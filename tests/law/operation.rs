@@ -1,4 +1,4 @@
-//! Who may enable, which motions need their host, and how an emergency stops the stage.
+//! The rules of operation: enabling, motions that need their host, and the emergency stop.
 
 use quadrant::app::supervisor::{Event, StageView, Supervisor};
 use quadrant::axes::AxisName;
@@ -26,7 +26,7 @@ fn is_enabled(tasks: &Tasks) -> bool {
     tasks.upper.borrow().outputs.enabled
 }
 
-/// What the operator asks, and a while.
+/// A wish of the operator, and a while.
 fn operate(tasks: &mut Tasks, command: Command) {
     tasks.upper.borrow_mut().operate(command);
     tasks.run(40);

@@ -1,6 +1,6 @@
 //! The comparison of encoder and plant, against its definition in seconds, volts and millimetres.
 //!
-//! What is expected is integrated here in f64 from the description: no line of it is shared with the law.
+//! The expectation is integrated here in f64 from the description: no line of it is shared with the law.
 
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
@@ -139,13 +139,13 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
     let model = model();
     for words in AMPLIFIERS {
         let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);
-        for (open, holds_v) in [(true, model.held_v), (false, model.held_v)] {
+        for open in [true, false] {
             for volts in [0.55, 0.7, 1.0, -1.5, 4.0] {
                 let (mut force, mut velocity, mut distance) = (0.0_f64, 0.0_f64, 0.0_f64);
                 let found = expected(|_| {
                     force += (volts - force) * INTERVAL_S / (model.delay_s + FILTER_S);
                     let beyond = |limit: f64| (force.abs() - limit).max(0.0) * force.signum();
-                    let mut moves = beyond(holds_v);
+                    let mut moves = beyond(model.held_v);
                     if open && moves == 0.0 {
                         moves = beyond(model.breakaway_v);
                     }
@@ -168,15 +168,11 @@ fn an_encoder_that_stands_is_found_when_the_model_has_gone_the_distance() {
 
 #[test]
 fn a_speed_that_no_load_explains_is_found_when_it_has_gained_the_bound() {
-    for (proving_mm, of_load) in [(1e9, 1.0), (0.0, 3.0)] {
+    let model = model();
+    for (proving_mm, load_v) in [(1e9, model.first_load_v), (0.0, model.load_v)] {
         let model = PlausibilityModel {
             proving_mm,
-            ..model()
-        };
-        let load_v = if of_load == 1.0 {
-            model.first_load_v
-        } else {
-            model.load_v
+            ..model
         };
         for words in AMPLIFIERS {
             let axis = Plausibility::new(&model, words, COUNT_MM, PERIOD_S);

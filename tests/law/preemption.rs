@@ -1,4 +1,4 @@
-//! What the tasks agree on holds in every interleaving of them: nothing is decided on a state that has passed.
+//! The tasks' agreements in every interleaving of them: nothing is decided on a state that has passed.
 
 use quadrant::app::LINK_TIMEOUT_TICKS;
 use quadrant::command::Command;

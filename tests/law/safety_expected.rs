@@ -10,7 +10,7 @@ use quadrant::stage::{Outputs, StageState};
 use crate::common::Rig;
 use crate::safety_faults::{CASES, End, provoke};
 
-/// What a fault does to the outputs.
+/// A fault's effect on the outputs.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Does {
     /// Zero volts and disabled in the tick that finds it.
@@ -25,7 +25,7 @@ use Does::{Off, Start, Stop};
 /// Ticks of the longest stop with the simulated stage's settings, and the 200 that the axes rest before they are off.
 const STOP_TICKS: u32 = 1050 + 200;
 
-/// What it takes to clear a fault.
+/// The way to clear a fault.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Clears {
     Reset,

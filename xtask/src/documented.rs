@@ -12,7 +12,7 @@ use anyhow::{Context, Result, bail, ensure};
 
 use xtask::command;
 
-/// Where the commands run, a folder for each page.
+/// The folder in which the commands run, one below it for each page.
 const FOLDER: &str = "target/documented";
 /// Folders of the project that commands name.
 const NAMED: [&str; 2] = ["host-sim", "examples"];

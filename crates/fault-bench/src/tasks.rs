@@ -146,7 +146,7 @@ impl Upper {
         self.control.snapshot()
     }
 
-    /// What the operator's button asks.
+    /// The wish of the operator's button.
     pub fn operate(&mut self, command: Command) {
         if self.requests.len() < 3 {
             self.requests.push_back(command);
@@ -158,7 +158,7 @@ impl Upper {
         self.line.0.extend(bytes);
     }
 
-    /// What interrupts the server at one access: mostly nothing.
+    /// The interruption of the server at one access: mostly none.
     fn preempt(&mut self) {
         let ticks = match self.noise.bits() % 16 {
             0 => self.noise.bits() % 25,

@@ -36,7 +36,7 @@ impl Page {
     /// of the files. The same data give the same bytes.
     ///
     /// # Errors
-    /// What [`Self::to_html`] refuses, whatever the formats; files that cannot be written.
+    /// As [`Self::to_html`], whatever the formats; files that cannot be written.
     pub fn write(
         &self,
         folder: &Path,

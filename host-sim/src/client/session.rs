@@ -13,7 +13,7 @@ use quadrant::link::message::{MachineState, TelemetryBlock};
 use super::error::ClientError;
 use super::interrupt::Interrupt;
 use super::timeout::{ANSWER, BUSY, BUSY_PAUSE, Idempotency, answer_timeout, idempotency};
-use crate::machine::{SimulatedIo, Transport, VIEWER_ID};
+use crate::machine::{SimulatedIo, Transport, VIEWER_ID, encoded};
 
 /// Notices that are kept until someone asks for them; of more, the oldest are dropped.
 const MOST_NOTICES: usize = 1 << 14;
@@ -250,8 +250,8 @@ impl Client {
     }
 
     /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
-    /// its host has started when that falls silent. Asks for what others see, if they may look. Whoever lets time pass without [`wait`](Self::wait) calls this a few
-    /// times a second.
+    /// its host has started when that falls silent. Asks for everything that others see, if they may look. Whoever lets time
+    /// pass without [`wait`](Self::wait) calls this a few times a second.
     ///
     /// # Errors
     /// As [`request`](Self::request).
@@ -261,19 +261,16 @@ impl Client {
         if !(self.moves || shared) || self.now().saturating_sub(self.asked) < ALIVE {
             return Ok(());
         }
-        if shared {
-            self.look()?;
-        }
-        self.moves &= !self.status()?.is_at_rest();
+        let status = if shared { self.look()? } else { self.status()? };
+        self.moves &= !status.is_at_rest();
         Ok(())
     }
 
-    /// Asks for what others see who look at the machine.
-    fn look(&mut self) -> Result<(), ClientError> {
-        self.status()?;
+    /// Asks for everything that others see who look at the machine.
+    fn look(&mut self) -> Result<Status, ClientError> {
         self.inputs()?;
         self.fault()?;
-        Ok(())
+        self.status()
     }
 
     /// Stops the axes if somebody asked for it: once, and the outputs go off when it was asked for again before they are at
@@ -365,10 +362,7 @@ impl Client {
             id,
             body: body.clone(),
         };
-        let mut buffer = [0; FRAME_BYTES];
-        let bytes = frame::encode(&request, &mut buffer)
-            .expect("every request fits a frame")
-            .to_vec();
+        let bytes = encoded(&request);
         let attempts = match idempotency(body) {
             Idempotency::NotIdempotent => 1,
             Idempotency::Query | Idempotency::Idempotent => ATTEMPTS,

@@ -57,7 +57,7 @@ pub struct Difference {
     pub other: Option<Value>,
 }
 
-/// What the machine's draft has other than what acts: what `apply` would change.
+/// The settings that `apply` would change: those of the machine's draft that differ from the acting ones.
 ///
 /// # Errors
 /// A connection that is broken.
@@ -76,13 +76,13 @@ pub fn edited(client: &mut Client) -> Result<Vec<Difference>, ClientError> {
     Ok(differences)
 }
 
-/// What a file has other than what acts: what loading it would change.
+/// The settings that loading a file would change.
 ///
 /// # Errors
 /// A connection that is broken.
 pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Difference>, ClientError> {
     let mut paths = Vec::new();
-    // Every setting of every part is in one of the two; of the firmware's own lists that of the file has them all.
+    // A part that the file lacks is a path too: one difference.
     let _ = file.list("", &mut |path| paths.push(path.to_owned()));
     let mut differences = Vec::new();
     for path in paths {
@@ -259,7 +259,7 @@ pub struct Loaded {
 /// refuses one of them, or the whole, its draft is reverted.
 ///
 /// # Errors
-/// What the machine refuses; a connection that is broken.
+/// A setting that the machine refuses, or a connection that is broken.
 pub fn load(client: &mut Client, settings: &StageSettings) -> Result<Loaded, ExchangeError> {
     let outcome = write_draft(client, settings).and_then(|(changed, left)| {
         let applied = apply(client)?;

@@ -467,7 +467,7 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
             .map(|window| window[2 * lag] - 2.0 * window[lag] + window[0])
             .collect()
     };
-    let right = DVector::from_vec(second(positions));
+    let right = second(positions);
     let path = second(&integral(positions, positions[0], step_s));
     let none = Pass {
         sign,
@@ -489,26 +489,39 @@ fn fit_pass(recording: &Recording, begin: usize, from: usize, end: usize, lag: u
         let double_push = second(&integral(&middle, 0.0, step_s));
         let count = right.len().min(double_push.len());
         let columns = [double_push, vec![1.0; count], path.clone()];
-        let norms = columns.each_ref().map(|column| norm(column));
-        let matrix = DMatrix::from_fn(count, 3, |row, column| columns[column][row] / norms[column]);
-        let right = right.rows(0, count);
-        let Ok(solution) = matrix.clone().svd(true, true).solve(&right, 1e-12) else {
-            continue;
-        };
-        let cost = (&matrix * &solution - right).norm_squared();
-        if cost < best.0 {
-            let gain = solution[0] / norms[0];
-            let slowing = -sign * solution[1] / norms[1] / (lag as f64 * step_s).powi(2);
-            let pass = Pass {
-                sign,
-                gain,
-                damping_per_s: -solution[2] / norms[2],
-                friction_v: slowing / gain,
-            };
-            best = (cost, pass);
+        if let Some(fit) = fit_columns(&columns, &right[..count], sign, lag as f64 * step_s)
+            && fit.0 < best.0
+        {
+            best = fit;
         }
     }
     best.1
+}
+
+/// The pass whose columns, first those of push, friction and path, give `right` with the least squares over a lag, s; and what is
+/// left, squared.
+fn fit_columns<const N: usize>(
+    columns: &[Vec<f64>; N],
+    right: &[f64],
+    sign: f64,
+    lag_s: f64,
+) -> Option<(f64, Pass)> {
+    let norms = columns.each_ref().map(|column| norm(column));
+    let matrix = DMatrix::from_fn(right.len(), N, |row, column| {
+        columns[column][row] / norms[column]
+    });
+    let right = DVector::from_column_slice(right);
+    let solution = matrix.clone().svd(true, true).solve(&right, 1e-12).ok()?;
+    let cost = (&matrix * &solution - right).norm_squared();
+    let gain = solution[0] / norms[0];
+    let slowing = -sign * solution[1] / norms[1] / lag_s.powi(2);
+    let pass = Pass {
+        sign,
+        gain,
+        damping_per_s: -solution[2] / norms[2],
+        friction_v: slowing / gain,
+    };
+    Some((cost, pass))
 }
 
 /// Mean of A over the passes, and its standard deviation.
@@ -615,21 +628,8 @@ fn fit_ringing(
         second(&ring[1][start..start + positions.len()]),
     ];
     let count = columns.iter().map(Vec::len).fold(right.len(), usize::min);
-    let norms = columns.each_ref().map(|column| norm(column));
-    let matrix = DMatrix::from_fn(count, 5, |row, column| columns[column][row] / norms[column]);
-    let right = DVector::from_column_slice(&right[..count]);
-    let solution = matrix.clone().svd(true, true).solve(&right, 1e-12).ok()?;
-    let cost = (&matrix * &solution - right).norm_squared();
-    let gain = solution[0] / norms[0];
     let sign = recording.voltage_v[begin].signum();
-    let slowing = -sign * solution[1] / norms[1] / (lag as f64 * step_s).powi(2);
-    let pass = Pass {
-        sign,
-        gain,
-        damping_per_s: -solution[2] / norms[2],
-        friction_v: slowing / gain,
-    };
-    Some((cost, pass))
+    fit_columns(&columns, &right[..count], sign, lag as f64 * step_s)
 }
 
 /// Length of a column of a least-squares problem, above zero.

@@ -68,4 +68,4 @@ pub use tcp::TcpTransport;
 pub use test_axis::{
     AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, open_loop_mm, usable_mm,
 };
-pub use transport::Transport;
+pub use transport::{Transport, encoded};

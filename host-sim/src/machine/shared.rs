@@ -20,7 +20,7 @@ use quadrant::link::server::LinkServer;
 
 use super::simulated_io::SimulatedIo;
 use super::stream::or_none;
-use super::transport::Transport;
+use super::transport::{Transport, encoded};
 
 /// Number of a viewer's requests on their way to the machine; the client never gives it.
 pub const VIEWER_ID: u16 = u16::MAX;
@@ -31,7 +31,7 @@ const LOOK: Duration = Duration::from_millis(20);
 /// Time in which a viewer takes what it is sent; after that it is gone.
 const TAKING: Duration = Duration::from_secs(2);
 
-/// What a viewer asked of the machine: nothing, to stop, or to disable, the stronger of them.
+/// A viewer's wish of the machine: none, to stop, or to disable, the stronger of them.
 const NOTHING: u8 = 0;
 const STOP: u8 = 1;
 const DISABLE: u8 = 2;
@@ -44,7 +44,7 @@ pub struct Shared<T> {
     address: SocketAddr,
 }
 
-/// What holder and viewers have in common.
+/// The common ground of holder and viewers.
 #[derive(Default)]
 struct Hub {
     heard: Mutex<Heard>,
@@ -147,7 +147,7 @@ impl<T: Transport> Transport for Shared<T> {
 }
 
 impl Hub {
-    /// What a viewer that panicked left is as good as before: nothing is half written.
+    /// The answers kept so far, also after a viewer that panicked: nothing is half written.
     fn heard(&self) -> MutexGuard<'_, Heard> {
         self.heard.lock().unwrap_or_else(PoisonError::into_inner)
     }
@@ -231,11 +231,4 @@ fn tell(notices: &Receiver<Notice>, stream: &mut TcpStream) -> io::Result<()> {
         stream.write_all(&encoded(&Message::Notice(notice)))?;
     }
     Ok(())
-}
-
-fn encoded(message: &impl serde::Serialize) -> Vec<u8> {
-    let mut buffer = [0; FRAME_BYTES];
-    frame::encode(message, &mut buffer)
-        .expect("every message fits a frame")
-        .to_vec()
 }

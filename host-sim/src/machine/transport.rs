@@ -3,6 +3,9 @@
 use std::io;
 use std::time::Duration;
 
+use quadrant::link::frame::{self, FRAME_BYTES};
+use serde::Serialize;
+
 use super::simulated_io::SimulatedIo;
 
 /// A connection that carries bytes both ways, and the clock by which it waits.
@@ -38,4 +41,15 @@ pub trait Transport {
     fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
         None
     }
+}
+
+/// The bytes of a message of the link, as they are sent.
+///
+/// # Panics
+/// Never: every message fits a frame.
+pub fn encoded(message: &impl Serialize) -> Vec<u8> {
+    let mut buffer = [0; FRAME_BYTES];
+    frame::encode(message, &mut buffer)
+        .expect("every message fits a frame")
+        .to_vec()
 }

@@ -507,7 +507,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.overspeed.speed()
     }
 
-    /// What the axis shows of its motion and output.
+    /// The axis' motion and output as it shows them.
     #[inline(always)]
     fn shown(&self) -> Shown {
         Shown {

@@ -123,7 +123,7 @@ pub struct Plausibility {
     velocity: i32,
 }
 
-/// What an axis shows at a comparison.
+/// An axis at a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Shown {
     /// Low bits of the count.

@@ -29,7 +29,8 @@ const STOP_TICKS: u32 = 1050 + 200;
 const UNPLANNED_MM: f64 = 2.1;
 /// Speed below which an axis comes to rest, mm/s: if its encoder dies then, the voltage that it has may be that of a load.
 const COMING_TO_REST_MM_S: f64 = 30.0;
-/// What coasts at a speed, mm per mm/s: 1 / B of the plant; and what the largest output adds that is on its way, A V Td / B, mm.
+/// The distance that an axis coasts, mm per mm/s: 1 / B of the plant; and that which the largest output adds while on its way,
+/// A V Td / B, mm.
 const COASTING_S: f64 = 1.0 / 144.8;
 const COASTING_MM: f64 = 69_390.0 * 10.0 * 1.2e-3 / 144.8;
 /// Ticks of a campaign, and the last one in which something happens.

@@ -49,7 +49,7 @@ pub struct ConnectedAxis<'a> {
     stage: StageSettings,
     travel_mm: f64,
     origin_mm: f64,
-    /// What was recorded of the last experiment, if that was stopped.
+    /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
 }
 

@@ -47,7 +47,7 @@ pub struct SimulatedTestAxis {
     travel_mm: f64,
     /// Largest distance of the table from zero so far, mm.
     farthest_mm: f64,
-    /// What was recorded last of an experiment that was stopped.
+    /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
     /// The axis under test is the first; the others stand still.
     stage: StageSettings,
