@@ -89,4 +89,5 @@ mod stream_refusals;
 mod structural_filters;
 mod supervisor;
 mod surface_laws;
+mod switches;
 mod telemetry;

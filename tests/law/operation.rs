@@ -4,7 +4,9 @@ use quadrant::app::supervisor::{Event, StageView, Supervisor};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::link::message::{AxisName as WireAxis, Body};
-use quadrant::safety::{AxisSwitches, EnabledBy, FaultCode, HostNeeded, SafetyState, Switches};
+use quadrant::safety::{
+    AxisSwitches, EnabledBy, FaultCode, HostNeeded, Operation, Reaction, SafetyState, Switches,
+};
 use quadrant::settings::{EmergencyReaction, StageSettings};
 use quadrant::stage::Outputs;
 
@@ -224,4 +226,29 @@ fn an_axis_that_is_pushed_while_the_outputs_are_off_is_told_once_a_push() {
     assert_eq!(told(enabled, 200), 0);
     assert_eq!(told(standing, 1), 0);
     assert_eq!(told(pushed, 50), 0);
+}
+
+#[test]
+fn the_rules_decide_over_three_faults_and_every_other_has_its_own_reaction() {
+    for [emergency_stop, link_lost, underrun] in [
+        [Reaction::Off, Reaction::Stop, Reaction::Hold],
+        [Reaction::Stop, Reaction::Hold, Reaction::Off],
+        [Reaction::Hold, Reaction::Off, Reaction::Stop],
+    ] {
+        let operation = Operation {
+            emergency_stop,
+            link_lost,
+            underrun,
+            ..Operation::default()
+        };
+        for code in FaultCode::ALL {
+            let expected = match code {
+                FaultCode::EmergencyStop => emergency_stop,
+                FaultCode::LinkLost => link_lost,
+                FaultCode::StreamUnderrun => underrun,
+                other => other.reaction(),
+            };
+            assert_eq!(operation.reaction(code), expected, "{code:?}");
+        }
+    }
 }

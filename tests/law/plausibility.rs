@@ -290,3 +290,124 @@ fn a_wrong_sign_is_found_as_soon_wherever_the_counter_began() {
     });
     assert_eq!(found, [found[0]; 3]);
 }
+
+/// Time, s, at most 0.1, until an axis is found that speeds up at 8000 mm/s^2 without a voltage, and whose count stands at `count`
+/// when the memory begins, at another place afterwards if it is given one, and `first` counts on from the first comparison.
+fn gain_found_s(axis: &Plausibility, count: i32, moved_to: Option<i32>, first: i32) -> Option<f64> {
+    let shown = |count: i32, speed_mm_s: f64| Shown {
+        count,
+        speed: (speed_mm_s * SPEED).round() as i32,
+        words: 0,
+        open: false,
+    };
+    let mut state = axis.start(shown(count, 0.0));
+    if let Some(count) = moved_to {
+        state.recount(count);
+    }
+    let count = moved_to.unwrap_or(count).wrapping_add(first);
+    (1..250)
+        .map(|index| f64::from(index) * INTERVAL_S)
+        .find(|time_s| !axis.step(&mut state, shown(count, 8000.0 * time_s)))
+}
+
+#[test]
+fn the_first_motion_is_what_the_axis_has_gone_since_it_was_enabled_wherever_its_counter_stands() {
+    // 0.5 mm: 1000 counts. Until then 1 V of load is believed, and 3 V afterwards.
+    let model = PlausibilityModel {
+        proving_mm: 0.5,
+        ..model()
+    };
+    let axis = Plausibility::new(&model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+    let [at_first, later] = [0, 5000].map(|first| gain_found_s(&axis, 0, None, first));
+    assert!(
+        at_first.is_some() && at_first < later,
+        "{at_first:?}, {later:?}"
+    );
+    for count in [0, 1_000_000, -40_000_000, i32::MAX] {
+        for moved_to in [None, Some(0), Some(77), Some(-1_000_000)] {
+            let what = format!("{count}, {moved_to:?}");
+            let found = |first| gain_found_s(&axis, count, moved_to, first);
+            for first in [0, 1000, -1000] {
+                assert_eq!(found(first), at_first, "{what}, {first}");
+            }
+            for first in [1001, -1001] {
+                assert_eq!(found(first), later, "{what}, {first}");
+            }
+        }
+    }
+}
+
+#[test]
+fn two_counts_to_and_fro_are_no_motion() {
+    let axis = Plausibility::new(&model(), AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+    let found = |counts: f64| {
+        let moves = |time_s: f64| {
+            let forth = (time_s / INTERVAL_S).round() as i32 % 2 == 1;
+            (if forth { counts * COUNT_MM } else { 0.0 }, 0.0)
+        };
+        // As much as a load may hold.
+        time_until_found(&axis, AMPLIFIERS[0], true, |_| 1.0, moves)
+    };
+    let stands = found(0.0);
+    assert!(stands.is_some());
+    for counts in [1.0, -1.0, 2.0, -2.0] {
+        assert_eq!(found(counts), stands, "{counts}");
+    }
+    for counts in [3.0, -3.0] {
+        assert_eq!(found(counts), None, "{counts}");
+    }
+}
+
+#[test]
+fn a_loop_that_is_opened_begins_its_standstill_anew() {
+    let axis = Plausibility::new(&model(), AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+    let word = (0.7 * AMPLIFIERS[0].per_volt).round() as i32 * INTERVAL as i32;
+    let found_after = |before: u32, forgets: bool| {
+        let mut state = PlausibilityState::default();
+        let mut shown = Shown {
+            count: 0,
+            speed: 0,
+            words: 0,
+            open: false,
+        };
+        let mut step = |state: &mut PlausibilityState| {
+            shown.words = shown.words.wrapping_add(word);
+            axis.step(state, shown)
+        };
+        for _ in 0..before {
+            assert!(step(&mut state));
+        }
+        if forgets {
+            state.forget_standstill();
+        }
+        (0..1000).find(|_| !step(&mut state)).expect("found")
+    };
+    let anew = found_after(30, true);
+    assert_eq!(found_after(100, true), anew);
+    assert!(found_after(30, false) < anew);
+    assert!(found_after(100, false) < found_after(30, false));
+}
+
+#[test]
+fn a_spent_budget_says_nothing_of_a_closed_loop() {
+    let axis = Plausibility::without_model(0.02, 0.5, AMPLIFIERS[0], PERIOD_S);
+    let mut state = PlausibilityState::default();
+    let mut shown = Shown {
+        count: 0,
+        speed: 0,
+        words: 0,
+        open: true,
+    };
+    let word = 3 * AMPLIFIERS[0].per_volt as i32 * INTERVAL as i32;
+    for _ in 0..1000 {
+        shown.words += word;
+        if !axis.step(&mut state, shown) {
+            break;
+        }
+    }
+    shown.words += word;
+    assert!(!axis.step(&mut state, shown));
+    shown.open = false;
+    shown.words += word;
+    assert!(axis.step(&mut state, shown));
+}

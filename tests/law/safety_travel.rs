@@ -324,9 +324,11 @@ fn the_measured_position_counts_wherever_the_reference_is() {
         let mut state = TravelState::default();
         let mut step =
             |measured| travel.step(&mut state, &ramp, Position::ZERO, Position::ZERO, measured);
-        assert_eq!(step(mm(side * 9.9)), Ok(()));
+        let end = mm(side * 10.0);
+        assert_eq!(step(end), Ok(()));
         // The reference stands in the middle.
-        assert_eq!(step(mm(side * 10.1)), Err(FaultCode::TravelExceeded));
+        let beyond = end + Position(side as i64);
+        assert_eq!(step(beyond), Err(FaultCode::TravelExceeded));
     }
 }
 

@@ -217,7 +217,7 @@ impl Plausibility {
 
     /// A memory of an axis whose outputs are off until now: anything may have moved it.
     #[inline(always)]
-    pub(crate) fn start(&self, shown: Shown) -> PlausibilityState {
+    pub fn start(&self, shown: Shown) -> PlausibilityState {
         let speed = shown.speed.wrapping_shl(self.shift);
         PlausibilityState {
             count: shown.count,
@@ -242,7 +242,7 @@ impl Plausibility {
             self.moves_along(state, counts, speed) & self.stands(state, counts, shown.open)
         } else {
             state.force = pushed;
-            !shown.open | (self.push == 0) | self.stands(state, counts, shown.open)
+            !shown.open | self.stands(state, counts, shown.open)
         }
     }
 
@@ -299,12 +299,12 @@ impl Plausibility {
 
 impl PlausibilityState {
     /// Goes on from another origin of the count.
-    pub(crate) fn recount(&mut self, count: i32) {
+    pub fn recount(&mut self, count: i32) {
         self.count = count;
     }
 
     /// Begins a standstill anew: the loop is opened.
-    pub(crate) fn forget_standstill(&mut self) {
+    pub fn forget_standstill(&mut self) {
         self.travelled = 0;
         self.modelled = 0;
         self.distance = 0;
