@@ -5,11 +5,15 @@
 mod attribution;
 mod board_smoke;
 mod combinations;
+mod cortex_m;
 mod count;
+mod cycles;
 mod faults;
 mod gdb;
 mod interrupt_latency;
+mod kinds;
 mod lockstep;
+mod longest_path;
 mod reference_model;
 mod saturation;
 mod stages;
@@ -48,6 +52,8 @@ enum Verb {
     Faults(FaultArgs),
     /// Count the instructions of one control tick, stage by stage
     Count(CountArgs),
+    /// Calculate the cycles of one control tick, and a bound of them
+    Cycles(CountArgs),
     /// Run every feedback law with every feedforward in lockstep, and count what each costs
     Combinations(CombinationArgs),
     /// Count the instructions of a control tick while link, queues and log are overloaded
@@ -89,7 +95,7 @@ struct FaultArgs {
     overwrite_expected: bool,
 }
 
-/// Options of a count.
+/// Options of a count or a calculation of cycles.
 #[derive(Args)]
 struct CountArgs {
     /// The firmware's number type
@@ -145,6 +151,9 @@ fn run(cli: Cli) -> Result<()> {
         Verb::Saturation { scalar } => saturation::run(toolchain, scalar),
         Verb::Count(args) => {
             count::run(toolchain, args.scalar, args.ticks, args.overwrite_expected)
+        }
+        Verb::Cycles(args) => {
+            cycles::run(toolchain, args.scalar, args.ticks, args.overwrite_expected)
         }
         Verb::Combinations(args) => {
             combinations::lockstep(toolchain, args.scalar)?;

@@ -167,7 +167,7 @@ fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
     let counted = ticks
         .get(..TICKS as usize)
         .context("the trace ends too early")?;
-    Ok(counted.iter().map(|tick| tick.values().sum()).collect())
+    Ok(counted.iter().map(|tick| tick.instructions()).collect())
 }
 
 /// Runs the motion, and the load from [`LOADED`] on.

@@ -130,8 +130,21 @@ impl Tracer {
 /// Functions that follow a control tick: seeing the first instruction of one ends the tick.
 const FOLLOWERS: [&str; 4] = ["DISPATCHER_0", "DISPATCHER_1", "DISPATCHER_2", "main"];
 
-/// Instructions of one tick, by stage.
-pub(crate) type Tick = BTreeMap<&'static str, u32>;
+/// One tick.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Tick {
+    /// Its number of instructions, by stage.
+    pub(crate) stages: BTreeMap<&'static str, u32>,
+    /// The addresses of its instructions, in the order of execution.
+    pub(crate) path: Vec<u32>,
+}
+
+impl Tick {
+    /// Its number of instructions.
+    pub(crate) fn instructions(&self) -> u32 {
+        self.path.len() as u32
+    }
+}
 
 /// Follows a trace.
 struct Tally<'a> {
@@ -163,7 +176,7 @@ impl Tally<'_> {
         if address == self.root {
             self.closed.extend(self.open.take().map(|open| open.tick));
             self.open = Some(OpenTick {
-                tick: Tick::new(),
+                tick: Tick::default(),
                 calls: Vec::new(),
                 last: stages::OTHER,
             });
@@ -191,7 +204,8 @@ impl Tally<'_> {
             .last()
             .map_or(stages::OTHER, |(_, caller)| caller);
         let stage = self.attribution.stage(address)?.unwrap_or(caller);
-        *open.tick.entry(stage).or_default() += 1;
+        *open.tick.stages.entry(stage).or_default() += 1;
+        open.tick.path.push(address);
         open.last = stage;
         Ok(())
     }

@@ -34,6 +34,7 @@ mod glitch_monitor;
 mod homing;
 mod injection;
 mod injection_ends;
+mod injection_over_link;
 mod jog;
 mod learning;
 mod link_frames;

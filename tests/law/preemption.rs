@@ -100,7 +100,11 @@ fn enable_and_store_in_one_burst_write_nothing_while_the_outputs_are_on() {
 fn slower() -> Body {
     let mut settings = settings();
     settings.axes[0].limits.max_velocity_mm_s = 100.0;
-    let path = "/axes/0/limits/max_velocity_mm_s";
+    set("/axes/0/limits/max_velocity_mm_s", &settings)
+}
+
+/// Sets a leaf as it is in some settings.
+fn set(path: &str, settings: &StageSettings) -> Body {
     let mut bytes = [0; quadrant::settings::MAX_VALUE_BYTES];
     let (kind, length) = settings.get_bytes(path, &mut bytes).expect("a leaf");
     Body::Settings(SettingsRequest::Set {
@@ -132,6 +136,24 @@ fn enable_waits_for_the_settings_that_were_applied_before_it() {
     tasks.run(300);
     assert!(refused(tasks.answers.get(&(first + 2))));
     assert!(!tasks.upper.borrow().outputs.enabled);
+}
+
+#[test]
+fn settings_that_may_change_while_driven_act_and_leave_the_outputs_on() {
+    let mut tasks = enabled();
+    let mut changed = settings();
+    changed.axes[0].feedback.pid.kp_v_per_mm *= 0.5;
+    let path = "/axes/0/feedback/pid/kp_v_per_mm";
+    tasks.ask(set(path, &changed)).expect("a draft");
+    tasks
+        .ask(Body::Settings(SettingsRequest::Apply))
+        .expect("applies");
+    tasks.run(300);
+    assert!(tasks.upper.borrow().outputs.enabled);
+    tasks.ask(slower()).expect("a draft");
+    let refusal = tasks.ask(Body::Settings(SettingsRequest::Apply));
+    assert!(refusal.is_err(), "{refusal:?}");
+    assert!(tasks.upper.borrow().outputs.enabled);
 }
 
 #[test]

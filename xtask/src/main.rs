@@ -59,6 +59,8 @@ enum Verb {
     Faults(Forwarded),
     /// Count the instructions of one control tick, stage by stage
     Count(Forwarded),
+    /// Calculate the cycles of one control tick on the reference board, and a bound of them
+    Cycles(Forwarded),
     /// Run every feedback law with every feedforward in lockstep, and count what each costs
     Combinations(Forwarded),
     /// Count the instructions of a control tick while link, queues and log are overloaded
@@ -172,6 +174,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::BoardSmoke(args) => forward(toolchain()?, "board-smoke", args)?,
         Verb::Faults(args) => forward(toolchain()?, "faults", args)?,
         Verb::Count(args) => forward(toolchain()?, "count", args)?,
+        Verb::Cycles(args) => forward(toolchain()?, "cycles", args)?,
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
         Verb::Documented(options) => documented::run(&options)?,

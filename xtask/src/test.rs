@@ -304,6 +304,7 @@ fn emulated(report: &mut Report, toolchain: Toolchain) -> Result<()> {
         step(&of("paced by the timer"), &verb(&["emulate", "--paced"]));
         step(&of("every fault injected"), &verb(&["faults"]));
         step(&of("instructions per tick"), &verb(&["count"]));
+        step(&of("cycles per tick, by calculation"), &verb(&["cycles"]));
         step(
             &of("every law and feedforward, and instructions of each"),
             &verb(&["combinations"]),

@@ -795,23 +795,52 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             speed: 0,
             ..state.shown()
         };
-        *state = AxisState {
-            encoder: state.encoder.clone(),
-            plausibility: self.plausibility.start(shown),
-            overload: state.overload,
-            homed: state.homed,
-            index: state.index,
-            following: self.following.start(),
-            learning: self.learning.resume(&state.learning),
-            look_ahead: here,
-            preview: [here; PREVIEW_ROOM],
-            telemetry: AxisTelemetry {
-                bumpless_offset: S::ZERO,
-                output: S::ZERO,
-                ..state.telemetry
-            },
-            ..AxisState::default()
-        };
+        // Field by field: a whole state, made apart and copied, takes half a tick longer.
+        let AxisState {
+            encoder: _,
+            homed: _,
+            overload: _,
+            index: _,
+            overspeed,
+            signal_loss,
+            travel,
+            telemetry,
+            displacement,
+            displacement_before,
+            look_ahead,
+            following,
+            acceleration,
+            reference_velocity,
+            injected,
+            feedback,
+            filters,
+            friction,
+            generator,
+            plausibility,
+            preview,
+            pulse,
+            learning,
+        } = state;
+        *overspeed = OverspeedState::default();
+        *signal_loss = SignalLossState::default();
+        *travel = TravelState::default();
+        telemetry.bumpless_offset = S::ZERO;
+        telemetry.output = S::ZERO;
+        *displacement = Position::ZERO;
+        *displacement_before = Position::ZERO;
+        *look_ahead = here;
+        *following = self.following.start();
+        *acceleration = S::ZERO;
+        *reference_velocity = S::ZERO;
+        *injected = S::ZERO;
+        *feedback = FeedbackState::default();
+        *filters = FiltersState::default();
+        *friction = FeedforwardState::default();
+        *generator = GeneratorState::default();
+        *plausibility = self.plausibility.start(shown);
+        *preview = [here; PREVIEW_ROOM];
+        *pulse = None;
+        *learning = self.learning.resume(learning);
     }
 
     /// Starts or ends a motion, from where the reference stands. Only what
