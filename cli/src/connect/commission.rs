@@ -18,5 +18,8 @@ pub(super) fn run(client: &mut Client, options: &CommissionOptions) -> anyhow::R
         store: options.store,
     };
     let done = job.run(client)?;
-    Ok(Answer::new(done.text.trim_end(), done.data))
+    Ok(Answer {
+        failure: done.failure,
+        ..Answer::new(done.text.trim_end(), done.data)
+    })
 }
