@@ -286,6 +286,8 @@ impl Job<'_> {
             machine.store(&origin)?;
             text.push_str("They are kept for the next start.\n");
         }
+        let drift = found.found.drift_note();
+        text.extend(drift.iter().map(|note| format!("{note}\n")));
         let verdict: Vec<_> = found
             .found
             .verification
@@ -300,6 +302,7 @@ impl Job<'_> {
             "settings": path,
             "verdict": verdict,
             "better_than_pid": better,
+            "drift": found.found.verification.as_ref().map(|tried| tried.drift.ratio()),
             "applied": self.apply && better,
             "stored": self.store && better,
         });
