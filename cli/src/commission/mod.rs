@@ -18,14 +18,14 @@ use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
 use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
-use quadrant_sim::machine::{Journal, Machine, TestAxis};
+use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
 use super::endpoint::Endpoint;
-use super::subject::{travel, travel_mm};
+use super::subject::{known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
 use quadrant_cli::{say, terminal, warn};
@@ -49,9 +49,10 @@ pub(super) struct Arguments {
     /// verdict and no cross-check.
     #[arg(long, value_name = "FOLDER")]
     record: Option<PathBuf>,
-    /// Travel either way from where the axis stands, mm; without it, that to the soft limits of a homed axis.
-    #[arg(long, value_name = "MM", value_parser = travel, conflicts_with = "record")]
-    travel: Option<f64>,
+    /// Travel from where the axis stands, mm: 200 for as much either way, or -5..180 of one that stands near an end. Without it,
+    /// that to the soft limits of a homed axis.
+    #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true, conflicts_with = "record")]
+    travel: Option<Travel>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
     /// Without them those of --into if it is there, else those that the machine has, and the axes that were commissioned
     /// into the folder for results before.
@@ -103,8 +104,8 @@ struct Found {
 /// A commissioning of one axis of a machine.
 pub(super) struct Job<'a> {
     pub(super) axis: AxisName,
-    /// Travel either way, mm; without it, that to the soft limits.
-    pub(super) travel_mm: Option<f64>,
+    /// Travel from where the axis stands; without it, that to the soft limits.
+    pub(super) travel: Option<Travel>,
     /// Settings to start from; without them, those of the machine.
     pub(super) start: Option<SettingsFile>,
     /// File for the settings, in place of `settings.toml` in the folder for results.
@@ -149,7 +150,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut machine = arguments.machine.open(output.seed)?;
     let job = Job {
         axis: (*axis).into(),
-        travel_mm: arguments.travel,
+        travel: arguments.travel,
         start,
         into: into.as_deref(),
         request,
@@ -228,7 +229,7 @@ impl Job<'_> {
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
         output.ready()?;
-        let travel_mm = travel_mm(machine, axis, self.travel_mm, None)?;
+        let travel = known_travel(machine, axis, self.travel)?;
         let before = machine.settings()?;
         let mut file = match self.start {
             Some(file) => file,
@@ -238,7 +239,7 @@ impl Job<'_> {
         let folder = output.below(axis.as_str());
         let experiments = folder.file(EXPERIMENTS)?;
         let outcome = {
-            let mut test_axis = machine.test_axis(axis, travel_mm)?;
+            let mut test_axis = machine.test_axis(axis, travel)?;
             let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
                 .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
             self.request.run(&mut journal, &base, output.seed)
@@ -491,17 +492,17 @@ mod tests {
             self.stage.settings()
         }
 
-        fn free_travel_mm(&mut self, axis: AxisName) -> Result<Option<f64>, MachineError> {
-            self.stage.free_travel_mm(axis)
+        fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
+            self.stage.free_travel(axis)
         }
 
         fn test_axis(
             &mut self,
             axis: AxisName,
-            travel_mm: f64,
+            travel: Travel,
         ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
             let dead = self.dead;
-            let axis = self.stage.test_axis(axis, travel_mm)?;
+            let axis = self.stage.test_axis(axis, travel)?;
             Ok(Box::new(SpoiltAxis { axis, dead }))
         }
 
@@ -563,7 +564,7 @@ mod tests {
         let Words { request, output } = clap::Parser::parse_from(words);
         let job = Job {
             axis: AxisName::X,
-            travel_mm: Some(30.0),
+            travel: Some(Travel::either_way(30.0)),
             start: None,
             into: None,
             request: &request,

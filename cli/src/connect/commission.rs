@@ -9,7 +9,7 @@ use crate::commission::Job;
 pub(super) fn run(client: &mut Client, options: &CommissionOptions) -> anyhow::Result<Answer> {
     let job = Job {
         axis: options.axis.into(),
-        travel_mm: options.travel,
+        travel: options.travel,
         start: None,
         into: None,
         request: &options.request,

@@ -34,7 +34,7 @@ const STEPS: [(&str, f64); 6] = [
     ("verdict", 0.14),
 ];
 
-/// Position from which the experiments begin, mm: that in which the axis was switched on, in the middle of its travel.
+/// Position from which the experiments begin, mm: the middle of the travel.
 const HOME_MM: f64 = 0.0;
 /// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
 const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
@@ -82,13 +82,17 @@ fn guarded(
     };
 
     test_axis.apply(&zero_gain_settings(base))?;
-    let steps = MotorConstantSettings::default().fitted_to(test_axis.info().travel_mm);
+    let steps = MotorConstantSettings::default().fitted_to(test_axis.info().first_room_mm());
     let motor = motor_constant::measure(test_axis, &steps, &mut |share| {
         report(step, share);
     })?;
 
     let [ahead_v, back_v] = motor.directed_v;
     test_axis.slowed_by(motor.gain_mm_per_v_s2 * ahead_v.min(back_v));
+
+    if middle_first(&test_axis.info()).is_some() {
+        to_the_middle(test_axis, base, &motor)?;
+    }
 
     step += 1;
     let (response, plant) = linear_model(test_axis, base, &motor, &mut |share| {
@@ -145,6 +149,34 @@ fn guarded(
     found.settings = verification.settings(&found.settings);
     found.verification = Some(verification);
     Ok(found)
+}
+
+/// The place to which an axis moves first that stands near an end, mm; none if it stands near enough to the middle.
+pub(super) fn middle_first(info: &AxisInfo) -> Option<f64> {
+    (info.start_mm.abs() > NEAR_MIDDLE * info.travel_mm).then_some(HOME_MM)
+}
+
+/// Share of the travel within which an axis counts as in the middle.
+const NEAR_MIDDLE: f64 = 0.1;
+
+/// Moves the axis to the middle of its travel under the first controller, or a softer one where that oscillates.
+fn to_the_middle(
+    test_axis: &mut Guard<'_>,
+    base: &AxisSettings,
+    motor: &MotorConstant,
+) -> Result<(), CommissionError> {
+    let rate_hz = test_axis.info().rate_hz;
+    let gain = motor.gain_mm_per_v_s2;
+    let mut outcome = Ok(());
+    for share in BOOTSTRAP_SHARES {
+        let settings = soft_bootstrap_settings(base, gain, rate_hz, share);
+        test_axis.apply(&with_rough_friction(settings, gain, motor.directed_v))?;
+        outcome = approach(test_axis, HOME_MM);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    Ok(outcome?)
 }
 
 /// The response of the sliding axis under a first controller, and the linear model. A mode that the first controller excites

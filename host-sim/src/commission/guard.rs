@@ -20,6 +20,8 @@ use crate::record::Recording;
 pub(super) const FOLLOWING_SHARE: f64 = 0.17;
 /// Share of the travel in which the axis comes to rest when its outputs go off.
 const COASTING_SHARE: f64 = 0.05;
+/// Shares of the way to the nearer end that tracking error and coasting may take, each.
+const OF_ROOM: f64 = 0.45;
 /// Share of the deceleration by friction that is counted on.
 const COUNTED_FRICTION: f64 = 0.7;
 /// Lowest limit of the velocity, mm/s.
@@ -49,6 +51,8 @@ pub struct Guard<'a> {
     slowing_mm_s2: Option<f64>,
     /// Position after the last experiment, mm.
     at_mm: Option<f64>,
+    /// Position in which the axis was seen last, mm.
+    seen_mm: f64,
     /// Everything that was run.
     pub runs: Vec<Run>,
     rings: Option<Ringing>,
@@ -60,6 +64,7 @@ impl<'a> Guard<'a> {
     /// Guards an axis of which nothing is known.
     pub fn new(axis: &'a mut dyn TestAxis) -> Self {
         Self {
+            seen_mm: axis.info().start_mm,
             axis,
             slowing_mm_s2: None,
             at_mm: None,
@@ -96,15 +101,22 @@ impl<'a> Guard<'a> {
         let Some(slowing) = self.slowing_mm_s2 else {
             return most;
         };
-        let stopped_from = (2.0 * slowing * COASTING_SHARE * travel_mm).sqrt();
+        let coasting_mm = (COASTING_SHARE * travel_mm).min(OF_ROOM * self.room_mm());
+        let stopped_from = (2.0 * slowing * coasting_mm).sqrt();
         let tripped_at = stopped_from / settings.limits.overspeed_ratio;
         tripped_at.max(LEAST_LIMIT_MM_S).min(most)
+    }
+
+    /// Way to the nearer end from where the axis was seen last, mm.
+    fn room_mm(&self) -> f64 {
+        (self.axis.info().travel_mm - self.seen_mm.abs()).max(0.0)
     }
 
     /// Limits of an experiment, from the travel.
     fn limited(&self, settings: &AxisSettings) -> AxisSettings {
         let mut settings = settings.clone();
-        let most_mm = FOLLOWING_SHARE * self.axis.info().travel_mm;
+        let share_mm = FOLLOWING_SHARE * self.axis.info().travel_mm;
+        let most_mm = share_mm.min(OF_ROOM * self.room_mm());
         let limits = &mut settings.limits;
         limits.following_error_mm = limits.following_error_mm.min(most_mm);
         limits.following_error_max_mm = limits.following_error_max_mm.min(most_mm);
@@ -151,6 +163,7 @@ impl<'a> Guard<'a> {
         };
         let most = |most: f64, volts: &f64| most.max(volts.abs());
         self.at_mm = recording.position_mm.last().copied().or(self.at_mm);
+        self.seen_mm = self.at_mm.unwrap_or(self.seen_mm);
         self.runs.push(Run {
             name: experiment.name.clone(),
             span_mm: (

@@ -47,10 +47,19 @@ pub struct AxisInfo {
     pub resolution_mm: f64,
     /// Largest voltage of the amplifier, V.
     pub full_scale_v: f64,
-    /// Travel either way from where the axis stood first, mm; an experiment that leaves it is stopped.
+    /// Travel either way from its middle, mm; an experiment that leaves it is stopped. Positions count from the middle.
     pub travel_mm: f64,
+    /// Position in which the axis stood first, mm.
+    pub start_mm: f64,
     /// Largest velocity, mm/s; an experiment that exceeds it is stopped.
     pub max_velocity_mm_s: f64,
+}
+
+impl AxisInfo {
+    /// Returns the way to the nearer end from where the axis stood first, mm.
+    pub fn first_room_mm(&self) -> f64 {
+        self.travel_mm - self.start_mm.abs()
+    }
 }
 
 /// An axis that experiments can be run on.

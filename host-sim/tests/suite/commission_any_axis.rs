@@ -5,7 +5,7 @@ use quadrant::friction::lugre::LugreParameters;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, Planned, commission, plan};
 use quadrant_sim::machine::{
-    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis,
+    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, Travel,
 };
 use quadrant_sim::plant::{AxisParameters, FrictionParameters, StageParameters};
 use quadrant_sim::record::Recording;
@@ -124,6 +124,32 @@ fn axes_unlike_the_simulated_stages_are_commissioned_and_beat_the_best_pid_every
         );
         assert!(worst <= 1.01 && mean < most, "{name}: {mean} {worst}");
     });
+}
+
+#[test]
+fn an_axis_that_stands_near_an_end_of_its_travel_moves_to_the_middle_first() {
+    for travel in [(4.0, 26.0), (26.0, 4.0)] {
+        let travel = Travel {
+            negative_mm: travel.0,
+            positive_mm: travel.1,
+        };
+        let mut test_axis = SimulatedTestAxis::new(0, x(), 1).with_travel(travel);
+        let base = StageSettings::simulated().axes[0].clone();
+        let request = CommissionSettings::default();
+        let planned = plan(&test_axis.info(), &request);
+        assert!(
+            planned.iter().any(|step| step.step.contains("middle")),
+            "{planned:?}"
+        );
+        let found = commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap();
+        let verification = found.verification.as_ref().unwrap();
+        assert!(verification.is_better_than_pid(), "{:?}", found.notes());
+        // In open loop it keeps to four tenths of the way to either end, and coasts on by less than the rest.
+        let first = &found.ran[0];
+        let (low_mm, high_mm) = first.span_mm;
+        assert!(low_mm > -15.0 && high_mm < 15.0, "{first:?}");
+        assert!(test_axis.farthest_mm() < travel.half_mm());
+    }
 }
 
 #[test]
