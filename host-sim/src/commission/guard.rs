@@ -22,6 +22,8 @@ pub(super) const FOLLOWING_SHARE: f64 = 0.17;
 const COASTING_SHARE: f64 = 0.05;
 /// Shares of the way to the nearer end that tracking error and coasting may take, each.
 const OF_ROOM: f64 = 0.45;
+/// Share of the travel that the tracking error may take in any case: an axis at its end must be able to come back.
+const LEAST_SHARE: f64 = 0.02;
 /// Share of the deceleration by friction that is counted on.
 const COUNTED_FRICTION: f64 = 0.7;
 /// Lowest limit of the velocity, mm/s.
@@ -65,9 +67,9 @@ impl<'a> Guard<'a> {
     pub fn new(axis: &'a mut dyn TestAxis) -> Self {
         Self {
             seen_mm: axis.info().start_mm,
+            at_mm: Some(axis.info().start_mm),
             axis,
             slowing_mm_s2: None,
-            at_mm: None,
             runs: Vec::new(),
             rings: None,
             last: Recording::default(),
@@ -116,7 +118,8 @@ impl<'a> Guard<'a> {
     fn limited(&self, settings: &AxisSettings) -> AxisSettings {
         let mut settings = settings.clone();
         let share_mm = FOLLOWING_SHARE * self.axis.info().travel_mm;
-        let most_mm = share_mm.min(OF_ROOM * self.room_mm());
+        let least_mm = LEAST_SHARE * self.axis.info().travel_mm;
+        let most_mm = share_mm.min((OF_ROOM * self.room_mm()).max(least_mm));
         let limits = &mut settings.limits;
         limits.following_error_mm = limits.following_error_mm.min(most_mm);
         limits.following_error_max_mm = limits.following_error_max_mm.min(most_mm);
@@ -132,8 +135,18 @@ impl<'a> Guard<'a> {
         let Drive::ClosedLoop(motion) = &experiment.drive else {
             return Ok(());
         };
-        let (Some(at_mm), Some(span)) = (self.at_mm, span_mm(motion)) else {
+        let Some(span) = span_mm(motion) else {
             return Ok(());
+        };
+        let Some(at_mm) = self.at_mm else {
+            if span.is_empty() {
+                return Ok(());
+            }
+            return Err(ExperimentError::Impossible {
+                experiment: experiment.name.clone(),
+                reason: "the axis was stopped and coasted on: where it stands is to be read first"
+                    .to_owned(),
+            });
         };
         // Towards the middle is always allowed.
         let travel_mm = self.axis.info().travel_mm;
@@ -181,7 +194,7 @@ impl<'a> Guard<'a> {
 /// Time at the end of an experiment that is kept, s.
 const LATEST_S: f64 = 0.5;
 /// Share of the travel by which an experiment may begin beside its place.
-const SLACK: f64 = 0.08;
+const SLACK: f64 = 0.06;
 
 /// Smallest and largest position of a motion, from where it begins, mm; none if that is not known beforehand.
 fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {

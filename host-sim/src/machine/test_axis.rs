@@ -100,6 +100,9 @@ const USED_OF_SHORT: f64 = 0.7;
 const SHORT_MM: f64 = 200.0;
 /// Share of the room in a direction after which an axis in open loop is stopped: it coasts on by as much again, and more.
 const OPEN_LOOP: f64 = 0.4;
+/// The same towards an end that is nearer than this share of the travel: what it coasts does not shrink with the room.
+const OPEN_LOOP_NEAR: f64 = 0.2;
+const NEAR_END: f64 = 0.52;
 
 /// Returns the travel that planned motions use of a travel either way, mm.
 pub fn usable_mm(travel_mm: f64) -> f64 {
@@ -146,7 +149,14 @@ impl Sides {
 
 /// Returns the positions between which an axis in open loop stays that stands at `here_mm`, mm.
 pub fn open_loop_mm(travel_mm: f64, here_mm: f64) -> (f64, f64) {
-    let room = |to_end_mm: f64| OPEN_LOOP * to_end_mm.max(0.0);
+    let room = |to_end_mm: f64| {
+        let share = if to_end_mm < NEAR_END * travel_mm {
+            OPEN_LOOP_NEAR
+        } else {
+            OPEN_LOOP
+        };
+        share * to_end_mm.max(0.0)
+    };
     (
         here_mm - room(travel_mm + here_mm),
         here_mm + room(travel_mm - here_mm),
