@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant_sim::machine::{Machine, TestAxis};
+use quadrant_sim::machine::{Machine, TestAxis, Travel};
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::endpoint::Endpoint;
@@ -55,9 +55,11 @@ pub(super) struct Measured<T> {
     pub(super) stage: StageSettings,
 }
 
+/// Largest travel, mm.
+const MOST_MM: f64 = 1e4;
+
 /// Reads a travel, mm.
 pub(super) fn travel(text: &str) -> Result<f64, String> {
-    const MOST_MM: f64 = 1e4;
     let value: f64 = text.parse().map_err(|error| format!("{error}"))?;
     if value > 0.0 && value <= MOST_MM {
         Ok(value)
@@ -66,7 +68,59 @@ pub(super) fn travel(text: &str) -> Result<f64, String> {
     }
 }
 
-/// Returns the travel that is given, else that to the soft limits, else `fallback_mm`.
+/// Reads a travel from where the axis stands: "200" either way, mm, or "-5..180".
+pub(super) fn travel_both_ways(text: &str) -> Result<Travel, String> {
+    let Some((low, high)) = text.split_once("..") else {
+        return travel(text).map(Travel::either_way);
+    };
+    let bound = |name: &str, text: &str, least: f64, most: f64| -> Result<f64, String> {
+        let value: f64 = text
+            .parse()
+            .map_err(|error| format!("{name} end {text:?}: {error}"))?;
+        if (least..=most).contains(&value) {
+            Ok(value)
+        } else {
+            Err(format!(
+                "{name} end {value} mm: it must be {least} to {most} mm"
+            ))
+        }
+    };
+    let low_mm = bound("lower", low, -MOST_MM, 0.0)?;
+    let high_mm = bound("upper", high, 0.0, MOST_MM)?;
+    if low_mm == high_mm {
+        return Err("the ends are the same: the axis could not move".to_owned());
+    }
+    Ok(Travel {
+        negative_mm: -low_mm,
+        positive_mm: high_mm,
+    })
+}
+
+/// Returns the travel that is given, else that to the soft limits.
+pub(super) fn known_travel(
+    machine: &mut dyn Machine,
+    axis: AxisName,
+    given: Option<Travel>,
+) -> anyhow::Result<Travel> {
+    let known = match given {
+        Some(travel) => Some(travel),
+        None => machine.free_travel(axis)?,
+    };
+    let travel = known.with_context(|| unknown_travel(axis))?;
+    if travel.nearer_mm() < LEAST_ROOM_MM {
+        bail!(
+            "{axis} stands {:.2} mm from an end of its travel: move it to at least {LEAST_ROOM_MM} mm from it, for the first test is in \
+             open loop",
+            travel.nearer_mm()
+        );
+    }
+    Ok(travel)
+}
+
+/// Least way to the nearer end from where an axis is commissioned, mm.
+const LEAST_ROOM_MM: f64 = 2.0;
+
+/// Returns the travel either way that is given, else that to the nearer soft limit, else `fallback_mm`.
 pub(super) fn travel_mm(
     machine: &mut dyn Machine,
     axis: AxisName,
@@ -75,14 +129,17 @@ pub(super) fn travel_mm(
 ) -> anyhow::Result<f64> {
     let known_mm = match given_mm {
         Some(travel_mm) => Some(travel_mm),
-        None => machine.free_travel_mm(axis)?,
+        None => machine.free_travel(axis)?.map(Travel::nearer_mm),
     };
-    known_mm.or(fallback_mm).with_context(|| {
-        format!(
-            "{axis} is not homed, or has no travel: home it and move it to the middle of its travel, or say with \
-             --travel how far it may go from where it stands"
-        )
-    })
+    known_mm
+        .or(fallback_mm)
+        .with_context(|| unknown_travel(axis))
+}
+
+fn unknown_travel(axis: AxisName) -> String {
+    format!(
+        "{axis} is not homed, or has no travel: home it, or say with --travel how far it may go from where it stands"
+    )
 }
 
 /// Runs `measure` on an axis, with the settings to start from: `start`, else those in force, which it has again
@@ -94,7 +151,7 @@ pub(super) fn on_axis<T>(
     start: Option<&AxisSettings>,
     measure: impl FnOnce(&mut dyn TestAxis, &AxisSettings) -> anyhow::Result<T>,
 ) -> anyhow::Result<T> {
-    let mut test_axis = machine.test_axis(axis, travel_mm)?;
+    let mut test_axis = machine.test_axis(axis, Travel::either_way(travel_mm))?;
     let before = test_axis.settings().clone();
     let outcome = measure(&mut *test_axis, start.unwrap_or(&before));
     test_axis.apply(&before)?;
@@ -180,5 +237,31 @@ impl Destination {
             axis.name()
         );
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_travel_is_as_much_either_way_or_from_one_end_to_the_other() {
+        assert_eq!(travel_both_ways("200"), Ok(Travel::either_way(200.0)));
+        let near_an_end = Travel {
+            negative_mm: 5.0,
+            positive_mm: 180.0,
+        };
+        assert_eq!(travel_both_ways("-5..180"), Ok(near_an_end));
+        assert!(travel_both_ways("0..180").is_ok());
+        for (text, said) in [
+            ("5..180", "lower end 5 mm: it must be -10000 to 0 mm"),
+            ("-5..-1", "upper end -1 mm: it must be 0 to 10000 mm"),
+            ("-5..x", "upper end \"x\""),
+            ("0..0", "could not move"),
+            ("-5", "above 0"),
+        ] {
+            let refused = travel_both_ways(text).unwrap_err();
+            assert!(refused.contains(said), "{text}: {refused}");
+        }
     }
 }

@@ -18,14 +18,14 @@ use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
 use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
-use quadrant_sim::machine::{Journal, Machine, TestAxis};
+use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
 use super::endpoint::Endpoint;
-use super::subject::{travel, travel_mm};
+use super::subject::{known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
 use quadrant_cli::{say, terminal, warn};
@@ -49,9 +49,10 @@ pub(super) struct Arguments {
     /// verdict and no cross-check.
     #[arg(long, value_name = "FOLDER")]
     record: Option<PathBuf>,
-    /// Travel either way from where the axis stands, mm; without it, that to the soft limits of a homed axis.
-    #[arg(long, value_name = "MM", value_parser = travel, conflicts_with = "record")]
-    travel: Option<f64>,
+    /// Travel from where the axis stands, mm: 200 for as much either way, or -5..180 of one that stands near an end. Without it,
+    /// that to the soft limits of a homed axis.
+    #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true, conflicts_with = "record")]
+    travel: Option<Travel>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
     /// Without them those of --into if it is there, else those that the machine has, and the axes that were commissioned
     /// into the folder for results before.
@@ -103,8 +104,8 @@ struct Found {
 /// A commissioning of one axis of a machine.
 pub(super) struct Job<'a> {
     pub(super) axis: AxisName,
-    /// Travel either way, mm; without it, that to the soft limits.
-    pub(super) travel_mm: Option<f64>,
+    /// Travel from where the axis stands; without it, that to the soft limits.
+    pub(super) travel: Option<Travel>,
     /// Settings to start from; without them, those of the machine.
     pub(super) start: Option<SettingsFile>,
     /// File for the settings, in place of `settings.toml` in the folder for results.
@@ -121,8 +122,8 @@ pub(super) struct Job<'a> {
 pub(super) struct Done {
     pub(super) text: String,
     pub(super) data: Value,
-    /// False if nothing better than the PID alone was found.
-    pub(super) better: bool,
+    /// Reason why it counts as failed, where nothing better than the PID alone was found.
+    pub(super) failure: Option<String>,
 }
 
 /// The file for the settings of the stage.
@@ -149,7 +150,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut machine = arguments.machine.open(output.seed)?;
     let job = Job {
         axis: (*axis).into(),
-        travel_mm: arguments.travel,
+        travel: arguments.travel,
         start,
         into: into.as_deref(),
         request,
@@ -166,12 +167,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         );
     }
     terminal::print(format_args!("{}", done.text));
-    if !done.better {
-        bail!(
-            "nothing was better than the PID alone on every sine; its settings are in {PID_ALONE}, and the page shows what was tried"
-        );
+    match done.failure {
+        Some(failure) => bail!(failure),
+        None => Ok(()),
     }
-    Ok(())
 }
 
 impl Arguments {
@@ -230,7 +229,7 @@ impl Job<'_> {
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
         output.ready()?;
-        let travel_mm = travel_mm(machine, axis, self.travel_mm, None)?;
+        let travel = known_travel(machine, axis, self.travel)?;
         let before = machine.settings()?;
         let mut file = match self.start {
             Some(file) => file,
@@ -240,7 +239,7 @@ impl Job<'_> {
         let folder = output.below(axis.as_str());
         let experiments = folder.file(EXPERIMENTS)?;
         let outcome = {
-            let mut test_axis = machine.test_axis(axis, travel_mm)?;
+            let mut test_axis = machine.test_axis(axis, travel)?;
             let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
                 .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
             self.request.run(&mut journal, &base, output.seed)
@@ -248,12 +247,21 @@ impl Job<'_> {
         machine
             .load(&before)
             .context("the machine did not take its old settings back")?;
-        let found = outcome.with_context(|| {
-            format!(
-                "the commissioning has ended early; with --resume it goes on with what is in {}",
-                experiments.display()
-            )
-        })?;
+        let found = match outcome {
+            Ok(found) => found,
+            Err(error) if Journal::is_empty(&experiments) => {
+                Journal::remove(&experiments)?;
+                return Err(
+                    error.context("the commissioning has ended before anything was measured")
+                );
+            }
+            Err(error) => {
+                return Err(error.context(format!(
+                    "the commissioning has ended early; with --resume it goes on with what is in {}",
+                    experiments.display()
+                )));
+            }
+        };
 
         let who = format!("the {axis} axis of {}", machine.description());
         let better = found.is_better_than_pid();
@@ -279,6 +287,8 @@ impl Job<'_> {
             machine.store(&origin)?;
             text.push_str("They are kept for the next start.\n");
         }
+        let drift = found.found.drift_note();
+        text.extend(drift.iter().map(|note| format!("{note}\n")));
         let verdict: Vec<_> = found
             .found
             .verification
@@ -293,10 +303,22 @@ impl Job<'_> {
             "settings": path,
             "verdict": verdict,
             "better_than_pid": better,
+            "drift": found.found.verification.as_ref().map(|tried| tried.drift.ratio()),
             "applied": self.apply && better,
             "stored": self.store && better,
         });
-        Ok(Done { text, data, better })
+        let failure = (!better).then(|| {
+            format!(
+                "nothing was better than the PID alone on every sine; its settings are in {}, and the page beside them shows what \
+                 was tried",
+                path.display()
+            )
+        });
+        Ok(Done {
+            text,
+            data,
+            failure,
+        })
     }
 }
 
@@ -435,5 +457,154 @@ impl Found {
         let mut lines = vec![format!("{}: the settings of the stage", path.display())];
         lines.extend(output.keep_page(&page, "commission.html")?);
         Ok(lines)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use quadrant_sim::machine::{AxisInfo, Experiment, ExperimentError, LawStage, MachineError};
+    use quadrant_sim::record::Recording;
+
+    use super::*;
+
+    /// The simulated stage, with an axis on which one kind of experiment goes wrong.
+    struct Spoilt {
+        stage: LawStage,
+        /// True if nothing can be measured; else every law but the PID shakes the axis.
+        dead: bool,
+    }
+
+    struct SpoiltAxis<'a> {
+        axis: Box<dyn TestAxis + 'a>,
+        dead: bool,
+    }
+
+    impl Machine for Spoilt {
+        fn description(&self) -> String {
+            self.stage.description()
+        }
+
+        fn is_simulated(&mut self) -> bool {
+            true
+        }
+
+        fn settings(&mut self) -> Result<StageSettings, MachineError> {
+            self.stage.settings()
+        }
+
+        fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
+            self.stage.free_travel(axis)
+        }
+
+        fn test_axis(
+            &mut self,
+            axis: AxisName,
+            travel: Travel,
+        ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
+            let dead = self.dead;
+            let axis = self.stage.test_axis(axis, travel)?;
+            Ok(Box::new(SpoiltAxis { axis, dead }))
+        }
+
+        fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
+            self.stage.load(settings)
+        }
+
+        fn store(&mut self, provenance: &str) -> Result<(), MachineError> {
+            self.stage.store(provenance)
+        }
+    }
+
+    impl TestAxis for SpoiltAxis<'_> {
+        fn info(&self) -> AxisInfo {
+            self.axis.info()
+        }
+
+        fn settings(&self) -> &AxisSettings {
+            self.axis.settings()
+        }
+
+        fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+            self.axis.apply(settings)
+        }
+
+        fn perform(
+            &mut self,
+            experiment: &Experiment,
+            progress: &mut dyn FnMut(f64),
+        ) -> Result<Recording, ExperimentError> {
+            if self.dead {
+                return Err(ExperimentError::Impossible {
+                    experiment: experiment.name.clone(),
+                    reason: "the line is cut".to_owned(),
+                });
+            }
+            let mut recording = self.axis.perform(experiment, progress)?;
+            if experiment.name.starts_with("N-PID") {
+                for position_mm in recording.position_mm.iter_mut().step_by(2) {
+                    *position_mm += 0.5;
+                }
+            }
+            Ok(recording)
+        }
+    }
+
+    #[derive(clap::Parser)]
+    struct Words {
+        #[command(flatten)]
+        request: Request,
+        #[command(flatten)]
+        output: Output,
+    }
+
+    /// A quick commissioning of x into a folder.
+    fn commission_into(folder: &Path, machine: &mut Spoilt) -> anyhow::Result<Done> {
+        let words = ["", "--quick", "--out"].map(std::ffi::OsStr::new);
+        let words = words.into_iter().chain([folder.as_os_str()]);
+        let Words { request, output } = clap::Parser::parse_from(words);
+        let job = Job {
+            axis: AxisName::X,
+            travel: Some(Travel::either_way(30.0)),
+            start: None,
+            into: None,
+            request: &request,
+            output: &output,
+            apply: true,
+            store: false,
+        };
+        job.run(machine)
+    }
+
+    #[test]
+    fn where_nothing_beats_the_pid_it_fails_and_its_settings_are_in_the_folder_of_the_axis() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut machine = Spoilt {
+            stage: LawStage::new(1),
+            dead: false,
+        };
+        let before = machine.settings().unwrap();
+        let done = commission_into(folder.path(), &mut machine).unwrap();
+        let kept = folder.path().join("x").join(PID_ALONE);
+        let failure = done.failure.unwrap();
+        assert!(failure.contains(&*kept.to_string_lossy()), "{failure}");
+        let axis = &SettingsFile::read(&kept).unwrap().stage.axes[0];
+        assert_eq!(axis.feedback.law, quadrant::control::feedback::LawKind::Pid);
+        assert!(!folder.path().join(SETTINGS).exists());
+        assert_eq!(done.data["applied"], false);
+        assert_eq!(machine.settings().unwrap(), before);
+    }
+
+    #[test]
+    fn nothing_is_to_be_resumed_where_nothing_was_measured() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut machine = Spoilt {
+            stage: LawStage::new(1),
+            dead: true,
+        };
+        let error = commission_into(folder.path(), &mut machine).err().unwrap();
+        let said = quadrant_cli::explained(&error);
+        assert!(said.contains("the line is cut"), "{said}");
+        assert!(!said.contains("--resume"), "{said}");
+        assert!(!folder.path().join("x").join(EXPERIMENTS).exists());
     }
 }

@@ -9,6 +9,8 @@ use serde_json::{Value, json};
 pub(super) struct Answer {
     pub(super) text: String,
     pub(super) data: Value,
+    /// Reason why the command counts as failed, though it has a result.
+    pub(super) failure: Option<String>,
 }
 
 impl Answer {
@@ -16,6 +18,7 @@ impl Answer {
         Self {
             text: text.to_string(),
             data,
+            failure: None,
         }
     }
 

@@ -5,11 +5,11 @@ use std::path::PathBuf;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand, ValueEnum};
 use quadrant::link::message::Channel;
-use quadrant_sim::machine::simulated_io;
+use quadrant_sim::machine::{Travel, simulated_io};
 
 use crate::commission::Request;
 use crate::plane::PlaneName;
-use crate::subject::travel;
+use crate::subject::{travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::Output;
 
@@ -408,12 +408,13 @@ pub(super) struct IdentifyOptions {
 /// Options of the command `commission`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct CommissionOptions {
-    /// The axis: x, y or z. It must stand where it can move by the travel either way.
+    /// The axis: x, y or z.
     #[arg(long, value_enum)]
     pub(super) axis: Axis,
-    /// Travel either way from where the axis stands, mm; without it, that to its soft limits, once it is homed.
-    #[arg(long, value_name = "MM", value_parser = travel)]
-    pub(super) travel: Option<f64>,
+    /// Travel from where the axis stands, mm: 200 for as much either way, or -5..180 of one that stands near an end. Without it,
+    /// that to its soft limits, once it is homed.
+    #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true)]
+    pub(super) travel: Option<Travel>,
     /// Let the settings that were found act on the machine. Without it the machine keeps those that it had.
     #[arg(long)]
     pub(super) apply: bool,

@@ -9,7 +9,7 @@ use crate::commission::Job;
 pub(super) fn run(client: &mut Client, options: &CommissionOptions) -> anyhow::Result<Answer> {
     let job = Job {
         axis: options.axis.into(),
-        travel_mm: options.travel,
+        travel: options.travel,
         start: None,
         into: None,
         request: &options.request,
@@ -18,5 +18,8 @@ pub(super) fn run(client: &mut Client, options: &CommissionOptions) -> anyhow::R
         store: options.store,
     };
     let done = job.run(client)?;
-    Ok(Answer::new(done.text.trim_end(), done.data))
+    Ok(Answer {
+        failure: done.failure,
+        ..Answer::new(done.text.trim_end(), done.data)
+    })
 }

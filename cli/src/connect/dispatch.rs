@@ -15,9 +15,16 @@ use super::{
 pub(super) fn run(session: &mut Session, command: &Command, source: &str) -> bool {
     session.client.resume();
     match answer(session, command) {
-        Ok(Answer { text, data }) => {
+        Ok(Answer {
+            text,
+            data,
+            failure,
+        }) => {
             session.printer.result(command.name(), &text, &data);
-            true
+            if let Some(failure) = &failure {
+                session.printer.error(command.name(), source, failure);
+            }
+            failure.is_none()
         }
         Err(error) => {
             let error = explained(&error);

@@ -102,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         json: arguments.json,
     };
     if let Some(command @ Command::Ports) = &arguments.command {
-        let Answer { text, data } = machine::ports()?;
+        let Answer { text, data, .. } = machine::ports()?;
         printer.result(command.name(), &text, &data);
         return Ok(());
     }

@@ -69,43 +69,63 @@ const BRACKETS: usize = 4000;
 /// Stability is read by Nyquist's criterion from the crossings of the negative real axis beyond -1, counted with their
 /// direction, for an open loop without unstable poles and with at most three integrators.
 pub fn margins(open_loop: &impl OpenLoop) -> Result<Margins, MarginError> {
-    let scan = Scan::new(open_loop)?;
-    let phase_crossovers = scan.phase_crossovers();
-    let gain_crossovers = scan.gain_crossovers();
-    if scan.encirclements(&phase_crossovers) != 0 {
-        return Err(MarginError::Unstable);
-    }
-    let (gain_margin, phase_crossover) = phase_crossovers
-        .iter()
-        .map(|&omega| (open_loop.response(omega).norm().recip(), omega))
-        .filter(|&(factor, _)| factor > 1.0)
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .ok_or(MarginError::NoPhaseCrossover)?;
-    let (phase_margin, gain_crossover) = gain_crossovers
-        .iter()
-        .map(|&omega| ((-open_loop.response(omega)).arg().abs(), omega))
-        .min_by(|a, b| a.0.total_cmp(&b.0))
-        .ok_or(MarginError::NoGainCrossover)?;
-    let (sensitivity_peak, sensitivity_omega) = scan.peak(|l| (l + 1.0).norm().recip());
-    let (complementary_peak, complementary_omega) = scan.peak(|l| (l / (l + 1.0)).norm());
-    Ok(Margins {
-        gain_margin_db: 20.0 * gain_margin.log10(),
-        phase_crossover_hz: phase_crossover / TAU,
-        phase_margin_deg: phase_margin.to_degrees(),
-        gain_crossover_hz: gain_crossover / TAU,
-        sensitivity_peak,
-        sensitivity_peak_hz: sensitivity_omega / TAU,
-        complementary_peak,
-        complementary_peak_hz: complementary_omega / TAU,
-    })
+    Scan::new(open_loop)?.margins()
 }
 
-/// The lowest frequency at which the loop's phase falls through -180 degrees, rad/s.
-pub fn falling_phase_crossover(open_loop: &impl OpenLoop) -> Result<f64, MarginError> {
-    let scan = Scan::new(open_loop)?;
-    let falls = |&omega: &f64| scan.direction(omega) < 0;
-    let first = scan.phase_crossovers().into_iter().find(falls);
-    first.ok_or(MarginError::NoPhaseCrossover)
+/// Loops that differ by a factor on their gain: the response over the band is computed once for all of them.
+pub struct LoopGains<'a, L: OpenLoop>(Scan<'a, L>);
+
+impl<'a, L: OpenLoop> LoopGains<'a, L> {
+    /// Takes a loop as that of factor 1.
+    ///
+    /// # Errors
+    /// A response that is not finite.
+    pub fn new(open_loop: &'a L) -> Result<Self, MarginError> {
+        Scan::new(open_loop).map(Self)
+    }
+
+    /// The lowest frequency at which the phase of all of them falls through -180 degrees, rad/s.
+    ///
+    /// # Errors
+    /// A phase that does not.
+    pub fn falling_phase_crossover(&self) -> Result<f64, MarginError> {
+        let falls = |&omega: &f64| self.0.direction(omega) < 0;
+        let first = self.0.phase_crossovers().into_iter().find(falls);
+        first.ok_or(MarginError::NoPhaseCrossover)
+    }
+
+    /// [`margins`] of the loop with a factor above zero.
+    ///
+    /// # Errors
+    /// As [`margins`].
+    pub fn margins(&self, factor: f64) -> Result<Margins, MarginError> {
+        let Scan { open_loop, points } = &self.0;
+        let points = points.iter().map(|&(omega, l)| (omega, factor * l));
+        let scaled = Scan {
+            open_loop: &Scaled {
+                open_loop: *open_loop,
+                factor,
+            },
+            points: points.collect(),
+        };
+        scaled.margins()
+    }
+}
+
+/// A loop with a factor on its gain.
+struct Scaled<'a, L> {
+    open_loop: &'a L,
+    factor: f64,
+}
+
+impl<L: OpenLoop> OpenLoop for Scaled<'_, L> {
+    fn response(&self, omega_rad_s: f64) -> Complex64 {
+        self.factor * self.open_loop.response(omega_rad_s)
+    }
+
+    fn band_rad_s(&self) -> (f64, f64) {
+        self.open_loop.band_rad_s()
+    }
 }
 
 /// A loop's response over its band, coarsely.
@@ -128,6 +148,38 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
         finite
             .then_some(Self { open_loop, points })
             .ok_or(MarginError::NotFinite)
+    }
+
+    fn margins(&self) -> Result<Margins, MarginError> {
+        let open_loop = self.open_loop;
+        let phase_crossovers = self.phase_crossovers();
+        let gain_crossovers = self.gain_crossovers();
+        if self.encirclements(&phase_crossovers) != 0 {
+            return Err(MarginError::Unstable);
+        }
+        let (gain_margin, phase_crossover) = phase_crossovers
+            .iter()
+            .map(|&omega| (open_loop.response(omega).norm().recip(), omega))
+            .filter(|&(factor, _)| factor > 1.0)
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .ok_or(MarginError::NoPhaseCrossover)?;
+        let (phase_margin, gain_crossover) = gain_crossovers
+            .iter()
+            .map(|&omega| ((-open_loop.response(omega)).arg().abs(), omega))
+            .min_by(|a, b| a.0.total_cmp(&b.0))
+            .ok_or(MarginError::NoGainCrossover)?;
+        let (sensitivity_peak, sensitivity_omega) = self.peak(|l| (l + 1.0).norm().recip());
+        let (complementary_peak, complementary_omega) = self.peak(|l| (l / (l + 1.0)).norm());
+        Ok(Margins {
+            gain_margin_db: 20.0 * gain_margin.log10(),
+            phase_crossover_hz: phase_crossover / TAU,
+            phase_margin_deg: phase_margin.to_degrees(),
+            gain_crossover_hz: gain_crossover / TAU,
+            sensitivity_peak,
+            sensitivity_peak_hz: sensitivity_omega / TAU,
+            complementary_peak,
+            complementary_peak_hz: complementary_omega / TAU,
+        })
     }
 
     /// Frequencies at which the response is real and negative, ascending.
@@ -275,6 +327,28 @@ mod tests {
         near(real.im / real.re, 0.0, 1e-12);
         let unit = CONTINUOUS.response(TAU * margins.gain_crossover_hz);
         near(unit.norm(), 1.0, 1e-12);
+    }
+
+    #[test]
+    fn loops_that_differ_by_a_factor_have_the_margins_of_each_computed_alone() {
+        let family = LoopGains::new(&CONTINUOUS).unwrap();
+        let crossover_hz = family.falling_phase_crossover().unwrap() / TAU;
+        near(crossover_hz, 194.0, 0.5);
+        for factor in [0.2, 0.7, 1.3, 2.0] {
+            let gains = PidGains {
+                kp_v_per_mm: factor * X_GAINS.kp_v_per_mm,
+                ki_v_per_mm_s: factor * X_GAINS.ki_v_per_mm_s,
+                kd_v_s_per_mm: factor * X_GAINS.kd_v_s_per_mm,
+                ..X_GAINS
+            };
+            let plant = X_PLANT;
+            let alone = margins(&ContinuousLoop { plant, gains }).unwrap();
+            let together = family.margins(factor).unwrap();
+            near(together.gain_margin_db, alone.gain_margin_db, 1e-9);
+            near(together.sensitivity_peak, alone.sensitivity_peak, 1e-6);
+            near(together.complementary_peak, alone.complementary_peak, 1e-6);
+        }
+        assert_eq!(family.margins(4.0), Err(MarginError::Unstable));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use quadrant::settings::StageSettings;
 use super::session::Client;
 use super::settings;
 use super::test_axis::ConnectedAxis;
-use crate::machine::{Machine, MachineError, TestAxis};
+use crate::machine::{Machine, MachineError, TestAxis, Travel};
 
 fn connection(error: impl Error + Send + Sync + 'static) -> MachineError {
     MachineError::Connection(Box::new(error))
@@ -28,8 +28,8 @@ impl Machine for Client {
         settings::dump(self).map_err(connection)
     }
 
-    /// The way to the nearer soft limit; `None` while the axis is not homed, or has no soft limits.
-    fn free_travel_mm(&mut self, axis: AxisName) -> Result<Option<f64>, MachineError> {
+    /// The ways to the soft limits; `None` while the axis is not homed, has no soft limits, or stands beyond one.
+    fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
         let status = self.status().map_err(connection)?;
         let stage = Machine::settings(self)?;
         let here = status.axes[axis as usize].position_mm;
@@ -37,15 +37,19 @@ impl Machine for Client {
         let travel = limits
             .travel_mm
             .filter(|_| status.homed.contains(axis.into()));
-        Ok(travel.map(|travel| (here - travel.negative).min(travel.positive - here)))
+        let room = travel.map(|travel| Travel {
+            negative_mm: here - travel.negative,
+            positive_mm: travel.positive - here,
+        });
+        Ok(room.filter(|room| room.nearer_mm() >= 0.0))
     }
 
     fn test_axis(
         &mut self,
         axis: AxisName,
-        travel_mm: f64,
+        travel: Travel,
     ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
-        let test_axis = ConnectedAxis::new(self, axis, travel_mm).map_err(connection)?;
+        let test_axis = ConnectedAxis::new(self, axis, travel).map_err(connection)?;
         Ok(Box::new(test_axis))
     }
 

@@ -34,7 +34,7 @@ const STEPS: [(&str, f64); 6] = [
     ("verdict", 0.14),
 ];
 
-/// Position from which the experiments begin, mm: that in which the axis was switched on, in the middle of its travel.
+/// Position from which the experiments begin, mm: the middle of the travel.
 const HOME_MM: f64 = 0.0;
 /// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
 const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
@@ -82,13 +82,17 @@ fn guarded(
     };
 
     test_axis.apply(&zero_gain_settings(base))?;
-    let steps = MotorConstantSettings::default().fitted_to(test_axis.info().travel_mm);
+    let steps = MotorConstantSettings::default().fitted_to(test_axis.info().first_room_mm());
     let motor = motor_constant::measure(test_axis, &steps, &mut |share| {
         report(step, share);
     })?;
 
     let [ahead_v, back_v] = motor.directed_v;
     test_axis.slowed_by(motor.gain_mm_per_v_s2 * ahead_v.min(back_v));
+
+    if middle_first(&test_axis.info()).is_some() {
+        to_the_middle(test_axis, base, &motor)?;
+    }
 
     step += 1;
     let (response, plant) = linear_model(test_axis, base, &motor, &mut |share| {
@@ -147,6 +151,34 @@ fn guarded(
     Ok(found)
 }
 
+/// The place to which an axis moves first that stands near an end, mm; none if it stands near enough to the middle.
+pub(super) fn middle_first(info: &AxisInfo) -> Option<f64> {
+    (info.start_mm.abs() > NEAR_MIDDLE * info.travel_mm).then_some(HOME_MM)
+}
+
+/// Share of the travel within which an axis counts as in the middle.
+const NEAR_MIDDLE: f64 = 0.1;
+
+/// Moves the axis to the middle of its travel under the first controller, or a softer one where that oscillates.
+fn to_the_middle(
+    test_axis: &mut Guard<'_>,
+    base: &AxisSettings,
+    motor: &MotorConstant,
+) -> Result<(), CommissionError> {
+    let rate_hz = test_axis.info().rate_hz;
+    let gain = motor.gain_mm_per_v_s2;
+    let mut outcome = Ok(());
+    for share in BOOTSTRAP_SHARES {
+        let settings = soft_bootstrap_settings(base, gain, rate_hz, share);
+        test_axis.apply(&with_rough_friction(settings, gain, motor.directed_v))?;
+        outcome = approach(test_axis, HOME_MM);
+        if outcome.is_ok() {
+            break;
+        }
+    }
+    Ok(outcome?)
+}
+
 /// The response of the sliding axis under a first controller, and the linear model. A mode that the first controller excites
 /// spoils both: they are repeated with softer ones, as soft as the frequency demands that was seen.
 fn linear_model(
@@ -157,32 +189,50 @@ fn linear_model(
 ) -> Result<(FrfMeasurement, PlantFit), CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
     let gain = motor.gain_mm_per_v_s2;
+    let feeds_friction =
+        |info: &AxisInfo, share: f64| share < 1.0 || info.travel_mm < SHORT_TRAVEL_MM;
     let attempt = |test_axis: &mut Guard<'_>,
                    share: f64,
+                   trim: f64,
                    progress: &mut dyn FnMut(f64)|
      -> Result<(FrfMeasurement, PlantFit), CommissionError> {
         let mut settings = soft_bootstrap_settings(base, gain, rate_hz, share);
-        if share < 1.0 || test_axis.info().travel_mm < SHORT_TRAVEL_MM {
-            settings = with_rough_friction(settings, gain, motor.directed_v);
+        if feeds_friction(&test_axis.info(), share) {
+            let friction_v = motor.directed_v.map(|volts| trim * volts);
+            settings = with_rough_friction(settings, gain, friction_v);
         }
         test_axis.apply(&settings)?;
         let response = sliding_response(test_axis, gain, progress)?;
         let plant = models::plant(&response)?;
         Ok((response, plant))
     };
-    let first = match attempt(test_axis, 1.0, progress) {
+    let first = match attempt(test_axis, 1.0, 1.0, progress) {
         Ok(found) => return Ok(found),
         Err(error) => error,
     };
     let mut seen = rings(test_axis, &first);
-    let mut next = next_share(1.0, &first, seen);
+    let (mut share, mut trim, mut trims) = (1.0, 1.0, 0);
+    let mut next = next_share(share, &first, seen);
+    let mut trimmed = trimmed(test_axis, &first, seen);
     for _ in 1..ATTEMPTS {
-        let Some(share) = next else { break };
-        match attempt(test_axis, share, progress) {
+        // The friction that is fed forward is known by its order only: first that, then the controller.
+        if let Some(factor) = trimmed
+            && trims < TRIMS
+            && feeds_friction(&test_axis.info(), share)
+        {
+            trim *= factor;
+            trims += 1;
+        } else if let Some(next) = next {
+            (share, trims) = (next, 0);
+        } else {
+            break;
+        }
+        match attempt(test_axis, share, trim, progress) {
             Ok(found) => return Ok(found),
             Err(error) => {
                 let now = rings(test_axis, &error);
                 next = next_share(share, &error, now);
+                trimmed = self::trimmed(test_axis, &error, now);
                 seen = now.or(seen);
             }
         }
@@ -204,9 +254,25 @@ fn rings(test_axis: &Guard<'_>, error: &CommissionError) -> Option<Ringing> {
     test_axis.ringing().or_else(at_end)
 }
 
+/// Factor on the friction that is fed forward, after the tracking error stopped an axis that lagged by more friction, or ran
+/// ahead by less; none after another failure.
+fn trimmed(test_axis: &Guard<'_>, error: &CommissionError, rings: Option<Ringing>) -> Option<f64> {
+    let stopped = test_axis.interrupted()?;
+    if rings.is_some() || !is_stuck(error) {
+        return None;
+    }
+    let (first, last) = (stopped.reference_mm.first()?, stopped.reference_mm.last()?);
+    let behind_mm = (last - stopped.position_mm.last()?) * (last - first).signum();
+    Some(if behind_mm > 0.0 { MORE } else { LESS })
+}
+
 /// Share of the usual crossover that is tried after one that failed; none if there is none left.
 fn next_share(share: f64, error: &CommissionError, rings: Option<Ringing>) -> Option<f64> {
-    if rings.is_none() && share >= 1.0 && is_stuck(error) {
+    let slowed = matches!(
+        error,
+        CommissionError::Response(FrfError::NotSliding { .. })
+    );
+    if rings.is_none() && (share >= 1.0 && is_stuck(error) || share > 1.0 && slowed) {
         // The axis is held by more than so soft a controller overcomes.
         return Some(STIFFER * share).filter(|share| *share <= STIFFEST);
     }
@@ -236,7 +302,11 @@ fn is_stuck(error: &CommissionError) -> bool {
 }
 
 /// First controllers that are tried.
-const ATTEMPTS: usize = 6;
+const ATTEMPTS: usize = 10;
+/// Trims of the friction that is fed forward, for each controller, and their factors.
+const TRIMS: usize = 1;
+const MORE: f64 = 1.2;
+const LESS: f64 = 0.6;
 /// Factor on the crossover of one that does not move the axis, and the largest share of the usual crossover.
 const STIFFER: f64 = 1.7;
 const STIFFEST: f64 = 5.0;

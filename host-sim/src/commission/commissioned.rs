@@ -130,15 +130,9 @@ impl Commissioned {
             )),
         }
         if let Some(verification) = &self.verification {
-            if (verification.drift - 1.0).abs() > NOTED_DRIFT {
-                notes.push(format!(
-                    "The axis changed while it was tried: the PID's RMS error at the end was {:.2} times that at the start.",
-                    verification.drift
-                ));
-            }
             notes.push(if verification.is_better_than_pid() {
                 let chosen = verification.chosen();
-                let (worst, mean) = chosen.against(&verification.laws[0]);
+                let (worst, mean) = verification.against_pid(chosen);
                 format!(
                     "Chosen: {}, with {:.0} % of the PID's errors on the mean over {} sines, and {:.0} % at worst.",
                     chosen.law,
@@ -151,6 +145,24 @@ impl Commissioned {
             });
         }
         notes
+    }
+
+    /// The change of the axis while laws were tried on it, and its meaning, in sentences; nothing of one that is not worth a note.
+    pub fn drift_note(&self) -> Option<String> {
+        let drift = &self.verification.as_ref()?.drift;
+        let ([first_mm, last_mm], lasted_s) = drift.ends()?;
+        let changed = drift.ratio() - 1.0;
+        (changed.abs() > NOTED_DRIFT).then(|| {
+            format!(
+                "The axis changed by {:+.0} % while laws were tried on it: within {:.1} min the PID's RMS error went from {:.2} to \
+                 {:.2} um. Each law was compared with the PID's error at its own time, but friction was measured before: warm the \
+                 axis up and commission it again if it works warm.",
+                100.0 * changed,
+                lasted_s / 60.0,
+                1e3 * first_mm,
+                1e3 * last_mm,
+            )
+        })
     }
 }
 

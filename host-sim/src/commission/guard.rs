@@ -20,6 +20,10 @@ use crate::record::Recording;
 pub(super) const FOLLOWING_SHARE: f64 = 0.17;
 /// Share of the travel in which the axis comes to rest when its outputs go off.
 const COASTING_SHARE: f64 = 0.05;
+/// Shares of the way to the nearer end that tracking error and coasting may take, each.
+const OF_ROOM: f64 = 0.45;
+/// Share of the travel that the tracking error may take in any case: an axis at its end must be able to come back.
+const LEAST_SHARE: f64 = 0.02;
 /// Share of the deceleration by friction that is counted on.
 const COUNTED_FRICTION: f64 = 0.7;
 /// Lowest limit of the velocity, mm/s.
@@ -49,6 +53,8 @@ pub struct Guard<'a> {
     slowing_mm_s2: Option<f64>,
     /// Position after the last experiment, mm.
     at_mm: Option<f64>,
+    /// Position in which the axis was seen last, mm.
+    seen_mm: f64,
     /// Everything that was run.
     pub runs: Vec<Run>,
     rings: Option<Ringing>,
@@ -60,9 +66,10 @@ impl<'a> Guard<'a> {
     /// Guards an axis of which nothing is known.
     pub fn new(axis: &'a mut dyn TestAxis) -> Self {
         Self {
+            seen_mm: axis.info().start_mm,
+            at_mm: Some(axis.info().start_mm),
             axis,
             slowing_mm_s2: None,
-            at_mm: None,
             runs: Vec::new(),
             rings: None,
             last: Recording::default(),
@@ -96,15 +103,23 @@ impl<'a> Guard<'a> {
         let Some(slowing) = self.slowing_mm_s2 else {
             return most;
         };
-        let stopped_from = (2.0 * slowing * COASTING_SHARE * travel_mm).sqrt();
+        let coasting_mm = (COASTING_SHARE * travel_mm).min(OF_ROOM * self.room_mm());
+        let stopped_from = (2.0 * slowing * coasting_mm).sqrt();
         let tripped_at = stopped_from / settings.limits.overspeed_ratio;
         tripped_at.max(LEAST_LIMIT_MM_S).min(most)
+    }
+
+    /// Way to the nearer end from where the axis was seen last, mm.
+    fn room_mm(&self) -> f64 {
+        (self.axis.info().travel_mm - self.seen_mm.abs()).max(0.0)
     }
 
     /// Limits of an experiment, from the travel.
     fn limited(&self, settings: &AxisSettings) -> AxisSettings {
         let mut settings = settings.clone();
-        let most_mm = FOLLOWING_SHARE * self.axis.info().travel_mm;
+        let share_mm = FOLLOWING_SHARE * self.axis.info().travel_mm;
+        let least_mm = LEAST_SHARE * self.axis.info().travel_mm;
+        let most_mm = share_mm.min((OF_ROOM * self.room_mm()).max(least_mm));
         let limits = &mut settings.limits;
         limits.following_error_mm = limits.following_error_mm.min(most_mm);
         limits.following_error_max_mm = limits.following_error_max_mm.min(most_mm);
@@ -120,8 +135,18 @@ impl<'a> Guard<'a> {
         let Drive::ClosedLoop(motion) = &experiment.drive else {
             return Ok(());
         };
-        let (Some(at_mm), Some(span)) = (self.at_mm, span_mm(motion)) else {
+        let Some(span) = span_mm(motion) else {
             return Ok(());
+        };
+        let Some(at_mm) = self.at_mm else {
+            if span.is_empty() {
+                return Ok(());
+            }
+            return Err(ExperimentError::Impossible {
+                experiment: experiment.name.clone(),
+                reason: "the axis was stopped and coasted on: where it stands is to be read first"
+                    .to_owned(),
+            });
         };
         // Towards the middle is always allowed.
         let travel_mm = self.axis.info().travel_mm;
@@ -151,6 +176,7 @@ impl<'a> Guard<'a> {
         };
         let most = |most: f64, volts: &f64| most.max(volts.abs());
         self.at_mm = recording.position_mm.last().copied().or(self.at_mm);
+        self.seen_mm = self.at_mm.unwrap_or(self.seen_mm);
         self.runs.push(Run {
             name: experiment.name.clone(),
             span_mm: (
@@ -168,7 +194,7 @@ impl<'a> Guard<'a> {
 /// Time at the end of an experiment that is kept, s.
 const LATEST_S: f64 = 0.5;
 /// Share of the travel by which an experiment may begin beside its place.
-const SLACK: f64 = 0.08;
+const SLACK: f64 = 0.06;
 
 /// Smallest and largest position of a motion, from where it begins, mm; none if that is not known beforehand.
 fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {

@@ -74,7 +74,7 @@ pub fn results_table(verification: &Verification) -> Table {
                 Cell::number(UM_PER_MM * read(score), decimals)
             })
         };
-        let (worst, mean) = law.against(pid);
+        let (worst, mean) = verification.against_pid(law);
         let percent = |ratio: f64| {
             if ratio.is_finite() {
                 Cell::number(100.0 * ratio, 0)
@@ -169,7 +169,11 @@ pub fn commission_page(
         id: "result".to_owned(),
         // From saved recordings nothing ran on the settings.
         heading: "Controller".to_owned(),
-        prose: found.notes(),
+        prose: found
+            .notes()
+            .into_iter()
+            .chain(found.drift_note())
+            .collect(),
         blocks: vec![Block::Table(gains_table(found))],
     };
     if let Some(verification) = &found.verification {

@@ -1,12 +1,12 @@
 //! What a commissioning will do to an axis, said before anything moves.
 
-use super::chain::{SINE_SHARE, response_settings};
+use super::chain::{SINE_SHARE, middle_first, response_settings};
 use super::commissioned::CommissionSettings;
 use super::guard::FOLLOWING_SHARE;
 use super::verify;
 use crate::identify::motor_constant::MotorConstantSettings;
 use crate::identify::virgin_curve::VirginCurveSettings;
-use crate::machine::{AxisInfo, open_loop_mm, usable_mm};
+use crate::machine::{AxisInfo, approach_mm_s, open_loop_mm, usable_mm};
 use crate::report::{Cell, Column, Table};
 
 /// One step of a commissioning.
@@ -14,7 +14,7 @@ use crate::report::{Cell, Column, Table};
 pub struct Planned {
     /// Its name.
     pub step: &'static str,
-    /// Largest distance from where the axis stands at the beginning, either way, mm.
+    /// Largest distance from the middle of the travel, mm.
     pub within_mm: f64,
     /// Largest velocity of the plan, mm/s; none in open loop.
     pub fastest_mm_s: Option<f64>,
@@ -30,11 +30,11 @@ const MOTOR_TESTS: f64 = 8.0;
 /// The steps of a commissioning on an axis.
 pub fn plan(info: &AxisInfo, request: &CommissionSettings) -> Vec<Planned> {
     let used_mm = usable_mm(info.travel_mm);
-    let motor = MotorConstantSettings::default().fitted_to(info.travel_mm);
-    let (_, room_mm) = open_loop_mm(info.travel_mm, 0.0);
+    let motor = MotorConstantSettings::default().fitted_to(info.first_room_mm());
+    let (low_mm, high_mm) = open_loop_mm(info.travel_mm, info.start_mm);
     let mut planned = vec![Planned {
         step: "motor constant, in open loop",
-        within_mm: room_mm,
+        within_mm: low_mm.abs().max(high_mm.abs()),
         fastest_mm_s: None,
         volts: format!(
             "steps, from {:.2} V upwards until it slides",
@@ -42,6 +42,17 @@ pub fn plan(info: &AxisInfo, request: &CommissionSettings) -> Vec<Planned> {
         ),
         lasts_s: MOTOR_TESTS * motor.lasts_s(),
     }];
+    if let Some(target_mm) = middle_first(info) {
+        let distance_mm = (target_mm - info.start_mm).abs();
+        let velocity_mm_s = approach_mm_s(info);
+        planned.push(Planned {
+            step: "to the middle of the travel",
+            within_mm: info.start_mm.abs(),
+            fastest_mm_s: Some(velocity_mm_s),
+            volts: "the controller's".to_owned(),
+            lasts_s: distance_mm / velocity_mm_s,
+        });
+    }
     let response = response_settings(info);
     let (_, _, lasts_s) = response
         .extent(info.travel_mm, info.rate_hz)
@@ -91,10 +102,18 @@ pub fn plan(info: &AxisInfo, request: &CommissionSettings) -> Vec<Planned> {
 pub fn plan_table(info: &AxisInfo, planned: &[Planned]) -> Table {
     let total_s: f64 = planned.iter().map(|step| step.lasts_s).sum();
     let stray_mm = FOLLOWING_SHARE * info.travel_mm;
+    let beside = if info.start_mm == 0.0 {
+        String::new()
+    } else {
+        format!(
+            " of the middle of its travel, {:.1} mm beside which it stands",
+            info.start_mm.abs()
+        )
+    };
     Table {
         id: "plan".to_owned(),
         caption: format!(
-            "What the {} axis will do: about {:.0} min of axis time, within {:.1} mm either way. An experiment ends when the axis is {:.1} \
+            "What the {} axis will do: about {:.0} min of axis time, within {:.1} mm either way{beside}. An experiment ends when the axis is {:.1} \
              mm beside its plan, or too fast to stop in time. Positions are known to a count of {} um: errors of two counts are \
              the least that can be told",
             info.name,

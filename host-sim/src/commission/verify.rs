@@ -8,6 +8,7 @@ use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
+use super::drift::Drift;
 use crate::experiment::metrics::{Score, score, worst_and_mean};
 use crate::experiment::sine_test::SineTest;
 use crate::machine::{
@@ -81,19 +82,32 @@ pub struct LawResult {
     pub recording: Recording,
     /// The reason why the axis was stopped, if it was.
     pub stopped: Option<String>,
+    /// Times at which the sines had been run, s from the first trial on.
+    at_s: Vec<f64>,
     settings: AxisSettings,
 }
 
 impl LawResult {
-    /// Its errors over those of the PID: the largest of all ratios, and their geometric mean, over the sines that both ran;
-    /// infinite for a law that was stopped.
-    pub fn against(&self, pid: &Self) -> (f64, f64) {
+    /// Its errors over those that the PID would have made at the same time: the largest of all ratios, and their geometric mean,
+    /// over the sines that both ran; infinite for a law that was stopped.
+    fn against(&self, pid: &Self, drift: &Drift) -> (f64, f64) {
         if self.stopped.is_some() {
             return (f64::INFINITY, f64::INFINITY);
         }
-        let pairs = self.scores.iter().zip(&pid.scores);
-        let ratios: Vec<f64> = pairs
-            .flat_map(|(own, pid)| [own.largest_mm / pid.largest_mm, own.rms_mm / pid.rms_mm])
+        let runs = |law: &Self| -> Vec<(Score, f64)> {
+            let times = law.at_s.iter().copied();
+            law.scores.iter().copied().zip(times).collect()
+        };
+        let ratios: Vec<f64> = runs(self)
+            .into_iter()
+            .zip(runs(pid))
+            .flat_map(|((own, own_s), (pid, pid_s))| {
+                let changed = drift.between(pid_s, own_s);
+                [
+                    own.largest_mm / (changed * pid.largest_mm),
+                    own.rms_mm / (changed * pid.rms_mm),
+                ]
+            })
             .collect();
         worst_and_mean(&ratios)
     }
@@ -107,8 +121,8 @@ pub struct Verification {
     pub laws: Vec<LawResult>,
     /// Index of the law that is handed over.
     pub chosen: usize,
-    /// RMS error of the PID at the end over that at the start, on the first sine: how far the axis changed meanwhile.
-    pub drift: f64,
+    /// Change of the axis meanwhile, on the first sine.
+    pub drift: Drift,
 }
 
 impl Verification {
@@ -119,6 +133,12 @@ impl Verification {
 
     pub fn chosen(&self) -> &LawResult {
         &self.laws[self.chosen]
+    }
+
+    /// Errors of one of the laws over those that the PID would have made at the same time: the largest of all ratios, and their
+    /// geometric mean, over the sines that the law ran on; infinite for one that was stopped.
+    pub fn against_pid(&self, law: &LawResult) -> (f64, f64) {
+        law.against(&self.laws[0], &self.drift)
     }
 
     /// Settings of the law that is handed over, with the limits of `base`.
@@ -157,6 +177,7 @@ pub fn verify(
         sines: &sines,
         progress,
         done: 0.0,
+        used_s: 0.0,
     };
     let pid = measuring_settings(settings);
     let npid = AxisSettings {
@@ -180,6 +201,8 @@ pub fn verify(
         return Err(stopped.into());
     }
     let pid_alone = alone.0.clone();
+    let mut drift = Drift::default();
+    note(&mut drift, &pid_alone);
     let mut laws = vec![alone.0];
     let nonlinear = bench.try_law("N-PID", &npid, sines.len());
     laws.extend(nonlinear.ok().map(|found| found.0));
@@ -192,18 +215,17 @@ pub fn verify(
             kinds.push((kind, found));
         }
     }
-    let mean = |law: &LawResult| law.against(&pid_alone).1;
-    let smallest = kinds
+    note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
+    let means = kinds
         .iter()
-        .map(|(_, law)| mean(law))
-        .fold(f64::INFINITY, f64::min);
-    let best = kinds
-        .iter()
-        .position(|(_, law)| mean(law) <= AS_GOOD * smallest);
+        .map(|(_, law)| law.against(&pid_alone, &drift).1);
+    let means: Vec<f64> = means.collect();
+    let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
+    let best = means.iter().position(|mean| *mean <= AS_GOOD * smallest);
     if let Some(index) = best {
         let (kind, mut whole) = kinds.remove(index);
         bench.finish(&mut whole);
-        let mut worst = whole.against(&pid_alone).0;
+        let mut worst = whole.against(&pid_alone, &drift).0;
         laws.push(whole);
         for share in SHARES {
             if worst <= NO_WORSE {
@@ -211,22 +233,21 @@ pub fn verify(
             }
             let law = format!("N-PID + {:.0} % of {}", 100.0 * share, kind.name());
             if let Ok((found, _)) = bench.try_law(&law, &full(kind, share), sines.len()) {
-                worst = found.against(&pid_alone).0;
+                worst = found.against(&pid_alone, &drift).0;
                 laws.push(found);
             }
         }
+        note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
     }
     let good = |law: &LawResult| {
-        let (worst, mean) = law.against(&pid_alone);
+        let (worst, mean) = law.against(&pid_alone, &drift);
         law.scores.len() == sines.len() && worst <= NO_WORSE && mean < 1.0
     };
+    let mean = |law: &LawResult| law.against(&pid_alone, &drift).1;
     let chosen = (1..laws.len())
         .filter(|&index| good(&laws[index]))
         .min_by(|&a, &b| mean(&laws[a]).total_cmp(&mean(&laws[b])))
         .unwrap_or(0);
-    let again = bench.try_law("PID, again", &pid, 1)?.0;
-    let rms = |law: &LawResult| law.scores.first().map_or(f64::NAN, |score| score.rms_mm);
-    let drift = rms(&again) / rms(&pid_alone);
     // The others are shown, too, after those that ran on every sine.
     laws.extend(kinds.into_iter().map(|(_, law)| law));
     Ok(Verification {
@@ -237,31 +258,46 @@ pub fn verify(
     })
 }
 
+/// Name of the PID's further runs.
+const AGAIN: &str = "PID, again";
+
+/// Takes a run of the PID on the first sine into account.
+fn note(drift: &mut Drift, pid: &LawResult) {
+    if let (Some(score), Some(at_s)) = (pid.scores.first(), pid.at_s.first()) {
+        drift.note(*at_s, score.rms_mm);
+    }
+}
+
 /// Time that trials take on sines where no share of the friction is to be tried, s.
 pub(super) fn lasts_s(sines: &[SineTest]) -> f64 {
     let runs = |index: usize| {
         let compared = if index < COMPARED { KINDS.len() } else { 1 };
-        // The PID and the N-PID alone, and the PID again at the end.
-        2 + compared + usize::from(index == 0)
+        // The PID and the N-PID alone, and the PID again twice.
+        2 + compared + 2 * usize::from(index == 0)
     };
     sines
         .iter()
         .enumerate()
-        .map(|(index, sine)| {
-            let frequency_hz = sine.velocity_mm_s / (TAU * sine.amplitude_mm);
-            runs(index) as f64 * (CYCLES / frequency_hz + 2.0 * LEAD_S)
-        })
+        .map(|(index, sine)| runs(index) as f64 * one_lasts_s(sine))
         .sum()
 }
 
+/// Time of one run on a sine, s.
+fn one_lasts_s(sine: &SineTest) -> f64 {
+    let frequency_hz = sine.velocity_mm_s / (TAU * sine.amplitude_mm);
+    CYCLES / frequency_hz + 2.0 * LEAD_S
+}
+
 /// Runs that all trials make at most, for progress.
-const MOST_RUNS: f64 = 33.0;
+const MOST_RUNS: f64 = 34.0;
 
 struct Bench<'a> {
     test_axis: &'a mut dyn TestAxis,
     sines: &'a [SineTest],
     progress: &'a mut dyn FnMut(f64),
     done: f64,
+    /// Time for which the axis has run on sines, s.
+    used_s: f64,
 }
 
 impl Bench<'_> {
@@ -282,6 +318,7 @@ impl Bench<'_> {
             scores: Vec::new(),
             recording: Recording::default(),
             stopped: None,
+            at_s: Vec::new(),
             settings,
         };
         let stopped = self.run_on(&mut result, count);
@@ -312,7 +349,9 @@ impl Bench<'_> {
             self.done += 1.0;
             match outcome {
                 Ok((score, recording)) => {
+                    self.used_s += one_lasts_s(&self.sines[index]);
                     result.scores.push(score);
+                    result.at_s.push(self.used_s);
                     if index == 0 {
                         result.recording = recording;
                     }

@@ -103,35 +103,49 @@ const HEADLINES: [Headline; 7] = {
     ]
 };
 
-/// The thesis' headline changes beside ours, sine of the first amplitude, mean over the velocities.
-pub fn headline_table(comparison: &Comparison) -> Table {
-    let rows = HEADLINES
+/// Name of the full law's changes against the best PID.
+const AGAINST_BEST_PID: &str = "static + GMS + N-PID against the best PID";
+
+/// The thesis' headline changes beside ours, sine of the first amplitude, mean over the velocities; below them that of the full
+/// law against the best PID, which the thesis does not have. `honest` are the runs of [`honest`](super::honest).
+pub fn headline_table(comparison: &Comparison, honest: &Comparison) -> Table {
+    let row = |baseline: &Comparison, name: &str, thesis: Cell, headline: &Headline| {
+        let cells = |knowledge, metric| {
+            let pair = [headline.from, headline.to];
+            let changes = comparison.changes_percent_from(
+                baseline,
+                knowledge,
+                metric,
+                pair,
+                &VELOCITIES_MM_S,
+            );
+            statistic_cells(changes, 1.0, 1)
+        };
+        let measured = if headline.metrics.len() == 1 {
+            "quadrant glitch"
+        } else {
+            "tracking error"
+        };
+        let mut row = vec![Cell::text(name), Cell::text(measured), thesis];
+        for &metric in headline.metrics {
+            let [exact, _] = cells(ModelKnowledge::Exact, metric);
+            row.push(exact);
+            row.extend(cells(ModelKnowledge::Identified, metric));
+        }
+        row.resize(9, Cell::Missing);
+        row
+    };
+    let mut rows: Vec<_> = HEADLINES
         .iter()
         .map(|headline| {
-            let cells = |knowledge, metric| {
-                let pair = [headline.from, headline.to];
-                let changes = comparison.changes_percent(knowledge, metric, pair, &VELOCITIES_MM_S);
-                statistic_cells(changes, 1.0, 1)
-            };
-            let name = if headline.metrics.len() == 1 {
-                "quadrant glitch"
-            } else {
-                "tracking error"
-            };
-            let mut row = vec![
-                Cell::text(headline.comparison),
-                Cell::text(name),
-                Cell::number(headline.change_percent, 1),
-            ];
-            for &metric in headline.metrics {
-                let [exact, _] = cells(ModelKnowledge::Exact, metric);
-                row.push(exact);
-                row.extend(cells(ModelKnowledge::Identified, metric));
-            }
-            row.resize(9, Cell::Missing);
-            row
+            let thesis = Cell::number(headline.change_percent, 1);
+            row(comparison, headline.comparison, thesis, headline)
         })
         .collect();
+    let full = HEADLINES
+        .iter()
+        .filter(|headline| headline.to == Configuration::BEST);
+    rows.extend(full.map(|headline| row(honest, AGAINST_BEST_PID, Cell::Missing, headline)));
     Table {
         id: "headlines".to_owned(),
         caption: "The thesis' headline changes beside ours; tracking error as largest magnitude, and again as RMS"

@@ -36,7 +36,7 @@ pub fn comparison_tables(
         .map(|(id, metric)| score_table(id, metric, comparison));
     std::iter::once(honest_table(comparison, honest))
         .chain(scores)
-        .chain([headline_table(comparison), circle_table(circles)])
+        .chain([headline_table(comparison, honest), circle_table(circles)])
         .collect()
 }
 

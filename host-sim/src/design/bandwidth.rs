@@ -5,11 +5,10 @@ use std::f64::consts::TAU;
 use quadrant::control::pid::PidGains;
 
 use super::form::Form;
-use super::margins::Margins;
+use super::loop_shape::OpenLoop;
+use super::margins::{LoopGains, Margins};
 use super::process::Process;
-use super::shaping::{
-    LARGEST_RATIO, SMALLEST_RATIO, ShapingError, proportional_derivative, scale_to_gain_margin,
-};
+use super::shaping::{LARGEST_RATIO, SMALLEST_RATIO, ShapingError, proportional_derivative};
 
 /// Bounds on the peaks of `|S|` and `|T|`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -106,19 +105,21 @@ fn stiffest_at(
     bounds: &PeakBounds,
     least_kp: f64,
 ) -> Result<PidGains, f64> {
-    let unit = proportional_derivative(1.0, ratio_s, filter_s);
-    let scaled = |gain_margin_db: f64| scale_to_gain_margin(process, form, &unit, gain_margin_db);
+    let unit = process.open_loop(&proportional_derivative(1.0, ratio_s, filter_s), form);
+    // Only the gain differs from here on.
+    let loops = LoopGains::new(&unit).map_err(|_| f64::INFINITY)?;
+    let crossover = loops.falling_phase_crossover().map_err(|_| f64::INFINITY)?;
+    let unit_gain = unit.response(crossover).norm();
+    let kp_v_per_mm = |gain_margin_db: f64| 10.0_f64.powf(-gain_margin_db / 20.0) / unit_gain;
     let excess = |gain_margin_db: f64| {
-        scaled(gain_margin_db)
-            .and_then(|gains| process.margins(&gains, form))
+        unit.margins_of(&loops, kp_v_per_mm(gain_margin_db))
             .map_or(f64::INFINITY, |margins| bounds.excess(&margins))
     };
     let gain_margin_db = |index: usize| 1.0 + 0.75 * index as f64;
     let mut least = f64::INFINITY;
     for index in 0..GAIN_MARGINS {
         // Gains fall with the margin, and lie above these as long as one step back might be enough.
-        let one_back = scaled(gain_margin_db(index.saturating_sub(1)));
-        if one_back.is_ok_and(|gains| gains.kp_v_per_mm <= least_kp) {
+        if kp_v_per_mm(gain_margin_db(index.saturating_sub(1))) <= least_kp {
             break;
         }
         let found = excess(gain_margin_db(index));
@@ -135,7 +136,12 @@ fn stiffest_at(
                     outside = middle;
                 }
             }
-            return scaled(inside).map_err(|_| f64::INFINITY);
+            let kp_v_per_mm = kp_v_per_mm(inside);
+            return Ok(proportional_derivative(
+                kp_v_per_mm,
+                ratio_s * kp_v_per_mm,
+                filter_s,
+            ));
         }
         least = least.min(found);
     }

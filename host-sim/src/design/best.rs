@@ -4,6 +4,7 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use quadrant::control::pid::PidGains;
+use rayon::prelude::*;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
@@ -25,7 +26,7 @@ const FREQUENCIES: usize = 400;
 /// # Errors
 /// As [`design_pid`]: a process that allows no such loop.
 pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
-    let designs = INTEGRAL_SHARES.map(|integral_share| {
+    let design = |integral_share: f64| {
         let request = PidRequest {
             target: Target::Bandwidth {
                 sensitivity_peak: SENSITIVITY_PEAK,
@@ -37,7 +38,8 @@ pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesig
             ki_v_per_mm_s: None,
         };
         design_pid(process, &request)
-    });
+    };
+    let designs: Vec<_> = INTEGRAL_SHARES.into_par_iter().map(design).collect();
     let best = designs
         .iter()
         .flatten()

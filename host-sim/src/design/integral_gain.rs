@@ -7,8 +7,11 @@
 use quadrant::control::{pid::PidGains, plant_model::PlantModel};
 
 use super::form::Form;
-use super::margins::{Margins, bisect};
+use super::margins::Margins;
 use super::process::Process;
+
+/// Most halvings between a gain that is acceptable and one that is not.
+const HALVINGS: usize = 80;
 
 /// A figure as a publication prints it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -133,8 +136,20 @@ pub fn largest_integral_gain_where(
     while high < 1e9 * first && passes(high) {
         high *= 1.1;
     }
-    let low = if high > first { high / 1.1 } else { 0.0 };
-    Some(round_down_to_two_digits(bisect(low, high, passes)))
+    let mut low = if high > first { high / 1.1 } else { 0.0 };
+    // Further halvings would not be seen in two digits.
+    for _ in 0..HALVINGS {
+        if round_down_to_two_digits(low) == round_down_to_two_digits(high) {
+            break;
+        }
+        let middle = 0.5 * (low + high);
+        if passes(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    Some(round_down_to_two_digits(low))
 }
 
 /// Two significant digits, never above the value.

@@ -134,10 +134,10 @@ impl<'a> MeasuredLoop<'a> {
         }
     }
 
-    /// True if the loop's gain has fallen at the upper end of the band, so that nothing is to be feared above it but a
-    /// resonance that was not measured.
-    pub fn has_fallen(&self) -> bool {
-        self.response(self.band_rad_s().1).norm() < FALLEN
+    /// True if the loop's gain, times a factor, has fallen at the upper end of the band, so that nothing is to be feared above
+    /// it but a resonance that was not measured.
+    pub fn has_fallen(&self, factor: f64) -> bool {
+        factor * self.response(self.band_rad_s().1).norm() < FALLEN
     }
 }
 

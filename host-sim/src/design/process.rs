@@ -5,7 +5,7 @@ use quadrant::control::{filter::FilterSettings, pid::PidGains, plant_model::Plan
 
 use super::form::Form;
 use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
-use super::margins::{MarginError, Margins, bisect, margins};
+use super::margins::{LoopGains, MarginError, Margins, bisect, margins};
 use super::measured::{MeasuredLoop, MeasuredResponse};
 use crate::identify::mode::{self, Mode};
 use num_complex::Complex64;
@@ -87,6 +87,31 @@ impl OpenLoop for AnyLoop<'_> {
     }
 }
 
+impl AnyLoop<'_> {
+    /// Checks that a measured response goes on to where the loop's gain, times a factor, has fallen.
+    fn check_band(&self, factor: f64) -> Result<(), MarginError> {
+        match self {
+            Self::Measured(measured) if !measured.has_fallen(factor) => {
+                Err(MarginError::BandTooNarrow)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Margins with a factor on the gain of this loop; `loops` are those that it makes.
+    ///
+    /// # Errors
+    /// As [`Process::margins`].
+    pub(super) fn margins_of(
+        &self,
+        loops: &LoopGains<'_, Self>,
+        factor: f64,
+    ) -> Result<Margins, MarginError> {
+        self.check_band(factor)?;
+        loops.margins(factor)
+    }
+}
+
 /// The loop that a PID closes around the rigid model.
 fn rigid_loop(plant: &PlantModel, gains: &PidGains, form: Form) -> AnyLoop<'static> {
     match form {
@@ -145,11 +170,7 @@ impl Process {
     /// A loop without margins; [`MarginError::BandTooNarrow`] when a measured response ends before the loop's gain has fallen.
     pub fn margins(&self, gains: &PidGains, form: Form) -> Result<Margins, MarginError> {
         let open_loop = self.open_loop(gains, form);
-        if let AnyLoop::Measured(measured) = &open_loop
-            && !measured.has_fallen()
-        {
-            return Err(MarginError::BandTooNarrow);
-        }
+        open_loop.check_band(1.0)?;
         margins(&open_loop)
     }
 

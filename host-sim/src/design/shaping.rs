@@ -8,7 +8,7 @@ use quadrant::control::pid::PidGains;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
-use super::margins::{MarginError, bisect, falling_phase_crossover};
+use super::margins::{LoopGains, MarginError, bisect};
 use super::process::Process;
 
 /// Reasons for which no gains have the margins asked for.
@@ -139,14 +139,14 @@ pub fn shape_to_margins(
 }
 
 /// Scales a controller so that the loop has a gain margin.
-pub(super) fn scale_to_gain_margin(
+fn scale_to_gain_margin(
     process: &Process,
     form: Form,
     gains: &PidGains,
     gain_margin_db: f64,
 ) -> Result<PidGains, MarginError> {
     let open_loop = process.open_loop(gains, form);
-    let crossover = falling_phase_crossover(&open_loop)?;
+    let crossover = LoopGains::new(&open_loop)?.falling_phase_crossover()?;
     let factor = 10.0_f64.powf(-gain_margin_db / 20.0) / open_loop.response(crossover).norm();
     Ok(PidGains {
         kp_v_per_mm: gains.kp_v_per_mm * factor,

@@ -207,7 +207,12 @@ pub fn measure(
     let mut settings = *settings;
     // In positive and in negative direction: friction may differ, and what hangs pulls one way.
     let mut levels_v = [settings.first_level_v; 2];
-    let mut ahead = 1.0;
+    // From near an end, away from it.
+    let mut ahead = if axis.start_mm > OUTSIDE * axis.travel_mm {
+        -1.0
+    } else {
+        1.0
+    };
     let mut shortenings = 0;
     let (mut others, usual_s) = (0, settings.dwell_s);
     while levels_v

@@ -16,7 +16,7 @@ use num_complex::Complex64;
 use quadrant::control::plant_model::PlantModel;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
-use super::mode::{self, Mode};
+use super::mode::{self, Mode, TRANSMITS};
 use super::response::{FrequencyResponse, ResponsePoint};
 
 /// Spring to ground in the model.
@@ -145,7 +145,8 @@ pub enum PlantError {
     #[error(
         "the model misses the response by {gain_db:.1} dB and {phase_deg:.0} deg RMS, most at {worst_hz:.0} Hz: this is not a \
          second-order axis with a dead time and two modes at most (look for a loose part that resonates there, for play in the \
-         drive), or friction distorts the response (measure at a bias velocity or a larger amplitude)"
+         drive), or friction distorts the response (measure at a bias velocity or a larger amplitude){}",
+        of_mode(mode_hz)
     )]
     Misfit {
         /// RMS of the gain's error.
@@ -154,9 +155,20 @@ pub enum PlantError {
         phase_deg: f64,
         /// Frequency of the largest error.
         worst_hz: f64,
+        /// Frequency of the mode that explains most, if one was found.
+        mode_hz: Option<f64>,
     },
     #[error(transparent)]
     Fit(#[from] FitError),
+}
+
+/// The mode behind a misfit, and what would help, in words.
+fn of_mode(mode_hz: &Option<f64>) -> String {
+    mode_hz.map_or(String::new(), |hz| {
+        format!(
+            "; there is a mode at {hz:.0} Hz: a stiffer coupling or guide, more damping, or the encoder on the motor would help"
+        )
+    })
 }
 
 /// Fewest lines of a fit.
@@ -213,6 +225,7 @@ pub fn fit_plant(
             gain_db: all.gain_db,
             phase_deg: all.phase_deg,
             worst_hz: worst_hz(&lines, &model),
+            mode_hz: model.modes.first().map(|mode| mode.frequency_hz),
         });
     }
     check_support(&lines, &plant, &found, settings.negligible_damping)?;
@@ -330,6 +343,11 @@ const DAMPINGS: (f64, f64) = (1e-3, 0.5);
 const DAMPING_START: f64 = 0.03;
 /// Start of an anti-resonance over the mode's frequency: of equal masses.
 const ANTI_START: f64 = 0.7;
+/// Start of a damper that transmits force above the mode: damping ratio of the mode, and frequency over the mode's.
+const STRONG_START: f64 = 0.1;
+const DAMPER_START: f64 = 6.0;
+/// Bounds of its damping ratio.
+const DAMPERS: (f64, f64) = (TRANSMITS, 5.0);
 /// Largest relative standard error of a mode's frequency.
 const MOST_UNCERTAIN_MODE: f64 = 0.05;
 
@@ -364,8 +382,10 @@ fn with_modes(lines: &[ResponsePoint], stiffness: Stiffness) -> Result<(Fit, Mod
             Err(_) => true,
         };
         let first = stiffness.unknowns() + 1;
+        // A damper has no frequency of its own.
         let determined = (first..fit.0.values.len())
             .step_by(2)
+            .filter(|index| fit.0.values[index + 1] < TRANSMITS)
             .all(|index| fit.0.standard_errors[index] < MOST_UNCERTAIN_MODE * fit.0.values[index]);
         if !better || !determined {
             break;
@@ -393,10 +413,17 @@ fn another_mode(
     for index in 0..STARTS {
         let share = (index as f64 + 0.5) / STARTS as f64;
         let frequency_hz = lowest_hz * (highest_hz / lowest_hz).powf(share);
-        for anti in [None, Some((ANTI_START * frequency_hz, DAMPING_START))] {
+        let dip = Some((ANTI_START * frequency_hz, DAMPING_START));
+        // (s / w_a)^2 is small, and 2 d_a / w_a that of the mode.
+        let damper = Some((DAMPER_START * frequency_hz, DAMPER_START * STRONG_START));
+        for (damping, anti) in [
+            (DAMPING_START, None),
+            (DAMPING_START, dip),
+            (STRONG_START, damper),
+        ] {
             let mode = Mode {
                 frequency_hz,
-                damping: DAMPING_START,
+                damping,
                 anti,
             };
             let mut modes = modes.to_vec();
@@ -498,7 +525,11 @@ fn search(
     for (mode, names) in whole.modes.iter().zip(MODE_NAMES) {
         let pairs = [Some((mode.frequency_hz, mode.damping)), mode.anti];
         for ((frequency_hz, damping), names) in pairs.into_iter().flatten().zip(names.chunks(2)) {
-            let frequencies = (0.5 * LOWEST_MODE_HZ, 1.5 * highest_hz);
+            let (frequencies, dampings) = if damping < TRANSMITS {
+                ((0.5 * LOWEST_MODE_HZ, 1.5 * highest_hz), DAMPINGS)
+            } else {
+                ((0.5 * LOWEST_MODE_HZ, DAMPER_START * highest_hz), DAMPERS)
+            };
             parameters.push(Parameter {
                 name: names[0],
                 start: frequency_hz.clamp(1.01 * frequencies.0, 0.99 * frequencies.1),
@@ -506,8 +537,8 @@ fn search(
             });
             parameters.push(Parameter {
                 name: names[1],
-                start: damping.clamp(1.1 * DAMPINGS.0, 0.9 * DAMPINGS.1),
-                bounds: DAMPINGS,
+                start: damping.clamp(1.1 * dampings.0, 0.9 * dampings.1),
+                bounds: dampings,
             });
         }
     }
@@ -658,6 +689,25 @@ mod tests {
             error_hz > 0.0 && error_hz < 0.01 * mode.frequency_hz,
             "{error_hz} Hz"
         );
+    }
+
+    #[test]
+    fn a_strongly_damped_spring_transmits_force_above_its_mode() {
+        // Two masses, the encoder on the far one: (1 + 2 d s / w) / (1 + 2 d s / w + (s / w)^2).
+        let (frequency_hz, damping) = (38.0, 0.1);
+        let exact = Mode {
+            frequency_hz,
+            damping,
+            anti: Some((1e3 * frequency_hz, 1e3 * damping)),
+        };
+        let found = fit_plant(&response(&[exact]), &SLIDING).unwrap();
+        let [mode] = found.modes[..] else {
+            panic!("{:?}", found.modes);
+        };
+        assert!((mode.frequency_hz / 38.0 - 1.0).abs() < 0.02, "{mode:?}");
+        assert!((mode.damping - damping).abs() < 0.02, "{mode:?}");
+        let all = found.bands.iter().map(|band| band.phase_deg);
+        assert!(all.fold(0.0, f64::max) < 2.0, "{:?}", found.bands);
     }
 
     #[test]

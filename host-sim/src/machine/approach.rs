@@ -2,7 +2,7 @@
 
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 
-use super::test_axis::{Drive, Experiment, ExperimentError, TestAxis};
+use super::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
 
 /// Limits of the move: unhurried.
 const VELOCITY_MM_S: f64 = 30.0;
@@ -35,13 +35,18 @@ pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), Expe
     Ok(())
 }
 
+/// Velocity of a move, mm/s.
+pub fn approach_mm_s(info: &AxisInfo) -> f64 {
+    VELOCITY_MM_S
+        .min(MOST_VELOCITY * info.max_velocity_mm_s)
+        .min(info.travel_mm / TRAVEL_S)
+}
+
 /// One move towards the target; the distance that is left, mm.
 fn approach_once(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<f64, ExperimentError> {
     let info = test_axis.info();
     let rate_hz = info.rate_hz;
-    let velocity_mm_s = VELOCITY_MM_S
-        .min(MOST_VELOCITY * info.max_velocity_mm_s)
-        .min(info.travel_mm / TRAVEL_S);
+    let velocity_mm_s = approach_mm_s(&info);
     let look = Experiment {
         name: "reading the position".to_owned(),
         drive: Drive::ClosedLoop(MotionSettings::Hold),

@@ -5,6 +5,7 @@ use quadrant::settings::StageSettings;
 
 use super::error::MachineError;
 use super::test_axis::TestAxis;
+use super::travel::Travel;
 
 /// A machine with three axes: the one start of identification and commissioning.
 pub trait Machine {
@@ -20,20 +21,20 @@ pub trait Machine {
     /// A connection that is broken.
     fn settings(&mut self) -> Result<StageSettings, MachineError>;
 
-    /// Returns the travel that an axis has either way from where it stands, mm; `None` if it is not known.
+    /// Returns the travel that an axis has from where it stands; `None` if it is not known.
     ///
     /// # Errors
     /// A connection that is broken.
-    fn free_travel_mm(&mut self, axis: AxisName) -> Result<Option<f64>, MachineError>;
+    fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError>;
 
-    /// Returns an axis for experiments, which keep it within `travel_mm` of where it stands, either way.
+    /// Returns an axis for experiments, which keep it within `travel` of where it stands.
     ///
     /// # Errors
     /// A connection that is broken.
     fn test_axis(
         &mut self,
         axis: AxisName,
-        travel_mm: f64,
+        travel: Travel,
     ) -> Result<Box<dyn TestAxis + '_>, MachineError>;
 
     /// Switches the outputs off and puts settings in force.

@@ -12,6 +12,9 @@ use super::error::MachineError;
 use super::test_axis::{AxisInfo, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;
 
+/// Extension of a file with an experiment.
+const KEPT: &str = "json";
+
 /// A test axis whose experiments are kept in a folder. Those that are there already are not run again, as long as they are the
 /// same experiments under the same settings in the same order; settings act only once an experiment is run.
 pub struct Journal<'a> {
@@ -66,6 +69,12 @@ impl<'a> Journal<'a> {
         }
     }
 
+    /// True if no experiment is kept in a folder.
+    pub fn is_empty(folder: &Path) -> bool {
+        let kept = |entry: fs::DirEntry| entry.path().extension().is_some_and(|it| it == KEPT);
+        fs::read_dir(folder).map_or(true, |entries| !entries.flatten().any(kept))
+    }
+
     fn key(&self, experiment: &Experiment) -> u64 {
         let mut hasher = DefaultHasher::new();
         format!("{experiment:?} {:?}", self.settings).hash(&mut hasher);
@@ -109,7 +118,7 @@ impl TestAxis for Journal<'_> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        let path = self.folder.join(format!("{:03}.json", self.next));
+        let path = self.folder.join(format!("{:03}.{KEPT}", self.next));
         self.next += 1;
         let key = self.key(experiment);
         if self.known

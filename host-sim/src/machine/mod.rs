@@ -51,8 +51,9 @@ mod tcp;
 mod test_axis;
 mod timing;
 mod transport;
+mod travel;
 
-pub use approach::approach;
+pub use approach::{approach, approach_mm_s};
 #[cfg(all(unix, feature = "emulated"))]
 pub use emulated_link::EmulatedLink;
 pub use error::MachineError;
@@ -69,3 +70,4 @@ pub use test_axis::{
     AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, open_loop_mm, usable_mm,
 };
 pub use transport::{Transport, encoded};
+pub use travel::Travel;

@@ -47,10 +47,19 @@ pub struct AxisInfo {
     pub resolution_mm: f64,
     /// Largest voltage of the amplifier, V.
     pub full_scale_v: f64,
-    /// Travel either way from where the axis stood first, mm; an experiment that leaves it is stopped.
+    /// Travel either way from its middle, mm; an experiment that leaves it is stopped. Positions count from the middle.
     pub travel_mm: f64,
+    /// Position in which the axis stood first, mm.
+    pub start_mm: f64,
     /// Largest velocity, mm/s; an experiment that exceeds it is stopped.
     pub max_velocity_mm_s: f64,
+}
+
+impl AxisInfo {
+    /// Returns the way to the nearer end from where the axis stood first, mm.
+    pub fn first_room_mm(&self) -> f64 {
+        self.travel_mm - self.start_mm.abs()
+    }
 }
 
 /// An axis that experiments can be run on.
@@ -91,6 +100,9 @@ const USED_OF_SHORT: f64 = 0.7;
 const SHORT_MM: f64 = 200.0;
 /// Share of the room in a direction after which an axis in open loop is stopped: it coasts on by as much again, and more.
 const OPEN_LOOP: f64 = 0.4;
+/// The same towards an end that is nearer than this share of the travel: what it coasts does not shrink with the room.
+const OPEN_LOOP_NEAR: f64 = 0.2;
+const NEAR_END: f64 = 0.52;
 
 /// Returns the travel that planned motions use of a travel either way, mm.
 pub fn usable_mm(travel_mm: f64) -> f64 {
@@ -137,7 +149,14 @@ impl Sides {
 
 /// Returns the positions between which an axis in open loop stays that stands at `here_mm`, mm.
 pub fn open_loop_mm(travel_mm: f64, here_mm: f64) -> (f64, f64) {
-    let room = |to_end_mm: f64| OPEN_LOOP * to_end_mm.max(0.0);
+    let room = |to_end_mm: f64| {
+        let share = if to_end_mm < NEAR_END * travel_mm {
+            OPEN_LOOP_NEAR
+        } else {
+            OPEN_LOOP
+        };
+        share * to_end_mm.max(0.0)
+    };
     (
         here_mm - room(travel_mm + here_mm),
         here_mm + room(travel_mm - here_mm),

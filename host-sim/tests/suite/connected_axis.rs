@@ -15,7 +15,7 @@ use quadrant_sim::client::{Client, ClientError, settings};
 use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
 use quadrant_sim::machine::{
-    Drive, Experiment, ExperimentError, SimulatedLink, SimulatedTestAxis, TestAxis,
+    Drive, Experiment, ExperimentError, SimulatedLink, SimulatedTestAxis, TestAxis, Travel,
 };
 use quadrant_sim::plant::StageParameters;
 
@@ -188,13 +188,13 @@ fn an_axis_that_moves_is_not_measured() {
     let mut client = enabled();
     client.order(jog(5.0)).unwrap();
     client.wait(Duration::from_millis(100)).unwrap();
-    let Err(refused) = ConnectedAxis::new(&mut client, AxisName::X, 5.0) else {
+    let Err(refused) = ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(5.0)) else {
         panic!("measured");
     };
     assert!(refused.to_string().contains("`stop`"), "{refused}");
     client.order(Body::Stop).unwrap();
     client.wait(Duration::from_secs(1)).unwrap();
-    assert!(ConnectedAxis::new(&mut client, AxisName::X, 5.0).is_ok());
+    assert!(ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(5.0)).is_ok());
 }
 
 #[test]
@@ -263,7 +263,8 @@ fn sawtooth(count: usize) -> Vec<f64> {
 #[test]
 fn in_open_loop_the_recording_is_what_was_put_out() {
     let mut client = client();
-    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 20.0).unwrap();
+    let mut test_axis =
+        ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(20.0)).unwrap();
     let limp = zero_gain_settings(test_axis.settings());
     test_axis.apply(&limp).unwrap();
     let experiment = Experiment {
@@ -303,7 +304,8 @@ fn in_open_loop_the_recording_is_what_was_put_out() {
 #[test]
 fn in_closed_loop_injection_and_motion_begin_together() {
     let mut client = client();
-    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 200.0).unwrap();
+    let mut test_axis =
+        ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(200.0)).unwrap();
     let measuring = measuring_settings(test_axis.settings());
     test_axis.apply(&measuring).unwrap();
     let experiment = Experiment {
@@ -349,7 +351,8 @@ fn in_closed_loop_injection_and_motion_begin_together() {
 #[test]
 fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
     let mut client = client();
-    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 2.0).unwrap();
+    let mut test_axis =
+        ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(2.0)).unwrap();
     let experiment = Experiment {
         name: "too much".to_owned(),
         drive: Drive::OpenLoop,
@@ -370,7 +373,8 @@ fn an_axis_that_leaves_the_travel_is_a_fault_of_the_experiment() {
 #[test]
 fn the_motor_constant_of_the_connected_axis_is_that_of_the_axis_itself() {
     let mut client = client();
-    let mut test_axis = ConnectedAxis::new(&mut client, AxisName::X, 20.0).unwrap();
+    let mut test_axis =
+        ConnectedAxis::new(&mut client, AxisName::X, Travel::either_way(20.0)).unwrap();
     let limp = zero_gain_settings(test_axis.settings());
     test_axis.apply(&limp).unwrap();
     let settings = MotorConstantSettings::default();

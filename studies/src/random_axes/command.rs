@@ -5,6 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::cases::table;
 use super::{Line, Outcome, RandomAxis, judge};
 use crate::campaign::{Campaign, Seeded};
 use quadrant_cli::say;
@@ -20,6 +21,9 @@ pub struct Arguments {
     /// Only axes without a resonance.
     #[arg(long)]
     rigid: bool,
+    /// Named axes instead, each with one thing that a commissioning may stumble over: a table of them, in Markdown.
+    #[arg(long, conflicts_with_all = ["seeds", "shard", "merge", "rigid"])]
+    cases: bool,
 }
 
 impl Seeded for Line {
@@ -33,6 +37,10 @@ impl Seeded for Line {
 /// # Errors
 /// A file that cannot be read or written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
+    if arguments.cases {
+        table();
+        return Ok(());
+    }
     let wanted = |seed: u64| !arguments.rigid || RandomAxis::new(seed).is_rigid();
     let lines = arguments.campaign.lines(
         &arguments.results,

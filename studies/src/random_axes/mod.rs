@@ -3,8 +3,10 @@
 //! The commissioned settings are judged on sines that the commissioning did not see, with noise that it did not see, against
 //! the PID that it designed. A result is one line of a CSV file, so that a campaign can be interrupted, divided and merged.
 
+pub mod cases;
 pub mod command;
 mod plant;
+mod subject;
 
 use std::time::Instant;
 
@@ -16,6 +18,7 @@ use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned
 use quadrant_sim::design::DesignError;
 use quadrant_sim::experiment::metrics::worst_and_mean;
 use quadrant_sim::experiment::sine_test::SineTest;
+use quadrant_sim::identify::plant::PlantError;
 use quadrant_sim::machine::{
     AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach,
 };
@@ -23,6 +26,7 @@ use quadrant_sim::record::Recording;
 use serde::{Deserialize, Serialize};
 
 pub use plant::RandomAxis;
+pub use subject::Subject;
 
 /// Result of one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, strum::Display)]
@@ -86,7 +90,7 @@ const MOST_TRAVEL: f64 = 0.4;
 
 /// An axis that counts the time for which it is used, and warms meanwhile.
 struct Timed<'a> {
-    random: &'a RandomAxis,
+    subject: &'a Subject,
     test_axis: SimulatedTestAxis,
     used_s: f64,
 }
@@ -112,7 +116,7 @@ impl TestAxis for Timed<'_> {
         let outcome = self.test_axis.perform(experiment, progress);
         let recording = outcome?;
         self.used_s += recording.len() as f64 * recording.sample_time_s;
-        if let Some(warmed) = self.random.warmed(self.used_s) {
+        if let Some(warmed) = self.subject.warmed(self.used_s) {
             self.test_axis.change(warmed);
         }
         Ok(recording)
@@ -125,15 +129,24 @@ impl TestAxis for Timed<'_> {
 
 /// Commissions the axis of a seed and judges the result.
 pub fn judge(seed: u64) -> Line {
+    judge_subject(&RandomAxis::new(seed).subject())
+}
+
+/// Commissions an axis and judges the result.
+pub fn judge_subject(subject: &Subject) -> Line {
     let began = Instant::now();
-    let random = RandomAxis::new(seed);
+    let Subject {
+        seed,
+        parameters,
+        travel,
+        ..
+    } = subject;
     let mut base = StageSettings::simulated().axes[0].clone();
-    base.encoder.resolution_mm = random.parameters.resolution_mm;
-    base.amplifier.full_scale_v = random.parameters.full_scale_v;
+    base.encoder.resolution_mm = parameters.resolution_mm;
+    base.amplifier.full_scale_v = parameters.full_scale_v;
     let mut axis = Timed {
-        random: &random,
-        test_axis: SimulatedTestAxis::new(0, random.parameters.clone(), seed)
-            .with_travel_mm(random.travel_mm),
+        subject,
+        test_axis: SimulatedTestAxis::new(0, parameters.clone(), *seed).with_travel(*travel),
         used_s: 0.0,
     };
     let found = commission(
@@ -143,25 +156,25 @@ pub fn judge(seed: u64) -> Line {
         &mut |_, _| {},
     );
     let mut line = Line {
-        seed,
+        seed: *seed,
         outcome: Outcome::RefusedWrongly,
         worst_ratio: None,
         mean_ratio: None,
         feedforward: String::new(),
         axis_min: axis.used_s / 60.0,
         computed_s: 0.0,
-        axis: random.to_string(),
+        axis: subject.description.clone(),
         reason: String::new(),
     };
     match found {
-        Ok(found) => line.fill(&found, &random),
-        Err(error) if names_resonance(&error, &random) => {
+        Ok(found) => line.fill(&found, subject),
+        Err(error) if names_resonance(&error, subject) => {
             line.outcome = Outcome::Refused;
             line.reason = quadrant_cli::explained(&error.into());
         }
         Err(error) => line.reason = quadrant_cli::explained(&error.into()),
     }
-    if axis.test_axis.farthest_mm() > random.travel_mm {
+    if axis.test_axis.farthest_mm() > travel.half_mm() {
         line.outcome = Outcome::LeftTravel;
     }
     line.computed_s = began.elapsed().as_secs_f64();
@@ -169,13 +182,17 @@ pub fn judge(seed: u64) -> Line {
 }
 
 /// True if a refusal names the frequency of the axis' resonance.
-fn names_resonance(error: &CommissionError, random: &RandomAxis) -> bool {
+fn names_resonance(error: &CommissionError, subject: &Subject) -> bool {
     let named_hz = match error {
         CommissionError::Rings { frequency_hz, .. }
         | CommissionError::Pid(DesignError::Mode { frequency_hz }) => *frequency_hz,
+        CommissionError::Plant(PlantError::Misfit {
+            mode_hz: Some(mode_hz),
+            ..
+        }) => *mode_hz,
         _ => return false,
     };
-    random.resonance_hz().is_some_and(|true_hz| {
+    subject.resonance_hz.is_some_and(|true_hz| {
         let ratio = named_hz / true_hz;
         ratio.max(1.0 / ratio) < NAMED
     })
@@ -185,7 +202,7 @@ fn names_resonance(error: &CommissionError, random: &RandomAxis) -> bool {
 const NAMED: f64 = 1.5;
 
 impl Line {
-    fn fill(&mut self, found: &Commissioned, random: &RandomAxis) {
+    fn fill(&mut self, found: &Commissioned, subject: &Subject) {
         let better = found
             .verification
             .as_ref()
@@ -203,8 +220,8 @@ impl Line {
         let ratios: Result<Vec<f64>, String> = SINES
             .iter()
             .map(|sine| {
-                let reference = largest(&pid, random, used_s, sine)?;
-                Ok(largest(&found.settings, random, used_s, sine)? / reference)
+                let reference = largest(&pid, subject, used_s, sine)?;
+                Ok(largest(&found.settings, subject, used_s, sine)? / reference)
             })
             .collect();
         match ratios {
@@ -229,17 +246,17 @@ impl Line {
 /// Largest error on a sine, mm, of a fresh axis with other noise.
 fn largest(
     settings: &AxisSettings,
-    random: &RandomAxis,
+    subject: &Subject,
     used_s: f64,
     sine: &SineTest,
 ) -> Result<f64, String> {
-    let parameters = random
+    let parameters = subject
         .warmed(used_s)
-        .unwrap_or_else(|| random.parameters.clone());
-    let mut axis =
-        SimulatedTestAxis::new(0, parameters, !random.seed).with_travel_mm(random.travel_mm);
+        .unwrap_or_else(|| subject.parameters.clone());
+    let travel_mm = subject.travel.half_mm();
+    let mut axis = SimulatedTestAxis::new(0, parameters, !subject.seed).with_travel_mm(travel_mm);
     axis.apply(settings).map_err(|error| error.to_string())?;
-    let fitted = sine.within(MOST_TRAVEL * random.travel_mm);
+    let fitted = sine.within(MOST_TRAVEL * travel_mm);
     approach(&mut axis, 0.0)
         .and_then(|()| run_sine(&mut axis, "judging", fitted, &mut |_| {}))
         .map(|(score, _)| score.largest_mm)

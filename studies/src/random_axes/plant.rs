@@ -8,12 +8,15 @@ use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
 use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_sim::machine::Travel;
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Cogging, Drive, EncoderSide, FrictionParameters, PLANT_ELEMENTS,
     StageParameters, virgin_curve_elements,
 };
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
+
+use super::subject::Subject;
 
 /// An axis drawn from a seed.
 #[derive(Clone, Debug)]
@@ -160,16 +163,16 @@ impl RandomAxis {
         }
     }
 
-    /// Frequency of the resonance, Hz, if there is one.
-    pub fn resonance_hz(&self) -> Option<f64> {
-        self.resonance.map(|(frequency_hz, _)| frequency_hz)
-    }
-
-    /// The parameters after the axis was used for a time, s; nothing of one that does not warm.
-    pub fn warmed(&self, used_s: f64) -> Option<AxisParameters> {
-        let (change, warms_s) = self.warming;
-        let factor = 1.0 + change * (1.0 - (-used_s / warms_s).exp());
-        (change != 0.0).then(|| self.parameters.clone().with_friction(factor))
+    /// The axis, to be commissioned from the middle of its travel.
+    pub fn subject(&self) -> Subject {
+        Subject {
+            seed: self.seed,
+            parameters: self.parameters.clone(),
+            travel: Travel::either_way(self.travel_mm),
+            resonance_hz: self.resonance.map(|(frequency_hz, _)| frequency_hz),
+            warming: self.warming,
+            description: self.to_string(),
+        }
     }
 
     /// True if motor and table move as one.

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
+use quadrant_sim::compare::honest::with_best_pid;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::pages::provenance;
@@ -23,6 +24,8 @@ pub struct Context {
     pub settings_path: Option<PathBuf>,
     /// The runs of chapter 5, once a part has needed them.
     comparison: OnceLock<Comparison>,
+    /// The runs with the best PID, once a part has needed them.
+    honest: OnceLock<Comparison>,
 }
 
 impl Context {
@@ -38,6 +41,7 @@ impl Context {
             settings,
             settings_path: law_settings.path,
             comparison: OnceLock::new(),
+            honest: OnceLock::new(),
         })
     }
 
@@ -60,6 +64,23 @@ impl Context {
         let configurations = Configuration::all();
         let comparison = self.request(&setups, &configurations).run(advance)?;
         Ok(self.comparison.get_or_init(|| comparison))
+    }
+
+    /// Runs the best PID alone on the same sines of the first amplitude, unless a part before did.
+    ///
+    /// # Errors
+    /// A model that no PID keeps the bounds on, a refused setting, or a fault.
+    pub fn honest(&self) -> anyhow::Result<&Comparison> {
+        if let Some(honest) = self.honest.get() {
+            return Ok(honest);
+        }
+        let setups = RunConfiguration::both(&with_best_pid(&self.settings.stage)?);
+        let request = Request {
+            amplitudes_mm: &AMPLITUDES_MM[..1],
+            ..self.request(&setups, &[Configuration::PID])
+        };
+        let honest = request.run(&|_| {})?;
+        Ok(self.honest.get_or_init(|| honest))
     }
 
     /// About how long that takes on two cores, s; nothing once it was done.

@@ -10,7 +10,7 @@ use quadrant_sim::design::pages::pid::PidPage;
 use quadrant_sim::design::robustness::{Uncertainty, robustness};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::time_varying::VaryingLoop;
-use quadrant_sim::design::{Form, Process};
+use quadrant_sim::design::{Form, Process, best_pid};
 use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::report::Section;
@@ -74,18 +74,23 @@ pub(super) fn controllers(context: &Context, progress: &Progress) -> anyhow::Res
         step_response(&plant, &gains, nonlinear, &request)
     };
     let [small_mm, _] = STEPS_MM;
+    let best = best_pid(&process, sampled, gains.derivative_filter_s)?.gains;
     let pid = PidPage {
         subject: String::new(),
         gains,
-        forms: [("continuous", Form::Continuous), ("as it runs", sampled)]
-            .map(|(name, form)| {
-                (
-                    name.to_owned(),
-                    process.open_loop(&gains, form),
-                    process.margins(&gains, form),
-                )
-            })
-            .into(),
+        forms: [
+            ("continuous", gains, Form::Continuous),
+            ("as it runs", gains, sampled),
+            ("best PID, as it runs", best, sampled),
+        ]
+        .map(|(name, gains, form)| {
+            (
+                name.to_owned(),
+                process.open_loop(&gains, form),
+                process.margins(&gains, form),
+            )
+        })
+        .into(),
         step: Some(answer(small_mm, None)),
     };
     let margins = process.margins(&gains, sampled)?;

@@ -83,7 +83,7 @@ fn number(table: &Table, row: usize, heading: &str) -> f64 {
 
 #[test]
 fn every_table_and_figure_of_the_chapter_is_there_once() {
-    let sections = chapter5_sections(&made_up());
+    let sections = chapter5_sections(&made_up(), &made_up());
     let found = labels(&sections);
     for number in 1..=22 {
         assert_eq!(
@@ -118,7 +118,7 @@ fn every_table_and_figure_of_the_chapter_is_there_once() {
 
 #[test]
 fn tables_hold_means_deviations_and_changes_of_the_right_entries() {
-    let sections = chapter5_sections(&made_up());
+    let sections = chapter5_sections(&made_up(), &made_up());
     let found = labels(&sections);
     let close = |value: f64, expected: f64| {
         assert!(
@@ -138,6 +138,10 @@ fn tables_hold_means_deviations_and_changes_of_the_right_entries() {
     close(number(feedforwards, 2, "Largest"), 0.5);
     close(number(feedforwards, 2, "Change"), -99.0);
     let simulated = table(&found, "Table 5.5");
+    // With PID the best one follows each four.
+    assert_eq!(simulated.rows.len(), 15);
+    close(number(simulated, 9, "Largest"), 100.0);
+    close(number(simulated, 9, "Change"), 0.0);
     assert!(simulated.columns.iter().all(|column| column.heading != "±"));
     let glitches = table(&found, "Table 5.16");
     close(number(glitches, 3, "Glitch PID"), 0.09);
@@ -149,7 +153,7 @@ fn tables_hold_means_deviations_and_changes_of_the_right_entries() {
 
 #[test]
 fn the_headline_table_sets_ours_beside_the_thesis() {
-    let section = headline_section(&made_up());
+    let section = headline_section(&made_up(), &made_up());
     let [Block::Table(changes), Block::Table(best)] = &section.blocks[..] else {
         panic!("{:?}", section.blocks);
     };
@@ -158,6 +162,9 @@ fn the_headline_table_sets_ours_beside_the_thesis() {
     close(number(changes, 0, "Identified model"), -50.0);
     close(number(changes, 0, "±"), 0.0);
     close(number(changes, 5, "Exact model"), 100.0 * (0.5e-3 - 1.0));
+    assert_eq!(changes.rows.len(), 9);
+    assert!(matches!(changes.rows[7][2], Cell::Missing));
+    close(number(changes, 7, "Exact model"), 100.0 * (0.5e-3 - 1.0));
     assert_eq!(best.rows.len(), 9);
     close(number(best, 0, "Best, identified"), 0.05);
 }

@@ -11,3 +11,4 @@ mod report_command;
 mod report_parts;
 mod robustness;
 mod robustness_command;
+mod unplanned_motion;

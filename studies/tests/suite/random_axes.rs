@@ -1,6 +1,7 @@
 //! Commissioning of axes that nobody tuned it on.
 
-use quadrant_studies::random_axes::{Outcome, RandomAxis, judge};
+use quadrant_studies::random_axes::cases::cases;
+use quadrant_studies::random_axes::{Outcome, RandomAxis, judge, judge_subject};
 use rayon::prelude::*;
 
 #[test]
@@ -21,6 +22,22 @@ fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse
         .filter(|line| line.outcome == Outcome::Commissioned);
     let (all, commissioned) = (rigid.count(), commissioned.count());
     assert!(5 * commissioned >= 4 * all, "{commissioned} of {all}");
+}
+
+#[test]
+fn the_cheapest_of_the_named_axes_are_commissioned() {
+    let names = ["travel of 10 mm either way", "travel of -3 to 37 mm"];
+    let cases: Vec<_> = cases()
+        .into_iter()
+        .filter(|case| names.contains(&&*case.description))
+        .collect();
+    assert_eq!(cases.len(), names.len());
+    cases.par_iter().for_each(|case| {
+        let line = judge_subject(case);
+        println!("{line:?}");
+        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.4, "{line:?}");
+    });
 }
 
 #[test]

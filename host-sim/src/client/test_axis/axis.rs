@@ -17,7 +17,7 @@ use crate::client::session::Client;
 use crate::client::settings;
 use crate::client::settle;
 use crate::machine::{
-    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, open_loop_mm,
+    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, Travel, open_loop_mm,
 };
 use crate::record::Recording;
 
@@ -42,39 +42,39 @@ const ENABLING: Duration = Duration::from_millis(100);
 ///
 /// Experiments run under the machine's own limits and faults, and are recorded by telemetry: as often as they ask for, if
 /// the line carries three channels so often, else as often as it does; a sample's voltage is the mean over all of its
-/// control periods in any case. Positions are counted from where the axis stood when this was made.
+/// control periods in any case. Positions are counted from the middle of the travel.
 pub struct ConnectedAxis<'a> {
     client: &'a mut Client,
     axis: AxisName,
     stage: StageSettings,
-    travel_mm: f64,
+    travel: Travel,
+    /// The machine's position of the middle of the travel, mm.
     origin_mm: f64,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
 }
 
 impl<'a> ConnectedAxis<'a> {
-    /// An axis of the machine, whose settings are read. Experiments keep it within `travel_mm` of where it stands, either
-    /// way.
+    /// An axis of the machine, whose settings are read. Experiments keep it within `travel` of where it stands.
     ///
     /// # Errors
     /// A motion that is under way, a connection that is broken, or a machine of another release.
     pub fn new(
         client: &'a mut Client,
         axis: AxisName,
-        travel_mm: f64,
+        travel: Travel,
     ) -> Result<Self, ClientError> {
         let stage = settings::dump(client)?;
         let status = client.status()?;
         if !status.is_at_rest() {
             return Err(ClientError::Moving);
         }
-        let origin_mm = status.axes[axis as usize].position_mm;
+        let origin_mm = status.axes[axis as usize].position_mm - travel.start_mm();
         Ok(Self {
             client,
             axis,
             stage,
-            travel_mm,
+            travel,
             origin_mm,
             interrupted: None,
         })
@@ -154,11 +154,11 @@ impl<'a> ConnectedAxis<'a> {
         if injects {
             let room_mm = match experiment.drive {
                 Drive::OpenLoop => {
-                    let (low_mm, high_mm) = open_loop_mm(self.travel_mm, here_mm);
+                    let (low_mm, high_mm) = open_loop_mm(self.travel.half_mm(), here_mm);
                     (here_mm - low_mm).min(high_mm - here_mm)
                 }
-                Drive::ClosedLoop(_) if moves => self.travel_mm,
-                Drive::ClosedLoop(_) => self.travel_mm - here_mm.abs(),
+                Drive::ClosedLoop(_) if moves => self.travel.half_mm(),
+                Drive::ClosedLoop(_) => self.travel.half_mm() - here_mm.abs(),
             };
             let mut plan = Injection::new(
                 experiment,
@@ -245,7 +245,8 @@ impl TestAxis for ConnectedAxis<'_> {
             rate_hz: self.client.identity().rate_hz,
             resolution_mm: settings.encoder.resolution_mm,
             full_scale_v: settings.amplifier.full_scale_v,
-            travel_mm: self.travel_mm,
+            travel_mm: self.travel.half_mm(),
+            start_mm: self.travel.start_mm(),
             max_velocity_mm_s: settings.limits.max_velocity_mm_s,
         }
     }

@@ -230,8 +230,12 @@ fn a_set_points_velocity_and_acceleration_are_those_of_its_position() {
 #[test]
 fn a_connected_axis_runs_experiments_in_closed_loop() {
     let (mut client, bench) = connected();
-    let mut test_axis =
-        ConnectedAxis::new(&mut client, quadrant::axes::AxisName::X, 200.0).unwrap();
+    let mut test_axis = ConnectedAxis::new(
+        &mut client,
+        quadrant::axes::AxisName::X,
+        crate::machine::Travel::either_way(200.0),
+    )
+    .unwrap();
     let motion = MotionSettings::PointToPoint(PointToPointSettings {
         distance_mm: 5.0,
         max_velocity_mm_s: 20.0,

@@ -15,6 +15,7 @@ use super::recorder::{Period, Recorder};
 use super::watch::Watch;
 use crate::machine::error::MachineError;
 use crate::machine::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+use crate::machine::travel::Travel;
 use crate::plant::{AxisParameters, SimulatedAxis};
 use crate::record::Recording;
 
@@ -43,9 +44,8 @@ pub struct SimulatedTestAxis {
     plant: SimulatedAxis,
     full_scale_v: f64,
     resolution_mm: f64,
-    /// Travel either way, mm.
-    travel_mm: f64,
-    /// Largest distance of the table from zero so far, mm.
+    travel: Travel,
+    /// Largest distance of the table from the middle of the travel so far, mm.
     farthest_mm: f64,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
@@ -66,7 +66,7 @@ impl SimulatedTestAxis {
             name: NAMES[index],
             full_scale_v: truth.full_scale_v,
             resolution_mm: truth.resolution_mm,
-            travel_mm: TRAVEL_MM,
+            travel: Travel::either_way(TRAVEL_MM),
             farthest_mm: 0.0,
             interrupted: None,
             plant: SimulatedAxis::new(truth, stage.rate_hz, seed),
@@ -76,8 +76,15 @@ impl SimulatedTestAxis {
 
     /// The same axis with another travel either way, mm.
     #[must_use]
-    pub fn with_travel_mm(mut self, travel_mm: f64) -> Self {
-        self.travel_mm = travel_mm;
+    pub fn with_travel_mm(self, travel_mm: f64) -> Self {
+        self.with_travel(Travel::either_way(travel_mm))
+    }
+
+    /// The same axis with another travel from where it stands, which it has not moved from yet.
+    #[must_use]
+    pub fn with_travel(mut self, travel: Travel) -> Self {
+        self.travel = travel;
+        self.farthest_mm = travel.start_mm().abs();
         self
     }
 
@@ -91,7 +98,7 @@ impl SimulatedTestAxis {
         self.plant.change(truth);
     }
 
-    /// The largest distance from zero at which the table was so far, mm: for judging.
+    /// The largest distance from the middle of the travel at which the table was so far, mm: for judging.
     pub fn farthest_mm(&self) -> f64 {
         self.farthest_mm
     }
@@ -99,7 +106,8 @@ impl SimulatedTestAxis {
     /// One control period of the plant.
     fn move_on(&mut self, code: DacCode, enabled: bool) {
         self.plant.step(code, enabled);
-        self.farthest_mm = self.farthest_mm.max(self.plant.position_mm().abs());
+        let position_mm = self.plant.position_mm() + self.travel.start_mm();
+        self.farthest_mm = self.farthest_mm.max(position_mm.abs());
     }
 
     /// Lets the axis come to rest without its outputs, as after a fault.
@@ -155,7 +163,8 @@ impl SimulatedTestAxis {
         let mut rested = false;
         loop {
             let raw = self.plant.read_counter();
-            let position_mm = f64::from(raw as i32) * self.resolution_mm;
+            let moved_mm = f64::from(raw as i32) * self.resolution_mm;
+            let position_mm = moved_mm + self.travel.start_mm();
             let Some(step) = law.step(raw, experiment)? else {
                 if waited == ENABLE_TICKS && !rested {
                     // As a person would, who is told that the axis still moves.
@@ -308,7 +317,8 @@ impl TestAxis for SimulatedTestAxis {
             rate_hz: self.stage.rate_hz,
             resolution_mm: self.resolution_mm,
             full_scale_v: self.full_scale_v,
-            travel_mm: self.travel_mm,
+            travel_mm: self.travel.half_mm(),
+            start_mm: self.travel.start_mm(),
             max_velocity_mm_s: self.settings().limits.max_velocity_mm_s,
         }
     }

@@ -8,6 +8,7 @@ use super::axis::{SimulatedTestAxis, TRAVEL_MM};
 use crate::machine::error::MachineError;
 use crate::machine::interface::Machine;
 use crate::machine::test_axis::TestAxis;
+use crate::machine::travel::Travel;
 use crate::plant::StageParameters;
 
 /// The simulated stage, with everything a real one has, under the control law alone.
@@ -42,19 +43,18 @@ impl Machine for LawStage {
         Ok(self.settings.clone())
     }
 
-    fn free_travel_mm(&mut self, _: AxisName) -> Result<Option<f64>, MachineError> {
-        Ok(Some(TRAVEL_MM))
+    fn free_travel(&mut self, _: AxisName) -> Result<Option<Travel>, MachineError> {
+        Ok(Some(Travel::either_way(TRAVEL_MM)))
     }
 
     /// The axis as it was switched on, under its PID alone.
     fn test_axis(
         &mut self,
         axis: AxisName,
-        travel_mm: f64,
+        travel: Travel,
     ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
         let truth = self.truth.axes[axis as usize].clone();
-        let test_axis =
-            SimulatedTestAxis::new(axis as usize, truth, self.seed).with_travel_mm(travel_mm);
+        let test_axis = SimulatedTestAxis::new(axis as usize, truth, self.seed).with_travel(travel);
         Ok(Box::new(test_axis))
     }
 

@@ -6,12 +6,16 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
 use quadrant_sim::compare::sine::VELOCITIES_MM_S;
+use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::{Metric, change_percent};
 use quadrant_sim::experiment::run_configuration::ModelKnowledge;
 use quadrant_sim::pages::{UM_PER_MM, statistic_cells};
 use quadrant_sim::report::{Block, Cell, Column, Table};
 
 use crate::thesis::chapter5::{CONTROLLERS, Chapter, knowledge_name};
+
+/// Name of the PID that no gain is denied, without feedforward.
+const BEST_PID: &str = "none, best PID";
 
 /// One side of a comparison: the heading of its columns, and whether its runs are repeated.
 struct Side {
@@ -231,6 +235,17 @@ impl Chapter<'_> {
                     } else {
                         change(alone, entry, measure)
                     });
+                }
+                rows.push(cells);
+            }
+            if controller == LawKind::Pid {
+                let best =
+                    self.honest
+                        .find(Configuration::PID, knowledge, AMPLITUDES_MM[0], velocity);
+                let mut cells = vec![velocity_cell(velocity), Cell::text(BEST_PID)];
+                for measure in measures {
+                    cells.extend(side.cells(best, measure));
+                    cells.push(change(alone, best, measure));
                 }
                 rows.push(cells);
             }

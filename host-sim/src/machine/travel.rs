@@ -1,0 +1,52 @@
+//! The room that an axis has from where it stands.
+
+/// Room in both directions, mm, each zero or more, and not both zero.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Travel {
+    /// To smaller positions.
+    pub negative_mm: f64,
+    /// To larger ones.
+    pub positive_mm: f64,
+}
+
+impl Travel {
+    /// As much either way, mm.
+    pub const fn either_way(mm: f64) -> Self {
+        Self {
+            negative_mm: mm,
+            positive_mm: mm,
+        }
+    }
+
+    /// From the middle to either end, mm.
+    pub fn half_mm(self) -> f64 {
+        0.5 * (self.negative_mm + self.positive_mm)
+    }
+
+    /// To the nearer end, mm.
+    pub fn nearer_mm(self) -> f64 {
+        self.negative_mm.min(self.positive_mm)
+    }
+
+    /// Position of where the axis stands, counted from the middle, mm.
+    pub fn start_mm(self) -> f64 {
+        0.5 * (self.negative_mm - self.positive_mm)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn positions_count_from_the_middle_of_the_travel() {
+        let travel = Travel {
+            negative_mm: 5.0,
+            positive_mm: 180.0,
+        };
+        assert_eq!((travel.half_mm(), travel.start_mm()), (92.5, -87.5));
+        assert_eq!(travel.start_mm() - travel.negative_mm, -travel.half_mm());
+        assert_eq!(travel.nearer_mm(), 5.0);
+        assert_eq!(Travel::either_way(20.0).start_mm(), 0.0);
+    }
+}
