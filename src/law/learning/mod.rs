@@ -174,6 +174,37 @@ struct Sums<S> {
     without: S,
 }
 
+/// The result of learning at a tick, as the slow half takes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LearningReading<S> {
+    /// The scale of the friction feedforward less 1, a [`Quantity::Multiplier`].
+    pub deviation: S,
+    /// The gate less 1, a [`Quantity::Multiplier`]: 0 while nothing vibrates.
+    pub gate: S,
+    /// Sums of the squares of the error, and of the error without feedforward, in learning's own unit.
+    pub squares: [S; 2],
+    /// The reason for which the scale is not learnt, or that it is.
+    pub status: LearningStatus,
+}
+
+impl<S: Scalar> LearningReading<S> {
+    /// The scale of the friction feedforward; 1 is the commissioned one.
+    pub fn scale(&self) -> f32 {
+        1.0 + self.deviation.to_f32(Quantity::Multiplier)
+    }
+
+    /// The share of the friction before sliding that the vibration leaves, 0 to 1.
+    pub fn gate(&self) -> f32 {
+        1.0 + self.gate.to_f32(Quantity::Multiplier)
+    }
+
+    /// RMS error over that without feedforward, over the guard's window; none before the axis has moved.
+    pub fn error_share(&self) -> Option<f32> {
+        let [with, without] = self.squares.map(|sum| sum.to_f32(Quantity::Multiplier));
+        (without > 0.0).then(|| libm::sqrtf(with / without))
+    }
+}
+
 /// The axis as a step of learning sees it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LearningInput<S> {
@@ -382,6 +413,17 @@ impl<S: Scalar> LearningState<S> {
     /// The reason for which the scale is not learnt, or that it is.
     pub const fn status(&self) -> LearningStatus {
         self.status
+    }
+
+    /// All of it at once, for a person.
+    #[inline(always)]
+    pub(crate) fn reading(&self) -> LearningReading<S> {
+        LearningReading {
+            deviation: self.deviation,
+            gate: self.gate.deviation(),
+            squares: [self.sums.with, self.sums.without],
+            status: self.status,
+        }
     }
 
     /// Takes note that the output is at its limit.
