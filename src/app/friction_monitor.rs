@@ -1,9 +1,9 @@
 //! The friction monitor: reports an axis whose friction, as learning finds it, is no longer what was commissioned.
 //!
 //! It runs in the supervising task on the snapshots. What it finds is shown, in the log and over the link, and never fed back.
-//! A scale has settled when it has stayed within [`STEADY`] for [`SETTLED_RUNS`] of learning without vibration: a cut takes
-//! friction's hysteresis away, and says nothing about the machine. It is reported when it has left the last one reported by
-//! [`WORTH_TELLING`], so that an axis fills neither log nor link.
+//! A scale has settled when it has stayed within 3 % for 5 s of learning without vibration: a cut takes friction's hysteresis
+//! away, and says nothing about the machine. It is reported when it is 5 % or more from the last one reported, so that an axis
+//! fills neither log nor link.
 
 use super::Snapshot;
 use crate::law::axes::AxisName;
@@ -48,7 +48,7 @@ struct AxisMonitor {
     /// The scale that was reported last, and that from which it may settle.
     told: f32,
     anchor: f32,
-    /// Runs of learning within [`STEADY`] of the anchor.
+    /// Runs of learning near the anchor.
     steady: u16,
 }
 

@@ -11,7 +11,7 @@
 //! rate: no division, and it moves the faster the more is known. A much weaker pull leads to the commissioned value, 1. It
 //! stays within 0 to [`MOST_SCALE`]; `docs/learning.md` shows why the axis stays bounded with it.
 //!
-//! **Cut.** Under a vibration the scale also makes up for what the [gate](vibration) takes away, so that there are two of them: what is
+//! **Cut.** Under a vibration the scale also makes up for what the gate takes away, so that there are two of them: what is
 //! learnt while the gate is closed holds while it is closed.
 //!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the

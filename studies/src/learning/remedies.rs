@@ -152,7 +152,7 @@ impl HighPass {
 }
 
 /// The GMS of the settings stepped by the reference and by the measured vibration, its output averaged; blended with the gate by
-/// the share of the vibration's power above [`AVERAGED_HZ`].
+/// the share of the vibration's power above 75 Hz.
 pub(super) struct FedFriction {
     model: Gms<f64, FIRMWARE_ELEMENTS>,
     state: GmsState<f64, FIRMWARE_ELEMENTS>,
