@@ -5,6 +5,7 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
+use quadrant::app::friction_monitor::FrictionChange;
 use quadrant::app::glitch_monitor::GlitchEvent;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
@@ -96,9 +97,10 @@ enum Topic {
     Settings,
     Losses,
     Glitches,
+    Friction,
 }
 
-const TOPICS: [&str; 8] = [
+const TOPICS: [&str; 9] = [
     "the outputs",
     "refusals",
     "faults",
@@ -107,6 +109,7 @@ const TOPICS: [&str; 8] = [
     "settings and captures",
     "losses",
     "glitches",
+    "friction",
 ];
 
 /// Limits the lines that a task prints.
@@ -194,6 +197,7 @@ const fn topic(event: Event) -> Topic {
         Event::MotionStarted | Event::MotionFinished | Event::MovedWhileOff(_) => Topic::Motion,
         Event::Refused(..) => Topic::Refusals,
         Event::Faulted(_) | Event::Stopping(_) | Event::Held(_) => Topic::Faults,
+        Event::FrictionChanged(_) => Topic::Friction,
     }
 }
 
@@ -206,6 +210,7 @@ fn print_event(event: Event) {
         Event::MovedWhileOff(axis) => {
             defmt::warn!("{=str} moves though the outputs are off", axis.as_str());
         }
+        Event::FrictionChanged(change) => print_friction(change),
         Event::Refused(_, refusal) => match refusal.axis() {
             Some(axis) => {
                 defmt::warn!(
@@ -245,6 +250,23 @@ fn print_glitch(event: GlitchEvent) {
             tenths(circle.deviation_um),
             tenths(circle.angle_deg)
         ),
+    }
+}
+
+fn print_friction(change: FrictionChange) {
+    let (axis, times) = (change.axis.as_str(), f32::from(change.percent) / 100.0);
+    if change.needs_maintenance {
+        defmt::warn!(
+            "friction of {=str} is {=f32} times what was commissioned: look after guide, drive and lubrication, or commission again",
+            axis,
+            times
+        );
+    } else {
+        defmt::info!(
+            "friction of {=str} is {=f32} times what was commissioned",
+            axis,
+            times
+        );
     }
 }
 

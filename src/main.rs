@@ -284,7 +284,7 @@ mod app {
                 let _ = cx.local.commands_in.enqueue(command);
                 print(cx.local.lines_in, LogEntry::Command(command));
             }
-            for event in supervised.events.into_iter().flatten() {
+            for event in supervised.events {
                 // A server or a log that is late loses its newest; nothing waits for them.
                 let _ = cx.local.events_in.enqueue((snapshot.tick, event));
                 print(cx.local.lines_in, LogEntry::Event(event));

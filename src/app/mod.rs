@@ -23,6 +23,7 @@ pub mod capture;
 mod change_detector;
 mod control;
 pub mod crash_record;
+pub mod friction_monitor;
 pub mod glitch_monitor;
 mod host_need;
 mod intake;

@@ -5,6 +5,7 @@ use crate::law::axes::PerAxis;
 use crate::law::axis::AxisState;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::injection::InjectionProgress;
+use crate::law::learning::LearningReading;
 use crate::law::safety::Switches;
 use crate::law::safety::monitor::FollowingState;
 use crate::law::scalar::Scalar;
@@ -29,6 +30,8 @@ pub struct AxisSnapshot<S> {
     pub limited_by: LimitedBy,
     /// The largest tracking error since enabling, against its limit.
     pub following: FollowingState<S>,
+    /// The result of learning.
+    pub learning: LearningReading<S>,
 }
 
 /// The machine at one tick.
@@ -71,6 +74,7 @@ impl<S: Scalar> Snapshot<S> {
                     output: telemetry.output,
                     limited_by: telemetry.limited_by,
                     following: axis.following(),
+                    learning: axis.learning().reading(),
                 }
             }),
             injection: state.injection_progress(),

@@ -1,6 +1,7 @@
 //! The supervising task: passes or refuses requests of the operator at the machine, and finds events to report.
 
 use super::Snapshot;
+use super::friction_monitor::FrictionMonitor;
 use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
 use crate::app::supervisor::{Decision, Event, Supervisor};
 use crate::law::command::Command;
@@ -12,18 +13,22 @@ pub struct Supervised {
     /// The command for the control law's next tick.
     pub command: Option<Command>,
     /// The events found.
-    pub events: [Option<Event>; 5],
+    pub events: heapless::Vec<Event, MAX_EVENTS>,
     /// Glitches and circles that have ended.
     pub glitches: heapless::Vec<GlitchEvent, MAX_GLITCH_EVENTS>,
     /// True once a second: the tracking errors are due in the log.
     pub status_due: bool,
 }
 
+/// Most events of one run: those of a [`Decision`], and a change of friction of each axis.
+const MAX_EVENTS: usize = 8;
+
 /// The supervising task's state.
 #[derive(Clone, Debug)]
 pub struct Supervision {
     supervisor: Supervisor,
     glitches: GlitchMonitor,
+    friction: FrictionMonitor,
     runs: u32,
 }
 
@@ -36,6 +41,7 @@ impl Supervision {
         Self {
             supervisor: Supervisor::default(),
             glitches: GlitchMonitor::new(resolution_mm.map(|length| length as f32)),
+            friction: FrictionMonitor::default(),
             runs: 0,
         }
     }
@@ -48,9 +54,13 @@ impl Supervision {
     ) -> Supervised {
         let Decision { command, events } = self.supervisor.step(snapshot.view, request);
         self.runs = self.runs.wrapping_add(1);
+        let changes = self
+            .friction
+            .step(snapshot)
+            .map(|change| change.map(Event::FrictionChanged));
         Supervised {
             command,
-            events,
+            events: events.into_iter().chain(changes).flatten().collect(),
             glitches: self.glitches.step(snapshot),
             status_due: self.runs.is_multiple_of(STATUS_RUNS),
         }

@@ -3,6 +3,7 @@
 //! Runs every [`PERIOD_TICKS`] control ticks, below the control interrupt. Pure, so that the firmware and the host's
 //! run of the same job decide alike.
 
+use super::friction_monitor::FrictionChange;
 use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::safety::{Fault, SafetyState, Station};
@@ -31,6 +32,8 @@ pub enum Event {
     MotionFinished,
     /// An axis that stood was moved though the outputs are off.
     MovedWhileOff(AxisName),
+    /// The friction of an axis has settled away from what was commissioned.
+    FrictionChanged(FrictionChange),
     /// A request was refused.
     Refused(Command, Refusal),
 }

@@ -4,6 +4,7 @@ use quadrant_link::message::{self as wire, text};
 
 use super::supervisor;
 use crate::law::axes::AxisName;
+use crate::law::learning::LearningStatus;
 use crate::law::motion::MotionMode;
 use crate::law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use crate::law::safety::SafetyState;
@@ -39,6 +40,21 @@ impl From<LimitedBy> for wire::LimitedBy {
             LimitedBy::Nothing => Self::Nothing,
             LimitedBy::OutputLimit => Self::OutputLimit,
         }
+    }
+}
+
+impl LearningStatus {
+    /// The state of an axis that learns; none for one that does not.
+    pub(super) const fn on_the_link(self) -> Option<wire::LearningState> {
+        Some(match self {
+            Self::Off => return None,
+            Self::Learning => wire::LearningState::Learning,
+            Self::AtRest => wire::LearningState::AtRest,
+            Self::OtherMotion => wire::LearningState::OtherMotion,
+            Self::Saturated => wire::LearningState::Saturated,
+            Self::Settling => wire::LearningState::Settling,
+            Self::Fading => wire::LearningState::Fading,
+        })
     }
 }
 
@@ -90,6 +106,11 @@ impl From<supervisor::Event> for wire::Event {
             Event::MotionStarted => Self::MotionStarted,
             Event::MotionFinished => Self::MotionFinished,
             Event::MovedWhileOff(axis) => Self::MovedWhileOff(axis.into()),
+            Event::FrictionChanged(change) => Self::FrictionChanged {
+                axis: change.axis.into(),
+                percent: change.percent,
+                needs_maintenance: change.needs_maintenance,
+            },
             Event::Refused(_, reason) => Self::Refused(text(format_args!("{reason}"))),
         }
     }

@@ -10,6 +10,7 @@
 //! - [`numerics`]: f32 and fixed point against f64;
 //! - [`outputs`]: the amplifier outputs' resolution;
 //! - [`identification`]: identification judged by the plant's parameters;
+//! - [`learning`]: other starts, part programs and changes, with the feedforward that learns;
 //! - [`cuts`]: learning under random cuts and changes of friction;
 //! - [`random_axes`]: commissioning of axes that are not the simulated stage's;
 //! - [`random_faults`]: faults at random activities, and what must hold whatever happens;
@@ -23,6 +24,7 @@ pub mod cuts;
 pub mod friction_models;
 pub mod identification;
 pub mod laws;
+pub mod learning;
 pub mod numerics;
 pub mod outputs;
 pub mod random_axes;

@@ -6,8 +6,8 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use quadrant_cli::{explained, terminal, warn};
 use quadrant_studies::{
-    cuts, friction_models, identification, laws, numerics, outputs, random_axes, random_faults,
-    report, robustness,
+    cuts, friction_models, identification, laws, learning, numerics, outputs, random_axes,
+    random_faults, report, robustness,
 };
 
 /// The thesis' tables and figures, and the comparative studies, on the simulated stage.
@@ -35,6 +35,8 @@ enum Command {
     Identification(identification::command::Arguments),
     /// Compare all feedback laws, tuned with equal effort at equal robustness, and feedforward whose model is wrong.
     Laws(laws::command::Arguments),
+    /// Run the feedforward that learns from other starts, on part programs, after changes of the axis.
+    Learning(learning::command::Arguments),
     /// Compare f32 and fixed point with f64 over the whole comparison.
     Numerics(numerics::command::Arguments),
     /// Compare amplifier outputs of 16 bits with 12 bits, plain and with the error shaped.
@@ -54,6 +56,7 @@ fn main() -> ExitCode {
         Command::Friction(arguments) => friction_models::command::run(&arguments),
         Command::Identification(arguments) => identification::command::run(&arguments),
         Command::Laws(arguments) => laws::command::run(&arguments),
+        Command::Learning(arguments) => learning::command::run(&arguments),
         Command::Numerics(arguments) => numerics::command::run(&arguments),
         Command::Outputs(arguments) => outputs::command::run(&arguments),
         Command::Report(arguments) => report::command::run(&arguments),

@@ -41,6 +41,9 @@ struct Axis<S: Scalar> {
     rig: Rig<S>,
     plant: Plant,
     encoder: Encoder,
+    /// Amplitude, V, and frequency, Hz, of a load that shakes the axis.
+    shaken: (f64, f64),
+    ticks: u32,
 }
 
 impl<S: Scalar> Axis<S> {
@@ -54,6 +57,8 @@ impl<S: Scalar> Axis<S> {
             rig: Rig::with_plant(settings, plan),
             plant: Plant::new(&Truth { friction, ..MODEL }),
             encoder: Encoder::new(Death::Healthy, 7),
+            shaken: (0.0, 0.0),
+            ticks: 0,
         };
         axis.tick();
         axis.rig.inputs.command = Some(Command::Enable);
@@ -71,7 +76,11 @@ impl<S: Scalar> Axis<S> {
         self.rig.inputs.readings[0].count = count as u32;
         let outputs = self.rig.tick();
         let [x, ..] = *outputs.codes;
-        self.plant.step(f64::from(x.0) / 32_767.0 * 10.0);
+        let (amplitude_v, hz) = self.shaken;
+        let phase = std::f64::consts::TAU * hz * f64::from(self.ticks) * PERIOD_S;
+        self.ticks += 1;
+        let load_v = amplitude_v * phase.sin();
+        self.plant.step(f64::from(x.0) / 32_767.0 * 10.0 + load_v);
     }
 
     /// Runs for a time; returns the mean square of the error, mm^2.
@@ -165,6 +174,27 @@ fn a_feedforward_that_harms_is_faded_out_and_it_is_said() {
     }
     assert!(fading);
     assert!(axis.scale() < 0.15, "{}", axis.scale());
+}
+
+#[test]
+fn what_a_cut_raises_ends_with_it() {
+    for shaken in [(0.11, 300.0), (0.2, 350.0)] {
+        let mut axis = Axis::<f32>::on_sine(&learning(), 1.0);
+        axis.shaken = shaken;
+        axis.command(Command::Run);
+        let mut gate = 0.0;
+        for _ in 0..80_000 {
+            axis.tick();
+            gate += f64::from(axis.rig.state.axes()[0].learning().gate()) / 8e4;
+        }
+        let raised = axis.scale();
+        axis.shaken = (0.0, 0.0);
+        axis.run(0.5);
+        let left = axis.scale();
+        println!("{shaken:?}: gate {gate}, scale {raised}, then {left}");
+        assert!((0.1..0.8).contains(&gate) && raised > 1.1);
+        assert!(left < 1.1);
+    }
 }
 
 #[test]

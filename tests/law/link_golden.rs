@@ -60,6 +60,7 @@ fn requests() -> Vec<(Body, &'static str)> {
         (Body::Status, "01"),
         (Body::Fault, "02"),
         (Body::Inputs, "12"),
+        (Body::Learning, "13"),
         (Body::ResetFault, "03"),
         (Body::Enable, "04"),
         (Body::Disable, "05"),

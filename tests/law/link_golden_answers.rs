@@ -151,6 +151,23 @@ fn replies() -> Vec<(Result<Reply, LinkError>, &'static str)> {
             "0dac02818002070101\
              72",
         ),
+        (
+            Ok(Reply::Learning(Learning {
+                tick: 300,
+                axes: [
+                    Some(AxisLearning {
+                        state: LearningState::Fading,
+                        scale: 1.5,
+                        gate: 1.0,
+                        error_share: Some(0.25),
+                    }),
+                    None,
+                    None,
+                ],
+            })),
+            "0eac0201050000c03f\
+             0000803f010000803e0000",
+        ),
         (Err(LinkError::Version { yours: 9, mine: 1 }), "000901"),
         (Err(LinkError::Undecodable), "01"),
         (Err(LinkError::NoHello), "02"),
@@ -201,6 +218,14 @@ fn notices() -> Vec<(Notice, &'static str)> {
         (event(Event::SettingsApplied(AxisSet::ALL)), "0001ac020b07"),
         (event(Event::SettingsStored), "0001ac020c"),
         (event(Event::MovedWhileOff(Y)), "0001ac020d01"),
+        (
+            event(Event::FrictionChanged {
+                axis: Y,
+                percent: 160,
+                needs_maintenance: true,
+            }),
+            "0001ac020e01a00101",
+        ),
         (
             Notice::Telemetry(TelemetryBlock {
                 generation: 2,

@@ -187,7 +187,7 @@ impl Requests<'_> {
 
     /// Any request, all its numbers finite.
     fn body(&mut self) -> Body {
-        match self.below(19) {
+        match self.below(20) {
             0 => Body::Hello,
             1 => Body::Status,
             2 => Body::Fault,
@@ -224,6 +224,7 @@ impl Requests<'_> {
             15 => Body::Capture(self.capture()),
             16 => Body::Inject(self.injection()),
             17 => Body::Inputs,
+            18 => Body::Learning,
             _ => Body::Reboot,
         }
     }

@@ -27,6 +27,7 @@ mod friction_dahl;
 mod friction_gms;
 mod friction_gms_memory;
 mod friction_lugre;
+mod friction_monitor;
 mod friction_smoothed_gms;
 mod friction_static;
 mod gain_schedule;

@@ -98,6 +98,12 @@ pub(super) enum Command {
         /// The file: TOML, as for `load`; without it, what `apply` would change.
         file: Option<PathBuf>,
     },
+    /// Take the friction that an axis has learnt into the draft: its friction gains as they act, times the scale.
+    Adopt {
+        /// The axis: x, y or z.
+        #[arg(value_enum)]
+        axis: Axis,
+    },
     /// Write all settings to a file that every other command reads.
     Dump {
         /// The file: TOML.
@@ -479,6 +485,7 @@ impl Command {
             Self::Set { .. } => "set",
             Self::List { .. } => "list",
             Self::Diff { .. } => "diff",
+            Self::Adopt { .. } => "adopt",
             Self::Dump { .. } => "dump",
             Self::Load { .. } => "load",
             Self::Apply => "apply",

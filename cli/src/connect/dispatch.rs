@@ -8,7 +8,8 @@ use super::command::{Command, RecordOptions};
 use super::line::{self, Said};
 use super::session::Session;
 use super::{
-    commission, identify, inputs, machine, observe, program, scope, settings, simulated_io, watch,
+    commission, identify, inputs, learnt, machine, observe, program, scope, settings, simulated_io,
+    watch,
 };
 
 /// Gives a command and prints its result; returns true if it succeeded. `source` is its line, for messages.
@@ -58,6 +59,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         Command::Plan { file } => program::plan(client, file),
         Command::Circle(options) => program::circle_plan(client, options),
         Command::Stream(options) => program::stream_program(client, options),
+        Command::Adopt { axis } => learnt::adopt(client, *axis),
         Command::Get { path } => settings::get(client, path),
         Command::Set { path, value } => settings::set(client, path, value),
         Command::List { prefix } => settings::list(client, prefix),

@@ -24,6 +24,7 @@ pub(super) const GROUPS: [(&str, &[&str]); 6] = [
             "set",
             "list",
             "diff",
+            "adopt",
             "apply",
             "revert",
             "defaults",

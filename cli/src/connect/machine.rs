@@ -11,7 +11,7 @@ use serde_json::json;
 
 use super::answer::{Answer, name, seconds};
 use super::command::Command;
-use super::inputs;
+use super::{inputs, learnt};
 use quadrant_cli::axis::Axis;
 
 /// Lists the serial ports of this computer.
@@ -53,11 +53,15 @@ pub(super) fn hello(client: &mut Client) -> anyhow::Result<Answer> {
 pub(super) fn status(client: &mut Client) -> anyhow::Result<Answer> {
     let status = client.status()?;
     let inputs = client.inputs()?;
+    let learning = client.learning()?;
     let mut text = status_text(
         &status,
         client.identity().rate_hz,
         client.identity().cycle_hz,
     );
+    for line in learnt::lines(&learning) {
+        let _ = write!(text, "\n{line}");
+    }
     let active = inputs::active(&inputs);
     if !active.is_empty() {
         let _ = write!(text, "\nactive inputs: {}", active.join(", "));
@@ -73,6 +77,7 @@ pub(super) fn status(client: &mut Client) -> anyhow::Result<Answer> {
         data["axes"][index]["axis"] = json!(axis.as_str());
         data["axes"][index]["limited_by"] = json!(name(&status.axes[index].limited_by));
     }
+    data["learning"] = learnt::data(&learning);
     data["inputs"] = json!(active);
     data["refusal"] = json!(inputs.refusal);
     Ok(Answer::new(text, data))

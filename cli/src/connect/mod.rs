@@ -9,6 +9,7 @@ mod flash;
 mod help;
 mod identify;
 mod inputs;
+mod learnt;
 mod line;
 mod machine;
 mod observe;

@@ -62,18 +62,7 @@ pub(super) fn diff(client: &mut Client, file: Option<&Path>) -> anyhow::Result<A
         Some(file) => settings::against(client, &SettingsFile::read(file)?.stage)?,
         None => settings::edited(client)?,
     };
-    let shown = |value: &Option<Value>| value.as_ref().map_or("-".to_owned(), Value::to_string);
-    let mut lines: Vec<String> = differences
-        .iter()
-        .map(|difference| {
-            let Difference {
-                path,
-                acting,
-                other,
-            } = difference;
-            format!("{path} {} -> {}", shown(acting), shown(other))
-        })
-        .collect();
+    let mut lines: Vec<String> = differences.iter().map(difference_line).collect();
     if lines.is_empty() {
         lines.push(match file {
             Some(file) => format!("what acts is what {} says", file.display()),
@@ -81,6 +70,17 @@ pub(super) fn diff(client: &mut Client, file: Option<&Path>) -> anyhow::Result<A
         });
     }
     Ok(Answer::new(lines.join("\n"), json!(differences)))
+}
+
+/// A setting with the value that acts, and the other one.
+pub(super) fn difference_line(difference: &Difference) -> String {
+    let shown = |value: &Option<Value>| value.as_ref().map_or("-".to_owned(), Value::to_string);
+    let Difference {
+        path,
+        acting,
+        other,
+    } = difference;
+    format!("{path} {} -> {}", shown(acting), shown(other))
 }
 
 pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {

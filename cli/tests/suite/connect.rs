@@ -464,3 +464,69 @@ fn inputs_are_seen_and_what_they_prevent() {
     let last = said.rsplit("emergency-stop ").next().unwrap();
     assert!(last.contains("nothing keeps the outputs off"), "{said}");
 }
+
+/// An x axis that was told of 0.7 times its friction, and learns on a sine.
+const TOLD_TOO_LITTLE: &str = "set x/feedforward/gains/gms 0.7\nset x/feedforward/gains/level 0.7\n\
+     set x/feedforward/gains/viscous 0.7\nset x/feedforward/learning present\napply\n";
+
+#[test]
+fn what_an_axis_has_learnt_is_shown_told_and_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let stage = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../host-sim/data/identified-stage.toml"
+    );
+    let said = succeeds(
+        folder.path(),
+        &["--json"],
+        &format!(
+            "load {stage}\n{TOLD_TOO_LITTLE}enable\n\
+             circle --radius-mm 5 --feed-mm-min 600 --turns 8\nrun\nwait rest\nstatus\nevents\n\
+             adopt x\nadopt x\napply\nstatus\nget x/feedforward/gains/gms\n"
+        ),
+    );
+    let results = results(&said);
+    let of = |command: &str| -> Vec<&Value> {
+        let named = results.iter().filter(|line| line["command"] == command);
+        named.map(|line| &line["result"]).collect()
+    };
+    let [before, after] = of("status")[..] else {
+        panic!("{said}");
+    };
+    let learnt = &before["learning"][0];
+    let scale = learnt["scale"].as_f64().unwrap();
+    assert!((1.3..1.6).contains(&scale), "{learnt}");
+    assert_eq!(learnt["state"], "at-rest");
+    assert!(learnt["error_share"].as_f64().unwrap() < 0.5, "{learnt}");
+    assert_eq!(before["learning"][1], Value::Null);
+    let told = of("events")
+        .into_iter()
+        .find_map(|line| line["event"].get("FrictionChanged"))
+        .unwrap_or_else(|| panic!("{said}"));
+    assert_eq!(told["axis"], "x");
+    assert!(
+        (130..150).contains(&told["percent"].as_u64().unwrap()),
+        "{told}"
+    );
+    // Twice is as once.
+    let [first, second] = of("adopt")[..] else {
+        panic!("{said}");
+    };
+    assert_eq!(first, second);
+    assert_eq!(first["gains"].as_array().unwrap().len(), 3);
+    let kept = of("get")[0].as_f64().unwrap();
+    assert!((kept / (0.7 * scale) - 1.0).abs() < 1e-3, "{kept} {scale}");
+    assert_eq!(after["learning"][0]["scale"], 1.0);
+}
+
+#[test]
+fn an_axis_that_does_not_learn_has_nothing_to_keep() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = session(folder.path(), &[], "adopt y\n");
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(!output.status.success());
+    assert!(
+        errors.contains("set y/feedforward/learning present"),
+        "{errors}"
+    );
+}

@@ -6,6 +6,7 @@
 //!
 //! - [`Client`]: a session; requests are answered or fail in words, notices are kept until they are asked for;
 //! - [`settings`]: leaf by leaf, and as the file that every other command reads;
+//! - [`adopt`]: the friction that an axis has learnt, taken into the settings;
 //! - [`samples`], [`columns`]: telemetry and captures, and their CSV files;
 //! - [`set_points`]: a part program, streamed;
 //! - [`settle`]: waiting for rest and for homing;
@@ -15,6 +16,7 @@
 //! Transports, and the machines in this process, are in [`machine`](crate::machine), which knows no client.
 //! `docs/console.md` is the user's page.
 
+pub mod adopt;
 pub mod columns;
 mod connected;
 mod error;

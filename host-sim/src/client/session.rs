@@ -6,7 +6,8 @@ use std::time::Duration;
 
 use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
-    Body, FaultReport, Identity, Inputs, LinkError, Message, Notice, Reply, Request, Status,
+    Body, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice, Reply, Request,
+    Status,
 };
 use quadrant::link::message::{MachineState, TelemetryBlock};
 
@@ -184,6 +185,17 @@ impl Client {
         }
     }
 
+    /// Reads what the axes have learnt.
+    ///
+    /// # Errors
+    /// As [`request`](Self::request).
+    pub fn learning(&mut self) -> Result<Learning, ClientError> {
+        match self.request(Body::Learning)? {
+            Reply::Learning(learning) => Ok(learning),
+            other => Err(self.unexpected("learning", &other)),
+        }
+    }
+
     /// The latched fault, if there is one.
     ///
     /// # Errors
@@ -269,6 +281,7 @@ impl Client {
     /// Asks for everything that others see who look at the machine.
     fn look(&mut self) -> Result<Status, ClientError> {
         self.inputs()?;
+        self.learning()?;
         self.fault()?;
         self.status()
     }
@@ -494,5 +507,6 @@ const fn reply_name(reply: &Reply) -> &'static str {
         Reply::Words(_) => "words of a capture",
         Reply::Inject(_) => "the state of an injection",
         Reply::Inputs(_) => "the digital inputs",
+        Reply::Learning(_) => "what was learnt",
     }
 }

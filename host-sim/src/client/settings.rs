@@ -103,7 +103,7 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
 }
 
 /// The value that acts at a path, if what acts has it.
-fn acting(client: &mut Client, path: &str) -> Result<Option<Value>, ClientError> {
+pub(super) fn acting(client: &mut Client, path: &str) -> Result<Option<Value>, ClientError> {
     match request_value(client, SettingsRequest::GetInForce(bounded("path", path)?)) {
         Ok(value) => decode(path, &value).map(Some),
         Err(ClientError::Refused { .. }) => Ok(None),

@@ -40,6 +40,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Status
         | Body::Fault
         | Body::Inputs
+        | Body::Learning
         | Body::Settings(
             SettingsRequest::Get(_)
             | SettingsRequest::GetInForce(_)

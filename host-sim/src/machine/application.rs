@@ -155,7 +155,7 @@ impl<S: Scalar> Running<S> {
         self.commands.extend(supervised.command);
         self.control
             .show_glitches(self.supervision.glitch_readings());
-        for event in supervised.events.into_iter().flatten() {
+        for event in supervised.events {
             self.server.push_event(seen.tick, event);
         }
         let after = self

@@ -14,7 +14,8 @@ use std::time::Duration;
 
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{
-    Body, FaultReport, Identity, Inputs, LinkError, Message, Notice, Reply, Request, Status, text,
+    Body, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice, Reply, Request,
+    Status, text,
 };
 use quadrant::link::server::LinkServer;
 
@@ -57,6 +58,7 @@ struct Heard {
     identity: Option<Identity>,
     status: Option<Status>,
     inputs: Option<Inputs>,
+    learning: Option<Learning>,
     fault: Option<Option<FaultReport>>,
     viewers: Vec<SyncSender<Notice>>,
 }
@@ -159,6 +161,7 @@ impl Hub {
                 Ok(Reply::Identity(identity)) => heard.identity = Some(identity),
                 Ok(Reply::Status(status)) => heard.status = Some(status),
                 Ok(Reply::Inputs(inputs)) => heard.inputs = Some(inputs),
+                Ok(Reply::Learning(learning)) => heard.learning = Some(learning),
                 Ok(Reply::Fault(fault)) => heard.fault = Some(fault),
                 _ => {}
             },
@@ -187,6 +190,7 @@ impl Hub {
             Body::Hello => heard.identity.clone().map(Reply::Identity),
             Body::Status => heard.status.clone().map(Reply::Status),
             Body::Inputs => heard.inputs.clone().map(Reply::Inputs),
+            Body::Learning => heard.learning.clone().map(Reply::Learning),
             Body::Fault => heard.fault.clone().map(Reply::Fault),
             _ => {
                 return Err(LinkError::Refused(text(format_args!(

@@ -319,6 +319,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             Body::Status => Ok(Reply::Status(self.status())),
             Body::Fault => Ok(Reply::Fault(self.fault())),
             Body::Inputs => Ok(Reply::Inputs(self.inputs())),
+            Body::Learning => Ok(Reply::Learning(self.learning())),
             Body::Stream(request) => self.serve_stream(request),
             Body::Inject(request) => self.serve_inject(request),
             Body::Settings(request) => self.serve_settings(request),

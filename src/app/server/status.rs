@@ -11,7 +11,8 @@ use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_FRACTION_BITS, Position};
 use quadrant_link::PROTOCOL_VERSION;
 use quadrant_link::message::{
-    AxisSet, AxisStatus, FaultReport, Identity, Inputs, MachineState, Status, text,
+    AxisLearning, AxisSet, AxisStatus, FaultReport, Identity, Inputs, Learning, MachineState,
+    Status, text,
 };
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
@@ -67,6 +68,21 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             refusal: refusal.map(|refusal| match refusal.axis() {
                 Some(axis) => text(format_args!("{axis}: {}", refusal.as_str())),
                 None => text(format_args!("{}", refusal.as_str())),
+            }),
+        }
+    }
+
+    pub(super) fn learning(&self) -> Learning {
+        Learning {
+            tick: self.seen.tick,
+            axes: self.seen.axes.map(|axis| {
+                let seen = axis.learning;
+                Some(AxisLearning {
+                    state: seen.status.on_the_link()?,
+                    scale: seen.scale(),
+                    gate: seen.gate(),
+                    error_share: seen.error_share(),
+                })
             }),
         }
     }

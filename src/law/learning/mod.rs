@@ -11,6 +11,9 @@
 //! rate: no division, and it moves the faster the more is known. A much weaker pull leads to the commissioned value, 1. It
 //! stays within 0 to [`MOST_SCALE`]; `docs/learning.md` shows why the axis stays bounded with it.
 //!
+//! **Cut.** Under a vibration the scale also makes up for what the gate takes away, so that there are two of them: what is
+//! learnt while the gate is closed holds while it is closed.
+//!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
 //! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
 
@@ -82,6 +85,10 @@ const GUARD_S: f64 = 2.0;
 const GUARD_SHARE: f64 = 0.05;
 const GUARD_COUNTS: f64 = 0.5;
 
+/// Gate below which it is closed, and blocks, half a second, after which an open gate ends a cut.
+const SHAKEN: f64 = 0.9;
+const QUIET_BLOCKS: u8 = 40;
+
 /// Time for which nothing is learnt after the model and the axis may have parted, s.
 const SETTLING_S: f64 = 1.0;
 
@@ -138,6 +145,8 @@ struct Estimate<S: Scalar> {
     fade: S,
     guard_share: S::Gain,
     guard_least: S,
+    /// The gate less 1 below which the axis is shaken.
+    shaken: S,
 }
 
 /// The memory of learning.
@@ -156,9 +165,21 @@ pub struct LearningState<S: Scalar> {
     /// Steps in the block, and steps until learning begins again.
     steps: u8,
     settling: u16,
+    /// True if the gate is closed; blocks for which it has been closed or open; and what was learnt while it was the other.
+    shaken: bool,
+    lasting: u8,
+    other: Learnt<S>,
     /// Sums of the block, and the forgetting ones.
     block: Sums<S>,
     sums: Sums<S>,
+}
+
+/// What was learnt in one state of the gate: the scale less 1, and the sums that it was learnt from.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Learnt<S> {
+    deviation: S,
+    information: S,
+    correlation: S,
 }
 
 /// Sums of products, in units.
@@ -172,6 +193,37 @@ struct Sums<S> {
     with: S,
     /// `e0^2`.
     without: S,
+}
+
+/// The result of learning at a tick, as the slow half takes it.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LearningReading<S> {
+    /// The scale of the friction feedforward less 1, a [`Quantity::Multiplier`].
+    pub deviation: S,
+    /// The gate less 1, a [`Quantity::Multiplier`]: 0 while nothing vibrates.
+    pub gate: S,
+    /// Sums of the squares of the error, and of the error without feedforward, in learning's own unit.
+    pub squares: [S; 2],
+    /// The reason for which the scale is not learnt, or that it is.
+    pub status: LearningStatus,
+}
+
+impl<S: Scalar> LearningReading<S> {
+    /// The scale of the friction feedforward; 1 is the commissioned one.
+    pub fn scale(&self) -> f32 {
+        1.0 + self.deviation.to_f32(Quantity::Multiplier)
+    }
+
+    /// The share of the friction before sliding that the vibration leaves, 0 to 1.
+    pub fn gate(&self) -> f32 {
+        1.0 + self.gate.to_f32(Quantity::Multiplier)
+    }
+
+    /// RMS error over that without feedforward, over the guard's window; none before the axis has moved.
+    pub fn error_share(&self) -> Option<f32> {
+        let [with, without] = self.squares.map(|sum| sum.to_f32(Quantity::Multiplier));
+        (without > 0.0).then(|| libm::sqrtf(with / without))
+    }
 }
 
 /// The axis as a step of learning sees it.
@@ -222,6 +274,7 @@ impl<S: Scalar> Learning<S> {
                 fade: number(FADE_PER_S * block_s),
                 guard_share: share(GUARD_SHARE),
                 guard_least: number(GUARD_S * count * count),
+                shaken: number(SHAKEN - 1.0),
             },
         }
     }
@@ -251,6 +304,9 @@ impl<S: Scalar> Learning<S> {
         LearningState {
             deviation: state.deviation,
             sums: state.sums,
+            shaken: state.shaken,
+            lasting: state.lasting,
+            other: state.other,
             status: state.status,
             ..LearningState::default()
         }
@@ -333,13 +389,39 @@ impl<S: Scalar> Learning<S> {
         gained + gained_by_scale.scale(self.unloaded)
     }
 
+    /// Takes up what was learnt with the gate as it is now: closed, the scale makes up for what the gate takes away. When it
+    /// opens, the scale is at most what it was before. When it closes again soon, it is what it was then.
+    #[inline(always)]
+    fn follow_gate(&self, state: &mut LearningState<S>) {
+        let shaken = state.gate.deviation() < self.estimate.shaken;
+        if shaken == state.shaken {
+            state.lasting = state.lasting.saturating_add(1);
+            return;
+        }
+        let now = Learnt {
+            deviation: state.deviation,
+            information: state.sums.information,
+            correlation: state.sums.correlation,
+        };
+        let before = core::mem::replace(&mut state.other, now);
+        if !shaken || state.lasting < QUIET_BLOCKS {
+            let falls = !shaken && now.deviation < before.deviation;
+            state.deviation = if falls { now } else { before }.deviation;
+            state.sums.information = before.information;
+            state.sums.correlation = before.correlation;
+        }
+        state.shaken = shaken;
+        state.lasting = 0;
+    }
+
     /// Takes a block into the sums, and moves the scale.
     #[inline(never)]
     fn end_block(&self, state: &mut LearningState<S>) {
         let estimate = &self.estimate;
-        let scale = self.scale(state);
         let block = core::mem::take(&mut state.block);
         state.steps = 0;
+        self.follow_gate(state);
+        let scale = self.scale(state);
         let sums = &mut state.sums;
         let add = |sum: S, keep: S, block: S| {
             sum.times(keep, Quantity::Fraction) + block.scale(estimate.step)
@@ -382,6 +464,17 @@ impl<S: Scalar> LearningState<S> {
     /// The reason for which the scale is not learnt, or that it is.
     pub const fn status(&self) -> LearningStatus {
         self.status
+    }
+
+    /// All of it at once, for a person.
+    #[inline(always)]
+    pub(crate) fn reading(&self) -> LearningReading<S> {
+        LearningReading {
+            deviation: self.deviation,
+            gate: self.gate.deviation(),
+            squares: [self.sums.with, self.sums.without],
+            status: self.status,
+        }
     }
 
     /// Takes note that the output is at its limit.

@@ -5,6 +5,7 @@ mod command;
 mod cuts;
 mod friction_models;
 mod laws;
+mod learning;
 mod random_axes;
 mod random_faults;
 mod report_command;

@@ -119,6 +119,19 @@ mod tests {
     }
 
     #[test]
+    fn an_axis_that_learns_shows_its_scale_beside_three_charts() {
+        let (mut client, mut watch) = watched(&[]);
+        assert!(!picture(&watch).contains("friction of"));
+        let path = quadrant_sim::client::settings::whole_path("z/feedforward/learning");
+        quadrant_sim::client::settings::set(&mut client, &path, "present").unwrap();
+        quadrant_sim::client::settings::apply(&mut client).unwrap();
+        press(&mut client, &mut watch, KeyCode::Char('e'));
+        let seen = picture(&watch);
+        assert!(seen.contains("friction of z x 1.000; frozen: "), "{seen}");
+        assert!(seen.contains("z.error, um"), "{seen}");
+    }
+
+    #[test]
     fn a_gain_is_nudged_and_undone_on_the_machine() {
         let (mut client, mut watch) = watched(&["--gain", "y/feedback/pid/kd_v_s_per_mm"]);
         let of = |client: &mut Client| {

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use anyhow::ensure;
 use quadrant::link::message::{
-    AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, Notice, Status, Trigger,
+    AxisName, Body, CapturePhase, Channel, FaultReport, Inputs, Learning, Notice, Status, Trigger,
 };
 use quadrant_sim::client::samples::{
     Samples, TelemetryRecorder, arm, least_decimation, read_capture,
@@ -64,6 +64,7 @@ pub(super) struct Watch {
     pub(super) cursor: f64,
     pub(super) status: Status,
     pub(super) inputs: Inputs,
+    pub(super) learning: Learning,
     pub(super) fault: Option<FaultReport>,
     pub(super) gains: Vec<Gain>,
     /// Number of the gain that is nudged.
@@ -95,6 +96,7 @@ impl Watch {
         let every = (options.window * identity.rate_hz / MOST_SAMPLES).ceil() as u16;
         let every = every.max(least_decimation(options.channels.len(), identity.rate_hz));
         let (status, inputs, fault) = (client.status()?, client.inputs()?, client.fault()?);
+        let learning = client.learning()?;
         let gains = gains(client, options)?;
         let resolutions_mm = settings::resolutions_mm(client)?;
         let _ = client.take_notices();
@@ -109,6 +111,7 @@ impl Watch {
             cursor: 1.0,
             status,
             inputs,
+            learning,
             fault,
             gains,
             chosen: 0,
@@ -130,6 +133,7 @@ impl Watch {
         self.telemetry.keep_last(self.room());
         self.status = client.status()?;
         self.inputs = client.inputs()?;
+        self.learning = client.learning()?;
         let told = self.fault.as_ref().map(|fault| fault.code);
         if self.status.fault != told {
             self.fault = client.fault()?;

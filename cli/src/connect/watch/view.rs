@@ -10,8 +10,8 @@ use ratatui::text::{Line, Span};
 use ratatui::widgets::{Axis, Block, Chart, Clear, Dataset, GraphType, Paragraph};
 
 use super::state::Watch;
-use crate::connect::inputs;
 use crate::connect::machine::axis_lines;
+use crate::connect::{inputs, learnt};
 
 const KEYS: [(&str, &str); 12] = [
     ("space", "freeze the charts, or let them go on"),
@@ -33,10 +33,12 @@ const KEYS: [(&str, &str); 12] = [
 
 pub(super) fn draw(watch: &Watch, frame: &mut Frame) {
     let gains = u16::from(!watch.gains.is_empty());
-    let [head, fault, table, lamps, gain, charts, message] = Layout::vertical([
+    let learnt = learnt::lines(&watch.learning);
+    let [head, fault, table, friction, lamps, gain, charts, message] = Layout::vertical([
         Constraint::Length(1),
         Constraint::Length(if watch.fault.is_some() { 2 } else { 0 }),
         Constraint::Length(4),
+        Constraint::Length(learnt.len() as u16),
         Constraint::Length(1),
         Constraint::Length(gains),
         Constraint::Min(3),
@@ -59,6 +61,8 @@ pub(super) fn draw(watch: &Watch, frame: &mut Frame) {
         frame.render_widget(Paragraph::new(text).style(Color::Red), fault);
     }
     frame.render_widget(axes(watch), table);
+    let learnt: Vec<Line> = learnt.into_iter().map(Line::from).collect();
+    frame.render_widget(Paragraph::new(learnt), friction);
     frame.render_widget(lamp_line(watch), lamps);
     frame.render_widget(gain_line(watch), gain);
     draw_charts(watch, frame, charts);

@@ -168,6 +168,61 @@ pub struct Inputs {
     pub refusal: Option<String<256>>,
 }
 
+/// The results of learning of the friction feedforward's scale.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Learning {
+    /// The control tick at which this was true.
+    pub tick: u32,
+    /// The axes in order, x, y, z: none for one that does not learn.
+    pub axes: [Option<AxisLearning>; 3],
+}
+
+/// One axis in a [`Learning`].
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AxisLearning {
+    /// The reason for which the scale is not learnt, or that it is.
+    pub state: LearningState,
+    /// The scale: friction over what was commissioned.
+    pub scale: f32,
+    /// The share of the friction before sliding that vibration leaves, 0 to 1.
+    pub gate: f32,
+    /// RMS error over that without feedforward, the last seconds counting; none before the axis has moved.
+    pub error_share: Option<f32>,
+}
+
+/// The reason for which the scale of an axis that learns stands, or that it is learnt.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, IntoStaticStr)]
+#[serde(rename_all = "kebab-case")]
+#[strum(serialize_all = "kebab-case")]
+pub enum LearningState {
+    /// The scale is learnt.
+    Learning,
+    /// The reference stands.
+    AtRest,
+    /// The motion is none of the work's: a jog, homing, a controlled stop, an injection.
+    OtherMotion,
+    /// The output is at its limit.
+    Saturated,
+    /// The settings were exchanged, or the output was at its limit, a moment ago.
+    Settling,
+    /// The axis errs more than it would without feedforward: the scale is faded out.
+    Fading,
+}
+
+impl LearningState {
+    /// The state in the words of a person.
+    pub const fn words(self) -> &'static str {
+        match self {
+            Self::Learning => "learning",
+            Self::AtRest => "frozen: at rest",
+            Self::OtherMotion => "frozen: jog, homing or stop",
+            Self::Saturated => "frozen: output at its limit",
+            Self::Settling => "frozen: settling",
+            Self::Fading => "fading out: no feedforward would do better",
+        }
+    }
+}
+
 /// The digital inputs that a machine has, by name, and the bit of each in [`Inputs::switches`].
 pub const INPUTS: [(&str, u16); 13] = [
     ("emergency-stop", 1 << 15),

@@ -24,8 +24,8 @@ pub use channel::{AxisSignal, Channel, StageSignal, UnknownChannel, WordKind};
 pub use error::LinkError;
 pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
 pub use machine::{
-    AxisMode, AxisStatus, FaultReport, INPUTS, Identity, Inputs, LimitedBy, MachineState,
-    NumberType, Status,
+    AxisLearning, AxisMode, AxisStatus, FaultReport, INPUTS, Identity, Inputs, Learning,
+    LearningState, LimitedBy, MachineState, NumberType, Status,
 };
 pub use motion::{
     AxisPoint, Harmonic, Motion, Plan, PointToPoint, STREAM_POINTS, SetPoint, StreamRequest,
@@ -109,6 +109,8 @@ pub enum Body {
     Inject(InjectRequest),
     /// Asks for the digital inputs, and for what keeps the outputs from being enabled. [`Reply::Inputs`].
     Inputs,
+    /// Asks for what the axes have learnt. [`Reply::Learning`].
+    Learning,
 }
 
 impl Body {
@@ -236,4 +238,6 @@ pub enum Reply {
     Inject(InjectStatus),
     /// The digital inputs.
     Inputs(Inputs),
+    /// What the axes have learnt.
+    Learning(Learning),
 }

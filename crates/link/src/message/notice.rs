@@ -77,6 +77,15 @@ pub enum Event {
     SettingsStored,
     /// An axis that stood was moved though the outputs are off.
     MovedWhileOff(AxisName),
+    /// The friction of an axis has settled away from what was commissioned, or from the last such event.
+    FrictionChanged {
+        /// The axis.
+        axis: AxisName,
+        /// Its friction over what was commissioned, percent.
+        percent: u16,
+        /// True if the change asks for maintenance.
+        needs_maintenance: bool,
+    },
 }
 
 impl fmt::Display for Event {
@@ -101,6 +110,21 @@ impl fmt::Display for Event {
             Self::SettingsApplied(_) => f.write_str("settings act"),
             Self::SettingsStored => f.write_str("settings are kept"),
             Self::MovedWhileOff(axis) => write!(f, "{axis} moves though the outputs are off"),
+            Self::FrictionChanged {
+                axis,
+                percent,
+                needs_maintenance,
+            } => {
+                let (whole, hundredths) = (percent / 100, percent % 100);
+                write!(
+                    f,
+                    "friction of {axis} is {whole}.{hundredths:02} times what was commissioned"
+                )?;
+                match needs_maintenance {
+                    true => f.write_str(": look after guide, drive and lubrication"),
+                    false => Ok(()),
+                }
+            }
         }
     }
 }

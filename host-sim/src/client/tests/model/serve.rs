@@ -44,6 +44,12 @@ impl Model {
                     refusal: None,
                 }));
             }
+            Body::Learning => {
+                return Ok(Reply::Learning(Learning {
+                    tick: self.tick,
+                    axes: [None; 3],
+                }));
+            }
             Body::Fault => {
                 return Ok(Reply::Fault(self.fault.map(|code| FaultReport {
                     code,
