@@ -37,7 +37,7 @@ fn a_union_has_what_either_has_also_where_both_have_it_and_a_difference_takes_on
         for other in EACH {
             let both = one.with(other);
             assert!(both.has(one) && both.has(other), "{one:?} {other:?}");
-            assert_eq!(both.without(other).has(other), false);
+            assert!(!both.without(other).has(other));
             assert_eq!(both.without(other).has(one), one != other);
             assert_eq!(one.without(other).with(other), both);
             let sets = [one, other].map(|switches| Switches::of_axes([switches; 3]));
@@ -57,4 +57,20 @@ fn an_axis_is_at_a_limit_only_by_its_limit_switches() {
     }
     assert!(EACH[0].with(EACH[1]).at_limit());
     assert!(!AxisSwitches::default().at_limit());
+}
+
+#[test]
+fn the_inputs_are_good_unless_an_amplifier_a_converter_or_the_emergency_stop_speaks_against_it() {
+    let bad = [false, false, false, true, true];
+    assert!(Switches::NONE.are_good());
+    assert!(!Switches::EMERGENCY_STOP.are_good());
+    for axis in AxisName::ALL {
+        for (one, one_bad) in EACH.into_iter().zip(bad) {
+            for (other, other_bad) in EACH.into_iter().zip(bad) {
+                let set = Switches::NONE.with_axis(axis, one.with(other));
+                assert_eq!(set.are_good(), !one_bad && !other_bad, "{axis} {set:?}");
+                assert!(!set.with(Switches::EMERGENCY_STOP).are_good());
+            }
+        }
+    }
 }
