@@ -118,6 +118,25 @@ fn a_motion_with_an_end_goes_on_alone_if_the_settings_or_the_operator_say_so() {
 }
 
 #[test]
+fn a_motion_of_the_operator_needs_no_host_even_after_one_of_the_host() {
+    let mut tasks = tasks(|_| {});
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.ask(plan(4.0)).expect("takes the plan");
+    tasks.ask(Body::Run).expect("runs");
+    for _ in 0..15 {
+        tasks.ask(Body::Status).expect("is there");
+        tasks.run(1000);
+    }
+    assert!(!tasks.upper.borrow().state().is_running());
+    operate(&mut tasks, Command::Run);
+    assert!(tasks.upper.borrow().state().is_running());
+    tasks.run(3 * HOST_TICKS);
+    assert_eq!(safety(&tasks).fault(), None);
+    let measured = tasks.upper.borrow().snapshot().axes[2].measured.0;
+    assert!(measured >= 2 * PLAN_END, "{measured}");
+}
+
+#[test]
 fn homing_needs_its_host_too() {
     let mut tasks = tasks(|_| {});
     tasks.ask(Body::Enable).expect("enables");

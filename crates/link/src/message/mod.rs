@@ -238,6 +238,6 @@ pub enum Reply {
     Inject(InjectStatus),
     /// The digital inputs.
     Inputs(Inputs),
-    /// What the axes have learnt.
+    /// The result of learning.
     Learning(Learning),
 }
