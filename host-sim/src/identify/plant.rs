@@ -216,19 +216,29 @@ pub fn fit_plant(
             least_coherence: settings.least_coherence,
         });
     }
-    let (found, model) = with_modes(&lines, settings.stiffness)?;
+    // A spring's damper and the dead time both bend the phase: where the response does not tell them apart, there is none.
+    fit_lines(&lines, settings, true).or_else(|_| fit_lines(&lines, settings, false))
+}
+
+/// Fits the model to lines, with springs whose own damper transmits force or without.
+fn fit_lines(
+    lines: &[ResponsePoint],
+    settings: &PlantFitSettings,
+    dampers: bool,
+) -> Result<PlantFit, PlantError> {
+    let (found, model) = with_modes(lines, settings.stiffness, dampers)?;
     let plant = model.plant;
-    let bands = bands(&lines, &model);
-    let all = band_misfit(&lines, &model);
+    let bands = bands(lines, &model);
+    let all = band_misfit(lines, &model);
     if all.gain_db > MOST_GAIN_DB || all.phase_deg > MOST_PHASE_DEG {
         return Err(PlantError::Misfit {
             gain_db: all.gain_db,
             phase_deg: all.phase_deg,
-            worst_hz: worst_hz(&lines, &model),
+            worst_hz: worst_hz(lines, &model),
             mode_hz: model.modes.first().map(|mode| mode.frequency_hz),
         });
     }
-    check_support(&lines, &plant, &found, settings.negligible_damping)?;
+    check_support(lines, &plant, &found, settings.negligible_damping)?;
     Ok(PlantFit {
         plant,
         modes: model.modes,
@@ -352,7 +362,11 @@ const DAMPERS: (f64, f64) = (TRANSMITS, 5.0);
 const MOST_UNCERTAIN_MODE: f64 = 0.05;
 
 /// The rigid model, and modes as long as they explain enough.
-fn with_modes(lines: &[ResponsePoint], stiffness: Stiffness) -> Result<(Fit, Model), FitError> {
+fn with_modes(
+    lines: &[ResponsePoint],
+    stiffness: Stiffness,
+    dampers: bool,
+) -> Result<(Fit, Model), FitError> {
     let start = Model {
         plant: linear_start(lines, stiffness),
         modes: Vec::new(),
@@ -371,7 +385,7 @@ fn with_modes(lines: &[ResponsePoint], stiffness: Stiffness) -> Result<(Fit, Mod
         best.as_ref().is_ok_and(small)
     };
     while modes.len() < MOST_MODES && !explained(&best) {
-        let Some(found) = another_mode(lines, &thinned, stiffness, &modes) else {
+        let Some(found) = another_mode(lines, &thinned, stiffness, &modes, dampers) else {
             break;
         };
         let Ok(fit) = refine(lines, stiffness, &found) else {
@@ -406,6 +420,7 @@ fn another_mode(
     thinned: &[ResponsePoint],
     stiffness: Stiffness,
     modes: &[Mode],
+    dampers: bool,
 ) -> Option<Model> {
     let highest_hz = HIGHEST_MODE * lines.last()?.frequency_hz;
     let lowest_hz = LOWEST_MODE_HZ.max(lines.first()?.frequency_hz);
@@ -416,11 +431,12 @@ fn another_mode(
         let dip = Some((ANTI_START * frequency_hz, DAMPING_START));
         // (s / w_a)^2 is small, and 2 d_a / w_a that of the mode.
         let damper = Some((DAMPER_START * frequency_hz, DAMPER_START * STRONG_START));
-        for (damping, anti) in [
+        let kinds = [
             (DAMPING_START, None),
             (DAMPING_START, dip),
             (STRONG_START, damper),
-        ] {
+        ];
+        for (damping, anti) in kinds.into_iter().take(if dampers { 3 } else { 2 }) {
             let mode = Mode {
                 frequency_hz,
                 damping,
