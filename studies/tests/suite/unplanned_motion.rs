@@ -148,7 +148,7 @@ fn no_experiment_leaves_the_travel_by_a_fiftieth_whatever_the_axis_and_wherever_
 fn without_the_guard_the_same_experiments_leave_it() {
     let left = (1..=AXES / 4)
         .into_par_iter()
-        .filter(|seed| unguarded(*seed) >= MOST);
+        .filter(|seed| unguarded(*seed) > 1.0);
     let left = left.count() as u64;
     println!("{left} of {}", AXES / 4);
     assert!(left >= 3, "{left} of {}", AXES / 4);
