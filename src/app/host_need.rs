@@ -13,16 +13,14 @@ use crate::law::stage::{Plan, StageState};
 /// Ticks without a valid request after which a host counts as lost: 0.5 s at 10 kHz.
 pub const LINK_TIMEOUT_TICKS: u32 = 5_000;
 
-/// Bit of an injected voltage, above those of the axes.
-const INJECTION: u8 = 1 << 3;
 /// Bits of all axes.
-const AXES: u8 = INJECTION - 1;
+const AXES: u8 = 0b111;
 
 /// The motions that need their host, and how long it has been silent. Kept by the control interrupt, so that no other task
 /// can keep it from ending them.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct HostNeed {
-    /// A bit for each axis, and [`INJECTION`].
+    /// A bit for each axis.
     motions: u8,
     /// Valid requests so far.
     frames: u32,
@@ -62,24 +60,22 @@ impl HostNeed {
         plan: &Plan<S>,
         state: &StageState<S, FIRMWARE_ELEMENTS>,
     ) {
-        let endless = || {
+        let every = needed == HostNeeded::EveryMotion;
+        let of_plan = || {
             AxisName::ALL
                 .into_iter()
-                .filter(|&axis| !plan[axis].ends())
+                .filter(|&axis| every || !plan[axis].ends())
                 .fold(0, |bits, axis| bits | bit(axis))
         };
-        let every = needed == HostNeeded::EveryMotion;
         self.motions |= match command {
-            Command::Run if every => AXES,
+            Command::Run => of_plan(),
+            // The voltage itself ends with what the host has sent ahead.
+            Command::StartInjection if state.injection_coupling() == Some(Coupling::WithPlan) => {
+                of_plan()
+            }
             Command::StartMove(axis) | Command::Home(axis) if every => bit(axis),
             Command::Jog(axis, _) => bit(axis),
-            Command::Run => endless(),
-            Command::StartMove(axis) => endless() & bit(axis),
             Command::StartStream => AXES,
-            Command::StartInjection => match state.injection_coupling() {
-                Some(Coupling::WithPlan) => INJECTION | endless(),
-                _ => INJECTION,
-            },
             _ => 0,
         };
     }
@@ -96,9 +92,6 @@ impl HostNeed {
             if !moves {
                 self.motions &= !bit(name);
             }
-        }
-        if !state.is_injecting() {
-            self.motions &= !INJECTION;
         }
     }
 }

@@ -238,7 +238,7 @@ impl<S: Scalar> Homing<S> {
                 let parking = self.approach.aim(self.parameters.parking - (here + offset));
                 *parked = MotionState::start(here + offset);
                 state.parking = Motion::PointToPoint(parking);
-                state.enter(Phase::Park, here + offset);
+                state.phase = Phase::Park;
                 return HomingEvent::Origin(offset);
             }
             _ => {}

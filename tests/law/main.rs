@@ -2,6 +2,7 @@
 
 mod admission_exhaustive;
 mod anti_windup;
+mod axis_alone;
 mod axis_limits;
 mod board_wiring;
 mod brake;
@@ -33,6 +34,8 @@ mod friction_static;
 mod gain_schedule;
 mod glitch_monitor;
 mod homing;
+mod homing_steps;
+mod host_requests;
 mod injection;
 mod injection_ends;
 mod injection_over_link;

@@ -3,7 +3,7 @@
 use quadrant::app::supervisor::{Event, StageView, Supervisor};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
-use quadrant::link::message::{AxisName as WireAxis, Body};
+use quadrant::link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
 use quadrant::safety::{
     AxisSwitches, EnabledBy, FaultCode, HostNeeded, Operation, Reaction, SafetyState, Switches,
 };
@@ -149,6 +149,82 @@ fn homing_needs_its_host_too() {
     tasks.run(3000);
     let code = safety(&tasks).fault().map(|fault| fault.code);
     assert_eq!(code, Some(FaultCode::LinkLost));
+}
+
+#[test]
+fn homing_goes_on_alone_if_the_settings_say_so() {
+    let mut tasks = tasks(|settings| settings.operation.host_needed = HostNeeded::EndlessMotion);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    tasks
+        .ask(Body::Home([WireAxis::Y].into_iter().collect()))
+        .expect("starts");
+    tasks.run(2 * HOST_TICKS);
+    assert!(tasks.upper.borrow().state().is_running());
+}
+
+#[test]
+fn a_host_is_lost_half_a_second_after_the_tick_that_heard_it_last() {
+    let mut tasks = tasks(|_| {});
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    let jog = Body::Jog {
+        axis: WireAxis::Y,
+        velocity_mm_s: 2.0,
+    };
+    tasks.ask(jog).expect("jogs");
+    tasks.run(10);
+    // Received by the run of the supervising task in tick `heard` - 1, and counted by the next.
+    let heard = tasks.tick() + 10;
+    tasks.send(&[Body::Status]);
+    tasks.run(2 * HOST_TICKS);
+    let fault = safety(&tasks).fault().expect("latched");
+    assert_eq!(fault.code, FaultCode::LinkLost);
+    assert_eq!(fault.tick - heard, HOST_TICKS + 1);
+}
+
+/// An injection of a few values with the plan, and then nobody asks anything.
+fn plan_of_an_injection(host_needed: HostNeeded, plan: Body) -> Tasks {
+    let mut tasks = tasks(|settings| settings.operation.host_needed = host_needed);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    tasks.ask(plan).expect("takes the plan");
+    let open = InjectRequest::Open {
+        axis: WireAxis::Z,
+        open_loop: false,
+        with_plan: true,
+        limit_v: 2.0,
+        travel_mm: 50.0,
+        max_velocity_mm_s: 100.0,
+    };
+    let values = InjectRequest::Values {
+        sequence: 0,
+        values: Voltages::new([0; 100].into_iter()),
+        last: true,
+    };
+    for request in [open, values] {
+        tasks.ask(Body::Inject(request)).expect("takes it");
+    }
+    tasks.run(300);
+    let upper = tasks.upper.borrow();
+    assert!(upper.state().is_running() && !upper.state().is_injecting());
+    drop(upper);
+    tasks
+}
+
+#[test]
+fn a_plan_that_an_injection_started_needs_its_host_as_one_that_was_run() {
+    for (needed, plan, is_needed) in [
+        (HostNeeded::EveryMotion, plan(8.0), true),
+        (HostNeeded::EndlessMotion, endless(), true),
+        (HostNeeded::EndlessMotion, plan(8.0), false),
+    ] {
+        let mut tasks = plan_of_an_injection(needed, plan);
+        tasks.run(HOST_TICKS + 3000);
+        let lost = safety(&tasks).fault().map(|fault| fault.code);
+        let expected = is_needed.then_some(FaultCode::LinkLost);
+        assert_eq!(lost, expected, "{needed:?}");
+    }
 }
 
 #[test]

@@ -156,6 +156,167 @@ fn settings_that_may_change_while_driven_act_and_leave_the_outputs_on() {
     assert!(tasks.upper.borrow().outputs.enabled);
 }
 
+/// The x axis under a jog of 5 mm/s, and the words it has put out.
+fn jogging(tasks: &mut Tasks, ticks: u32) -> Vec<i16> {
+    tasks
+        .ask(Body::Jog {
+            axis: AxisName::X,
+            velocity_mm_s: 5.0,
+        })
+        .expect("jogs");
+    tasks.run(1000);
+    x_words(tasks, ticks)
+}
+
+fn x_words(tasks: &mut Tasks, ticks: u32) -> Vec<i16> {
+    (0..ticks)
+        .map(|_| {
+            tasks.step();
+            tasks.upper.borrow().outputs.codes[0].0
+        })
+        .collect()
+}
+
+#[test]
+fn settings_that_change_while_driven_make_no_step_in_the_output() {
+    let mut tasks = enabled();
+    let before = *jogging(&mut tasks, 1).last().expect("one");
+    let mut changed = settings();
+    changed.axes[0].friction.sliding.positive.curve.coulomb_v *= 0.5;
+    let path = "/axes/0/friction/sliding/positive/curve/coulomb_v";
+    tasks.send(&[
+        set(path, &changed),
+        Body::Settings(SettingsRequest::Apply),
+        Body::Status,
+    ]);
+    let mut words = vec![before];
+    words.extend(x_words(&mut tasks, 5000));
+    let after = *words.last().expect("some");
+    let step = words
+        .windows(2)
+        .map(|pair| pair[0].abs_diff(pair[1]))
+        .max()
+        .expect("some");
+    let whole = before.abs_diff(after);
+    assert!(whole > 100, "{before} to {after}");
+    assert!(step < whole / 20, "a step of {step} on the way of {whole}");
+}
+
+#[test]
+fn gains_for_an_axis_that_was_not_commissioned_switch_the_outputs_off() {
+    let mut with_two = settings();
+    let z = &mut with_two.axes[2];
+    *z = StageSettings::default().axes[2].clone();
+    let mut tasks = Tasks::new(&with_two, 1);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    assert!(tasks.upper.borrow().outputs.enabled);
+    let mut changed = with_two.clone();
+    changed.axes[2].feedback.pid.kp_v_per_mm = 1.0;
+    tasks
+        .ask(set("/axes/2/feedback/pid/kp_v_per_mm", &changed))
+        .expect("a draft");
+    tasks
+        .ask(Body::Settings(SettingsRequest::Apply))
+        .expect("applies");
+    tasks.run(300);
+    assert!(!tasks.upper.borrow().outputs.enabled);
+    assert!(refused(Some(&tasks.ask(Body::Enable))));
+}
+
+/// The other sign of the x amplifier, taken by the server while the outputs are off.
+fn turned_round() -> [Body; 2] {
+    let mut changed = settings();
+    changed.axes[0].amplifier.reversed = !changed.axes[0].amplifier.reversed;
+    [
+        set("/axes/0/amplifier/reversed", &changed),
+        Body::Settings(SettingsRequest::Apply),
+    ]
+}
+
+#[test]
+fn settings_that_safety_depends_on_wait_for_the_outputs_to_be_off_whoever_enabled_them() {
+    let mut tasks = enabled();
+    let sign = |tasks: &mut Tasks| jogging(tasks, 1)[0].signum();
+    let usual = sign(&mut tasks);
+    tasks.ask(Body::Disable).expect("disables");
+    tasks.run(3000);
+    // The operator enables in the tick before the server, which saw them off, hands the settings over.
+    tasks.send(&turned_round());
+    tasks.upper.borrow_mut().operate(Command::Enable);
+    tasks.run(100);
+    let upper = tasks.upper.borrow().outputs.enabled;
+    assert!(upper, "the operator has enabled");
+    assert_eq!(sign(&mut tasks), usual);
+    tasks.ask(Body::Disable).expect("disables");
+    tasks.run(3000);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    assert_eq!(sign(&mut tasks), -usual);
+}
+
+#[test]
+fn nothing_enables_between_the_axes_of_one_change() {
+    let mut changed = settings();
+    for axis in &mut changed.axes {
+        axis.limits.max_velocity_mm_s = 100.0;
+    }
+    let mut withheld = 0;
+    for polls in 1..8 {
+        let mut tasks = Tasks::new(&settings(), 1);
+        for axis in ["x", "y"] {
+            let index = usize::from(axis == "y");
+            let path = format!("/axes/{index}/limits/max_velocity_mm_s");
+            tasks.ask(set(&path, &changed)).expect("a draft");
+        }
+        tasks.send(&[Body::Settings(SettingsRequest::Apply)]);
+        tasks.run(10 * polls);
+        // The server is held up with some axes handed over and others not.
+        tasks.held_up = 50;
+        tasks.run(10);
+        tasks.upper.borrow_mut().operate(Command::Enable);
+        tasks.run(100);
+        let is_enabled = tasks.upper.borrow().outputs.enabled;
+        withheld += u32::from(!is_enabled);
+        if !is_enabled {
+            tasks.run(1000);
+            tasks.upper.borrow_mut().operate(Command::Enable);
+            tasks.run(100);
+            assert!(tasks.upper.borrow().outputs.enabled, "after {polls} polls");
+        }
+    }
+    assert!((1..6).contains(&withheld), "{withheld} of 7");
+}
+
+#[test]
+fn an_order_that_waits_when_a_stop_overtakes_it_is_dropped() {
+    let mut tasks = enabled();
+    // Commands of the operator come in every tick, so that the host's orders wait.
+    tasks.upper.borrow_mut().inputs.command = Some(Command::Stop);
+    tasks.send(&[Body::Jog {
+        axis: AxisName::X,
+        velocity_mm_s: 5.0,
+    }]);
+    tasks.run(40);
+    tasks.upper.borrow_mut().inputs.command = None;
+    tasks.run(20);
+    assert!(!tasks.upper.borrow().state().is_running());
+}
+
+#[test]
+fn an_order_that_waits_when_the_operator_enables_is_carried_out() {
+    let mut tasks = enabled();
+    tasks.upper.borrow_mut().inputs.command = Some(Command::Enable);
+    tasks.send(&[Body::Jog {
+        axis: AxisName::X,
+        velocity_mm_s: 5.0,
+    }]);
+    tasks.run(40);
+    tasks.upper.borrow_mut().inputs.command = None;
+    tasks.run(20);
+    assert!(tasks.upper.borrow().state().is_running());
+}
+
 #[test]
 fn enable_and_reboot_in_one_burst_do_not_restart_a_driven_machine() {
     let mut tasks = Tasks::new(&settings(), 1);

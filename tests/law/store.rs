@@ -184,3 +184,73 @@ fn nothing_is_written_or_erased_while_the_enable_line_is_high() {
     }
     assert!(flash.erasures.iter().all(|&erasures| erasures > 0));
 }
+
+#[test]
+fn settings_behind_something_else_leave_it_alone() {
+    let mut flash = Flash::of_sectors(4);
+    flash.bytes[..2 * SECTOR].fill(0x5A);
+    let start = 2 * SECTOR as u32;
+    for number in 0..12 {
+        let mut store = Store::new(flash, start);
+        let provenance = Provenance::try_from("test").expect("fits");
+        let buffer = &mut [0; BUFFER_BYTES];
+        store
+            .save(&numbered(number), ELEMENTS, &provenance, buffer)
+            .expect("stores");
+        let mut settings = StageSettings::default();
+        let loaded = store
+            .load(&mut settings, ELEMENTS, buffer, &mut |_| {})
+            .expect("reads")
+            .expect("is there");
+        assert_eq!((loaded.sequence, loaded.is_newest), (number + 1, true));
+        assert_eq!(settings, numbered(number));
+        flash = store.into_flash();
+    }
+    assert!(flash.bytes[..2 * SECTOR].iter().all(|&byte| byte == 0x5A));
+    assert!(flash.erasures[..2] == [0; 2] && flash.erasures[2..].iter().all(|&count| count > 0));
+}
+
+#[test]
+fn errors_say_what_was_wrong_and_what_to_do() {
+    let refused = |settings: &StageSettings| settings.validate(ELEMENTS).expect_err("not valid");
+    let mut invalid = StageSettings::simulated();
+    invalid.axes[1].limits.max_velocity_mm_s = -1.0;
+    let error = refused(&invalid);
+    let texts = [
+        (
+            SaveError::<FlashError>::Refused(error.clone()).to_string(),
+            error.to_string(),
+        ),
+        (
+            SaveError::<FlashError>::TooLong.to_string(),
+            format!("more than {BUFFER_BYTES} bytes"),
+        ),
+        (
+            SaveError::Log(LogError::Flash(FlashError::Off)).to_string(),
+            "the flash failed: Off".into(),
+        ),
+        (
+            SaveError::<FlashError>::Log(LogError::NotKept).to_string(),
+            "replace the board".into(),
+        ),
+        (
+            SaveError::<FlashError>::Log(LogError::OutputsOn).to_string(),
+            "disable them".into(),
+        ),
+        (
+            LoadError::<FlashError>::Log(LogError::Damaged).to_string(),
+            "is damaged".into(),
+        ),
+        (
+            LoadError::<FlashError>::Decode(DecodeError::Refused(error.clone())).to_string(),
+            error.to_string(),
+        ),
+        (
+            DecodeError::Refused(error.clone()).to_string(),
+            "max_velocity_mm_s".into(),
+        ),
+    ];
+    for (said, expected) in texts {
+        assert!(said.contains(&expected), "{said}: {expected}");
+    }
+}

@@ -150,7 +150,9 @@ fn the_sectors_wear_evenly() {
         }
         flash = after;
     }
-    let [first, second] = flash.erasures;
+    let [first, second] = flash.erasures[..] else {
+        panic!("two sectors");
+    };
     println!(
         "first erasure before store {first_erased:?}; {first} and {second} erasures in 1000 stores"
     );

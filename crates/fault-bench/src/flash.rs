@@ -57,7 +57,7 @@ impl Damage {
     }
 }
 
-/// Two sectors, written by words of four bytes, each word once between erasures.
+/// Sectors, two unless there are to be more, written by words of four bytes, each word once between erasures.
 #[derive(Clone, Debug)]
 pub struct Flash {
     pub bytes: Vec<u8>,
@@ -65,7 +65,7 @@ pub struct Flash {
     /// Words written and sectors erased so far.
     pub operations: u64,
     /// Erasures of each sector.
-    pub erasures: [u32; 2],
+    pub erasures: Vec<u32>,
     /// The operation that the power fails in, and what becomes of it.
     pub cut: Option<(u64, Damage)>,
     /// Words whose bits do not change any more.
@@ -76,15 +76,7 @@ pub struct Flash {
 
 impl Default for Flash {
     fn default() -> Self {
-        Self {
-            bytes: vec![0xFF; 2 * SECTOR],
-            programmed: vec![false; 2 * SECTOR / 4],
-            operations: 0,
-            erasures: [0; 2],
-            cut: None,
-            worn: None,
-            outputs_on: false,
-        }
+        Self::of_sectors(2)
     }
 }
 
@@ -109,6 +101,19 @@ impl NorFlashError for FlashError {
 }
 
 impl Flash {
+    /// A blank flash of so many sectors.
+    pub fn of_sectors(count: usize) -> Self {
+        Self {
+            bytes: vec![0xFF; count * SECTOR],
+            programmed: vec![false; count * SECTOR / 4],
+            operations: 0,
+            erasures: vec![0; count],
+            cut: None,
+            worn: None,
+            outputs_on: false,
+        }
+    }
+
     /// True if the power has failed.
     pub fn is_off(&self) -> bool {
         self.cut.is_some_and(|(cut, _)| self.operations > cut)

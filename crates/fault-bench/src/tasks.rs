@@ -17,7 +17,9 @@ use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::hal::{Serial, SettingsFlash};
 use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
-use quadrant::link::message::{Body, LinkError, Message, NumberType, Reply, Request};
+use quadrant::link::message::{
+    Body, LinkError, Message, Notice, NumberType, Reply, Request, TelemetryBlock,
+};
 use quadrant::safety::FaultCode;
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Outputs, StageState};
@@ -52,6 +54,8 @@ pub struct Upper {
     seen: Snapshot<f32>,
     noise: Noise,
     pub outputs: Outputs,
+    /// Counts by which the x axis is away from its reference, while nothing else moves it.
+    pub pushed: i64,
     /// Inputs of the next tick beside the readings, which are those of a stage that follows its reference exactly.
     pub inputs: Inputs,
     /// An operation on the flash is under way.
@@ -94,19 +98,19 @@ impl Upper {
             .by_ref()
             .map(|axis| axis.reference().0)
             .into_array();
-        let mut readings = references
-            .map(|position| EncoderReading::of((position >> POSITION_FRACTION_BITS) as u32));
+        let mut counts = references.map(|position| position >> POSITION_FRACTION_BITS);
+        counts[0] += self.pushed;
         if let Some(x) = &mut self.x {
             let volts = f64::from(self.outputs.codes[0].0) / 32767.0 * 10.0;
             x.plant.step(if self.outputs.enabled { volts } else { 0.0 });
             x.dead = x.dead.map(|age| age + 1);
-            let count = x.encoder.read(x.plant.position_mm, x.dead);
-            readings[0] = EncoderReading::of(count as u32);
+            counts[0] = x.encoder.read(x.plant.position_mm, x.dead);
         }
+        let readings = counts.map(|count| EncoderReading::of(count as u32));
         self.control.hear(self.intake.frames());
         self.outputs = self.control.tick(&mut Inputs {
             readings: readings.into(),
-            command: self.commands.pop_front(),
+            command: self.commands.pop_front().or(self.inputs.command),
             ..self.inputs
         });
         self.driven_while_busy += u32::from(self.busy && self.outputs.enabled);
@@ -135,6 +139,10 @@ impl Upper {
         let snapshot = self.control.snapshot();
         let supervised = self.supervision.run(&snapshot, self.requests.pop_front());
         self.commands.extend(supervised.command);
+        if !supervised.glitches.is_empty() {
+            self.control
+                .show_glitches(self.supervision.glitch_readings());
+        }
         self.seen = snapshot;
     }
 
@@ -258,6 +266,8 @@ pub struct Tasks {
     receiver: Receiver,
     next_id: u16,
     pub answers: BTreeMap<u16, Result<Reply, LinkError>>,
+    /// Telemetry that the server has sent by itself.
+    pub blocks: Vec<TelemetryBlock>,
     pub restarts: u32,
     /// Polls that the server is late by: it builds, or is not there.
     pub held_up: u32,
@@ -298,6 +308,7 @@ impl Tasks {
             seen: Snapshot::default(),
             noise: Noise::new(seed),
             outputs: Outputs::default(),
+            pushed: 0,
             inputs: Inputs::default(),
             busy: false,
             driven_while_busy: 0,
@@ -333,6 +344,7 @@ impl Tasks {
             receiver: Receiver::new(),
             next_id: 1,
             answers: BTreeMap::new(),
+            blocks: Vec::new(),
             restarts: 0,
             held_up: 0,
         };
@@ -414,8 +426,12 @@ impl Tasks {
             let Some(payload) = self.receiver.push(byte) else {
                 continue;
             };
-            if let Ok(Message::Response(response)) = frame::decode(payload) {
-                self.answers.insert(response.id, response.result);
+            match frame::decode(payload) {
+                Ok(Message::Response(response)) => {
+                    self.answers.insert(response.id, response.result);
+                }
+                Ok(Message::Notice(Notice::Telemetry(block))) => self.blocks.push(block),
+                _ => {}
             }
         }
     }
