@@ -215,12 +215,12 @@ fn the_largest_error_since_enabling_is_kept() {
     assert_ne!(x.following(), rig.state.axes()[1].following());
 }
 
-/// The word of an x axis with +-0.5 V to put out, which was taken 2 mm away from where it holds while a voltage was added.
+/// The word of an x axis with +-2.5 V to put out, which was taken 2 mm away from where it holds while a voltage was added.
 fn word_of_pushed_axis(away: i32, injected_word: i16) -> i16 {
     let settings = with_x(|x| {
         x.feedback.law = LawKind::Pid;
-        x.feedback.pid.kp_v_per_mm = 1.0;
-        x.amplifier.output_limit_v = 0.5;
+        x.feedback.pid.kp_v_per_mm = 2.0;
+        x.amplifier.output_limit_v = 2.5;
         x.limits.following_error_mm = 20.0;
         x.limits.following_error_max_mm = 20.0;
     });
@@ -252,7 +252,7 @@ fn word_of_pushed_axis(away: i32, injected_word: i16) -> i16 {
 fn the_law_fills_what_a_voltage_beside_it_leaves_of_the_limit() {
     for away in [1, -1] {
         let alone = word_of_pushed_axis(away, 0);
-        assert_eq!(i32::from(alone), -away * 1638);
+        assert_eq!(i32::from(alone), -away * 8192);
         for injected in [1000, -1000] {
             assert_eq!(
                 word_of_pushed_axis(away, injected),
