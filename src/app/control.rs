@@ -232,7 +232,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             }
         };
         let needed = self.operation.host_needed;
-        self.host.start(command, needed, &self.plan, &self.state);
+        self.host.start(command, needed, &self.plan);
         self.heeded(Station::Host, command)
     }
 

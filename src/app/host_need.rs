@@ -4,7 +4,6 @@
 use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::injection::Coupling;
 use crate::law::motion::MotionMode;
 use crate::law::safety::HostNeeded;
 use crate::law::scalar::Scalar;
@@ -58,7 +57,6 @@ impl HostNeed {
         command: Command,
         needed: HostNeeded,
         plan: &Plan<S>,
-        state: &StageState<S, FIRMWARE_ELEMENTS>,
     ) {
         let every = needed == HostNeeded::EveryMotion;
         let of_plan = || {
@@ -68,11 +66,8 @@ impl HostNeed {
                 .fold(0, |bits, axis| bits | bit(axis))
         };
         self.motions |= match command {
-            Command::Run => of_plan(),
-            // The voltage itself ends with what the host has sent ahead.
-            Command::StartInjection if state.injection_coupling() == Some(Coupling::WithPlan) => {
-                of_plan()
-            }
+            // An injection may start the plan, too; of axes that stay where they are, nothing is kept.
+            Command::Run | Command::StartInjection => of_plan(),
             Command::StartMove(axis) | Command::Home(axis) if every => bit(axis),
             Command::Jog(axis, _) => bit(axis),
             Command::StartStream => AXES,

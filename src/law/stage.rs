@@ -263,11 +263,6 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         self.injection.is_running()
     }
 
-    /// The relation of the injection that waits or is under way to the loop and to the plan.
-    pub(crate) fn injection_coupling(&self) -> Option<Coupling> {
-        self.injection.injection().map(Injection::coupling)
-    }
-
     /// Progress of the injection under way, or else of the last one.
     pub fn injection_progress(&self) -> InjectionProgress {
         self.injection.progress()

@@ -190,7 +190,11 @@ fn settings_that_change_while_driven_make_no_step_in_the_output() {
         Body::Status,
     ]);
     let mut words = vec![before];
-    words.extend(x_words(&mut tasks, 5000));
+    words.extend(x_words(&mut tasks, 4000));
+    assert!(
+        tasks.upper.borrow().state().is_running(),
+        "the host is missed"
+    );
     let after = *words.last().expect("some");
     let step = words
         .windows(2)
