@@ -363,7 +363,8 @@ fn find_passes(
                 .windows(dwell)
                 .map(|window| sign * (window[dwell - 1] - window[0]))
                 .fold(f64::INFINITY, f64::min);
-            let all = sign * (positions[positions.len() - 1] - positions[0]);
+            // From before the pass on: in it, an axis on a soft spring may swing back.
+            let all = sign * (recording.position_mm[end - 1] - recording.position_mm[begin]);
             if -all > 4.0 * sliding_mm {
                 return Err(MotorConstantError::Reversed);
             }
