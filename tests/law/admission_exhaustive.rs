@@ -3,7 +3,7 @@
 //! A view is finite. Of the three axes y stands for all: what is asked of an axis depends on that axis and on what holds for
 //! the whole stage.
 
-use quadrant::admission::{StageView, refusal, refusal_from};
+use quadrant::admission::{Refusal, StageView, refusal, refusal_from};
 use quadrant::axes::{AxisName, PerAxis};
 use quadrant::command::Command;
 use quadrant::motion::MotionMode;
@@ -190,6 +190,74 @@ fn stop_and_disable_are_never_refused_and_a_reset_only_clears_what_is_latched() 
         let may = matches!(view.safety, SafetyState::Faulted(_)) && !view.settings_invalid;
         assert_eq!(resets, may, "{view:?}");
     }
+}
+
+#[test]
+fn every_refusal_says_something_of_its_own_and_names_its_axis() {
+    let of_axis = |code, axis| Refusal::BadInput(EnableInterlock { code, axis });
+    let whole = [
+        Refusal::FaultLatched,
+        Refusal::NotEnabled,
+        Refusal::AlreadyRunning,
+        Refusal::NoFault,
+        Refusal::Stopping,
+        Refusal::Starting,
+        Refusal::NoStream,
+        Refusal::NoInjection,
+        Refusal::Injecting,
+        Refusal::NotCommissioned,
+        Refusal::BrakeMoves,
+        Refusal::HostOnly,
+        Refusal::OperatorOnly,
+        Refusal::Locked,
+        Refusal::SettingsInvalid,
+        of_axis(FaultCode::EmergencyStop, None),
+    ];
+    let axis = [
+        Refusal::AxisBusy(AXIS),
+        Refusal::NotAtStandstill(AXIS),
+        Refusal::NotHomed(AXIS),
+        of_axis(FaultCode::AmplifierFault, Some(AXIS)),
+        of_axis(FaultCode::OutputMismatch, Some(AXIS)),
+        of_axis(FaultCode::StaleSample, Some(AXIS)),
+        of_axis(FaultCode::EncoderInvalid, Some(AXIS)),
+    ];
+    for refusal in whole {
+        assert_eq!(refusal.axis(), None, "{refusal}");
+        assert_eq!(refusal.to_string(), refusal.as_str());
+    }
+    for refusal in axis {
+        assert_eq!(refusal.axis(), Some(AXIS), "{refusal}");
+        assert_eq!(refusal.to_string(), format!("y: {}", refusal.as_str()));
+    }
+    let mut said: Vec<&str> = whole
+        .iter()
+        .chain(&axis)
+        .map(|refusal| refusal.as_str())
+        .collect();
+    assert!(said.iter().all(|text| text.len() > 20));
+    said.sort_unstable();
+    said.dedup();
+    assert_eq!(said.len(), whole.len() + axis.len());
+}
+
+#[test]
+fn an_axis_that_brakes_is_waited_for_before_a_reset_and_one_that_is_driven_moves_as_it_may() {
+    let braking = StageView {
+        safety: SafetyState::Stopping(FAULT),
+        ..StageView::default()
+    };
+    assert_eq!(
+        refusal(braking, Command::ResetFault),
+        Some(Refusal::Stopping)
+    );
+    let driven = StageView {
+        safety: SafetyState::Enabled,
+        commissioned: true,
+        moving: Some(AXIS),
+        ..StageView::default()
+    };
+    assert_eq!(refusal(driven, Command::Enable), None);
 }
 
 #[test]

@@ -164,6 +164,42 @@ fn the_error_without_feedforward_is_known_with_it() {
 }
 
 #[test]
+fn the_error_without_feedforward_is_that_of_the_loop_as_stiff_as_the_nonlinear_gain_makes_it() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 3.0);
+    let mut stiffer = learning();
+    stiffer.axes[0].feedback.law = LawKind::NPid;
+    let mut other = Rig::<f32>::with_plant(&stiffer, &sine_on_x(2.0, 5.0));
+    for tick in 0..30_000 {
+        let command = match tick {
+            1 => Some(Command::Enable),
+            2 => Some(Command::Run),
+            _ => None,
+        };
+        // What the axis does under the PID is shown to both laws.
+        other.inputs.readings = axis.rig.inputs.readings;
+        other.inputs.command = command;
+        other.tick();
+        axis.rig.inputs.command = command;
+        axis.tick();
+    }
+    let off = |rig: &Rig<f32>| rig.state.axes()[0].learning().error_squares_off();
+    let (pid, npid) = (off(&axis.rig), off(&other));
+    assert!(pid > 0.0 && npid > 0.0);
+    assert!(npid < 0.95 * pid, "{npid} mm^2 of {pid} mm^2");
+}
+
+#[test]
+fn settings_that_do_not_learn_forget_what_was_learnt() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    assert_ne!(axis.scale(), 1.0);
+    axis.rig.exchange(&fixed());
+    axis.run(0.1);
+    assert_eq!(axis.scale(), 1.0);
+}
+
+#[test]
 fn a_feedforward_that_harms_is_faded_out_and_it_is_said() {
     let mut axis = Axis::<f32>::on_sine(&learning(), 0.05);
     axis.command(Command::Run);

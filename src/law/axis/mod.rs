@@ -699,7 +699,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         };
         let agrees = watched != Err(FaultCode::EncoderImplausible);
         // Where counts may be lost, so is the origin.
-        if !reading.valid | !possible | !indexed | !agrees {
+        if [reading.valid, possible, indexed, agrees].contains(&false) {
             state.homed = false;
         }
         // The first that explains the others.
