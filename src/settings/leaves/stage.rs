@@ -44,7 +44,7 @@ const OPERATION: [LeafInfo; 3] = exchanged(Exchange::Disabled, [
          Everybody may stop and disable.")),
     of_stage(name("operation.host_needed", HostNeeded::VARIANTS,
         "Motions of a host that end when it falls silent: every-motion, or endless-motion (jogs, plans without an end, \
-         streams, injected voltages).")),
+         streams).")),
     of_stage(name("operation.emergency_stop", EmergencyReaction::VARIANTS,
         "Reaction to the emergency stop: off (category 0) or stop (category 1: brake, then off; the hardware must cut the \
          power later).")),
