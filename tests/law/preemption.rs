@@ -182,8 +182,8 @@ fn settings_that_change_while_driven_make_no_step_in_the_output() {
     let mut tasks = enabled();
     let before = *jogging(&mut tasks, 1).last().expect("one");
     let mut changed = settings();
-    changed.axes[0].friction.sliding.positive.curve.coulomb_v *= 0.5;
-    let path = "/axes/0/friction/sliding/positive/curve/coulomb_v";
+    changed.axes[0].friction.sliding.positive.viscous_v_s_per_mm += 0.02;
+    let path = "/axes/0/friction/sliding/positive/viscous_v_s_per_mm";
     tasks.send(&[
         set(path, &changed),
         Body::Settings(SettingsRequest::Apply),
