@@ -169,10 +169,9 @@ fn take_record(
             return Ok(false);
         };
         for (index, axis) in settings.axes.iter_mut().enumerate() {
+            // One that is there is made by its leaves.
             if record.axes & 1 << index == 0 {
                 (part.remove)(axis);
-            } else if !(part.is_present)(axis) {
-                (part.make)(axis);
             }
         }
         return Ok(true);
@@ -183,7 +182,7 @@ fn take_record(
             return Ok(false);
         }
         let Some(value) = value else { continue };
-        // A later firmware may have made a part optional that was not: its leaves make it.
+        // Also where a later firmware has made a part optional that was not.
         if let (Err(TreeError::Absent), Some((index, below))) =
             (settings.leaf(&path), below_axis(&path))
             && let (Some(part), Some(axis)) = (part_of(below), settings.axes.get_mut(index))
