@@ -370,6 +370,64 @@ fn a_fault_that_held_the_axes_is_shown_until_something_moves_and_not_until_someb
 }
 
 #[test]
+fn of_two_faults_that_hold_the_axes_the_first_is_shown_and_of_one_that_stops_them_none() {
+    for (reaction, expected) in [
+        (
+            quadrant::settings::LossReaction::Hold,
+            Some(FaultCode::LinkLost),
+        ),
+        (quadrant::settings::LossReaction::Stop, None),
+    ] {
+        let mut settings = StageSettings::simulated();
+        settings.streaming.link_lost = reaction;
+        let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
+        rig.start();
+        let velocity = settings.jog_at(AxisName::X, 1.0).expect("slow enough");
+        rig.command(Command::Stop);
+        rig.command(Command::Jog(AxisName::X, velocity));
+        let mut ticks = vec![];
+        for _ in 0..3 {
+            rig.inputs.link_lost = true;
+            rig.tick();
+            let held = rig.state.held();
+            assert_eq!(held.map(|fault| fault.code), expected);
+            ticks.push(held.map(|fault| fault.tick));
+        }
+        assert_eq!(ticks[0], ticks[2]);
+    }
+}
+
+#[test]
+fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_that_follows() {
+    let settings = with_x(|x| {
+        x.feedback.law = LawKind::Cascade;
+        x.feedforward.kind = quadrant::feedforward::FeedforwardKind::None;
+    });
+    let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
+    rig.start();
+    rig.command(Command::Stop);
+    let velocity = settings.jog_at(AxisName::X, 10.0).expect("slow enough");
+    rig.command(Command::Jog(AxisName::X, velocity));
+    let mut most = 0.0f32;
+    for tick in 0..3000 {
+        let reference = rig.state.axes()[0].telemetry().reference;
+        rig.inputs.set_counts([(reference.0 >> 16) as u32, 0, 0]);
+        rig.tick();
+        if tick > 1500 {
+            most = most.max(rig.state.axes()[0].telemetry().output_v().abs());
+        }
+    }
+    assert!(rig.state.is_running());
+    assert!(most < 0.1, "{most} V");
+}
+
+#[test]
+fn the_inputs_of_counts_have_them() {
+    let inputs = quadrant::stage::Inputs::of_counts([1, 2, 3]);
+    assert_eq!(inputs.readings.map(|reading| reading.count), [1, 2, 3]);
+}
+
+#[test]
 fn an_injection_begins_only_with_its_first_value_and_on_an_axis_that_was_commissioned() {
     let begin = |axis: AxisName, with_value: bool| {
         let mut settings = StageSettings::simulated();
