@@ -186,6 +186,18 @@ fn nothing_is_written_or_erased_while_the_enable_line_is_high() {
 }
 
 #[test]
+fn a_word_that_takes_no_write_costs_a_sector_and_not_the_settings() {
+    let mut flash = save(Flash::default(), &numbered(0), ELEMENTS);
+    let used = flash.bytes.iter().rposition(|&byte| byte != 0xFF);
+    let end = (used.expect("a set") + 1).next_multiple_of(4);
+    flash.refusing = Some(end..end + 4);
+    for number in 1..4 {
+        flash = save(flash, &numbered(number), ELEMENTS);
+        assert_eq!(load(&flash), Ok(Some((number + 1, numbered(number)))));
+    }
+}
+
+#[test]
 fn settings_behind_something_else_leave_it_alone() {
     let mut flash = Flash::of_sectors(4);
     flash.bytes[..2 * SECTOR].fill(0x5A);

@@ -70,6 +70,8 @@ pub struct Flash {
     pub cut: Option<(u64, Damage)>,
     /// Words whose bits do not change any more.
     pub worn: Option<std::ops::Range<usize>>,
+    /// Words that read as blank and take no write: a cut may leave such.
+    pub refusing: Option<std::ops::Range<usize>>,
     /// The amplifiers' enable line is high.
     pub outputs_on: bool,
 }
@@ -110,6 +112,7 @@ impl Flash {
             erasures: vec![0; count],
             cut: None,
             worn: None,
+            refusing: None,
             outputs_on: false,
         }
     }
@@ -187,7 +190,8 @@ impl NorFlash for Flash {
         check_write(self, offset, bytes.len()).map_err(FlashError::Refused)?;
         for (index, word) in bytes.chunks_exact(4).enumerate() {
             let at = offset as usize + 4 * index;
-            if self.programmed[at / 4] {
+            let refuses = |words: &std::ops::Range<usize>| words.contains(&at);
+            if self.programmed[at / 4] || self.refusing.as_ref().is_some_and(refuses) {
                 return Err(FlashError::WrittenTwice);
             }
             // A cut before the operation leaves the word as it is.
