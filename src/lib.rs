@@ -70,6 +70,6 @@ pub use quadrant_link as link;
 
 #[doc(inline)]
 pub use law::{
-    admission, axes, axis, command, control, decimal, encoder, feedforward, friction, homing,
-    injection, learning, motion, reference, safety, scalar, stage, table, telemetry, units,
+    admission, axes, axis, cancelling, command, control, decimal, encoder, feedforward, friction,
+    homing, injection, learning, motion, reference, safety, scalar, stage, table, telemetry, units,
 };

@@ -219,6 +219,10 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 }
                 return None;
             }
+            Order::Spindle(speed) => {
+                self.state.tell_spindle(speed);
+                return None;
+            }
             Order::Lock => {
                 self.state.lock();
                 return None;
@@ -262,7 +266,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                         let _ = self.ends.plans.dequeue();
                     }
                 }
-                Order::Plan | Order::Lock | Order::Unlock { .. } => {
+                Order::Plan | Order::Spindle(_) | Order::Lock | Order::Unlock { .. } => {
                     self.take_order(order);
                 }
             }

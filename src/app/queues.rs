@@ -8,6 +8,7 @@ use super::Axis;
 use crate::app::capture::Capture;
 use crate::app::telemetry::{Sample, Sampler};
 use crate::law::axes::AxisName;
+use crate::law::cancelling::SpindleSpeed;
 use crate::law::command::Command;
 use crate::law::injection::{Injection, VoltageBlock};
 use crate::law::reference::Segment;
@@ -24,6 +25,8 @@ pub(super) enum Order {
     Plan,
     /// Take one axis' motion of the plan that waits, and start it.
     Move(AxisName),
+    /// Take the speed of the spindle over.
+    Spindle(SpindleSpeed),
     /// Keep the outputs off.
     Lock,
     /// No longer keep the outputs off.

@@ -19,7 +19,7 @@
 //! | 6 | advances the reference: a plan, a jog, homing, a stream, or a stop | [`motion`], [`mod@reference`], [`homing`] |
 //! | 7 | checks limit switches and soft limits, look-ahead included | [`safety::travel`] |
 //! | 8 | forms the error in integers, turns it into a number, checks it | [`units`], [`scalar`], [`safety::monitor`] |
-//! | 9 | feeds friction and inertia forward, from the look-ahead reference alone, at a scale that may be learnt | [`feedforward`], [`friction`], [`learning`] |
+//! | 9 | feeds friction and inertia forward, from the look-ahead reference alone, at a scale that may be learnt; cancels a cut's vibration | [`feedforward`], [`friction`], [`learning`], [`cancelling`] |
 //! | 10 | feeds the error back, within what the output limit leaves | [`control`] |
 //! | 11 | limits the sum and makes the converter's word of it | [`axis`] |
 //! | 12 | leaves every term to be seen: samples for a host, a ring that freezes at a fault | [`axis::telemetry`] |
@@ -42,6 +42,7 @@
 pub mod admission;
 pub mod axes;
 pub mod axis;
+pub mod cancelling;
 pub mod command;
 pub mod control;
 pub mod decimal;

@@ -18,6 +18,7 @@
 use crate::law::admission::{self, StageView};
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::axis::{Axis, AxisState, Commissioning};
+use crate::law::cancelling::SpindleSpeed;
 use crate::law::command::Command;
 use crate::law::encoder::EncoderReading;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
@@ -220,6 +221,13 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
     #[inline(always)]
     pub fn offer_segment(&mut self, axis: AxisName, segment: Segment) {
         self.axes[axis].offer_segment(segment);
+    }
+
+    /// Takes the speed of the spindle over, for the axes that cancel its vibration.
+    pub fn tell_spindle(&mut self, speed: SpindleSpeed) {
+        for axis in &mut *self.axes {
+            axis.tell_spindle(speed);
+        }
     }
 
     /// Puts an axis' travel into force, or out of it: for absolute encoders. Homing does it by itself.

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::feedback::FeedbackSettings;
 use super::homing::HomingSettings;
 use super::limits::LimitSettings;
+use crate::law::cancelling::CancellingSettings;
 use crate::law::control::plant_model::PlantModel;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::law::friction::FrictionSettings;
@@ -101,4 +102,7 @@ pub struct FeedforwardSettings {
     /// Learning of the friction's scale while the axis works; none: the scale stays 1.
     #[serde(default)]
     pub learning: Option<LearningSettings>,
+    /// Cancelling of a cut's vibration at multiples of the spindle's frequency; none: nothing is cancelled.
+    #[serde(default)]
+    pub cancelling: Option<CancellingSettings>,
 }

@@ -5,7 +5,9 @@ use super::{
 };
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::axis::{Axis, AxisBuilder, Commissioning};
+use crate::law::cancelling::{CancellingLoop, CancellingSettings};
 use crate::law::control::feedback::LawKind;
+use crate::law::control::pid::PidGains;
 use crate::law::encoder::Encoder;
 use crate::law::feedforward::FeedforwardKind;
 use crate::law::learning::{Learning, LearningLoop};
@@ -158,6 +160,8 @@ impl AxisSettings {
             rate_hz: 1.0 / period_s,
         };
         let stop_ramp = Ramp::new(limits.braking_mm_s2, limits.braking_jerk_mm_s3, scale);
+        let gains = feedback.linear_gains();
+        let cancelling = self.cancelling(gains.first());
         let built = AxisBuilder::new(axis, encoder.resolution_mm, period_s)
             .encoder(Encoder::new(
                 encoder.counter_bits.into(),
@@ -193,6 +197,7 @@ impl AxisSettings {
             .plausibility(self.build_plausibility(period_s))
             .overload(amplifier.build_overload(period_s))
             .learning(self.build_learning(period_s))
+            .cancelling(cancelling.as_ref().map(|(settings, of)| (settings, of)))
             .index_spacing(IndexSpacing::new(
                 encoder.counts_per_index,
                 encoder.index_tolerance_counts,
@@ -235,6 +240,11 @@ impl AxisSettings {
             .curve
             .breakaway_v
             .max(sliding.negative.curve.breakaway_v);
+        // A voltage that cancels a cut is not seen, and goes from one limit to the other.
+        let cancelled_v = self
+            .feedforward
+            .cancelling
+            .map_or(0.0, |cancelling| 2.0 * cancelling.limit_v);
         // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
         let seen_mm = HELD_COUNTS * resolution_mm;
         let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
@@ -246,7 +256,7 @@ impl AxisSettings {
             limit_v,
             // Beyond it, a step of the encoder is a jump.
             largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
-            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v),
+            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v) + cancelled_v,
             breakaway_v: (FRICTION_ERROR * breakaway_v).max(HELD_SHARE * limit_v),
             load_v: LOAD_SHARE * limit_v,
             first_load_v: FIRST_LOAD_SHARE * limit_v,
@@ -274,6 +284,25 @@ impl AxisSettings {
             }
             _ => Learning::off(),
         }
+    }
+
+    /// Cancelling, if it is wanted, and the loop that it is in.
+    fn cancelling<'a>(
+        &'a self,
+        gains: Option<&'a PidGains>,
+    ) -> Option<(CancellingSettings, CancellingLoop<'a>)> {
+        let (settings, plant) = (self.feedforward.cancelling?, self.plant.as_ref()?);
+        let feedback = &self.feedback;
+        let nonlinear = feedback.nonlinear.filter(|_| feedback.law == LawKind::NPid);
+        let of = CancellingLoop {
+            plant,
+            pid: gains.unwrap_or(&feedback.pid),
+            friction: &self.friction.gms,
+            breakaway_v: self.friction.mean_breakaway_v(),
+            filters: feedback.filters.as_deref().unwrap_or_default(),
+            largest_gain: nonlinear.map_or(1.0, |gain| gain.largest()),
+        };
+        Some((settings, of))
     }
 
     #[inline(never)]

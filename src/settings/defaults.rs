@@ -11,6 +11,7 @@ use super::operation::{
 };
 use super::stage::StageSettings;
 use crate::law::axis::Commissioning;
+use crate::law::cancelling::CancellingSettings;
 use crate::law::control::feedback::LawKind;
 use crate::law::control::pid::PidGains;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
@@ -237,6 +238,7 @@ impl Default for FeedforwardSettings {
             },
             preview_s: default!("feedforward.preview_s"),
             learning: None,
+            cancelling: None,
         }
     }
 }
@@ -246,6 +248,19 @@ impl Default for LearningSettings {
         Self {
             memory_s: default!("feedforward.learning.memory_s"),
             vibration_mm_s: default!("feedforward.learning.vibration_mm_s"),
+        }
+    }
+}
+
+impl Default for CancellingSettings {
+    fn default() -> Self {
+        Self {
+            spindle_rpm: default!("feedforward.cancelling.spindle_rpm"),
+            ramp_rpm_s: default!("feedforward.cancelling.ramp_rpm_s"),
+            teeth: default!("feedforward.cancelling.teeth") as u8,
+            harmonics: default!("feedforward.cancelling.harmonics") as u8,
+            rate_per_s: default!("feedforward.cancelling.rate_per_s"),
+            limit_v: default!("feedforward.cancelling.limit_v"),
         }
     }
 }

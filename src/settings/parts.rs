@@ -6,6 +6,7 @@ use super::axis::AxisSettings;
 use super::homing::{HomeSwitch, HomingSettings};
 use super::leaves::default;
 use super::limits::TravelSettings;
+use crate::law::cancelling::CancellingSettings;
 use crate::law::control::cascade::CascadeGains;
 use crate::law::control::filter::FilterSettings;
 use crate::law::control::nctf::{CharacteristicPoint, NctfGains};
@@ -42,7 +43,7 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub(crate) static PARTS: [Part; 14] = [
+pub(crate) static PARTS: [Part; 15] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
@@ -129,6 +130,11 @@ pub(crate) static PARTS: [Part; 14] = [
         "/feedforward/learning",
         feedforward.learning,
         LearningSettings::default()
+    ),
+    part!(
+        "/feedforward/cancelling",
+        feedforward.cancelling,
+        CancellingSettings::default()
     ),
     part!(
         "/limits/travel_mm",

@@ -138,6 +138,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
             kind: FeedforwardKind::Combined,
             preview_s: parameters.plant.delay_s,
             learning: None,
+            cancelling: None,
             ..FeedforwardSettings::default()
         },
         limits: LimitSettings {

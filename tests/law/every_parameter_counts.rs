@@ -60,8 +60,12 @@ fn run<S: Scalar>(settings: &StageSettings, jumping: usize) -> Option<Trace> {
 fn leaves(value: &Value, path: &str, found: &mut Vec<String>) {
     match value {
         Value::Object(fields) => {
-            // On an axis of which the runs here know the plant, it acts: `learning.rs`.
-            for (name, value) in fields.iter().filter(|(name, _)| *name != "learning") {
+            // On an axis of which the runs here know the plant, they act: `learning.rs`, `cancelling.rs`.
+            let known = ["learning", "cancelling"];
+            for (name, value) in fields
+                .iter()
+                .filter(|(name, _)| !known.contains(&name.as_str()))
+            {
                 leaves(value, &format!("{path}/{name}"), found);
             }
         }

@@ -15,7 +15,7 @@ use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 use quadrant_fault_bench::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
 
 /// The x axis alone, with a PID that integrates as a commissioned one does.
-fn fixed() -> StageSettings {
+pub(crate) fn fixed() -> StageSettings {
     x_alone(|x| {
         x.feedback.law = LawKind::Pid;
         x.feedback.pid.ki_v_per_mm_s = 7.9;
@@ -37,18 +37,18 @@ fn learning() -> StageSettings {
 }
 
 /// A stage whose x axis moves as its output makes it.
-struct Axis<S: Scalar> {
-    rig: Rig<S>,
+pub(crate) struct Axis<S: Scalar> {
+    pub(crate) rig: Rig<S>,
     plant: Plant,
     encoder: Encoder,
     /// Amplitude, V, and frequency, Hz, of a load that shakes the axis.
-    shaken: (f64, f64),
+    pub(crate) shaken: (f64, f64),
     ticks: u32,
 }
 
 impl<S: Scalar> Axis<S> {
     /// On a slow sine, with so many times the friction that the settings know: the damping of its mass stays.
-    fn on_sine(settings: &StageSettings, friction: f64) -> Self {
+    pub(crate) fn on_sine(settings: &StageSettings, friction: f64) -> Self {
         Self::on(settings, friction, &sine_on_x(2.0, 5.0))
     }
 
@@ -66,12 +66,12 @@ impl<S: Scalar> Axis<S> {
         axis
     }
 
-    fn command(&mut self, command: Command) {
+    pub(crate) fn command(&mut self, command: Command) {
         self.rig.inputs.command = Some(command);
         self.tick();
     }
 
-    fn tick(&mut self) {
+    pub(crate) fn tick(&mut self) {
         let count = self.encoder.read(self.plant.position_mm, None);
         self.rig.inputs.readings[0].count = count as u32;
         let outputs = self.rig.tick();
@@ -84,7 +84,7 @@ impl<S: Scalar> Axis<S> {
     }
 
     /// Runs for a time; returns the mean square of the error, mm^2.
-    fn run(&mut self, seconds: f64) -> f64 {
+    pub(crate) fn run(&mut self, seconds: f64) -> f64 {
         let ticks = (seconds / PERIOD_S) as usize;
         let mut sum = 0.0;
         for _ in 0..ticks {

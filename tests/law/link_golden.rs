@@ -61,6 +61,7 @@ fn requests() -> Vec<(Body, &'static str)> {
         (Body::Fault, "02"),
         (Body::Inputs, "12"),
         (Body::Learning, "13"),
+        (Body::Spindle { rpm: 3000.0 }, "14000000000070a740"),
         (Body::ResetFault, "03"),
         (Body::Enable, "04"),
         (Body::Disable, "05"),

@@ -187,7 +187,7 @@ impl Requests<'_> {
 
     /// Any request, all its numbers finite.
     fn body(&mut self) -> Body {
-        match self.below(20) {
+        match self.below(21) {
             0 => Body::Hello,
             1 => Body::Status,
             2 => Body::Fault,
@@ -225,6 +225,7 @@ impl Requests<'_> {
             16 => Body::Inject(self.injection()),
             17 => Body::Inputs,
             18 => Body::Learning,
+            19 => Body::Spindle { rpm: self.real() },
             _ => Body::Reboot,
         }
     }

@@ -7,6 +7,7 @@ mod axis_limits;
 mod board_wiring;
 mod brake;
 mod bumpless;
+mod cancelling;
 mod capture;
 mod change_detector;
 mod common;

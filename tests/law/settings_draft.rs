@@ -217,6 +217,8 @@ fn every_leaf_of_amplifier_limits_homing_plant_and_commissioning_needs_the_outpu
             "rate_hz" | "encoder" => Exchange::Restart,
             "operation" | "brake" | "streaming" | "amplifier" | "limits" | "homing" | "plant"
             | "commissioned" => Exchange::Disabled,
+            // The comparison of encoder and plant allows for it.
+            "feedforward" if leaf.field == "feedforward.cancelling.limit_v" => Exchange::Disabled,
             "feedback" | "friction" | "feedforward" => Exchange::Driven,
             other => panic!("{other} is no group"),
         };

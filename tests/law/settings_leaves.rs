@@ -2,6 +2,7 @@
 
 use std::collections::BTreeSet;
 
+use quadrant::cancelling::CancellingSettings;
 use quadrant::control::filter::{FilterList, FilterSettings};
 use quadrant::learning::LearningSettings;
 use quadrant::settings::leaves::{LeafInfo, Range, all, find};
@@ -18,6 +19,7 @@ fn settings() -> StageSettings {
     let mut settings = StageSettings::simulated();
     for axis in &mut settings.axes {
         axis.feedforward.learning = Some(LearningSettings::default());
+        axis.feedforward.cancelling = Some(CancellingSettings::default());
         axis.feedback.filters = Some(FilterList::from_iter([FilterSettings::notch(
             1000.0, 0.2, 0.5,
         )]));
@@ -131,9 +133,15 @@ fn write(settings: &mut StageSettings, path: &str, number: f64) -> Result<(), Tr
 
 /// Returns true if a leaf is a whole number.
 pub(crate) fn is_whole(path: &str) -> bool {
-    ["counter_bits", "counts_per_index", "index_tolerance_counts"]
-        .iter()
-        .any(|name| path.ends_with(name))
+    [
+        "counter_bits",
+        "counts_per_index",
+        "index_tolerance_counts",
+        "teeth",
+        "harmonics",
+    ]
+    .iter()
+    .any(|name| path.ends_with(name))
 }
 
 fn about(leaf: &LeafInfo, result: &Result<(), SettingsError>) -> Option<Reason> {

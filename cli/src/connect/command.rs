@@ -63,6 +63,11 @@ pub(super) enum Command {
         /// The velocity, mm/s, with its sign; 0 brakes.
         velocity_mm_s: f64,
     },
+    /// Tell the speed of the spindle: axes with `feedforward/cancelling` cancel the vibration of the cut by it.
+    Spindle {
+        /// The speed, rpm; 0 if it stands.
+        rpm: f64,
+    },
     /// Start the plan: the motions of `plan` or `circle`, from where the axes stand. `wait rest` waits for their end.
     Run,
     /// Exchange the plan for that of a TOML file: `motions`, one for each axis.
@@ -477,6 +482,7 @@ impl Command {
             Self::Home { .. } => "home",
             Self::Move { .. } => "move",
             Self::Jog { .. } => "jog",
+            Self::Spindle { .. } => "spindle",
             Self::Run => "run",
             Self::Plan { .. } => "plan",
             Self::Circle(_) => "circle",

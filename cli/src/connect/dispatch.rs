@@ -49,6 +49,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         | Command::Home { .. }
         | Command::Move { .. }
         | Command::Jog { .. }
+        | Command::Spindle { .. }
         | Command::Run
         | Command::Reboot => machine::order(client, command),
         Command::Wait {

@@ -14,7 +14,7 @@ pub(super) const GROUPS: [(&str, &[&str]); 6] = [
         "Motion",
         &[
             "enable", "disable", "stop", "home", "move", "jog", "run", "plan", "circle", "stream",
-            "wait",
+            "spindle", "wait",
         ],
     ),
     (

@@ -196,6 +196,7 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
             axis: (*axis).into(),
             velocity_mm_s: *velocity_mm_s,
         },
+        Command::Spindle { rpm } => Body::Spindle { rpm: *rpm },
         Command::Run => Body::Run,
         Command::Reboot => Body::Reboot,
         other => bail!("{}: not an order", other.name()),

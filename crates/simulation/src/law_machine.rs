@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
 use quadrant::axes::{AxisName, PerAxis};
+use quadrant::cancelling::SpindleSpeed;
 use quadrant::command::Command;
 use quadrant::lockstep::{InputRecord, Job};
 use quadrant::reference::{Motion, Segment};
@@ -67,6 +68,11 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     /// Gives an axis of the plan another motion, for [`Command::StartMove`]. It must not be following the plan.
     pub fn set_motion(&mut self, axis: AxisName, motion: Motion<S>) {
         self.plan[axis as usize] = motion;
+    }
+
+    /// Tells the speed of the spindle.
+    pub fn tell_spindle(&mut self, speed: SpindleSpeed) {
+        self.state.tell_spindle(speed);
     }
 
     /// Takes other settings between two ticks, as the firmware does: the outputs go over without a jump.

@@ -54,6 +54,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Disable
         | Body::Stop
         | Body::SetPlan(_)
+        | Body::Spindle { .. }
         | Body::Stream(StreamRequest::Points { .. } | StreamRequest::Close)
         | Body::Inject(InjectRequest::Values { .. } | InjectRequest::Close)
         | Body::Settings(

@@ -332,6 +332,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
                 target_mm,
                 velocity_mm_s,
             } => self.start_move(axis.into(), target_mm, velocity_mm_s),
+            Body::Spindle { rpm } => self.set_spindle(rpm),
             other => self.serve_command(other),
         }
     }

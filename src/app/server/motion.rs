@@ -6,7 +6,9 @@ use crate::app::queues::Order;
 use crate::app::supervisor;
 use crate::hal::SettingsFlash;
 use crate::law::axes::{AxisName, PerAxis};
+use crate::law::cancelling::{MOST_RPM, SpindleSpeed};
 use crate::law::command::Command;
+use crate::law::decimal::Decimal;
 use crate::law::reference::{Motion, MotionSettings};
 use crate::law::safety::Station;
 use crate::law::scalar::Scalar;
@@ -122,6 +124,20 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         motions[index(axis)] = MotionSettings::PointToPoint(motion);
         self.hand_over(&PlanSettings { motions })?;
         self.order(Order::Move(axis))?;
+        Ok(Reply::Done)
+    }
+
+    /// Passes the speed of the spindle on.
+    pub(super) fn set_spindle(&mut self, rpm: f64) -> Result<Reply, LinkError> {
+        if !(0.0..=MOST_RPM).contains(&rpm) {
+            return Err(invalid(format_args!(
+                "rpm: {} is outside 0 to {}",
+                Decimal(rpm),
+                Decimal(MOST_RPM)
+            )));
+        }
+        let period_s = 1.0 / self.draft.in_force().rate_hz;
+        self.order(Order::Spindle(SpindleSpeed::from_rpm(rpm, period_s)))?;
         Ok(Reply::Done)
     }
 

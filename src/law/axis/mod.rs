@@ -29,6 +29,9 @@ pub mod telemetry;
 use core::fmt;
 
 use self::telemetry::{AxisTelemetry, LimitedBy};
+use crate::law::cancelling::{
+    Cancelling, CancellingLoop, CancellingSettings, CancellingState, Cut, SpindleSpeed,
+};
 use crate::law::command::Command;
 use crate::law::control::feedback::Feedback;
 use crate::law::control::filter::{Filters, FiltersState};
@@ -105,6 +108,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     bumpless_decay: S,
     travel: Travel,
     learns: bool,
+    cancels: bool,
     feedback: Feedback<S>,
     filters: Filters<S>,
     feedforward: Feedforward<S, N>,
@@ -118,6 +122,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     generator: ReferenceGenerator<S>,
     commissioning: Commissioning,
     learning: Learning<S>,
+    cancelling: Cancelling<S>,
 }
 
 /// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
@@ -213,6 +218,8 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.commissioning = Commissioning::Done;
         axis.learns = false;
         axis.learning = Learning::off();
+        axis.cancels = false;
+        axis.cancelling.switch_off();
         let builder = Self {
             axis,
             period_s,
@@ -335,6 +342,16 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
+    /// Cancelling of a cut's vibration.
+    #[must_use]
+    pub fn cancelling(self, parts: Option<(&CancellingSettings, &CancellingLoop<'_>)>) -> Self {
+        if let Some((settings, of)) = parts {
+            self.axis.cancelling.build_over(settings, of, self.period_s);
+        }
+        self.axis.cancels = self.axis.cancelling.is_on();
+        self
+    }
+
     /// The distance of the encoder's index pulses.
     #[must_use]
     pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
@@ -436,6 +453,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     pulse: Option<Position>,
     index: IndexState,
     learning: LearningState<S>,
+    cancelling: CancellingState<S>,
 }
 
 impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
@@ -464,6 +482,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             injected: S::ZERO,
             telemetry: AxisTelemetry::default(),
             learning: LearningState::default(),
+            cancelling: CancellingState::default(),
         }
     }
 }
@@ -477,6 +496,16 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// The memory of learning: the friction's scale.
     pub fn learning(&self) -> &LearningState<S> {
         &self.learning
+    }
+
+    /// The memory of cancelling: the voltage that it adds.
+    pub fn cancelling(&self) -> &CancellingState<S> {
+        &self.cancelling
+    }
+
+    /// Takes the speed of the spindle over.
+    pub(crate) fn tell_spindle(&mut self, speed: SpindleSpeed) {
+        self.cancelling.tell(speed);
     }
 
     /// True while a motion is under way.
@@ -621,6 +650,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             commissioning: Commissioning::Inert,
             learns: false,
             learning: Learning::off(),
+            cancels: false,
+            cancelling: Cancelling::off(),
         }
     }
 
@@ -728,6 +759,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if self.learns {
             self.learn(state);
         }
+        if self.cancels {
+            self.cancel(state);
+        }
         let shown = state.shown();
         let bears = self
             .overload
@@ -767,6 +801,19 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
                 _ => None,
             });
         state.feedback.unload(gained);
+    }
+
+    /// Takes a step of cancelling, on what the last tick left.
+    #[inline(never)]
+    fn cancel(&self, state: &mut AxisState<S, N>) {
+        let works = matches!(
+            state.mode(),
+            MotionMode::Plan | MotionMode::Stream | MotionMode::Hold
+        );
+        let seen = &state.telemetry;
+        let fed = works & (state.injected == S::ZERO) & (seen.velocity != S::ZERO);
+        let cut = if fed { Cut::Fed } else { Cut::Idle };
+        self.cancelling.step(&mut state.cancelling, seen.error, cut);
     }
 
     /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
@@ -820,6 +867,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             preview,
             pulse,
             learning,
+            cancelling,
         } = state;
         *overspeed = OverspeedState::default();
         *signal_loss = SignalLossState::default();
@@ -841,6 +889,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *preview = [here; PREVIEW_ROOM];
         *pulse = None;
         *learning = self.learning.resume(learning);
+        *cancelling = self.cancelling.start(cancelling);
     }
 
     /// Starts or ends a motion, from where the reference stands. Only what
@@ -1062,6 +1111,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if self.learns {
             total = self.scale_friction(state, changed);
         }
+        if self.cancels {
+            total = total + self.add_cancelling(state, changed);
+        }
         let input = FeedbackInput {
             error,
             velocity: state.reference_velocity,
@@ -1092,6 +1144,15 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         terms.total()
     }
 
+    /// The voltage that cancels; after a change of settings it begins at none.
+    #[inline(always)]
+    fn add_cancelling(&self, state: &mut AxisState<S, N>, changed: bool) -> S {
+        if changed {
+            state.cancelling = self.cancelling.start(&state.cancelling);
+        }
+        self.cancelling.advance(&mut state.cancelling)
+    }
+
     /// Puts the injected voltage out.
     #[cold]
     #[inline(never)]
@@ -1115,6 +1176,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
         telemetry.limited_by = if telemetry.feedback.saturated {
             state.learning.saturate();
+            state.cancelling.saturate();
             LimitedBy::OutputLimit
         } else {
             LimitedBy::Nothing
@@ -1164,6 +1226,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             state.feedback = FeedbackState::default();
             state.filters = FiltersState::default();
             state.friction = FeedforwardState::default();
+            state.cancelling = self.cancelling.start(&state.cancelling);
             state.telemetry.bumpless_offset = S::ZERO;
             self.stop(state);
         }

@@ -14,7 +14,7 @@ mod point_to_point;
 mod ramp;
 mod recorded;
 mod sample;
-mod sine;
+pub(in crate::law) mod sine;
 mod stream;
 mod stream_planner;
 

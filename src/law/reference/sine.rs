@@ -6,7 +6,7 @@
 /// A value that lies beside the motion in memory: there a coefficient takes one instruction to load, as a constant of the
 /// program two.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct SinePolynomial {
+pub(in crate::law) struct SinePolynomial {
     /// The constant coefficient, with 61 fraction bits.
     constant: i64,
     /// The others. Each has two fraction bits more than the one before, from 31 for that of `t`: then a step of Horner's
@@ -23,11 +23,11 @@ fn upper(a: i32, b: i32) -> i32 {
 }
 
 /// Fraction bits of a sine.
-pub(super) const SINE_BITS: u32 = 30;
+pub(in crate::law) const SINE_BITS: u32 = 30;
 
 impl SinePolynomial {
     /// The only one.
-    pub(super) const FIT: Self = Self {
+    pub(in crate::law) const FIT: Self = Self {
         constant: 2_921_876_942_130_950_361,
         coefficients: [
             -1_223_429_338,
@@ -61,7 +61,7 @@ impl SinePolynomial {
     /// The sine and the cosine of a phase.
     // Not inlined: the coefficients fit the registers of a function of its own.
     #[inline(never)]
-    pub(super) fn sine_and_cosine(&self, phase: u32) -> (i32, i32) {
+    pub(in crate::law) fn sine_and_cosine(&self, phase: u32) -> (i32, i32) {
         (self.sine(phase), self.sine(phase.wrapping_add(1 << 30)))
     }
 }

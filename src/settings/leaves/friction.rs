@@ -2,8 +2,9 @@
 
 use strum::VariantNames;
 
-use super::row::{LeafInfo, UNSET, at, list, name, number, period_s, point, times};
+use super::row::{Exchange, LeafInfo, UNSET, at, list, name, number, period_s, point, times};
 use crate::law::axis::MAX_PREVIEW_TICKS;
+use crate::law::cancelling::{HARMONICS, MOST_RPM};
 use crate::law::feedforward::FeedforwardKind;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 
@@ -68,4 +69,19 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "Time constant with which learning of the friction's scale forgets; left out with its part, nothing is learnt."),
     number("feedforward.learning.vibration_mm_s", "mm/s", at(0.1), at(1000.0), 2.0,
         "Amplitude of the axis' vibration between 40 and 150 Hz, as a velocity, that halves the feedforward of all friction but the viscous."),
+    number("feedforward.cancelling.spindle_rpm", "rpm", at(0.0), at(MOST_RPM), 0.0,
+        "Speed of the spindle until the link tells another; 0 if it stands. Left out with its part, no vibration is cancelled."),
+    number("feedforward.cancelling.ramp_rpm_s", "rpm/s", at(1.0), at(1e6), 1e4,
+        "Largest rate at which cancelling follows a change of the spindle's speed."),
+    number("feedforward.cancelling.teeth", "", at(1.0), at(64.0), 2.0,
+        "Teeth of the cutter."),
+    number("feedforward.cancelling.harmonics", "", at(1.0), at(HARMONICS as f64), 3.0,
+        "Frequencies that are cancelled: 1 is that of the teeth, 2 adds the spindle's, 3 twice the teeth's; of a single tooth once, twice and three times."),
+    number("feedforward.cancelling.rate_per_s", "1/s", at(0.1), at(20.0), 6.0,
+        "Rate at which the vibration's part of the error falls."),
+    LeafInfo {
+        exchange: Exchange::Disabled,
+        ..number("feedforward.cancelling.limit_v", "V", at(0.0), at(10.0), 0.3,
+            "Largest voltage that cancelling adds; twice as much more of the output need not show as motion.")
+    },
 ];

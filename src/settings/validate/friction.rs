@@ -38,7 +38,8 @@ impl AxisSettings {
         )?;
         self.validate_gms(at, period_s, room)?;
         self.validate_bristles(at, period_s)?;
-        self.validate_learning(at, period_s)
+        self.validate_learning(at, period_s)?;
+        self.validate_cancelling(at)
     }
 
     /// Learning needs a plant that its model has room for, and a law that is a PID at small errors.
@@ -51,10 +52,26 @@ impl AxisSettings {
         };
         let longest_s = MAX_DELAY_TICKS as f64 * period_s;
         at.within("plant.delay_s", plant.delay_s, 0.0, longest_s)?;
+        self.validate_is_pid(at, "feedforward.learning")
+    }
+
+    /// Cancelling needs the phase of the loop: a plant, and a law that is a PID at small errors.
+    fn validate_cancelling(&self, at: Place) -> Result<(), SettingsError> {
+        if self.feedforward.cancelling.is_none() {
+            return Ok(());
+        }
+        if self.plant.is_none() {
+            return at.refuse("plant", f64::NAN, Reason::Missing);
+        }
+        self.validate_is_pid(at, "feedforward.cancelling")
+    }
+
+    /// Refuses a part of the feedforward that works only with a law that is a PID at small errors.
+    fn validate_is_pid(&self, at: Place, part: &'static str) -> Result<(), SettingsError> {
         match self.feedback.law {
             LawKind::Pd | LawKind::Pid | LawKind::NPid => Ok(()),
             LawKind::Scheduled | LawKind::Cascade | LawKind::SlidingMode | LawKind::Nctf => {
-                at.refuse("feedforward.learning", f64::NAN, Reason::NeedsPid)
+                at.refuse(part, f64::NAN, Reason::NeedsPid)
             }
         }
     }

@@ -46,7 +46,9 @@ fn summary(lines: &BTreeMap<u64, Line>) {
     say!("Simulated, not measured: {} random cuts\n", lines.len());
     let all = lines.len() as f64;
     let mean = |read: fn(&Line) -> f64| lines.values().map(read).sum::<f64>() / all;
-    let ended = lines.values().filter(|line| !line.worst_ratio.is_finite());
+    let ended = lines
+        .values()
+        .filter(|line| !(line.worst_ratio + line.cancelling_worst_ratio).is_finite());
     say!("Ended by a fault: {}", ended.count());
     for (name, ratio, percent) in [
         (
@@ -58,6 +60,11 @@ fn summary(lines: &BTreeMap<u64, Line>) {
             "learning",
             |line| line.worst_ratio,
             |line| line.worse_percent,
+        ),
+        (
+            "cancelling",
+            |line| line.cancelling_worst_ratio,
+            |line| line.cancelling_worse_percent,
         ),
     ] {
         let cases = lines.values().filter(|line| ratio(line) > WORSE).count();
@@ -72,20 +79,25 @@ fn summary(lines: &BTreeMap<u64, Line>) {
         );
     }
     say!(
-        "\nRMS error, mean over the cases: {:.2} um without, {:.2} um as commissioned, {:.2} um learning",
+        "\nRMS error, mean over the cases: {:.2} um without, {:.2} um as commissioned, {:.2} um learning, {:.2} um learning and \
+         cancelling",
         mean(|line| line.off_um),
         mean(|line| line.fixed_um),
-        mean(|line| line.learning_um)
+        mean(|line| line.learning_um),
+        mean(|line| line.cancelling_um)
     );
     let mut worst: Vec<&Line> = lines.values().collect();
-    worst.sort_by(|a, b| b.worst_ratio.total_cmp(&a.worst_ratio));
-    say!("\nWorst, to be replayed with --seeds SEED+1 --results FILE:");
+    worst.sort_by(|a, b| {
+        b.cancelling_worst_ratio
+            .total_cmp(&a.cancelling_worst_ratio)
+    });
+    say!("\nWorst with cancelling, to be replayed with --seeds SEED+1 --results FILE:");
     for line in worst.iter().take(LISTED) {
         say!(
             "{:>6}  x {:.3} at {:>4.1} s: {}",
             line.seed,
-            line.worst_ratio,
-            line.worst_at_s,
+            line.cancelling_worst_ratio,
+            line.cancelling_worst_at_s,
             line.case
         );
     }

@@ -1,11 +1,12 @@
 //! Learning under random cuts, on axes that are no longer what they were: is it ever worse than no feedforward?
 //!
 //! The axis of a seed differs from its settings in mass, delay and noise. Its friction steps or drifts while it runs a sine,
-//! and a tool enters and leaves. The same run is made without feedforward, with the feedforward as commissioned, and with
-//! learning. Every 2 s of it after the first 5 s are compared with the run without.
+//! and a tool enters and leaves. The same run is made without feedforward, with the feedforward as commissioned, with
+//! learning, and with learning and cancelling at the speed of the spindle. Every 2 s of it after the first 5 s are compared with the run without.
 
 pub mod command;
 
+use quadrant::cancelling::CancellingSettings;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::learning::LearningSettings;
@@ -47,10 +48,15 @@ pub struct Line {
     /// The same of the feedforward as commissioned.
     pub fixed_worst_ratio: f64,
     pub fixed_worse_percent: f64,
-    /// RMS errors of all that is compared, um: without, as commissioned, learning.
+    /// The same of learning and cancelling.
+    pub cancelling_worst_ratio: f64,
+    pub cancelling_worst_at_s: f64,
+    pub cancelling_worse_percent: f64,
+    /// RMS errors of all that is compared, um: without, as commissioned, learning, learning and cancelling.
     pub off_um: f64,
     pub fixed_um: f64,
     pub learning_um: f64,
+    pub cancelling_um: f64,
     /// The case, for a person.
     pub case: String,
 }
@@ -130,6 +136,7 @@ impl Case {
         stage: &StageSettings,
         kind: FeedforwardKind,
         learning: Option<LearningSettings>,
+        cancels: bool,
         seed: u64,
     ) -> Option<Vec<f64>> {
         let mut stage = stage.clone();
@@ -137,6 +144,11 @@ impl Case {
         axis.feedback.law = self.law;
         axis.feedforward.kind = kind;
         axis.feedforward.learning = learning;
+        axis.feedforward.cancelling = cancels.then(|| CancellingSettings {
+            spindle_rpm: self.cut.spindle_rpm,
+            teeth: self.cut.teeth as u8,
+            ..CancellingSettings::default()
+        });
         stage.axes = [axis.clone(), axis.clone(), axis];
         let rate_hz = stage.rate_hz;
         let resolution_mm = stage.axes[0].encoder.resolution_mm;
@@ -253,14 +265,21 @@ pub fn judge(seed: u64) -> Line {
         .expect("the settings of the repository")
         .stage;
     let learning = Some(LearningSettings::default());
-    let [off, fixed, learning] = [
-        (FeedforwardKind::None, None),
-        (FeedforwardKind::Combined, None),
-        (FeedforwardKind::Combined, learning),
+    let [off, fixed, learning, cancelling] = [
+        (FeedforwardKind::None, None, false),
+        (FeedforwardKind::Combined, None, false),
+        (FeedforwardKind::Combined, learning, false),
+        (FeedforwardKind::Combined, learning, true),
     ]
-    .map(|(kind, learning)| case.run(&stage, kind, learning, seed).unwrap_or_default());
-    let [of_off, of_fixed, of_learning] = [&off, &fixed, &learning].map(|run| windows(run));
+    .map(|(kind, learning, cancels)| {
+        case.run(&stage, kind, learning, cancels, seed)
+            .unwrap_or_default()
+    });
+    let [of_off, of_fixed, of_learning, of_cancelling] =
+        [&off, &fixed, &learning, &cancelling].map(|run| windows(run));
     let (worst_ratio, at, worse_percent) = compare(&of_learning, &of_off);
+    let (cancelling_worst_ratio, cancelling_at, cancelling_worse_percent) =
+        compare(&of_cancelling, &of_off);
     let (fixed_worst_ratio, _, fixed_worse_percent) = compare(&of_fixed, &of_off);
     let whole = |run: &[f64]| {
         let first = (FIRST_S / RUN_S * run.len() as f64) as usize;
@@ -273,9 +292,13 @@ pub fn judge(seed: u64) -> Line {
         worse_percent,
         fixed_worst_ratio,
         fixed_worse_percent,
+        cancelling_worst_ratio,
+        cancelling_worst_at_s: FIRST_S + STRIDE_S * cancelling_at as f64,
+        cancelling_worse_percent,
         off_um: whole(&off),
         fixed_um: whole(&fixed),
         learning_um: whole(&learning),
+        cancelling_um: whole(&cancelling),
         case: case.describe(),
     }
 }

@@ -61,6 +61,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     if asked(Question::Cuts) {
         tables.extend(cuts::table(&stage, axis, seed)?);
+        tables.extend(cuts::speeds(&stage, axis, seed)?);
     }
     say!("Simulated, not measured; seed {seed}\n");
     for table in &tables {

@@ -1,5 +1,5 @@
-//! What else may be done about a cut, tried beside the law: a disturbance observer, a friction model fed with the measured
-//! vibration, and cancelling at the spindle's harmonics. Each adds a voltage to the law's output.
+//! What else may be done about a cut, tried beside the law: a disturbance observer, and a friction model fed with the measured
+//! vibration. Each adds a voltage to the law's output.
 
 use std::f64::consts::TAU;
 
@@ -224,73 +224,5 @@ impl Addition for FedFriction {
         let shaken = power / (power + HALF_MM_S * HALF_MM_S);
         let averaged = (self.power[1] / self.power[0].max(1e-12)).min(1.0);
         shaken * (averaged * fed - f64::from(seen.feedforward.gms))
-    }
-}
-
-/// Largest amplitude of a harmonic, V.
-const MOST_HARMONIC_V: f64 = 0.3;
-
-/// Voltages at multiples of the spindle's frequency, each adapted until the error has none of it, with the phase of the
-/// identified loop.
-pub(super) struct Cancelling {
-    harmonics: Vec<Harmonic>,
-    tick: u64,
-    period_s: f64,
-    rate_per_s: f64,
-}
-
-struct Harmonic {
-    omega: f64,
-    /// Position over a voltage at the plant's input, mm/V.
-    response: Complex64,
-    amplitude: Complex64,
-}
-
-impl Cancelling {
-    /// At these frequencies, Hz, with a rate of adaptation.
-    pub(super) fn new(
-        axis: &AxisSettings,
-        plant: &PlantModel,
-        frequencies_hz: &[f64],
-        rate_per_s: f64,
-        rate_hz: f64,
-    ) -> Self {
-        let open = SampledLoop::new(plant, &axis.feedback.pid, 1.0 / rate_hz, 0.0);
-        let harmonics = frequencies_hz.iter().map(|hz| {
-            let omega = TAU * hz;
-            let held = Complex64::cis(-0.5 * omega / rate_hz);
-            Harmonic {
-                omega,
-                response: plant.response(omega) * held / (1.0 + open.response(omega)),
-                amplitude: Complex64::default(),
-            }
-        });
-        Self {
-            harmonics: harmonics.collect(),
-            tick: 0,
-            period_s: 1.0 / rate_hz,
-            rate_per_s,
-        }
-    }
-}
-
-impl Addition for Cancelling {
-    fn step(&mut self, seen: &AxisTelemetry<f32>) -> f64 {
-        let time_s = self.tick as f64 * self.period_s;
-        self.tick += 1;
-        let error = f64::from(seen.error_mm());
-        let share = self.rate_per_s * self.period_s;
-        self.harmonics
-            .iter_mut()
-            .map(|harmonic| {
-                let turn = Complex64::cis(harmonic.omega * time_s);
-                harmonic.amplitude += share * 2.0 * error * turn.conj() / harmonic.response;
-                let size = harmonic.amplitude.norm();
-                if size > MOST_HARMONIC_V {
-                    harmonic.amplitude *= MOST_HARMONIC_V / size;
-                }
-                (harmonic.amplitude * turn).re
-            })
-            .sum()
     }
 }

@@ -1,6 +1,7 @@
 //! A run of one axis: motions one after the other, on an axis that changes between them, while a tool may cut.
 
 use quadrant::axes::AxisName;
+use quadrant::cancelling::SpindleSpeed;
 use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
@@ -55,6 +56,8 @@ pub(super) struct Phase {
     /// The axis as it then is, and what pushes it, from the beginning of the phase on.
     pub(super) truth: AxisParameters,
     pub(super) load: Load,
+    /// Speed of the spindle that the law is told at its beginning, rpm.
+    pub(super) spindle_rpm: Option<f64>,
 }
 
 /// Amplitude and velocity of the usual sine, mm and mm/s, and its lead-in, s: those of the comparison.
@@ -77,6 +80,7 @@ impl Phase {
             rest_s: 0.0,
             truth,
             load: Load::None,
+            spindle_rpm: None,
         }
     }
 
@@ -86,6 +90,7 @@ impl Phase {
             rest_s: seconds,
             truth,
             load: Load::None,
+            spindle_rpm: None,
         }
     }
 
@@ -181,6 +186,11 @@ pub(super) fn run(
         let starting = (START_S * rate_hz) as usize;
         let resting = (phase.rest_s * rate_hz) as usize;
         for tick in 0.. {
+            if tick == starting
+                && let Some(rpm) = phase.spindle_rpm
+            {
+                machine.tell_spindle(SpindleSpeed::from_rpm(rpm, 1.0 / rate_hz));
+            }
             if tick == starting && moves {
                 requests.push(Command::StartMove(AxisName::X));
             }

@@ -8,11 +8,16 @@ fn under_random_cuts_learning_is_hardly_ever_worse_than_no_feedforward_and_far_b
 {
     let lines: Vec<_> = (1..=20).into_par_iter().map(judge).collect();
     let mut worse = 0.0;
+    let (mut learning_um, mut cancelling_um) = (0.0, 0.0);
     for line in &lines {
         println!("{line:?}");
         assert!(line.worst_ratio.is_finite(), "{line:?}");
         assert!(line.learning_um < line.off_um, "{line:?}");
+        assert!(line.cancelling_um < line.off_um, "{line:?}");
+        learning_um += line.learning_um;
+        cancelling_um += line.cancelling_um;
         worse += line.worse_percent / lines.len() as f64;
     }
     assert!(worse < 5.0, "{worse} % of the windows");
+    assert!(cancelling_um < 0.9 * learning_um);
 }

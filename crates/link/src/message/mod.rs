@@ -111,6 +111,11 @@ pub enum Body {
     Inputs,
     /// Asks for what the axes have learnt. [`Reply::Learning`].
     Learning,
+    /// Tells the speed of the spindle, by which the vibration of a cut is cancelled.
+    Spindle {
+        /// The speed, rpm, 0 to 1 000 000; zero if it stands.
+        rpm: f64,
+    },
 }
 
 impl Body {
@@ -161,6 +166,7 @@ impl Body {
                 finite("velocity_mm_s", *velocity_mm_s)?;
             }
             Self::Jog { velocity_mm_s, .. } => finite("velocity_mm_s", *velocity_mm_s)?,
+            Self::Spindle { rpm } => finite("rpm", *rpm)?,
             Self::Stream(StreamRequest::Points { points, .. }) => {
                 for axis in points.iter().flat_map(|point| &point.axes) {
                     finite("position_mm", axis.position_mm)?;

@@ -61,6 +61,8 @@ impl Model {
                     captured: false,
                 })));
             }
+            // Nothing of the model turns.
+            Body::Spindle { .. } => {}
             Body::ResetFault => self.fault = None,
             Body::Enable if self.fault.is_some() => return Err(refused("a fault is latched")),
             Body::Enable => self.enabled = true,
