@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
 use quadrant::axes::PerAxis;
+use quadrant::axis::AxisState;
 use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -136,6 +137,25 @@ impl<S: Scalar> Rig<S> {
         for _ in 0..100 {
             self.tick();
         }
+    }
+
+    /// Shows x counts that grow by `step` a tick, and what is seen of it after each; then what a fault has ended begins anew.
+    pub(crate) fn show_counts<E>(
+        &mut self,
+        step: i32,
+        ticks: u16,
+        mut look: impl FnMut(&AxisState<S, 4>) -> Result<(), E>,
+    ) -> Result<(), E> {
+        for _ in 0..ticks {
+            let count = &mut self.inputs.readings[0].count;
+            *count = count.wrapping_add_signed(step);
+            self.tick();
+            look(&self.state.axes()[0])?;
+        }
+        self.command(Command::ResetFault);
+        self.command(Command::Enable);
+        self.command(Command::Run);
+        Ok(())
     }
 
     /// Goes over to other settings at the next tick.

@@ -50,6 +50,7 @@ mod link_hostile;
 mod link_model;
 mod link_sizes;
 mod link_traffic;
+mod link_words;
 mod lockstep_records;
 mod monitors;
 mod motion_modes;

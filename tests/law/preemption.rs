@@ -292,11 +292,10 @@ fn nothing_enables_between_the_axes_of_one_change() {
     assert!((1..6).contains(&withheld), "{withheld} of 7");
 }
 
-#[test]
-fn an_order_that_waits_when_a_stop_overtakes_it_is_dropped() {
+/// True if a jog that the host has asked for begins after commands of the operator's in every tick, which let it wait.
+fn jogs_after(command: Command) -> bool {
     let mut tasks = enabled();
-    // Commands of the operator come in every tick, so that the host's orders wait.
-    tasks.upper.borrow_mut().inputs.command = Some(Command::Stop);
+    tasks.upper.borrow_mut().inputs.command = Some(command);
     tasks.send(&[Body::Jog {
         axis: AxisName::X,
         velocity_mm_s: 5.0,
@@ -304,21 +303,14 @@ fn an_order_that_waits_when_a_stop_overtakes_it_is_dropped() {
     tasks.run(40);
     tasks.upper.borrow_mut().inputs.command = None;
     tasks.run(20);
-    assert!(!tasks.upper.borrow().state().is_running());
+    let upper = tasks.upper.borrow();
+    upper.state().is_running()
 }
 
 #[test]
-fn an_order_that_waits_when_the_operator_enables_is_carried_out() {
-    let mut tasks = enabled();
-    tasks.upper.borrow_mut().inputs.command = Some(Command::Enable);
-    tasks.send(&[Body::Jog {
-        axis: AxisName::X,
-        velocity_mm_s: 5.0,
-    }]);
-    tasks.run(40);
-    tasks.upper.borrow_mut().inputs.command = None;
-    tasks.run(20);
-    assert!(tasks.upper.borrow().state().is_running());
+fn an_order_that_waits_is_dropped_when_a_stop_overtakes_it_and_by_nothing_else() {
+    assert!(!jogs_after(Command::Stop));
+    assert!(jogs_after(Command::Enable));
 }
 
 #[test]

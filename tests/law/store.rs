@@ -230,7 +230,7 @@ fn errors_say_what_was_wrong_and_what_to_do() {
     let error = refused(&invalid);
     let texts = [
         (
-            SaveError::<FlashError>::Refused(error.clone()).to_string(),
+            SaveError::<FlashError>::Refused(error).to_string(),
             error.to_string(),
         ),
         (
@@ -254,11 +254,11 @@ fn errors_say_what_was_wrong_and_what_to_do() {
             "is damaged".into(),
         ),
         (
-            LoadError::<FlashError>::Decode(DecodeError::Refused(error.clone())).to_string(),
+            LoadError::<FlashError>::Decode(DecodeError::Refused(error)).to_string(),
             error.to_string(),
         ),
         (
-            DecodeError::Refused(error.clone()).to_string(),
+            DecodeError::Refused(error).to_string(),
             "max_velocity_mm_s".into(),
         ),
     ];
