@@ -2,9 +2,13 @@
 
 use quadrant::link::frame::{DecodeError, EncodeError};
 use quadrant::link::message::{
-    AxisName, AxisSet, AxisSignal, Body, CaptureRequest, Channel, InjectRequest, Plan,
-    SettingsRequest, StageSignal, StreamRequest, TelemetryRequest, Voltages, Words,
+    AxisName, AxisSet, AxisSignal, BLOCK_WORDS, Body, CaptureRequest, Channel, Event,
+    InjectRequest, LearningState, MachineState, Plan, Reply, SettingsRequest, StageSignal, Status,
+    StreamRequest, TelemetryBlock, TelemetryRequest, Voltages, Words, text,
 };
+use quadrant_fault_bench::tasks::Tasks;
+
+use crate::preemption::settings;
 
 const RESOLUTION_MM: [f64; 3] = [1e-3, 2e-3, 5e-4];
 
@@ -147,4 +151,98 @@ fn blocks_count_what_they_hold() {
     let mut words = Words::new();
     assert!(words.is_empty() && words.extend([1, 2].into_iter()));
     assert_eq!((words.len(), words.is_empty()), (2, false));
+}
+
+#[test]
+fn a_machine_is_driven_while_it_homes_works_and_brakes_and_rests_between() {
+    let mut tasks = Tasks::new(&settings(), 1);
+    let Ok(Reply::Status(seen)) = tasks.ask(Body::Status) else {
+        panic!("is there");
+    };
+    for (state, name, drives) in [
+        (MachineState::Start, "start", false),
+        (MachineState::Disabled, "disabled", false),
+        (MachineState::Homing, "homing", true),
+        (MachineState::Enabled, "enabled", true),
+        (MachineState::Fault, "fault", false),
+        (MachineState::Stopping, "stopping", true),
+    ] {
+        assert_eq!((state.as_str(), state.drives()), (name, drives));
+        for running in [false, true] {
+            let status = Status {
+                state,
+                running,
+                ..seen.clone()
+            };
+            let rests = !running && state != MachineState::Homing;
+            assert_eq!(status.is_at_rest(), rests, "{state:?} {running}");
+        }
+    }
+}
+
+#[test]
+fn events_and_states_of_learning_are_told_in_words() {
+    let friction = |percent, needs_maintenance| Event::FrictionChanged {
+        axis: AxisName::X,
+        percent,
+        needs_maintenance,
+    };
+    for (event, said) in [
+        (Event::Enabled, "outputs on"),
+        (
+            Event::Fault {
+                code: 7,
+                axis: Some(AxisName::Y),
+            },
+            "fault 7 of y",
+        ),
+        (
+            Event::Stopping {
+                code: 9,
+                axis: None,
+            },
+            "braking for fault 9",
+        ),
+        (
+            friction(118, false),
+            "friction of x is 1.18 times what was commissioned",
+        ),
+        (
+            friction(205, true),
+            "friction of x is 2.05 times what was commissioned: look after guide, drive and lubrication",
+        ),
+    ] {
+        assert_eq!(event.to_string(), said);
+    }
+    assert_eq!(LearningState::Learning.words(), "learning");
+    assert_eq!(LearningState::AtRest.words(), "frozen: at rest");
+}
+
+#[test]
+fn a_text_that_is_too_long_ends_between_two_characters() {
+    assert_eq!(text::<8>(format_args!("{} {}", 12, "ab")).as_str(), "12 ab");
+    assert_eq!(text::<8>(format_args!("1234567{}", 8)).as_str(), "12345678");
+    // Two bytes a character.
+    assert_eq!(text::<8>(format_args!("12äöü{}", "x")).as_str(), "12äöü");
+    assert_eq!(text::<8>(format_args!("123äöü{}", "x")).as_str(), "123äö");
+}
+
+#[test]
+fn a_block_gives_its_samples_with_their_numbers_and_takes_no_more_than_fit() {
+    let mut words = Words::new();
+    assert!(words.extend(1..8));
+    let block = TelemetryBlock {
+        sequence: 40,
+        channels: 3,
+        words: words.clone(),
+        ..TelemetryBlock::default()
+    };
+    let samples: Vec<(u32, Vec<u32>)> = block
+        .samples()
+        .map(|(number, words)| (number, words.collect()))
+        .collect();
+    assert_eq!(samples, [(40, vec![1, 2, 3]), (41, vec![4, 5, 6])]);
+    let room = BLOCK_WORDS - words.len();
+    assert!(!words.extend(0..room as u32 + 1) && words.len() == 7);
+    assert!(words.extend(0..room as u32) && words.len() == BLOCK_WORDS);
 }
