@@ -422,6 +422,39 @@ fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_t
 }
 
 #[test]
+fn the_feedback_follows_the_reference_by_the_longest_preview_that_there_is() {
+    let longest = quadrant::axis::MAX_PREVIEW_TICKS;
+    let mut axis = Axis::<f64, 4>::blank();
+    let settings = StageSettings::simulated();
+    let x = &settings.axes[0];
+    AxisBuilder::new(&mut axis, RESOLUTION_MM, PERIOD_S)
+        .amplifier(10.0, 10.0, 0.0, false)
+        .feedback(pid())
+        .feedforward(
+            quadrant::feedforward::FeedforwardKind::None,
+            &x.feedforward.gains,
+            &x.friction,
+            longest,
+        )
+        .try_build()
+        .expect("valid");
+    let plan = sine_on_x(5.0, 10.0);
+    let plan = plan.build::<f64>(&settings).expect("valid plan");
+    let mut state = AxisState::default();
+    axis.handle_command(&mut state, Command::Run);
+    let mut ahead = vec![];
+    for tick in 0..300 {
+        axis.tick(&mut state, &plan[0], &EncoderReading::of(0), tick)
+            .expect("no fault");
+        ahead.push(state.reference());
+        if let Some(before) = ahead.len().checked_sub(longest + 1) {
+            assert_eq!(state.telemetry().reference, ahead[before], "tick {tick}");
+        }
+    }
+    assert_ne!(ahead[0], ahead[299]);
+}
+
+#[test]
 fn the_inputs_of_counts_have_them() {
     let inputs = quadrant::stage::Inputs::of_counts([1, 2, 3]);
     assert_eq!(inputs.readings.map(|reading| reading.count), [1, 2, 3]);
