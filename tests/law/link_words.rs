@@ -82,6 +82,8 @@ fn a_number_that_is_none_goes_no_farther_than_the_link() {
             values[place] = bad;
             let said = format!("{:?}", Body::Inject(open(values)).check());
             assert!(said.contains(field) && said.contains(kind), "{said}");
+            let said = format!("{:?}", Body::Spindle { rpm: bad }.check());
+            assert!(said.contains("rpm") && said.contains(kind), "{said}");
         }
     }
 }

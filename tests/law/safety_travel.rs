@@ -361,3 +361,30 @@ fn the_stop_begins_at_the_speed_that_the_next_tick_may_have() {
         }
     }
 }
+
+#[test]
+fn an_axis_without_soft_limits_goes_either_way_once_it_is_homed() {
+    for velocity_mm_s in [20.0, -20.0] {
+        let settings = with_x(|x| x.limits.travel_mm = None);
+        let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
+        rig.tick();
+        rig.state.set_homed(AxisName::X, true);
+        rig.command(Command::Enable);
+        let velocity = settings
+            .jog_at(AxisName::X, velocity_mm_s)
+            .expect("slow enough");
+        rig.command(Command::Jog(AxisName::X, velocity));
+        for _ in 0..5000 {
+            let reference = rig.state.axes()[0].telemetry().reference;
+            rig.inputs.set_counts([(reference.0 >> 16) as u32, 0, 0]);
+            rig.tick();
+        }
+        let measured = rig.state.axes()[0].telemetry().measured.0;
+        assert!(
+            rig.state.safety().is_enabled(),
+            "{velocity_mm_s}: {:?}",
+            rig.state.safety()
+        );
+        assert!(measured.abs() > 5000, "{measured}");
+    }
+}

@@ -6,11 +6,11 @@ use crate::law::axes::AxisName;
 
 /// Bits of each axis.
 const BITS_PER_AXIS: u32 = 5;
-const NEGATIVE_LIMIT: u16 = 1 << 0;
-const POSITIVE_LIMIT: u16 = 1 << 1;
-const HOME: u16 = 1 << 2;
-const AMPLIFIER_FAULT: u16 = 1 << 3;
-const OUTPUT_MISMATCH: u16 = 1 << 4;
+const NEGATIVE_LIMIT: u16 = 0b0_0001;
+const POSITIVE_LIMIT: u16 = 0b0_0010;
+const HOME: u16 = 0b0_0100;
+const AMPLIFIER_FAULT: u16 = 0b0_1000;
+const OUTPUT_MISMATCH: u16 = 0b1_0000;
 /// The stage's own bit, above all axes'.
 const EMERGENCY_STOP: u16 = 1 << (3 * BITS_PER_AXIS);
 
