@@ -224,8 +224,10 @@ fn events_and_states_of_learning_are_told_in_words() {
 fn a_text_that_is_too_long_ends_between_two_characters() {
     assert_eq!(text::<8>(format_args!("{} {}", 12, "ab")).as_str(), "12 ab");
     assert_eq!(text::<8>(format_args!("1234567{}", 8)).as_str(), "12345678");
+    // In two parts: literals would be one.
+    let [first, second] = ["12345", "6789"].map(String::from);
     assert_eq!(
-        text::<8>(format_args!("{}{}", "12345", "6789")).as_str(),
+        text::<8>(format_args!("{first}{second}")).as_str(),
         "12345678"
     );
     // Two bytes a character.
