@@ -240,11 +240,6 @@ impl AxisSettings {
             .curve
             .breakaway_v
             .max(sliding.negative.curve.breakaway_v);
-        // A voltage that cancels a cut is not seen, and goes from one limit to the other.
-        let cancelled_v = self
-            .feedforward
-            .cancelling
-            .map_or(0.0, |cancelling| 2.0 * cancelling.limit_v);
         // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
         let seen_mm = HELD_COUNTS * resolution_mm;
         let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
@@ -256,7 +251,7 @@ impl AxisSettings {
             limit_v,
             // Beyond it, a step of the encoder is a jump.
             largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
-            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v) + cancelled_v,
+            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v),
             breakaway_v: (FRICTION_ERROR * breakaway_v).max(HELD_SHARE * limit_v),
             load_v: LOAD_SHARE * limit_v,
             first_load_v: FIRST_LOAD_SHARE * limit_v,

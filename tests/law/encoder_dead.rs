@@ -4,6 +4,7 @@
 use std::collections::VecDeque;
 
 use quadrant::axes::AxisName;
+use quadrant::cancelling::CancellingSettings;
 use quadrant::command::Command;
 use quadrant::injection::Injection;
 use quadrant::reference::{
@@ -333,13 +334,27 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
 
 #[test]
 fn an_encoder_that_dies_switches_off_before_the_axis_has_gone_far() {
-    let settings = StageSettings::simulated();
+    every_death(&StageSettings::simulated());
+}
+
+#[test]
+fn an_encoder_that_dies_does_so_too_under_a_law_that_cancels_a_cut() {
+    every_death(&with_x(|x| {
+        x.feedforward.cancelling = Some(CancellingSettings {
+            spindle_rpm: 3000.0,
+            ..CancellingSettings::default()
+        });
+    }));
+}
+
+/// Lets the encoder die in every way at every activity.
+fn every_death(settings: &StageSettings) {
     println!(
         "| death | activity | fault | ms from death | ms unplanned | mm unplanned | mm/s then |"
     );
     for death in DEATHS {
         for activity in ACTIVITIES {
-            let end = run_until_off(&settings, &MODEL, activity, death);
+            let end = run_until_off(settings, &MODEL, activity, death);
             println!(
                 "| {death:?} | {activity:?} | {} | {:.1} | {:.1} | {:.2} | {:.0} |",
                 end.fault.map_or("none", FaultCode::name),

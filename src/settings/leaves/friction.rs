@@ -82,6 +82,6 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     LeafInfo {
         exchange: Exchange::Disabled,
         ..number("feedforward.cancelling.limit_v", "V", at(0.0), at(10.0), 0.3,
-            "Largest voltage that cancelling adds; twice as much more of the output need not show as motion.")
+            "Largest voltage that cancelling adds.")
     },
 ];
