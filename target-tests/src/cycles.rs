@@ -27,8 +27,11 @@ const LITERAL_LINES: usize = 8;
 
 /// Control rate for which the share of the processor is printed, Hz.
 const RATE_HZ: f64 = 20_000.0;
-/// Tolerance above the expected bound, %.
+/// Tolerance above the expected bound without wait states, %.
 const TOLERANCE_PERCENT: f64 = 5.0;
+/// Tolerance above the expected bound without a cache, %: a loop of two instructions that any change elsewhere moves across the edge
+/// of a line costs two lines a turn more, and the largest copy of a tick takes 240 turns.
+const NO_CACHE_TOLERANCE_PERCENT: f64 = 20.0;
 
 /// File of the expected bounds.
 const GOLDEN: Golden = Golden {
@@ -105,12 +108,19 @@ fn compare(key: &str, bounds: Bounds, compiler: &str) -> Result<()> {
             "no figure is committed for {key}: `cargo xtask cycles --overwrite-expected` makes one"
         );
     };
-    let growth = 100.0 * (bounds.no_cache / expected.no_cache - 1.0);
-    println!("  {key}: {growth:+.1} % against the committed bound");
-    difference.ensure(growth <= TOLERANCE_PERCENT, || {
+    let [grown, no_cache_grown] = [
+        (bounds.no_wait_states, expected.no_wait_states),
+        (bounds.no_cache, expected.no_cache),
+    ]
+    .map(|(now, then)| 100.0 * (now / then - 1.0));
+    println!(
+        "  {key}: {grown:+.1} % against the committed bound, {no_cache_grown:+.1} % without a cache"
+    );
+    let bears = grown <= TOLERANCE_PERCENT && no_cache_grown <= NO_CACHE_TOLERANCE_PERCENT;
+    difference.ensure(bears, || {
         format!(
-            "{key}: the bound has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
-             `cargo xtask cycles --overwrite-expected` accepts it"
+            "{key}: the bound has grown by {grown:.1} %, without a cache by {no_cache_grown:.1} %, more than {TOLERANCE_PERCENT} or \
+             {NO_CACHE_TOLERANCE_PERCENT} %; if that is wanted, `cargo xtask cycles --overwrite-expected` accepts it"
         )
     })
 }
