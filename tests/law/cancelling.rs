@@ -337,12 +337,7 @@ fn hostile<S: Scalar>(steps: &[(i32, u16, u32)]) -> Result<(), TestCaseError> {
     let mut settings = cancelling(rpm(100.0));
     part(&mut settings).rate_per_s = 20.0;
     part(&mut settings).limit_v = 1.0;
-    for axis in &mut settings.axes {
-        axis.limits.following_error_mm = 20.0;
-        axis.limits.following_error_max_mm = 20.0;
-    }
-    let mut rig = Rig::<S>::with_plant(&settings, &sine_on_x(5.0, 20.0));
-    rig.start();
+    let mut rig = Rig::<S>::that_bears_any_error(settings);
     for &(step, ticks, rpm) in steps {
         let speed = SpindleSpeed::from_rpm(f64::from(rpm), PERIOD_S);
         rig.state.tell_spindle(speed);

@@ -139,6 +139,17 @@ impl<S: Scalar> Rig<S> {
         }
     }
 
+    /// A stage on a sine of x whose limits bear any error.
+    pub(crate) fn that_bears_any_error(mut settings: StageSettings) -> Self {
+        for axis in &mut settings.axes {
+            axis.limits.following_error_mm = 20.0;
+            axis.limits.following_error_max_mm = 20.0;
+        }
+        let mut rig = Self::with_plant(&settings, &sine_on_x(5.0, 20.0));
+        rig.start();
+        rig
+    }
+
     /// Shows x counts that grow by `step` a tick, and what is seen of it after each; then what a fault has ended begins anew.
     pub(crate) fn show_counts<E>(
         &mut self,

@@ -1,4 +1,4 @@
-//! What a host asks for, on its whole way: from the link through server and queues to the tick, and back.
+//! Requests of a host on their whole way: from the link through server and queues to the tick, and back.
 
 use quadrant::app::LINK_TIMEOUT_TICKS;
 use quadrant::command::Command;

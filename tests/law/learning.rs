@@ -332,13 +332,7 @@ fn learning_needs_a_plant_with_a_dead_time_that_it_holds_and_a_pid() {
 
 /// Learning on an encoder that shows anything; the scale and the gate after each tick.
 fn hostile<S: Scalar>(steps: &[(i32, u16)]) -> Result<(), TestCaseError> {
-    let mut settings = learning();
-    for axis in &mut settings.axes {
-        axis.limits.following_error_mm = 20.0;
-        axis.limits.following_error_max_mm = 20.0;
-    }
-    let mut rig = Rig::<S>::with_plant(&settings, &sine_on_x(5.0, 20.0));
-    rig.start();
+    let mut rig = Rig::<S>::that_bears_any_error(learning());
     for &(step, ticks) in steps {
         rig.show_counts(step, ticks, |axis| {
             let (scale, gate) = (axis.learning().scale(), axis.learning().gate());

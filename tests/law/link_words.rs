@@ -1,4 +1,4 @@
-//! What the link's types say to people, and what they count.
+//! The words of the link's types for people, and their counts.
 
 use quadrant::link::frame::{DecodeError, EncodeError};
 use quadrant::link::message::{

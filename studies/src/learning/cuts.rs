@@ -31,7 +31,7 @@ const SCORED_S: f64 = 2.0;
 /// Speed of the spindle where nothing is cut, Hz: that of the slot.
 const IDLE_HZ: f64 = 50.0;
 
-/// What is beside the feedforward: a voltage added to the law's output, or cancelling, a part of the law.
+/// A remedy beside the feedforward: a voltage added to the law's output, or cancelling, a part of the law.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Remedy {
     None,

@@ -1,4 +1,4 @@
-//! What else may be done about a cut, tried beside the law: a disturbance observer, and a friction model fed with the measured
+//! Remedies against a cut, tried beside the law: a disturbance observer, and a friction model fed with the measured
 //! vibration. Each adds a voltage to the law's output.
 
 use std::f64::consts::TAU;

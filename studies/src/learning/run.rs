@@ -99,7 +99,7 @@ impl Phase {
     }
 }
 
-/// What a phase has left: samples of every control period.
+/// The trace of a phase: samples of every control period.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Trace {
     /// Reference less true position, um.
