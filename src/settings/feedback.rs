@@ -97,7 +97,8 @@ impl FeedbackSettings {
             sliding_mode: surface.map(|surface| SlidingModeGains {
                 slope_per_s: surface.slope_per_s,
                 switching_v: switching_v(&surface),
-                boundary_mm_s: switching_v(&surface) / surface.gain_v_s_per_mm,
+                // Not beyond the widest by rounding.
+                boundary_mm_s: (switching_v(&surface) / surface.gain_v_s_per_mm).min(WIDEST_MM_S),
                 integral_per_s: surface.integral_per_s,
             }),
             // A straight line up to the largest velocity, until a trajectory is measured.

@@ -11,7 +11,7 @@ use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
 use quadrant::units::DacCode;
 
-use crate::common::{Rig, repeatable, sine_on_x};
+use crate::common::{Rig, repeatable};
 use crate::learning::{Axis, fixed};
 use quadrant_fault_bench::plant::PERIOD_S;
 

@@ -1,8 +1,9 @@
 //! Every number out of its range is refused by name, with the value and what is allowed.
 
 use quadrant::axes::AxisName;
+use quadrant::control::pid::PidGains;
 use quadrant::decimal::Decimal;
-use quadrant::settings::{PlanSettings, Reason, SettingsError, StageSettings};
+use quadrant::settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
 
 use crate::common::with_x;
 use crate::settings_fields::{FIELDS, Field};
@@ -143,4 +144,20 @@ fn defaults_are_valid_at_every_rate_they_claim_and_with_room() {
         PlanSettings::default().validate(&StageSettings::simulated()),
         Ok(())
     );
+}
+
+#[test]
+fn all_laws_of_a_pid_are_within_the_ranges_of_their_parameters_however_soft_it_is() {
+    for step in 0..2000 {
+        let soft = 1.01_f64.powi(-step);
+        let pid = PidGains {
+            kp_v_per_mm: 5.0 * soft,
+            ki_v_per_mm_s: 20.0 * soft,
+            kd_v_s_per_mm: 0.02 * soft,
+            derivative_filter_s: 1e-4,
+        };
+        let sliding_mode = FeedbackSettings::all_laws(pid, None, 250.0).sliding_mode;
+        let widest = sliding_mode.map(|gains| gains.boundary_mm_s);
+        assert!(widest.is_none_or(|mm_s| mm_s <= 1e3), "{soft}: {widest:?}");
+    }
 }

@@ -10,7 +10,7 @@ use super::bootstrap::{
 use super::commissioned::{CommissionSettings, Commissioned};
 use super::error::CommissionError;
 use super::guard::Guard;
-use super::models::{self, Measurements, Models};
+use super::models::{self, Controller, Measurements, Models};
 use super::ringing::Ringing;
 use super::verify::verify;
 use crate::identify::excitation::Excitation;
@@ -87,18 +87,31 @@ fn guarded(
         report(step, share);
     })?;
 
-    let [ahead_v, back_v] = motor.directed_v;
-    test_axis.slowed_by(motor.gain_mm_per_v_s2 * ahead_v.min(back_v));
-
-    if middle_first(&test_axis.info()).is_some() {
-        to_the_middle(test_axis, base, &motor)?;
-    }
-
     step += 1;
-    let (response, plant) = linear_model(test_axis, base, &motor, &mut |share| {
-        report(step, share);
-    })?;
-    let controller = models::controller(&plant, base, request, rate_hz)?;
+    let design = |plant: &PlantFit| models::controller(plant, base, request, rate_hz);
+    let mut model = |test_axis: &mut Guard<'_>, motor: &MotorConstant| {
+        let [ahead_v, back_v] = motor.directed_v;
+        test_axis.slowed_by(motor.gain_mm_per_v_s2 * ahead_v.min(back_v));
+        if middle_first(&test_axis.info()).is_some() {
+            to_the_middle(test_axis, base, motor)?;
+        }
+        linear_model(test_axis, base, motor, &design, &mut |share| {
+            report(step, share);
+        })
+    };
+    let (motor, (response, plant, controller)) = match model(test_axis, &motor) {
+        Ok(found) => (motor, found),
+        Err(first) => {
+            // Of an axis that rings, the gentle test may tell the mass better, and so make a better first controller.
+            let second = motor_constant::measure_gently(test_axis, &steps, &mut |_| {})
+                .map_err(CommissionError::from)
+                .and_then(|motor| Ok((model(test_axis, &motor)?, motor)));
+            match second {
+                Ok((found, motor)) => (motor, found),
+                Err(_) => return Err(first),
+            }
+        }
+    };
 
     step += 1;
     let mut settings = base.clone();
@@ -179,14 +192,15 @@ fn to_the_middle(
     Ok(outcome?)
 }
 
-/// The response of the sliding axis under a first controller, and the linear model. A mode that the first controller excites
+/// The response of the sliding axis under a first controller, the linear model, and the controller that `design` makes on it. A mode that the first controller excites
 /// spoils both: they are repeated with softer ones, as soft as the frequency demands that was seen.
 fn linear_model(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
     motor: &MotorConstant,
+    design: &dyn Fn(&PlantFit) -> Result<Controller, CommissionError>,
     progress: &mut dyn FnMut(f64),
-) -> Result<(FrfMeasurement, PlantFit), CommissionError> {
+) -> Result<(FrfMeasurement, PlantFit, Controller), CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
     let gain = motor.gain_mm_per_v_s2;
     let feeds_friction =
@@ -195,7 +209,7 @@ fn linear_model(
                    share: f64,
                    trim: f64,
                    progress: &mut dyn FnMut(f64)|
-     -> Result<(FrfMeasurement, PlantFit), CommissionError> {
+     -> Result<(FrfMeasurement, PlantFit, Controller), CommissionError> {
         let mut settings = soft_bootstrap_settings(base, gain, rate_hz, share);
         if feeds_friction(&test_axis.info(), share) {
             let friction_v = motor.directed_v.map(|volts| trim * volts);
@@ -204,7 +218,8 @@ fn linear_model(
         test_axis.apply(&settings)?;
         let response = sliding_response(test_axis, gain, progress)?;
         let plant = models::plant(&response)?;
-        Ok((response, plant))
+        let controller = design(&plant)?;
+        Ok((response, plant, controller))
     };
     let first = match attempt(test_axis, 1.0, 1.0, progress) {
         Ok(found) => return Ok(found),
@@ -212,7 +227,8 @@ fn linear_model(
     };
     let mut seen = rings(test_axis, &first);
     let (mut share, mut trim, mut trims) = (1.0, 1.0, 0);
-    let mut next = next_share(share, &first, seen);
+    let is_short = test_axis.info().travel_mm < SHORT_TRAVEL_MM;
+    let mut next = next_share(share, &first, seen, is_short);
     let mut trimmed = trimmed(test_axis, &first, seen);
     for _ in 1..ATTEMPTS {
         // The friction that is fed forward is known by its order only: first that, then the controller.
@@ -231,7 +247,7 @@ fn linear_model(
             Ok(found) => return Ok(found),
             Err(error) => {
                 let now = rings(test_axis, &error);
-                next = next_share(share, &error, now);
+                next = next_share(share, &error, now, is_short);
                 trimmed = self::trimmed(test_axis, &error, now);
                 seen = now.or(seen);
             }
@@ -266,13 +282,20 @@ fn trimmed(test_axis: &Guard<'_>, error: &CommissionError, rings: Option<Ringing
     Some(if behind_mm > 0.0 { MORE } else { LESS })
 }
 
-/// Share of the usual crossover that is tried after one that failed; none if there is none left.
-fn next_share(share: f64, error: &CommissionError, rings: Option<Ringing>) -> Option<f64> {
+/// Share of the usual crossover that is tried after one that failed; none if there is none left. `is_short`: the travel is, so that
+/// the axis is slow enough to stick and slip under a soft controller.
+fn next_share(
+    share: f64,
+    error: &CommissionError,
+    rings: Option<Ringing>,
+    is_short: bool,
+) -> Option<f64> {
     let slowed = matches!(
         error,
         CommissionError::Response(FrfError::NotSliding { .. })
     );
-    if rings.is_none() && (share >= 1.0 && is_stuck(error) || share > 1.0 && slowed) {
+    let held = is_stuck(error) || is_short;
+    if rings.is_none() && (share >= 1.0 && held || share > 1.0 && slowed) {
         // The axis is held by more than so soft a controller overcomes.
         return Some(STIFFER * share).filter(|share| *share <= STIFFEST);
     }
@@ -309,7 +332,7 @@ const MORE: f64 = 1.2;
 const LESS: f64 = 0.6;
 /// Factor on the crossover of one that does not move the axis, and the largest share of the usual crossover.
 const STIFFER: f64 = 1.7;
-const STIFFEST: f64 = 5.0;
+const STIFFEST: f64 = 8.5;
 /// Parameters of the response that suit an axis, without its gain.
 pub(super) fn response_settings(info: &AxisInfo) -> FrfSettings {
     let mut settings = FrfSettings::default().fitted_to(info.travel_mm);

@@ -184,6 +184,20 @@ fn assumed(breakaway_v: f64) -> GmsParameters {
     }
 }
 
+/// Elements whose springs sum up to `most_v_per_mm`, V/mm, at most: those of an axis that is stiffer than the control rate resolves
+/// are softer in the same proportion.
+fn no_stiffer(mut gms: GmsParameters, most_v_per_mm: f64) -> GmsParameters {
+    let sum: f64 = gms.elements.iter().map(|e| e.stiffness_v_per_mm).sum();
+    let share = (RESOLVED * most_v_per_mm / sum).min(1.0);
+    for element in &mut gms.elements {
+        element.stiffness_v_per_mm *= share;
+    }
+    gms
+}
+
+/// Share of the stiffest spring that is taken: none of it is lost by rounding.
+const RESOLVED: f64 = 0.999;
+
 impl Measurements {
     /// Identifies all models and makes the settings, as a commissioning does that measured this; without a verdict.
     ///
@@ -249,6 +263,7 @@ impl Models {
         let elements = gms
             .as_ref()
             .map_or_else(|_| assumed(breakaway_v), |found| found.gms.clone());
+        let elements = no_stiffer(elements, plant.plant.stiffest_v_per_mm(1.0 / rate_hz));
         settings.friction = with_all_models(friction.models(), elements);
         settings.feedforward.kind = FeedforwardKind::Combined;
         settings.feedforward.gains = FeedforwardGains {
@@ -331,5 +346,22 @@ mod tests {
         assert!(even_friction(&map).is_err());
         let (coulomb_v, _) = friction(&map).unwrap().mean_levels_v();
         assert!((coulomb_v - 0.1).abs() < 0.01, "{coulomb_v}");
+    }
+
+    #[test]
+    fn elements_stiffer_than_the_control_rate_resolves_become_softer_in_proportion() {
+        let element = |stiffness_v_per_mm, weight| GmsElement {
+            stiffness_v_per_mm,
+            weight,
+        };
+        let gms = GmsParameters {
+            elements: ShortVec::from_iter([element(300.0, 0.6), element(100.0, 0.4)]),
+            attraction_v_s: ASSUMED_ATTRACTION_V_S,
+        };
+        assert_eq!(no_stiffer(gms.clone(), 500.0), gms);
+        let softer = no_stiffer(gms, 200.0).elements;
+        let [first, second] = [&softer[0], &softer[1]].map(|e| e.stiffness_v_per_mm);
+        assert!((first / second - 3.0).abs() < 1e-12);
+        assert!((199.0..200.0).contains(&(first + second)));
     }
 }

@@ -24,6 +24,10 @@ pub struct MotorConstantSettings {
     pub dwell_s: f64,
     /// Levels in a pass.
     pub levels: usize,
+    /// Time in which the voltage rises before the first level, s; 0 for none. A motor on a soft spring does not leap then.
+    pub rise_s: f64,
+    /// Upper level over the lower.
+    pub upper_ratio: f64,
     /// Passes, alternating in direction; at least 2.
     pub passes: usize,
 }
@@ -35,6 +39,8 @@ impl Default for MotorConstantSettings {
             most_level_v: 5.0,
             dwell_s: 0.008,
             levels: 24,
+            rise_s: 0.0,
+            upper_ratio: 2.5,
             passes: 4,
         }
     }
@@ -47,7 +53,7 @@ const SHORTEST: f64 = 0.4;
 /// shortest dwell, s.
 const LEAST_LEVELS: usize = 14;
 const SHORTENED: f64 = 0.75;
-const SHORTENINGS: usize = 14;
+const TESTS_TOO_FAR: usize = 14;
 const LEAST_DWELL_S: f64 = 0.0015;
 /// Dwells that are tried over the usual one where a test is too uncertain.
 const OTHER_DWELLS: [f64; 3] = [1.7, 0.6, 2.4];
@@ -67,10 +73,30 @@ impl MotorConstantSettings {
 
     /// Time of one test, s.
     pub fn lasts_s(&self) -> f64 {
-        self.passes as f64 * (self.levels as f64 * self.dwell_s + REST_S)
+        self.passes as f64 * (self.rise_s + self.levels as f64 * self.dwell_s + REST_S)
     }
 
-    /// Fewer levels, down to those that a pass takes, then shorter ones: after a test that was stopped for its way.
+    /// Mean of the levels over the lower one.
+    fn mean_ratio(&self) -> f64 {
+        0.5 * (1.0 + self.upper_ratio)
+    }
+
+    /// A voltage that rises first, to levels that are nearer to each other.
+    #[must_use]
+    fn gentle(self) -> Self {
+        Self {
+            rise_s: RISE_S,
+            upper_ratio: GENTLE_RATIO,
+            ..self
+        }
+    }
+
+    /// True for a test whose voltage rises first.
+    fn is_gentle(&self) -> bool {
+        self.rise_s > 0.0
+    }
+
+    /// Fewer levels, down to those that a pass takes, then shorter ones.
     #[must_use]
     fn shortened(self) -> Self {
         let levels = (self.levels * 2 / 3).max(LEAST_LEVELS);
@@ -90,21 +116,50 @@ impl MotorConstantSettings {
     pub fn of(recording: &Recording) -> Self {
         let usual = Self::default();
         let drives = |volts: &&f64| volts.abs() > DRIVING_V;
-        let first = recording
+        let driven = recording
             .voltage_v
             .iter()
             .skip_while(|volts| !drives(volts));
-        let pass: Vec<f64> = first.take_while(drives).map(|volts| volts.abs()).collect();
-        // Every other level is the upper one, which comes first.
-        let between = 0.5 * (1.0 + UPPER) / UPPER * pass.iter().copied().fold(0.0, f64::max);
-        let changes = pass
+        let pass: Vec<f64> = driven.take_while(drives).map(|volts| volts.abs()).collect();
+        let Levels {
+            lower_v,
+            upper_v,
+            first,
+        } = Levels::of(&pass);
+        let is_upper = |volts: f64| volts > 0.5 * (lower_v + upper_v);
+        let changes = pass[first..]
             .windows(2)
-            .filter(|pair| (pair[0] > between) != (pair[1] > between));
+            .filter(|pair| is_upper(pair[0]) != is_upper(pair[1]));
         let levels = changes.count() + 1;
         Self {
-            dwell_s: pass.len() as f64 * recording.sample_time_s / levels as f64,
+            dwell_s: (pass.len() - first) as f64 * recording.sample_time_s / levels as f64,
             levels,
+            rise_s: first as f64 * recording.sample_time_s,
+            upper_ratio: upper_v / lower_v.max(DRIVING_V),
             ..usual
+        }
+    }
+}
+
+/// The two levels of a pass.
+struct Levels {
+    lower_v: f64,
+    upper_v: f64,
+    /// Samples before the first one, while the voltage rises.
+    first: usize,
+}
+
+impl Levels {
+    /// Of the magnitudes of a pass' voltage, V: the upper level comes first, and the lower one last.
+    fn of(pass_v: &[f64]) -> Self {
+        let upper_v = pass_v.iter().copied().fold(0.0, f64::max);
+        let lower_v = pass_v.last().copied().unwrap_or_default();
+        let between = 0.5 * (lower_v + upper_v);
+        let first = pass_v.iter().position(|volts| *volts > between);
+        Self {
+            lower_v,
+            upper_v,
+            first: first.unwrap_or_default(),
         }
     }
 }
@@ -166,17 +221,21 @@ pub enum MotorConstantError {
     Experiment(#[from] ExperimentError),
 }
 
-/// Upper level over the lower.
-const UPPER: f64 = 2.5;
+/// Upper level over the lower in a gentle test.
+const GENTLE_RATIO: f64 = 1.6;
 /// Factor by which the levels rise from test to test.
 const RAISE: f64 = 1.3;
-/// Friction in motion over the lower level, at least and at most: the mean is 1.75 times that, and some of it accelerates.
-const LEAST_FRICTION: f64 = 0.8;
-const MOST_FRICTION: f64 = 1.5;
+/// Friction in motion over the mean of the levels, at least and at most: some of the mean accelerates.
+const LEAST_FRICTION: f64 = 0.457;
+const MOST_FRICTION: f64 = 0.857;
 /// Factor by which the level is lowered of a direction in which the axis went too far.
 const LOWER: f64 = 1.2;
+/// Least factor from a level that holds to one that goes too far between which another one is tried.
+const NARROW: f64 = 1.06;
 /// Levels at the beginning of a pass that do not count: the axis breaks away.
 const BREAKING_AWAY: usize = 6;
+/// Time in which the voltage of a gentle test rises, s: one and a half periods of a mode of 30 Hz.
+const RISE_S: f64 = 0.05;
 /// Voltage from which on a sample belongs to a pass, V.
 const DRIVING_V: f64 = 0.01;
 /// Time at rest between passes, s.
@@ -186,6 +245,8 @@ const REST_S: f64 = 0.1;
 const SLIDING_COUNTS: f64 = 600.0;
 const LEAST_COUNTS: f64 = 60.0;
 const SLIDING_MM: f64 = 0.3;
+/// Slowest sliding over the mean in a gentle test, from level to level.
+const EVEN: f64 = 0.4;
 /// Dead times tried, s.
 const DELAY_STEP_S: f64 = 1e-4;
 const LONGEST_DELAY_S: f64 = 6e-3;
@@ -194,7 +255,56 @@ const LONGEST_DELAY: f64 = 0.8;
 /// Largest relative standard error.
 const MOST_UNCERTAIN: f64 = 0.2;
 
-/// Runs the test on the test_axis's axis, with rising levels until the axis slides.
+/// The lower level of a direction, with what is known of those that were tried.
+#[derive(Clone, Copy)]
+struct Level {
+    volts: f64,
+    /// Largest at which friction held the axis, V.
+    held_v: f64,
+    /// Smallest at which it went too far, V.
+    too_far_v: f64,
+}
+
+impl Level {
+    /// A level of which nothing is known.
+    fn at(volts: f64) -> Self {
+        Self {
+            volts,
+            held_v: 0.0,
+            too_far_v: f64::INFINITY,
+        }
+    }
+
+    /// The next one after a test in which friction held the axis.
+    fn raise(&mut self) {
+        self.held_v = self.held_v.max(self.volts);
+        self.volts = (RAISE * self.volts).min(self.between());
+    }
+
+    /// The next one after a test in which the axis went too far.
+    fn lower(&mut self) {
+        self.too_far_v = self.too_far_v.min(self.volts);
+        self.volts = (self.volts / LOWER).max(self.between());
+    }
+
+    /// The middle between what held and what went too far; not a number or without an end where either is unknown.
+    fn between(&self) -> f64 {
+        (self.held_v * self.too_far_v).sqrt()
+    }
+
+    /// True if there is no level left between what holds and what goes too far.
+    fn is_narrow(&self) -> bool {
+        self.too_far_v < NARROW * self.held_v
+    }
+
+    /// True if no level below one that goes too far is known to be worth a try: nothing holds, as where something hangs, or
+    /// hardly less does.
+    fn leaves_none(&self) -> bool {
+        self.held_v == 0.0 || self.is_narrow()
+    }
+}
+
+/// Runs the test on the test_axis's axis, with rising levels until the axis slides; gently where that goes too far or is too uncertain.
 ///
 /// # Errors
 /// An axis that does not slide, moves the wrong way, or is too uncertain; a run that is stopped.
@@ -203,25 +313,52 @@ pub fn measure(
     settings: &MotorConstantSettings,
     progress: &mut dyn FnMut(f64),
 ) -> Result<MotorConstant, MotorConstantError> {
+    match search(test_axis, settings, progress) {
+        Err(MotorConstantError::Uncertain { .. }) => measure_gently(test_axis, settings, progress),
+        Err(MotorConstantError::Experiment(error)) if went_too_far(&error) => {
+            measure_gently(test_axis, settings, progress)
+        }
+        outcome => outcome,
+    }
+}
+
+/// Runs the test with a voltage that rises first, to levels that are nearer to each other: for a motor that leaps on a soft spring.
+///
+/// # Errors
+/// As [`measure`].
+pub fn measure_gently(
+    test_axis: &mut dyn TestAxis,
+    settings: &MotorConstantSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<MotorConstant, MotorConstantError> {
+    search(test_axis, &settings.gentle(), progress)
+}
+
+fn search(
+    test_axis: &mut dyn TestAxis,
+    settings: &MotorConstantSettings,
+    progress: &mut dyn FnMut(f64),
+) -> Result<MotorConstant, MotorConstantError> {
     let axis = test_axis.info();
     let mut settings = *settings;
     // In positive and in negative direction: friction may differ, and what hangs pulls one way.
-    let mut levels_v = [settings.first_level_v; 2];
+    let mut levels = [Level::at(settings.first_level_v); 2];
     // From near an end, away from it.
     let mut ahead = if axis.start_mm > OUTSIDE * axis.travel_mm {
         -1.0
     } else {
         1.0
     };
-    let mut shortenings = 0;
+    let mut tests_too_far = 0;
     let (mut others, usual_s) = (0, settings.dwell_s);
-    while levels_v
+    while levels
         .iter()
-        .all(|level_v| *level_v <= settings.most_level_v)
+        .all(|level| level.volts <= settings.most_level_v)
     {
+        let levels_v = levels.map(|level| level.volts);
         let outcome = test_axis.perform(
             &Experiment {
-                name: test_name(levels_v),
+                name: test_name(levels_v, settings.upper_ratio),
                 drive: Drive::OpenLoop,
                 injection_v: steps(&settings, levels_v, ahead, axis.rate_hz),
                 decimation: 1,
@@ -230,15 +367,20 @@ pub fn measure(
             progress,
         );
         let recording = match outcome {
-            Err(error) if shortenings < SHORTENINGS && went_too_far(&error) => {
-                shortenings += 1;
-                settings = settings.shortened();
-                if let Some(stopped) = test_axis.interrupted() {
-                    ahead = inwards(stopped, 0.0, ahead);
-                    let mut driven = stopped.voltage_v.iter().rev();
-                    let last_v = driven.find(|volts| volts.abs() > DRIVING_V);
-                    let too_far = usize::from(last_v.is_some_and(|volts| *volts < 0.0));
-                    levels_v[too_far] /= LOWER;
+            Err(error) if tests_too_far < TESTS_TOO_FAR && went_too_far(&error) => {
+                tests_too_far += 1;
+                let Some(stopped) = test_axis.interrupted() else {
+                    settings = settings.shortened();
+                    continue;
+                };
+                ahead = inwards(stopped, 0.0, ahead);
+                let mut driven = stopped.voltage_v.iter().rev();
+                let last_v = driven.find(|volts| volts.abs() > DRIVING_V);
+                let direction = usize::from(last_v.is_some_and(|volts| *volts < 0.0));
+                levels[direction].lower();
+                if !settings.is_gentle() || levels[direction].leaves_none() {
+                    settings = settings.shortened();
+                    levels = levels.map(|level| Level::at(level.volts));
                 }
                 continue;
             }
@@ -248,11 +390,15 @@ pub fn measure(
         let slid = find_passes(&recording, &settings, axis.resolution_mm)?;
         let held = [1.0, -1.0].map(|sign| !slid.iter().any(|(pass, _)| pass.sign == sign));
         if held.contains(&true) {
-            for (level_v, held) in levels_v.iter_mut().zip(held) {
+            for (level, held) in levels.iter_mut().zip(held) {
                 // Friction still holds it.
                 if held {
-                    *level_v *= RAISE;
+                    level.raise();
                 }
+            }
+            if settings.is_gentle() && levels.iter().any(Level::is_narrow) {
+                settings = settings.shortened();
+                levels = levels.map(|level| Level::at(level.volts));
             }
             continue;
         }
@@ -275,8 +421,8 @@ fn dwell(settings: &MotorConstantSettings, rate_hz: f64) -> usize {
 }
 
 /// Name of a test at these levels.
-fn test_name([positive_v, negative_v]: [f64; 2]) -> String {
-    let between = |level_v: f64| format!("{level_v:.3} and {:.3} V", UPPER * level_v);
+fn test_name([positive_v, negative_v]: [f64; 2], upper_ratio: f64) -> String {
+    let between = |level_v: f64| format!("{level_v:.3} and {:.3} V", upper_ratio * level_v);
     if positive_v == negative_v {
         format!("steps between {}", between(positive_v))
     } else {
@@ -313,6 +459,7 @@ fn steps(
     rate_hz: f64,
 ) -> Vec<f64> {
     let dwell = dwell(settings, rate_hz);
+    let rise = (settings.rise_s * rate_hz).round() as usize;
     let rest = (REST_S * rate_hz) as usize;
     (0..settings.passes)
         .flat_map(|pass| {
@@ -323,11 +470,21 @@ fn steps(
             };
             let level_v = if sign > 0.0 { levels_v[0] } else { levels_v[1] };
             let level = move |index: usize| {
-                let factor = if index.is_multiple_of(2) { UPPER } else { 1.0 };
+                let factor = if index.is_multiple_of(2) {
+                    settings.upper_ratio
+                } else {
+                    1.0
+                };
                 sign * factor * level_v
             };
-            (0..settings.levels)
-                .flat_map(move |index| std::iter::repeat_n(level(index), dwell))
+            // Up to the mean of the levels.
+            let mean = 0.5 * (level(0) + level(1));
+            (0..rise)
+                .map(move |index| mean * (index + 1) as f64 / (rise + 1) as f64)
+                .chain(
+                    (0..settings.levels)
+                        .flat_map(move |index| std::iter::repeat_n(level(index), dwell)),
+                )
                 .chain(std::iter::repeat_n(0.0, rest))
         })
         .collect()
@@ -356,19 +513,33 @@ fn find_passes(
         let end = (begin..recording.len())
             .find(|index| !drives(index))
             .unwrap_or(recording.len());
-        let from = begin + BREAKING_AWAY * dwell;
+        let pass_v: Vec<f64> = recording.voltage_v[begin..end]
+            .iter()
+            .map(|volts| volts.abs())
+            .collect();
+        let from = begin + Levels::of(&pass_v).first + BREAKING_AWAY * dwell;
         if end >= from + 4 * dwell {
             let positions = &recording.position_mm[from..end];
-            let slowest = positions
-                .windows(dwell)
-                .map(|window| sign * (window[dwell - 1] - window[0]))
-                .fold(f64::INFINITY, f64::min);
+            let slowest = |window: usize| {
+                positions
+                    .windows(window)
+                    .map(|window| sign * (window[window.len() - 1] - window[0]))
+                    .fold(f64::INFINITY, f64::min)
+            };
+            let slides = if settings.is_gentle() {
+                // From one upper level to the next: a motor on a soft spring swings back between them, though the table slides on.
+                let way = sign * (positions[positions.len() - 1] - positions[0]);
+                let mean = way * (2 * dwell) as f64 / positions.len() as f64;
+                slowest(2 * dwell) > (LEAST_COUNTS * resolution_mm).max(EVEN * mean)
+            } else {
+                slowest(dwell) > sliding_mm
+            };
             // From before the pass on: in it, an axis on a soft spring may swing back.
             let all = sign * (recording.position_mm[end - 1] - recording.position_mm[begin]);
             if -all > 4.0 * sliding_mm {
                 return Err(MotorConstantError::Reversed);
             }
-            if slowest > sliding_mm {
+            if slides {
                 let pass = fit_pass(recording, begin, from, end, dwell);
                 found.push((pass, [begin, from, end]));
             }
@@ -427,13 +598,13 @@ pub fn evaluate(
     // The axis slid on through the lower level, so that the mean overcame its friction.
     let level_of = |sign: f64| {
         let most = |most: f64, volts: &f64| most.max(sign * volts);
-        recording.voltage_v.iter().fold(0.0, most) / UPPER
+        recording.voltage_v.iter().fold(0.0, most) / settings.upper_ratio
     };
     let believable = |sign: f64| {
-        let level_v = level_of(sign);
+        let mean_v = settings.mean_ratio() * level_of(sign);
         directed(sign)
-            .max(LEAST_FRICTION * level_v)
-            .min(MOST_FRICTION * level_v)
+            .max(LEAST_FRICTION * mean_v)
+            .min(MOST_FRICTION * mean_v)
     };
     Ok(MotorConstant {
         directed_v: [1.0, -1.0].map(believable),
@@ -441,11 +612,7 @@ pub fn evaluate(
         standard_error,
         damping_per_s: mean(|pass| pass.damping_per_s),
         friction_v: mean(|pass| pass.friction_v).max(0.0),
-        level_v: recording
-            .voltage_v
-            .iter()
-            .fold(0.0_f64, |most, v| most.max(v.abs()))
-            / UPPER,
+        level_v: level_of(1.0).max(level_of(-1.0)),
         recording,
     })
 }

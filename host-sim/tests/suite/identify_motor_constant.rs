@@ -1,10 +1,12 @@
 //! The motor constant of the simulated stage's axes, judged against their truth.
 
+use std::f64::consts::TAU;
+
 use quadrant_sim::identify::motor_constant::{
-    MotorConstant, MotorConstantError, MotorConstantSettings, evaluate, measure,
+    MotorConstant, MotorConstantError, MotorConstantSettings, evaluate, measure, measure_gently,
 };
 use quadrant_sim::machine::SimulatedTestAxis;
-use quadrant_sim::plant::{AxisParameters, StageParameters};
+use quadrant_sim::plant::{AxisParameters, Backlash, Drive, EncoderSide, StageParameters};
 use quadrant_sim::record::Recording;
 
 const RESOLUTION_MM: f64 = 5e-4;
@@ -118,4 +120,38 @@ fn a_recording_of_something_else_is_refused() {
         matches!(error, MotorConstantError::NoPasses { passes: 0 }),
         "{error}"
     );
+}
+
+/// The x axis at a third of its mass, its motor on a spring, with the encoder on the motor.
+fn on_a_soft_spring(frequency_hz: f64) -> AxisParameters {
+    let mut truth = StageParameters::real().axes[0].clone().with_mass(0.33);
+    let motor_share = 0.5;
+    let reduced = motor_share * (1.0 - motor_share) / truth.gain_mm_per_v_s2;
+    let natural_rad_s = TAU * frequency_hz;
+    truth.drive = Drive::RackAndPinion(Backlash {
+        width_mm: 0.0,
+        stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
+        damping_v_s_per_mm: 0.06 * reduced * natural_rad_s,
+        motor_share,
+        encoder: EncoderSide::Motor,
+    });
+    truth
+}
+
+#[test]
+fn a_motor_on_a_soft_spring_is_pushed_gently_until_its_table_slides() {
+    let travel_mm = 20.0;
+    let settings = MotorConstantSettings::default().fitted_to(travel_mm);
+    for frequency_hz in [45.0, 60.0] {
+        let truth = on_a_soft_spring(frequency_hz);
+        let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), 1).with_travel_mm(travel_mm);
+        let found = measure_gently(&mut test_axis, &settings, &mut |_| {}).unwrap();
+        // Between the whole mass and the motor's.
+        let share = found.gain_mm_per_v_s2 / truth.gain_mm_per_v_s2;
+        assert!((0.8..3.5).contains(&share), "{frequency_hz} Hz: {share}");
+        let shown = MotorConstantSettings::of(&found.recording);
+        assert!(shown.rise_s > 0.04, "{shown:?}");
+        let saved = evaluate(found.recording, &shown, RESOLUTION_MM).unwrap();
+        assert!((saved.gain_mm_per_v_s2 / found.gain_mm_per_v_s2 - 1.0).abs() < 0.02);
+    }
 }

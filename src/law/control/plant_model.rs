@@ -7,6 +7,9 @@ use miniconf::{TreeAny, TreeSchema};
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
+/// The largest product of control period and pre-sliding resonance, rad.
+const RESOLVED_RESONANCE: f64 = 0.5;
+
 /// Second order plus delay. Settings time and host only: double precision.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
@@ -40,6 +43,12 @@ impl PlantModel {
             self.stiffness_per_s2 - omega_rad_s * omega_rad_s,
             self.damping_per_s * omega_rad_s,
         )
+    }
+
+    /// The stiffest pre-sliding spring, V/mm, that a control period, s, resolves: it swings the mass by half a radian in it.
+    pub fn stiffest_v_per_mm(&self, period_s: f64) -> f64 {
+        let resonance = RESOLVED_RESONANCE / period_s;
+        resonance * resonance / self.gain_mm_per_v_s2
     }
 
     /// True if every parameter is finite and within the range its field states.

@@ -9,9 +9,6 @@ use crate::law::learning::MAX_DELAY_TICKS;
 use crate::settings::axis::AxisSettings;
 use crate::settings::error::{Reason, SettingsError};
 
-/// The largest product of control period and pre-sliding resonance, rad.
-const RESOLVED_RESONANCE: f64 = 0.5;
-
 /// The tables' largest error over the breakaway level.
 const TABLE_TOLERANCE: f64 = 1e-3;
 
@@ -150,8 +147,7 @@ impl AxisSettings {
         let Some(plant) = &self.plant else {
             return Ok(());
         };
-        let resonance = RESOLVED_RESONANCE / period_s;
-        let most = resonance * resonance / plant.gain_mm_per_v_s2;
+        let most = plant.stiffest_v_per_mm(period_s);
         if stiffness_v_per_mm > most {
             return at.refuse(field, stiffness_v_per_mm, Reason::TooStiffForRate { most });
         }

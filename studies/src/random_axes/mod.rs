@@ -83,7 +83,8 @@ const SINES: [SineTest; 3] = [
         velocity_mm_s: 30.0,
     },
 ];
-/// Largest error over the PID's from which on a result is worse.
+/// Largest error over the PID's from which on a result is worse, if it is also larger by a count of the encoder: where errors are a few
+/// counts, their largest scatters by as much.
 const WORSE: f64 = 1.02;
 /// Share of the travel that a judging sine takes at most.
 const MOST_TRAVEL: f64 = 0.4;
@@ -217,19 +218,24 @@ impl Line {
         }
         let pid = measuring_settings(&found.settings);
         let used_s = 60.0 * self.axis_min;
-        let ratios: Result<Vec<f64>, String> = SINES
+        let errors_mm: Result<Vec<[f64; 2]>, String> = SINES
             .iter()
             .map(|sine| {
                 let reference = largest(&pid, subject, used_s, sine)?;
-                Ok(largest(&found.settings, subject, used_s, sine)? / reference)
+                Ok([largest(&found.settings, subject, used_s, sine)?, reference])
             })
             .collect();
-        match ratios {
-            Ok(ratios) => {
+        match errors_mm {
+            Ok(errors_mm) => {
+                let ratios: Vec<f64> = errors_mm.iter().map(|[own, pid]| own / pid).collect();
                 let (worst, mean) = worst_and_mean(&ratios);
                 self.worst_ratio = Some(worst);
                 self.mean_ratio = Some(mean);
-                self.outcome = if worst > WORSE {
+                let count_mm = subject.parameters.resolution_mm;
+                let worse = errors_mm
+                    .iter()
+                    .any(|[own, pid]| own / pid > WORSE && own - pid > count_mm);
+                self.outcome = if worse {
                     Outcome::WorseThanPid
                 } else {
                     Outcome::Commissioned
