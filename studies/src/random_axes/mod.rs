@@ -221,8 +221,20 @@ impl Line {
         let errors_mm: Result<Vec<[f64; 2]>, String> = SINES
             .iter()
             .map(|sine| {
-                let reference = largest(&pid, subject, used_s, sine)?;
-                Ok([largest(&found.settings, subject, used_s, sine)?, reference])
+                // Under the limits that were handed over; where the PID leaves those, both have room.
+                let narrow = AxisSettings {
+                    limits: found.settings.limits,
+                    ..pid.clone()
+                };
+                let (limits, reference) = match largest(&narrow, subject, used_s, sine) {
+                    Ok(reference) => (narrow.limits, reference),
+                    Err(_) => (pid.limits, largest(&pid, subject, used_s, sine)?),
+                };
+                let own = AxisSettings {
+                    limits,
+                    ..found.settings.clone()
+                };
+                Ok([largest(&own, subject, used_s, sine)?, reference])
             })
             .collect();
         match errors_mm {
