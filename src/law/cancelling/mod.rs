@@ -271,6 +271,12 @@ impl<S: Scalar> Cancelling<S> {
         voltage
     }
 
+    /// Mean voltage of the ticks since the last step, V, half a tick early.
+    #[inline(always)]
+    pub(crate) fn mean(&self, state: &CancellingState<S>) -> S {
+        state.voltage - state.slope - state.slope
+    }
+
     /// Takes a step towards the wanted speed.
     #[cold]
     #[inline(never)]
