@@ -258,6 +258,18 @@ fn a_speed_that_is_told_wrong_by_a_percent_is_followed_and_not_by_more() {
 }
 
 #[test]
+fn a_vector_that_learns_slowly_keeps_to_the_speed_that_is_told() {
+    // A sixth of the rate: what it shows while it learns is no rotation.
+    let load = (0.3, 500.0);
+    let [with, without] = [cancelling(rpm(500.0)), fixed()].map(|settings| {
+        let mut axis = shaken::<f32>(&settings, load);
+        axis.run(8.0);
+        axis.run(2.0)
+    });
+    assert!(with < 0.02 * without, "{with} of {without}");
+}
+
+#[test]
 fn what_was_followed_ends_with_the_next_speed_that_is_told() {
     let load = (0.1, 100.0);
     let without = shaken::<f32>(&fixed(), load).run(3.0);
