@@ -186,6 +186,103 @@ fn a_ramp_of_the_speed_under_a_cut_harms_little_and_ends_in_cancelling() {
     assert!(at_last < 0.1 * without, "{at_last} of {without}");
 }
 
+/// Amplitude of the voltage as it is now, V: a turn of the spindle at 20 Hz and more.
+fn amplitude<S: Scalar>(axis: &mut Axis<S>) -> f64 {
+    largest(axis, 0.05)
+}
+
+#[test]
+fn what_cancelled_a_cut_is_unlearnt_as_soon_as_it_ends() {
+    fn left_after<S: Scalar>(hz: f64) -> f64 {
+        let mut axis = shaken::<S>(&cancelling(rpm(hz)), (0.2, hz));
+        axis.run(2.0);
+        let before = amplitude(&mut axis);
+        assert!(before > 0.1, "{before} V at {hz} Hz");
+        axis.shaken = (0.0, hz);
+        // At the rate of learning more than half of it would be left.
+        axis.run(0.1);
+        amplitude(&mut axis) / before
+    }
+    for hz in [20.0, 30.0, 60.0, 100.0] {
+        let left = [left_after::<f32>(hz), left_after::<Fixed>(hz)];
+        println!("{hz} Hz: {left:?}");
+        assert!(
+            left.into_iter().all(|left| left < 0.3),
+            "{left:?} at {hz} Hz"
+        );
+    }
+}
+
+#[test]
+fn a_reversal_that_errs_unlearns_little() {
+    for hz in [30.0, 60.0, 100.0] {
+        let mut axis = Axis::<f32>::on_sine(&cancelling(rpm(hz)), 1.5);
+        axis.shaken = (0.15, hz);
+        axis.command(Command::Run);
+        axis.run(2.0);
+        // A reversal every 1.26 s.
+        let amplitudes: Vec<f64> = (0..60).map(|_| amplitude(&mut axis)).collect();
+        let most = amplitudes.iter().copied().fold(0.0, f64::max);
+        let least = amplitudes.iter().copied().fold(most, f64::min);
+        println!("{hz} Hz: {least} to {most} V");
+        assert!(least > 0.5 * most, "{hz} Hz: {least} to {most} V");
+    }
+}
+
+#[test]
+fn a_speed_that_is_told_wrong_by_a_percent_is_followed_and_not_by_more() {
+    fn followed<S: Scalar>(hz: f64, told: f64) -> f64 {
+        let [with, without] = [cancelling(told * rpm(hz)), fixed()].map(|settings| {
+            let mut axis = shaken::<S>(&settings, (0.1, hz));
+            axis.run(5.0);
+            axis.run(2.0)
+        });
+        with / without
+    }
+    for (hz, told) in [
+        (100.0, 1.003),
+        (100.0, 1.01),
+        (100.0, 0.99),
+        (40.0, 1.01),
+        (150.0, 0.995),
+    ] {
+        let left = [followed::<f32>(hz, told), followed::<Fixed>(hz, told)];
+        println!("{hz} Hz x {told}: {left:?}");
+        assert!(
+            left.into_iter().all(|left| left < 0.1),
+            "{left:?}, {hz} Hz x {told}"
+        );
+    }
+    let beyond = followed::<f32>(100.0, 1.05);
+    assert!(beyond > 0.5, "{beyond}");
+}
+
+#[test]
+fn a_vector_that_learns_slowly_keeps_to_the_speed_that_is_told() {
+    // A sixth of the rate: what it shows while it learns is no rotation.
+    let load = (0.3, 500.0);
+    let [with, without] = [cancelling(rpm(500.0)), fixed()].map(|settings| {
+        let mut axis = shaken::<f32>(&settings, load);
+        axis.run(8.0);
+        axis.run(2.0)
+    });
+    assert!(with < 0.02 * without, "{with} of {without}");
+}
+
+#[test]
+fn what_was_followed_ends_with_the_next_speed_that_is_told() {
+    let load = (0.1, 100.0);
+    let without = shaken::<f32>(&fixed(), load).run(3.0);
+    let mut axis = shaken::<f32>(&cancelling(1.01 * rpm(100.0)), load);
+    axis.run(4.0);
+    let followed = axis.run(1.0);
+    assert!(followed < 0.1 * without, "{followed} of {without}");
+    let speed = SpindleSpeed::from_rpm(rpm(100.0), PERIOD_S);
+    axis.rig.state.tell_spindle(speed);
+    let told = axis.run(0.5);
+    assert!(told < 0.1 * without, "{told} of {without}");
+}
+
 #[test]
 fn the_speed_changes_no_faster_than_the_settings_say() {
     let time_to_100_hz = |ramp_rpm_s: f64| {

@@ -31,6 +31,8 @@ enum Activity {
     /// The encoder is dead before the jog begins.
     JogFromRest(f64),
     Sine(f64),
+    /// The same under a cut, Hz.
+    CutSine(f64, f64),
     /// A move at full speed and acceleration.
     Move,
     Homing,
@@ -65,7 +67,7 @@ const ACTIVITIES: [Activity; 19] = [
 
 fn plan(activity: Activity) -> PlanSettings {
     match activity {
-        Activity::Sine(velocity) => sine_on_x(5.0, velocity),
+        Activity::Sine(velocity) | Activity::CutSine(velocity, _) => sine_on_x(5.0, velocity),
         Activity::Move => {
             let mut plan = PlanSettings::default();
             plan.motions[0] = MotionSettings::PointToPoint(PointToPointSettings {
@@ -95,6 +97,12 @@ struct Bench<S: Scalar> {
     ticks: u32,
     enabled: bool,
 }
+
+/// Load of a cut, V.
+const CUT_V: f64 = 0.25;
+
+/// Frequencies of a cut, Hz: the teeth of a cutter of two pass.
+const CUTS_HZ: [f64; 4] = [10.0, 20.0, 35.0, 100.0];
 
 /// Ticks before the activity begins.
 const BEFORE: u32 = 50;
@@ -130,7 +138,7 @@ impl<S: Scalar> Bench<S> {
                 AxisName::X,
                 Velocity::from_mm_s(velocity, scale),
             )),
-            Activity::Sine(_) | Activity::Move => Some(Command::Run),
+            Activity::Sine(_) | Activity::CutSine(..) | Activity::Move => Some(Command::Run),
             Activity::Homing => Some(Command::Home(AxisName::X)),
             Activity::Stream => {
                 let limits = StreamLimits {
@@ -236,6 +244,10 @@ impl<S: Scalar> Bench<S> {
         if self.activity == Activity::RestUnderLoad {
             self.plant.load_v = if self.ticks / 2000 % 2 == 1 { 0.5 } else { 0.0 };
         }
+        if let Activity::CutSine(_, hz) = self.activity {
+            let turns = hz * f64::from(self.ticks) * PERIOD_S;
+            self.plant.load_v = CUT_V * (core::f64::consts::TAU * turns).sin();
+        }
         let outputs = self.rig.tick();
         self.enabled = outputs.enabled;
         let volts = f64::from(outputs.codes[0].0) / 32767.0 * 10.0;
@@ -321,7 +333,10 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
         // What a load does to an axis that stands is seen by the encoder alone.
         (_, Activity::RestUnderLoad) => death != Death::Reversed,
         // It is slower than its gaps; the index pulses tell.
-        (Death::Intermittent, Activity::Jog(speed) | Activity::JogFromRest(speed)) => speed <= 10.0,
+        (
+            Death::Intermittent,
+            Activity::Jog(speed) | Activity::JogFromRest(speed) | Activity::CutSine(speed, _),
+        ) => speed <= 10.0,
         (Death::Intermittent, Activity::OpenLoop(volts, _) | Activity::ClosedLoop(volts, _)) => {
             volts <= 0.3
         }
@@ -334,26 +349,55 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
 
 #[test]
 fn an_encoder_that_dies_switches_off_before_the_axis_has_gone_far() {
-    every_death(&StageSettings::simulated());
+    every_death(&StageSettings::simulated(), &ACTIVITIES);
 }
 
 #[test]
 fn an_encoder_that_dies_does_so_too_under_a_law_that_cancels_a_cut() {
-    every_death(&with_x(|x| {
-        x.feedforward.cancelling = Some(CancellingSettings {
-            spindle_rpm: 3000.0,
-            ..CancellingSettings::default()
-        });
-    }));
+    every_death(&cancelling(100.0), &ACTIVITIES);
 }
 
-/// Lets the encoder die in every way at every activity.
-fn every_death(settings: &StageSettings) {
+#[test]
+fn an_encoder_that_dies_under_a_cut_that_is_cancelled_switches_off_as_soon() {
+    for hz in CUTS_HZ {
+        let activities = [Activity::CutSine(10.0, hz), Activity::CutSine(30.0, hz)];
+        every_death(&cancelling(hz), &activities);
+    }
+}
+
+#[test]
+fn a_cut_that_is_cancelled_is_no_fault_of_the_encoder() {
+    for hz in CUTS_HZ {
+        for velocity in [3.0, 10.0, 30.0] {
+            let activity = Activity::CutSine(velocity, hz);
+            let settings = cancelling(hz);
+            let mut bench =
+                Bench::<f32>::new(&settings, &MODEL, activity, Death::Healthy, u32::MAX);
+            while bench.ticks < 40_000 && bench.fault().is_none() {
+                bench.tick();
+            }
+            assert_eq!(bench.fault(), None, "{activity:?}: tick {}", bench.ticks);
+        }
+    }
+}
+
+/// An axis that cancels a cut of a frequency, Hz.
+fn cancelling(hz: f64) -> StageSettings {
+    with_x(|x| {
+        x.feedforward.cancelling = Some(CancellingSettings {
+            spindle_rpm: 30.0 * hz,
+            ..CancellingSettings::default()
+        });
+    })
+}
+
+/// Lets the encoder die in every way at every one of the activities.
+fn every_death(settings: &StageSettings, activities: &[Activity]) {
     println!(
         "| death | activity | fault | ms from death | ms unplanned | mm unplanned | mm/s then |"
     );
     for death in DEATHS {
-        for activity in ACTIVITIES {
+        for &activity in activities {
             let end = run_until_off(settings, &MODEL, activity, death);
             println!(
                 "| {death:?} | {activity:?} | {} | {:.1} | {:.1} | {:.2} | {:.0} |",

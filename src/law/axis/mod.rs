@@ -806,8 +806,14 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Takes a step of cancelling, on what the last tick left.
     #[inline(never)]
     fn cancel(&self, state: &mut AxisState<S, N>) {
+        let mode = state.mode();
+        if mode != MotionMode::OpenLoop {
+            let words = self.cancelling.mean(&state.cancelling);
+            let words = words.round_scaled(self.amplifier.codes_per_volt);
+            state.plausibility.leave_out(words);
+        }
         let works = matches!(
-            state.mode(),
+            mode,
             MotionMode::Plan | MotionMode::Stream | MotionMode::Hold
         );
         let seen = &state.telemetry;

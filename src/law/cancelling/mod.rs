@@ -10,15 +10,24 @@
 //! G is the response of the nominal closed loop from a voltage at the plant's input to the position: so the harmonic of the error
 //! falls with the time constant 1 / rate. This is adaptive feedforward cancellation (Bodson, Sacks, Khosla, IEEE Trans. Autom.
 //! Control 39:1939, 1994), with the oscillator and its two weights as one vector. The spindle's angle need not be known, its speed
-//! must.
+//! must, within a per cent.
 //!
 //! Steps are [`STEP_TICKS`] control periods long, the axes one after the other. Between two steps the output goes along a straight
 //! line to the place that the vectors will have then. A speed that changes is followed at a bounded rate, one multiple a step:
 //! sine, cosine and response come from polynomials and tables, without a division.
+//!
+//! **Guard.** `p`, the sum of Re (G z), is the error that the vectors take away. Where the error goes against it, so that the mean of
+//! `-p (e + a p)` is above a floor, the vectors are too large: they are unlearnt much faster than they are learnt.
+//!
+//! **Slip.** The vector of the teeth turns against its own frequency where the spindle is not as fast as it is told. The speed
+//! follows that rotation, within 1.2 % of what was told.
 
 mod response;
 
+use core::f64::consts::TAU;
+
 use miniconf::{TreeAny, TreeSchema};
+use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 pub use self::response::{CancellingLoop, LEAST_MARGIN_DEG, STEP_TICKS};
@@ -34,6 +43,37 @@ const LEAK_S: f64 = 20.0;
 
 /// The same while nothing may be cancelled, s.
 const FADE_S: f64 = 0.1;
+
+/// Time of each of the guard's two means, s, or as many turns of the teeth's vector, if those take longer; time in which it unlearns, s;
+/// share by which the vectors may be too large; and the floor, mm RMS: below it stands what a reversal has in common with a
+/// vibration by chance.
+const GUARD_S: f64 = 0.03;
+const GUARD_TURNS: f64 = 1.0;
+const UNLEARN_S: f64 = 0.04;
+const EXCESS: f64 = 0.06;
+const FLOOR_MM: f64 = 1e-3;
+
+/// Lengths are multiplied by so much, 1/mm, for the guard, and are a quarter of a millimetre at most.
+const PER_UNIT: f64 = 4.0;
+
+/// Largest slip that is followed, right shifts of the speed that is told, which add up to 1.2 % of it.
+const SLIP_SHIFTS: (u32, u32) = (7, 8);
+
+/// Steps from one look at the rotation to the next; the time over which it is averaged, s; and the rate at which the slip follows
+/// it, a share of that at which the vector grows.
+const LOOK_STEPS: u8 = 64;
+const ROTATION_S: f64 = 0.15;
+const SLIP_SHARE: f64 = 1.0 / 3.0;
+
+/// Rotations that are told apart, rad/s: each is twice the one before.
+const LEAST_ROTATION: f64 = 0.25;
+const ROTATIONS: usize = 7;
+
+/// A vector below this, or below the others, says nothing about the speed, V.
+const LEAST_V: f64 = 0.01;
+
+/// Factor of a growth, so that fixed point has room for its part across the vector.
+const GROWN: f64 = 256.0;
 
 /// Units of a [`SpindleSpeed`] in a turn.
 const TURN: f64 = 4_294_967_296.0;
@@ -105,8 +145,41 @@ pub struct Cancelling<S: Scalar> {
     unit: S::Gain,
     keep: S,
     fade: S,
+    guard: Guard<S>,
+    follower: Follower<S>,
     /// Cosine and sine part of the growth of a vector by the error, over the frequency; zeros where nothing is cancelled.
     growth: [[S; 2]; NODES],
+    /// The same of the error that a vector takes away, of a volt and in the guard's unit.
+    response: [[S; 2]; NODES],
+}
+
+/// The guard's constants.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Guard<S: Scalar> {
+    per_unit: S::Gain,
+    one: S,
+    excess: S,
+    /// Share of the way to a new value that a mean goes in a step: the largest, and that of 2^-31 turns in a step.
+    share: S,
+    share_of_turn: S::Gain,
+    floor: S,
+    unlearn: S,
+}
+
+/// The constants of the slip's follower.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Follower<S: Scalar> {
+    grown: S::Gain,
+    per_volt: S::Gain,
+    /// Share of the way to a new value that a mean goes from one look to the next.
+    share: S,
+    /// Square of the least vector, and the part across a vector of a square, that the least rotation makes.
+    least: S,
+    rotation: S,
+    /// What the vector's growth takes away in a step, at half of the rate that is set.
+    slow: S,
+    /// Change of the slip in a look at the least rotation, over what the vector's growth takes away in a step.
+    change: S::Gain,
 }
 
 /// A multiple of the spindle's frequency.
@@ -118,6 +191,8 @@ struct Harmonic<S> {
     turn: [S; 2],
     /// Its growth by the error.
     growth: [S; 2],
+    /// The error that a volt of it takes away.
+    response: [S; 2],
 }
 
 /// The memory of cancelling.
@@ -136,6 +211,19 @@ pub struct CancellingState<S: Scalar> {
     fading: bool,
     /// The output was at its limit since the last step.
     saturated: bool,
+    /// Steps since the last look at the rotation.
+    steps: u8,
+    /// Share of the way to a new value that a mean of the guard goes in a step.
+    share: S,
+    /// Means of the harm that the vectors do, the second one of the first, squares of the guard's unit.
+    harm_now: S,
+    harm: S,
+    /// Growth across the vector of the teeth since the last look; its mean, and that of the vector's square.
+    across: S,
+    rotation: S,
+    square: S,
+    /// Deviation of the spindle's speed from the one that is told, 2^-32 turns in a step.
+    slip: i32,
 }
 
 /// The standing of the axis at a step.
@@ -177,12 +265,47 @@ impl<S: Scalar> Cancelling<S> {
         );
         self.keep = fraction(1.0 - step_s / LEAK_S);
         self.fade = fraction(libm::exp(-step_s / FADE_S));
-        for (index, node) in self.growth.iter_mut().enumerate() {
-            let growth = axis.growth(node_turns(index) / step_s, settings.rate_per_s, period_s);
-            *node = growth.map_or([S::ZERO; 2], |growth| {
-                [growth.re, growth.im].map(|part| S::quantise(part, Quantity::Multiplier))
-            });
+        let nodes = self.growth.iter_mut().zip(&mut self.response);
+        for (index, (growth, response)) in nodes.enumerate() {
+            let found = axis.node(node_turns(index) / step_s, settings.rate_per_s, period_s);
+            let parts = |value: Complex64| {
+                [value.re, value.im].map(|part| S::quantise(part, Quantity::Multiplier))
+            };
+            *growth = found.map_or([S::ZERO; 2], |node| parts(node.growth));
+            *response = found.map_or([S::ZERO; 2], |node| parts(node.response * PER_UNIT));
         }
+        let number = |value| S::quantise(value, Quantity::Multiplier);
+        let floor = FLOOR_MM * PER_UNIT;
+        self.guard = Guard {
+            per_unit: S::gain(PER_UNIT, Quantity::Length, Quantity::Multiplier),
+            one: number(1.0),
+            excess: fraction(EXCESS),
+            share: fraction(-libm::expm1(-step_s / GUARD_S)),
+            share_of_turn: S::gain(
+                2.0 / (GUARD_TURNS * TURN),
+                Quantity::Integer,
+                Quantity::Fraction,
+            ),
+            floor: number(floor * floor),
+            unlearn: fraction(libm::exp(-step_s / UNLEARN_S)),
+        };
+        let look_s = step_s * f64::from(LOOK_STEPS);
+        let per_volt = 1.0 / settings.limit_v.max(LEAST_V);
+        // Growth times response, which it is multiplied by, is 2 rate Ts.
+        let turns = SLIP_SHARE * look_s * LEAST_ROTATION / (2.0 * PER_UNIT * TAU);
+        self.follower = Follower {
+            grown: S::gain(GROWN * per_volt, Quantity::Voltage, Quantity::Multiplier),
+            per_volt: S::gain(per_volt, Quantity::Voltage, Quantity::Multiplier),
+            share: fraction(-libm::expm1(-look_s / ROTATION_S)),
+            least: S::quantise(LEAST_V * LEAST_V * per_volt, Quantity::Voltage),
+            rotation: number(LEAST_ROTATION * step_s * GROWN * f64::from(LOOK_STEPS)),
+            slow: number(settings.rate_per_s * step_s * PER_UNIT),
+            change: S::gain(
+                turns * TURN / f64::from(self.multiples[0].max(1)),
+                Quantity::Multiplier,
+                Quantity::Integer,
+            ),
+        };
     }
 
     /// No cancelling. The table stays: to clear it would take longer.
@@ -203,7 +326,10 @@ impl<S: Scalar> Cancelling<S> {
             unit: S::Gain::default(),
             keep: S::ZERO,
             fade: S::ZERO,
+            guard: Guard::default(),
+            follower: Follower::default(),
             growth: [[S::ZERO; 2]; NODES],
+            response: [[S::ZERO; 2]; NODES],
         }
     }
 
@@ -243,24 +369,112 @@ impl<S: Scalar> Cancelling<S> {
             self.tune(state);
         }
         let held = core::mem::take(&mut state.saturated) | fading;
-        let error = if held { S::ZERO } else { error }.scale(self.per_mm);
+        let error = if held { S::ZERO } else { error };
+        self.weigh(state, error);
+        let error = error.scale(self.per_mm);
         let most = self.most;
         let mut ahead = S::ZERO;
-        for harmonic in &mut state.harmonics {
+        let mut across = S::ZERO;
+        for (place, harmonic) in state.harmonics.iter_mut().enumerate() {
             let [cosine, sine] = harmonic.turn;
             let turned = |[x, y]: [S; 2]| {
                 x.times(cosine, Quantity::Fraction) - y.times(sine, Quantity::Fraction)
             };
             let [x, y] = harmonic.vector;
-            let [by_x, by_y] = harmonic.growth;
-            let grown = [
-                turned([x, y]) + error.times(by_x, Quantity::Multiplier),
-                turned([y, -x]) + error.times(by_y, Quantity::Multiplier),
-            ];
+            let [by_x, by_y] = harmonic
+                .growth
+                .map(|by| error.times(by, Quantity::Multiplier));
+            if place == 0 {
+                let grown = |by: S| by.scale(self.follower.grown);
+                across = x.times(grown(by_y), Quantity::Multiplier)
+                    - y.times(grown(by_x), Quantity::Multiplier);
+            }
+            let grown = [turned([x, y]) + by_x, turned([y, -x]) + by_y];
             harmonic.vector = grown.map(|part| part.within(most));
             ahead = ahead + turned(harmonic.vector);
         }
         state.slope = (ahead.within(most) - state.voltage).scale(self.share);
+        state.across = state.across + across;
+        state.steps += 1;
+        if state.steps >= LOOK_STEPS {
+            self.follow_slip(state);
+        }
+    }
+
+    /// Weighs the error against what the vectors take away, and unlearns vectors that are too large.
+    #[inline(always)]
+    fn weigh(&self, state: &mut CancellingState<S>, error: S) {
+        let guard = &self.guard;
+        let product = |one: S, other: S| one.times(other, Quantity::Multiplier);
+        let mut taken = S::ZERO;
+        for harmonic in &state.harmonics {
+            let ([x, y], [by_x, by_y]) = (harmonic.vector, harmonic.response);
+            taken = taken + product(x, by_x) - product(y, by_y);
+        }
+        let taken = taken.within(guard.one);
+        let error = error.scale(guard.per_unit).within(guard.one);
+        let allowed = error + taken.times(guard.excess, Quantity::Fraction);
+        // Two means, one behind the other: of a reversal's error little is left that the vibration makes ripple.
+        let mean = |mean: S, new: S| mean + (new - mean).times(state.share, Quantity::Fraction);
+        state.harm_now = mean(state.harm_now, -product(taken, allowed));
+        state.harm = mean(state.harm, state.harm_now);
+        if state.harm > guard.floor {
+            for harmonic in &mut state.harmonics {
+                let unlearnt = |part: S| part.times(guard.unlearn, Quantity::Fraction);
+                harmonic.vector = harmonic.vector.map(unlearnt);
+            }
+        }
+    }
+
+    /// Looks at the rotation of the teeth's vector, if it is the largest and grows at half the rate that is set or more, and takes the
+    /// slip a step further where it is more than the least.
+    #[cold]
+    #[inline(never)]
+    fn follow_slip(&self, state: &mut CancellingState<S>) {
+        let follower = &self.follower;
+        state.steps = 0;
+        let across = core::mem::take(&mut state.across);
+        let mut others = S::ZERO;
+        let mut square = S::ZERO;
+        let mut taken = S::ZERO;
+        for harmonic in state.harmonics.iter().rev() {
+            others = others + square;
+            let ([x, y], [re, im]) = (harmonic.growth, harmonic.response);
+            taken = x.times(re, Quantity::Multiplier) - y.times(im, Quantity::Multiplier);
+            let [x, y] = harmonic.vector;
+            let part = |part: S| part.times(part.scale(follower.per_volt), Quantity::Multiplier);
+            square = part(x) + part(y);
+        }
+        let mean = |mean: S, new: S| mean + (new - mean).times(follower.share, Quantity::Fraction);
+        state.rotation = mean(state.rotation, across);
+        state.square = mean(state.square, square);
+        let harms = state.harm > self.guard.floor;
+        if harms || square < follower.least || square < others || taken < follower.slow {
+            return;
+        }
+        let rotation = state.rotation.magnitude();
+        let mut bar = state.square.times(follower.rotation, Quantity::Multiplier);
+        let mut change = 0;
+        let mut next = taken.round_scaled(follower.change);
+        for _ in 0..ROTATIONS {
+            if rotation > bar {
+                change = next;
+            }
+            bar = bar + bar;
+            next = next.saturating_add(next);
+        }
+        if change == 0 {
+            return;
+        }
+        let told = self.wanted(state);
+        let most = ((told >> SLIP_SHIFTS.0) + (told >> SLIP_SHIFTS.1)) as i32;
+        let slip = if state.rotation > S::ZERO {
+            state.slip.saturating_add(change)
+        } else {
+            state.slip.saturating_sub(change)
+        };
+        state.slip = slip.min(most).max(-most);
+        state.stale = HARMONICS as u8;
     }
 
     /// The voltage of a tick.
@@ -271,12 +485,21 @@ impl<S: Scalar> Cancelling<S> {
         voltage
     }
 
+    /// Mean voltage of the ticks since the last step, V, half a tick early.
+    #[inline(always)]
+    pub(crate) fn mean(&self, state: &CancellingState<S>) -> S {
+        state.voltage - state.slope - state.slope
+    }
+
     /// Takes a step towards the wanted speed.
     #[cold]
     #[inline(never)]
     fn follow(&self, state: &mut CancellingState<S>, fading: bool) {
         let wanted = self.wanted(state);
         let now = state.speed;
+        if now != wanted {
+            state.slip = 0;
+        }
         let by = now.abs_diff(wanted).min(self.ramp);
         state.speed = if wanted > now {
             now.saturating_add(by)
@@ -302,10 +525,15 @@ impl<S: Scalar> Cancelling<S> {
         let Some((harmonic, multiple)) = harmonics.nth(place) else {
             return;
         };
-        let turns = state.speed.saturating_mul(multiple);
-        let growth = self.growth_at(turns);
-        harmonic.growth = growth.unwrap_or_default();
-        let keep = if growth.is_some() && !state.fading {
+        let speed = state.speed.saturating_add_signed(state.slip);
+        let turns = speed.saturating_mul(multiple);
+        if place == 0 {
+            let share = S::scale_integer((turns >> 1) as i32, self.guard.share_of_turn);
+            state.share = share.limit(S::ZERO, self.guard.share);
+        }
+        let found = self.nodes_at(turns);
+        (harmonic.growth, harmonic.response) = found.unwrap_or_default();
+        let keep = if found.is_some() && !state.fading {
             self.keep
         } else {
             self.fade
@@ -315,21 +543,24 @@ impl<S: Scalar> Cancelling<S> {
             .map(|part| S::scale_integer(part, self.unit).times(keep, Quantity::Fraction));
     }
 
-    /// The growth at a frequency, 2^-32 turns in a step; none where nothing is cancelled.
+    /// Growth and response at a frequency, 2^-32 turns in a step; none where nothing is cancelled.
     #[inline(always)]
-    fn growth_at(&self, turns: u32) -> Option<[S; 2]> {
+    fn nodes_at(&self, turns: u32) -> Option<([S; 2], [S; 2])> {
         let (index, place) = response::interval(turns)?;
-        let [low, high] = self.growth.get(index..)?.first_chunk::<2>()?;
-        let off = [S::ZERO; 2];
-        if *low == off || *high == off {
-            return None;
-        }
         let place = S::scale_integer(place, self.unit);
-        let [[x, y], [to_x, to_y]] = [*low, *high];
-        Some([
-            x + (to_x - x).times(place, Quantity::Fraction),
-            y + (to_y - y).times(place, Quantity::Fraction),
-        ])
+        let between = |table: &[[S; 2]; NODES]| {
+            let [low, high] = table.get(index..)?.first_chunk::<2>()?;
+            let off = [S::ZERO; 2];
+            if *low == off || *high == off {
+                return None;
+            }
+            let [[x, y], [to_x, to_y]] = [*low, *high];
+            Some([
+                x + (to_x - x).times(place, Quantity::Fraction),
+                y + (to_y - y).times(place, Quantity::Fraction),
+            ])
+        };
+        Some((between(&self.growth)?, between(&self.response)?))
     }
 }
 

@@ -77,6 +77,15 @@ pub struct CancellingLoop<'a> {
     pub largest_gain: f64,
 }
 
+/// A vector at a frequency.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Node {
+    /// Its growth by the error of one step, V/mm.
+    pub(super) growth: Complex64,
+    /// The error of the last tick that it takes away, mm/V.
+    pub(super) response: Complex64,
+}
+
 /// `sin(x) / x`.
 fn sinc(x: f64) -> f64 {
     if x < 1e-9 { 1.0 } else { libm::sin(x) / x }
@@ -88,13 +97,8 @@ fn cis(angle: f64) -> Complex64 {
 }
 
 impl CancellingLoop<'_> {
-    /// The growth of a vector by the error of one step, V/mm, at a frequency; none where the margin is too small.
-    pub(super) fn growth(
-        &self,
-        frequency_hz: f64,
-        rate_per_s: f64,
-        period_s: f64,
-    ) -> Option<Complex64> {
+    /// A vector at a frequency; none where the margin is too small.
+    pub(super) fn node(&self, frequency_hz: f64, rate_per_s: f64, period_s: f64) -> Option<Node> {
         if self.margin_deg(frequency_hz, period_s) < LEAST_MARGIN_DEG {
             return None;
         }
@@ -108,9 +112,12 @@ impl CancellingLoop<'_> {
         let rate_per_s = rate_per_s.min(most_per_s);
         // A straight line from step to step in place of a sine.
         let line = sinc(0.5 * omega * step_s);
-        let response = response * line * line;
         // The error is that of the tick before.
-        Some(cis(omega * period_s - lead) * (2.0 * rate_per_s * step_s) / response)
+        let response = response * line * line * cis(lead - omega * period_s);
+        Some(Node {
+            growth: response.inv() * (2.0 * rate_per_s * step_s),
+            response,
+        })
     }
 
     /// Angle that the response is taken to be ahead of the one while the axis slides: half way to the one before sliding.

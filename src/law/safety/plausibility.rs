@@ -298,6 +298,12 @@ impl Plausibility {
 }
 
 impl PlausibilityState {
+    /// Leaves a mean word out of the output since the last comparison: one that nothing but a load answers.
+    #[inline(always)]
+    pub(crate) fn leave_out(&mut self, word: i32) {
+        self.words = self.words.wrapping_add(word << INTERVAL_BITS);
+    }
+
     /// Goes on from another origin of the count.
     pub fn recount(&mut self, count: i32) {
         self.count = count;

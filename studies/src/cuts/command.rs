@@ -44,8 +44,11 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Prints the shares of worse windows, and the worst cases, each with its seed.
 fn summary(lines: &BTreeMap<u64, Line>) {
     say!("Simulated, not measured: {} random cuts\n", lines.len());
-    let all = lines.len() as f64;
-    let mean = |read: fn(&Line) -> f64| lines.values().map(read).sum::<f64>() / all;
+    // Without the runs that a fault ended: they have no RMS error.
+    let mean = |read: fn(&Line) -> f64| {
+        let finite = || lines.values().map(read).filter(|value| value.is_finite());
+        finite().sum::<f64>() / finite().count() as f64
+    };
     let ended = lines
         .values()
         .filter(|line| !(line.worst_ratio + line.cancelling_worst_ratio).is_finite());

@@ -225,6 +225,9 @@ impl Case {
 
 /// The windows of a run, as RMS errors in um.
 fn windows(errors: &[f64]) -> Vec<f64> {
+    if errors.is_empty() {
+        return Vec::new();
+    }
     let samples = |seconds: f64| (seconds * errors.len() as f64 / RUN_S).round() as usize;
     let first = samples(FIRST_S).min(errors.len());
     errors[first..]
@@ -238,8 +241,12 @@ fn rms(errors: &[f64]) -> f64 {
     (errors.iter().map(|error| error * error).sum::<f64>() / errors.len() as f64).sqrt()
 }
 
-/// Largest ratio of the windows, the number of its window, and the share of the windows that are worse, %.
+/// Largest ratio of the windows, the number of its window, and the share of the windows that are worse, %. A run that a fault
+/// ended is worse in all of them.
 fn compare(with: &[f64], without: &[f64]) -> (f64, usize, f64) {
+    if with.is_empty() {
+        return (f64::INFINITY, 0, 100.0);
+    }
     let ratios: Vec<f64> = with
         .iter()
         .zip(without)
