@@ -38,7 +38,7 @@ const STEPS: [(&str, f64); 6] = [
 const HOME_MM: f64 = 0.0;
 /// Acceleration per volt on which the usual excitation slides, mm/(V s^2): of the simulated stage's x axis.
 const USUAL_GAIN_MM_PER_V_S2: f64 = 69_390.0;
-/// Travel either way below which the lag of the first controller counts, mm.
+/// Travel either way below which the lag of the first controller counts, and the axis is slow enough to stick and slip under it, mm.
 const SHORT_TRAVEL_MM: f64 = 60.0;
 /// Times that the excitation is halved before the response is given up.
 const HALVINGS: usize = 6;
@@ -192,8 +192,8 @@ fn to_the_middle(
     Ok(outcome?)
 }
 
-/// The response of the sliding axis under a first controller, the linear model, and the controller that `design` makes on it. A mode that the first controller excites
-/// spoils both: they are repeated with softer ones, as soft as the frequency demands that was seen.
+/// The response of the sliding axis under a first controller, the linear model, and the controller that `design` makes on it. A mode
+/// that the first controller excites spoils them: they are repeated with softer ones, as soft as the frequency demands that was seen.
 fn linear_model(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
@@ -203,15 +203,15 @@ fn linear_model(
 ) -> Result<(FrfMeasurement, PlantFit, Controller), CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
     let gain = motor.gain_mm_per_v_s2;
-    let feeds_friction =
-        |info: &AxisInfo, share: f64| share < 1.0 || info.travel_mm < SHORT_TRAVEL_MM;
+    let is_short = test_axis.info().travel_mm < SHORT_TRAVEL_MM;
+    let feeds_friction = |share: f64| share < 1.0 || is_short;
     let attempt = |test_axis: &mut Guard<'_>,
                    share: f64,
                    trim: f64,
                    progress: &mut dyn FnMut(f64)|
      -> Result<(FrfMeasurement, PlantFit, Controller), CommissionError> {
         let mut settings = soft_bootstrap_settings(base, gain, rate_hz, share);
-        if feeds_friction(&test_axis.info(), share) {
+        if feeds_friction(share) {
             let friction_v = motor.directed_v.map(|volts| trim * volts);
             settings = with_rough_friction(settings, gain, friction_v);
         }
@@ -227,14 +227,13 @@ fn linear_model(
     };
     let mut seen = rings(test_axis, &first);
     let (mut share, mut trim, mut trims) = (1.0, 1.0, 0);
-    let is_short = test_axis.info().travel_mm < SHORT_TRAVEL_MM;
     let mut next = next_share(share, &first, seen, is_short);
     let mut trimmed = trimmed(test_axis, &first, seen);
     for _ in 1..ATTEMPTS {
         // The friction that is fed forward is known by its order only: first that, then the controller.
         if let Some(factor) = trimmed
             && trims < TRIMS
-            && feeds_friction(&test_axis.info(), share)
+            && feeds_friction(share)
         {
             trim *= factor;
             trims += 1;
@@ -282,8 +281,8 @@ fn trimmed(test_axis: &Guard<'_>, error: &CommissionError, rings: Option<Ringing
     Some(if behind_mm > 0.0 { MORE } else { LESS })
 }
 
-/// Share of the usual crossover that is tried after one that failed; none if there is none left. `is_short`: the travel is, so that
-/// the axis is slow enough to stick and slip under a soft controller.
+/// Share of the usual crossover that is tried after one that failed; none if there is none left. `is_short`: the travel is below
+/// [`SHORT_TRAVEL_MM`].
 fn next_share(
     share: f64,
     error: &CommissionError,

@@ -187,8 +187,7 @@ fn assumed(breakaway_v: f64) -> GmsParameters {
 /// Elements whose springs sum up to `most_v_per_mm`, V/mm, at most: those of an axis that is stiffer than the control rate resolves
 /// are softer in the same proportion.
 fn no_stiffer(mut gms: GmsParameters, most_v_per_mm: f64) -> GmsParameters {
-    let sum: f64 = gms.elements.iter().map(|e| e.stiffness_v_per_mm).sum();
-    let share = (RESOLVED * most_v_per_mm / sum).min(1.0);
+    let share = (RESOLVED * most_v_per_mm / gms.stiffness_v_per_mm()).min(1.0);
     for element in &mut gms.elements {
         element.stiffness_v_per_mm *= share;
     }

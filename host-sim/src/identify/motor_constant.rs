@@ -121,21 +121,16 @@ impl MotorConstantSettings {
             .iter()
             .skip_while(|volts| !drives(volts));
         let pass: Vec<f64> = driven.take_while(drives).map(|volts| volts.abs()).collect();
-        let Levels {
-            lower_v,
-            upper_v,
-            first,
-        } = Levels::of(&pass);
-        let is_upper = |volts: f64| volts > 0.5 * (lower_v + upper_v);
-        let changes = pass[first..]
+        let found = Levels::of(&pass);
+        let changes = pass[found.first..]
             .windows(2)
-            .filter(|pair| is_upper(pair[0]) != is_upper(pair[1]));
+            .filter(|pair| found.is_upper(pair[0]) != found.is_upper(pair[1]));
         let levels = changes.count() + 1;
         Self {
-            dwell_s: (pass.len() - first) as f64 * recording.sample_time_s / levels as f64,
+            dwell_s: (pass.len() - found.first) as f64 * recording.sample_time_s / levels as f64,
             levels,
-            rise_s: first as f64 * recording.sample_time_s,
-            upper_ratio: upper_v / lower_v.max(DRIVING_V),
+            rise_s: found.first as f64 * recording.sample_time_s,
+            upper_ratio: found.upper_v / found.lower_v.max(DRIVING_V),
             ..usual
         }
     }
@@ -152,15 +147,19 @@ struct Levels {
 impl Levels {
     /// Of the magnitudes of a pass' voltage, V: the upper level comes first, and the lower one last.
     fn of(pass_v: &[f64]) -> Self {
-        let upper_v = pass_v.iter().copied().fold(0.0, f64::max);
-        let lower_v = pass_v.last().copied().unwrap_or_default();
-        let between = 0.5 * (lower_v + upper_v);
-        let first = pass_v.iter().position(|volts| *volts > between);
-        Self {
-            lower_v,
-            upper_v,
-            first: first.unwrap_or_default(),
-        }
+        let mut found = Self {
+            lower_v: pass_v.last().copied().unwrap_or_default(),
+            upper_v: pass_v.iter().copied().fold(0.0, f64::max),
+            first: 0,
+        };
+        let first = pass_v.iter().position(|volts| found.is_upper(*volts));
+        found.first = first.unwrap_or_default();
+        found
+    }
+
+    /// True for a voltage, V, that is nearer to the upper level.
+    fn is_upper(&self, volts: f64) -> bool {
+        volts > 0.5 * (self.lower_v + self.upper_v)
     }
 }
 

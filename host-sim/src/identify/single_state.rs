@@ -120,7 +120,7 @@ fn single<P>(parameters: P, found: &Fit, breakaway_v: f64) -> SingleState<P> {
 }
 
 fn stiffness(gms: &GmsParameters) -> Parameter {
-    let total: f64 = gms.elements.iter().map(|e| e.stiffness_v_per_mm).sum();
+    let total = gms.stiffness_v_per_mm();
     Parameter {
         name: "sigma0",
         start: 0.5 * total,

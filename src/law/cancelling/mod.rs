@@ -176,7 +176,7 @@ struct Follower<S: Scalar> {
     /// Square of the least vector, and the part across a vector of a square, that the least rotation makes.
     least: S,
     rotation: S,
-    /// What the vector's growth takes away in a step, at half of the rate that is set.
+    /// The error that the vector's growth takes away in a step, at half of the rate that is set.
     slow: S,
     /// Change of the slip in a look at the least rotation, over what the vector's growth takes away in a step.
     change: S::Gain,

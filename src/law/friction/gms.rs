@@ -58,6 +58,12 @@ impl GmsParameters {
             .sum();
         libm::copysign(force, displacement_mm)
     }
+
+    /// The stiffness of all springs together, V/mm: that of the virgin curve at rest. Settings time and host only.
+    pub fn stiffness_v_per_mm(&self) -> f64 {
+        let springs = self.elements.iter();
+        springs.map(|element| element.stiffness_v_per_mm).sum()
+    }
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -217,15 +217,15 @@ impl Line {
             return;
         }
         let pid = measuring_settings(&found.settings);
+        // Under the limits that were handed over; where the PID leaves those, both have room.
+        let narrow = AxisSettings {
+            limits: found.settings.limits,
+            ..pid.clone()
+        };
         let used_s = 60.0 * self.axis_min;
         let errors_mm: Result<Vec<[f64; 2]>, String> = SINES
             .iter()
             .map(|sine| {
-                // Under the limits that were handed over; where the PID leaves those, both have room.
-                let narrow = AxisSettings {
-                    limits: found.settings.limits,
-                    ..pid.clone()
-                };
                 let (limits, reference) = match largest(&narrow, subject, used_s, sine) {
                     Ok(reference) => (narrow.limits, reference),
                     Err(_) => (pid.limits, largest(&pid, subject, used_s, sine)?),
