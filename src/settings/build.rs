@@ -25,6 +25,8 @@ use crate::law::units::{DacCode, Position};
 
 /// Counts that an axis shows for certain: those of one dead line, and noise.
 const HELD_COUNTS: f64 = 5.0;
+/// Counts that a step of an axis may have however slow: noise of a count RMS makes up to six in the difference of two readings.
+const LEAST_STEP_COUNTS: i32 = 8;
 /// Stiffness before sliding, and breakaway, over those of the settings, at most.
 const HELD_ERROR: f64 = 1.25;
 const FRICTION_ERROR: f64 = 1.5;
@@ -166,8 +168,8 @@ impl AxisSettings {
             .encoder(Encoder::new(
                 encoder.counter_bits.into(),
                 encoder.reversed,
-                // One count more: a slow axis still steps by whole counts, and noise adds one.
-                rounding::ceil(largest_step) as i32 + 1,
+                // One count more: a slow axis still steps by whole counts.
+                (rounding::ceil(largest_step) as i32 + 1).max(LEAST_STEP_COUNTS),
             ))
             .amplifier(
                 amplifier.output_limit_v,

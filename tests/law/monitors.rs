@@ -5,11 +5,12 @@ use quadrant::app::Snapshot;
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::safety::FaultCode;
 use quadrant::safety::monitor::{Following, FollowingState, SignalLoss, SignalLossState};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Stage, StageState};
 
-use crate::common::Rig;
+use crate::common::{Rig, with_x};
 
 /// Ticks until an encoder whose counts move like this is found silent, at an output of 2 V; at most 1000.
 fn silent(steps: impl Fn(u32) -> i32) -> Option<u32> {
@@ -84,6 +85,34 @@ fn a_jump_of_the_counter_is_motion_until_the_filter_has_forgotten_it() {
     for jump in [1 << 17, 1 << 24, i32::MAX, -(1 << 17), -(1 << 24), i32::MIN] {
         let ticks = f64::from(ticks_of_unrest(jump));
         assert!((ticks - expected(65536.0)).abs() < 1.5, "{jump}: {ticks}");
+    }
+}
+
+/// The fault after readings of an axis that may move by half a count a tick, one of which is `counts` off.
+fn fault_of_a_slow_axis(counts: i32) -> Option<FaultCode> {
+    let settings = with_x(|x| {
+        x.encoder.resolution_mm = 2e-3;
+        x.limits.max_velocity_mm_s = 5.0;
+        x.limits.unhomed_mm_s = None;
+    });
+    let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
+    for tick in 0..20 {
+        rig.inputs.command = (tick == 1).then_some(Command::Enable);
+        rig.inputs.readings[0].count = if tick == 10 { counts as u32 } else { 0 };
+        rig.tick();
+    }
+    rig.state.safety().fault().map(|fault| fault.code)
+}
+
+#[test]
+fn noise_of_a_count_is_no_jump_of_an_axis_however_slow() {
+    // Six counts in the difference of two readings are four times its standard deviation.
+    for counts in [1, -1, 6, -6] {
+        assert_eq!(fault_of_a_slow_axis(counts), None, "{counts}");
+    }
+    for counts in [12, -12] {
+        let fault = fault_of_a_slow_axis(counts);
+        assert_eq!(fault, Some(FaultCode::EncoderJump), "{counts}");
     }
 }
 
