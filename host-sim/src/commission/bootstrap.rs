@@ -88,6 +88,19 @@ pub fn with_rough_friction(
     gain_mm_per_v_s2: f64,
     friction_v: [f64; 2],
 ) -> AxisSettings {
+    settings.friction.sliding = rough_sliding(friction_v);
+    settings.feedforward.kind = FeedforwardKind::Static;
+    settings.feedforward.gains = FeedforwardGains {
+        level: ROUGH_SHARE,
+        viscous: 0.0,
+        gms: 0.0,
+        inertia_v_s2_per_mm: ROUGH_SHARE / gain_mm_per_v_s2,
+    };
+    settings
+}
+
+/// Sliding friction that is the same at every speed: in positive and in negative direction, V.
+pub(super) fn rough_sliding(friction_v: [f64; 2]) -> PerDirection<StaticFriction> {
     let sliding = |friction_v: f64| StaticFriction {
         curve: StribeckCurve {
             coulomb_v: friction_v.max(1e-6),
@@ -97,18 +110,10 @@ pub fn with_rough_friction(
         },
         viscous_v_s_per_mm: 0.0,
     };
-    settings.friction.sliding = PerDirection {
+    PerDirection {
         positive: sliding(friction_v[0]),
         negative: sliding(friction_v[1]),
-    };
-    settings.feedforward.kind = FeedforwardKind::Static;
-    settings.feedforward.gains = FeedforwardGains {
-        level: ROUGH_SHARE,
-        viscous: 0.0,
-        gms: 0.0,
-        inertia_v_s2_per_mm: ROUGH_SHARE / gain_mm_per_v_s2,
-    };
-    settings
+    }
 }
 
 /// Share of a roughly known friction and inertia that is fed forward.

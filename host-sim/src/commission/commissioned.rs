@@ -75,6 +75,8 @@ pub struct Commissioned {
     pub sector_bound: f64,
     /// Settings of the axis, finished.
     pub settings: AxisSettings,
+    /// What was done otherwise than usual, and why, in sentences.
+    pub remarks: Vec<String>,
     /// What was run on the axis, in order; nothing of a commissioning from saved recordings.
     pub ran: Vec<Run>,
     /// Trials on the axis; none of a commissioning from saved recordings, or where none were asked for.
@@ -108,6 +110,7 @@ impl Commissioned {
         if !self.ran.is_empty() {
             notes.push(self.account());
         }
+        notes.extend(self.remarks.iter().cloned());
         let runs = &self.friction.0.runs;
         let uneven = runs.iter().filter(|run| run.stick_slip).count();
         if 2 * uneven > runs.len() {

@@ -1,19 +1,24 @@
 //! From the measurements of a commissioning to its models and settings: without an axis.
 
 use heapless::Vec as ShortVec;
+use quadrant::axis::MAX_PREVIEW_TICKS;
 use quadrant::control::filter::FilterSettings;
+use quadrant::control::npid::NonlinearGain;
 use quadrant::control::pid::PidGains;
+use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::filtered_sector_bound;
 use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
-use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
 use quadrant::friction::stribeck::StaticFriction;
+use quadrant::friction::{FrictionSettings, PerDirection};
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 
+use super::bootstrap::rough_sliding;
 use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
 use super::error::CommissionError;
+use super::verify::VerifyError;
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
-use crate::design::{Form, PidRequest, Process, best_pid, design_pid, modal_pid};
+use crate::design::{Form, PidRequest, Process, best_pid, design_pid, modal_pid, noise_voltage_v};
 use crate::identify::frf::FrfMeasurement;
 use crate::identify::motor_constant::MotorConstant;
 use crate::identify::plant::{PlantFit, PlantFitSettings, Stiffness, fit_plant};
@@ -26,6 +31,8 @@ use crate::identify::virgin_curve::{
 };
 use crate::record::Recording;
 
+/// Pre-sliding range of a stiff axis, mm: before any is identified.
+const STIFF_RANGE_MM: f64 = 0.005;
 /// Elements that find their own knots.
 const FEW_ELEMENTS: usize = 4;
 /// Share of the largest force at which the pre-sliding range ends, the last knot over that range, and the exponent with which
@@ -64,6 +71,8 @@ pub(super) struct Controller {
     pub(super) filters: Vec<FilterSettings>,
     /// Largest gain in front of the PID that is shown to be stable with the modes; infinite without any.
     circle_bound: f64,
+    /// What the encoder's noise changed in it, in a sentence.
+    remark: Option<String>,
 }
 
 impl Controller {
@@ -99,31 +108,61 @@ pub(super) fn plant(response: &FrfMeasurement) -> Result<PlantFit, CommissionErr
     )?)
 }
 
-/// Designs the PID, and filters where modes want them, on the linear model.
+/// Designs the PID, and filters where modes want them, on the linear model; with so slow a filter of the derivative that the encoder's
+/// noise, as the motor-constant test shows it at rest, does not shake the axis out of its friction.
 pub(super) fn controller(
     plant: &PlantFit,
     base: &AxisSettings,
     request: &CommissionSettings,
+    motor: &MotorConstant,
     rate_hz: f64,
 ) -> Result<Controller, CommissionError> {
     let alone = |pid| Controller {
         pid,
         filters: Vec::new(),
         circle_bound: f64::INFINITY,
+        remark: None,
     };
     let filter_s = base.feedback.pid.derivative_filter_s;
     let Some(target) = request.target else {
         let form = sampled(rate_hz);
-        if plant.modes.is_empty() {
-            let process = Process::Model(plant.plant);
-            return Ok(alone(best_pid(&process, form, filter_s)?.gains));
+        let best = |filter_s: f64| -> Result<Controller, CommissionError> {
+            if plant.modes.is_empty() {
+                let process = Process::Model(plant.plant);
+                return Ok(alone(best_pid(&process, form, filter_s)?.gains));
+            }
+            let found = modal_pid(&plant.plant, &plant.modes, form, filter_s)?;
+            Ok(Controller {
+                pid: found.gains,
+                filters: found.filters,
+                circle_bound: found.circle_bound,
+                remark: None,
+            })
+        };
+        let noise_mm = motor.noise_mm();
+        let friction_v = 0.5 * (motor.directed_v[0] + motor.directed_v[1]);
+        let mut found = best(filter_s)?;
+        for step in 1..=SLOWER_FILTERS {
+            let axis = process(plant, &found.filters);
+            let noise_v = noise_voltage_v(&axis, &found.pid, form, noise_mm);
+            if noise_v <= NOISE_SHARE * friction_v {
+                break;
+            }
+            match best(SLOWER_FILTER.powi(step) * filter_s) {
+                Ok(quieter) => {
+                    found = quieter;
+                    found.remark = Some(format!(
+                        "The encoder's noise of {:.2} um RMS would have shaken the axis out of its friction of {friction_v:.3} V: the \
+                         derivative is filtered over {:.2} ms.",
+                        1e3 * noise_mm,
+                        1e3 * found.pid.derivative_filter_s,
+                    ));
+                }
+                // So slow a filter leaves no loop.
+                Err(_) => break,
+            }
         }
-        let found = modal_pid(&plant.plant, &plant.modes, form, filter_s)?;
-        return Ok(Controller {
-            pid: found.gains,
-            filters: found.filters,
-            circle_bound: found.circle_bound,
-        });
+        return Ok(found);
     };
     let design = PidRequest {
         target,
@@ -133,6 +172,12 @@ pub(super) fn controller(
     };
     Ok(alone(design_pid(&process(plant, &[]), &design)?.gains))
 }
+
+/// RMS voltage that the encoder's noise makes in the loop, over friction, from which on the derivative is filtered more; the filters
+/// that are tried, each slower by a factor.
+const NOISE_SHARE: f64 = 0.5;
+const SLOWER_FILTER: f64 = 2.0;
+const SLOWER_FILTERS: i32 = 5;
 
 /// The loop as it runs.
 pub(super) fn sampled(rate_hz: f64) -> Form {
@@ -173,11 +218,24 @@ pub(super) fn presliding(
     identify_elements(recording, &friction.models())
 }
 
-/// One spring that stands for a pre-sliding friction which was not identified.
-fn assumed(breakaway_v: f64) -> GmsParameters {
+/// Friction while it is measured, with the voltages that moved the axis in positive and negative direction: nothing is known of its
+/// springs, and what an encoder must show is not more than stiff ones let through.
+pub(super) fn rough_friction(
+    directed_v: [f64; 2],
+    plant: &PlantModel,
+    rate_hz: f64,
+) -> FrictionSettings {
+    let sliding = rough_sliding(directed_v);
+    let spring = one_spring(directed_v[0].max(directed_v[1]), STIFF_RANGE_MM);
+    let gms = no_stiffer(spring, plant.stiffest_v_per_mm(1.0 / rate_hz));
+    with_all_models(sliding, gms)
+}
+
+/// One spring that stands for a pre-sliding friction which was not identified, and yields at a displacement in mm.
+fn one_spring(breakaway_v: f64, range_mm: f64) -> GmsParameters {
     GmsParameters {
         elements: ShortVec::from_iter([GmsElement {
-            stiffness_v_per_mm: breakaway_v / ASSUMED_RANGE_MM,
+            stiffness_v_per_mm: breakaway_v / range_mm,
             weight: 1.0,
         }]),
         attraction_v_s: ASSUMED_ATTRACTION_V_S,
@@ -209,7 +267,7 @@ impl Measurements {
         rate_hz: f64,
     ) -> Result<Commissioned, CommissionError> {
         let plant = plant(&self.response)?;
-        let controller = controller(&plant, base, request, rate_hz)?;
+        let controller = controller(&plant, base, request, &self.motor, rate_hz)?;
         let friction = friction(&self.map)?;
         let gms = presliding(&self.presliding, &friction);
         let models = Models {
@@ -253,15 +311,12 @@ impl Models {
         let mut settings = base.clone();
         settings.commissioned = true;
         settings.plant = Some(plant.plant);
-        settings.feedback = FeedbackSettings {
-            integral_limit_v: base.feedback.integral_limit_v,
-            transfer_s: base.feedback.transfer_s,
-            ..FeedbackSettings::all_laws(*pid, nonlinear, base.limits.max_velocity_mm_s)
-        };
+        settings.feedback = feedback(base, *pid, nonlinear);
         controller.put_into(&mut settings);
-        let elements = gms
-            .as_ref()
-            .map_or_else(|_| assumed(breakaway_v), |found| found.gms.clone());
+        let elements = gms.as_ref().map_or_else(
+            |_| one_spring(breakaway_v, ASSUMED_RANGE_MM),
+            |found| found.gms.clone(),
+        );
         let elements = no_stiffer(elements, plant.plant.stiffest_v_per_mm(1.0 / rate_hz));
         settings.friction = with_all_models(friction.models(), elements);
         settings.feedforward.kind = FeedforwardKind::Combined;
@@ -271,7 +326,8 @@ impl Models {
             gms: 1.0,
             inertia_v_s2_per_mm: 1.0 / plant.plant.gain_mm_per_v_s2,
         };
-        settings.feedforward.preview_s = plant.plant.delay_s;
+        let longest_s = MAX_PREVIEW_TICKS as f64 / rate_hz;
+        settings.feedforward.preview_s = plant.plant.delay_s.min(longest_s);
         let margins = process(&plant, filters).margins(pid, sampled(rate_hz));
         Commissioned {
             motor: measurements.motor,
@@ -282,9 +338,52 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
+            remarks: controller.remark.into_iter().collect(),
             ran: Vec::new(),
             verification: None,
         }
+    }
+}
+
+/// Every law around a PID, with what of the feedback is the base's.
+fn feedback(
+    base: &AxisSettings,
+    pid: PidGains,
+    nonlinear: Option<NonlinearGain>,
+) -> FeedbackSettings {
+    FeedbackSettings {
+        integral_limit_v: base.feedback.integral_limit_v,
+        transfer_s: base.feedback.transfer_s,
+        ..FeedbackSettings::all_laws(pid, nonlinear, base.limits.max_velocity_mm_s)
+    }
+}
+
+/// Crossover of a softer PID over that of one which oscillates.
+const SOFTER: f64 = 0.75;
+
+impl Commissioned {
+    /// Replaces the law by a PID of the same shape at a lower crossover, for an axis on which it oscillates: the model lacks something,
+    /// so there is no nonlinear gain either.
+    pub(super) fn soften(&mut self, seen: &VerifyError, rate_hz: f64) {
+        self.remarks.push(format!(
+            "{seen}: a softer one took its place, with {:.0} % of its crossover and without a nonlinear gain.",
+            100.0 * SOFTER
+        ));
+        let old = self.settings.feedback.pid;
+        let pid = PidGains {
+            kp_v_per_mm: SOFTER.powi(2) * old.kp_v_per_mm,
+            ki_v_per_mm_s: SOFTER.powi(3) * old.ki_v_per_mm_s,
+            kd_v_s_per_mm: SOFTER * old.kd_v_s_per_mm,
+            ..old
+        };
+        let filters = self.settings.feedback.filters.take();
+        self.settings.feedback = FeedbackSettings {
+            filters,
+            ..feedback(&self.settings, pid, None)
+        };
+        let filters = self.settings.feedback.filters.as_deref();
+        self.margins =
+            process(&self.plant, filters.unwrap_or_default()).margins(&pid, sampled(rate_hz));
     }
 }
 
@@ -298,12 +397,7 @@ fn identify_elements(
 ) -> Result<GmsFit, VirginCurveError> {
     let identify = |knots| virgin_curve::identify(recording, Some(sliding), &knots);
     let few = identify(Knots::Automatic(FEW_ELEMENTS))?;
-    let top_v = few
-        .curve
-        .points
-        .iter()
-        .map(|point| point.force_v)
-        .fold(0.0, f64::max);
+    let top_v = few.curve.top_v();
     let rising = few
         .curve
         .points

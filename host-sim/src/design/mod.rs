@@ -10,6 +10,7 @@ mod form;
 pub mod integral_gain;
 pub mod measured;
 pub mod modal;
+mod noise;
 pub mod npid;
 pub mod pages;
 pub mod pid;
@@ -30,6 +31,7 @@ pub use integral_gain::{
 pub use loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
 pub use margins::{MarginError, Margins, margins};
 pub use modal::{ModalDesign, modal_pid};
+pub use noise::noise_voltage_v;
 pub use pid::{DesignError, INTEGRAL_SHARE, PidDesign, PidRequest, Target, design_pid};
 pub use process::Process;
 pub use quadrant_simulation::{held_plant, loop_shape, margins};

@@ -4,9 +4,14 @@ use proptest::prelude::*;
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::sector_bound;
+use rand::{Rng, SeedableRng};
+use rand_xoshiro::Xoshiro256PlusPlus;
 
 use super::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
-use super::{ContinuousLoop, Form, Process, SampledLoop, ShapingError, margins, shape_to_margins};
+use super::{
+    ContinuousLoop, Form, Process, SampledLoop, ShapingError, margins, noise_voltage_v,
+    shape_to_margins,
+};
 
 /// Control period of these tests, s.
 const PERIOD_S: f64 = 1e-4;
@@ -22,6 +27,16 @@ impl Run {
     /// The RMS error of the last tenth over that of the fifth tenth: below one when the motion dies out. `scaled` is
     /// what the PID is given in place of an error.
     fn growth(&self, scaled: impl Fn(f64) -> f64) -> f64 {
+        let mut squares = [0.0; 10];
+        self.periods(
+            |position| scaled(-position),
+            |done, _, position| squares[(10.0 * done) as usize] += position * position,
+        );
+        (squares[9] / squares[4]).sqrt()
+    }
+
+    /// The loop with `error` of the position; `observe` is told the share of the time, the voltage and the position, period by period.
+    fn periods(&self, mut error: impl FnMut(f64) -> f64, mut observe: impl FnMut(f64, f64, f64)) {
         let periods = (self.seconds / PERIOD_S) as usize;
         let whole_delay = (self.plant.delay_s / PERIOD_S + 1e-9).floor();
         let older_share = (self.plant.delay_s - whole_delay * PERIOD_S).max(0.0);
@@ -32,10 +47,9 @@ impl Run {
         // The last output at the back; at rest before the start.
         let mut outputs = std::collections::VecDeque::from(vec![0.0; whole_delay as usize + 2]);
         let mut state = [1.0, 0.0];
-        let (mut integral, mut derivative, mut previous) = (0.0, 0.0, scaled(-1.0));
-        let mut squares = [0.0; 10];
+        let (mut integral, mut derivative, mut previous) = (0.0, 0.0, error(1.0));
         for k in 0..periods {
-            let error = scaled(-state[0]);
+            let error = error(state[0]);
             integral += self.gains.ki_v_per_mm_s * PERIOD_S * error;
             derivative = a * derivative + b * (error - previous);
             previous = error;
@@ -43,9 +57,12 @@ impl Run {
             outputs.pop_front();
             state = self.integrate(state, outputs[0], older_share);
             state = self.integrate(state, outputs[1], PERIOD_S - older_share);
-            squares[k * 10 / periods] += state[0] * state[0];
+            observe(
+                k as f64 / periods as f64,
+                outputs[outputs.len() - 1],
+                state[0],
+            );
         }
-        (squares[9] / squares[4]).sqrt()
     }
 
     fn integrate(&self, mut state: [f64; 2], volts: f64, duration_s: f64) -> [f64; 2] {
@@ -225,5 +242,46 @@ proptest! {
         let largest = margins(&ContinuousLoop { plant, gains })
             .map_or(1.0, |m| 10.0_f64.powf(m.gain_margin_db / 20.0));
         prop_assert!(bound >= 1.0 && bound <= largest * (1.0 + 1e-4), "{bound}, {largest}");
+    }
+}
+
+#[test]
+fn the_voltage_of_the_noise_is_that_of_the_loop_that_runs() {
+    let form = Form::Sampled {
+        sample_time_s: PERIOD_S,
+        computation_delay_s: 0.0,
+    };
+    let noise_mm = 1e-3;
+    for filter_s in [FILTER_S, 4e-4] {
+        for (plant, gains) in axes() {
+            let gains = PidGains {
+                ki_v_per_mm_s: 0.7,
+                derivative_filter_s: filter_s,
+                ..gains
+            };
+            let run = Run {
+                plant,
+                gains,
+                seconds: 6.0,
+            };
+            let mut random = Xoshiro256PlusPlus::seed_from_u64(1);
+            // Of uniform noise.
+            let most_mm = noise_mm * 3.0_f64.sqrt();
+            let (mut squares, mut count) = (0.0, 0.0);
+            run.periods(
+                |position| -position + random.random_range(-most_mm..most_mm),
+                // The first position, which is let go, is forgotten by then.
+                |done, volts, _| {
+                    if done > 0.3 {
+                        squares += volts * volts;
+                        count += 1.0;
+                    }
+                },
+            );
+            let measured_v = f64::sqrt(squares / count);
+            let expected_v = noise_voltage_v(&Process::Model(plant), &gains, form, noise_mm);
+            let ratio = measured_v / expected_v;
+            assert!((0.97..1.03).contains(&ratio), "{measured_v} {expected_v} V");
+        }
     }
 }

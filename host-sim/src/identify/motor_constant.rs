@@ -187,7 +187,28 @@ impl MotorConstant {
     pub fn force_n_per_v(&self, moving_mass_kg: f64) -> f64 {
         1e-3 * self.gain_mm_per_v_s2 * moving_mass_kg
     }
+
+    /// Standard deviation of the encoder's noise, mm, from the quietest part of the test, in which the axis rests; by second
+    /// differences, which leave out a motor that still swings on its spring. Zero of an encoder that shows whole counts and no noise.
+    pub fn noise_mm(&self) -> f64 {
+        let samples = ((RESTING_S / self.recording.sample_time_s) as usize).max(3);
+        let parts = self.recording.position_mm.chunks_exact(samples);
+        let squares = parts.map(|part| {
+            let bends = part.windows(3).map(|p| p[0] - 2.0 * p[1] + p[2]);
+            bends.map(|bend| bend * bend).sum::<f64>() / (samples - 2) as f64
+        });
+        let least = squares.fold(f64::INFINITY, f64::min);
+        // A second difference adds three readings with weights of 1, 2 and 1.
+        if least.is_finite() {
+            (least / 6.0).sqrt()
+        } else {
+            0.0
+        }
+    }
 }
+
+/// Length of the parts of a test of which the quietest is at rest, s.
+const RESTING_S: f64 = 0.02;
 
 /// Reasons for which no motor constant was found.
 #[derive(Debug, thiserror::Error)]

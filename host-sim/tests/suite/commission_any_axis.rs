@@ -219,3 +219,36 @@ fn feedforward_that_is_worse_than_the_pid_is_not_handed_over() {
     let (worst, _) = verification.against_pid(verification.chosen());
     assert!(worst <= 1.01, "{}", verification.chosen().law);
 }
+
+#[test]
+fn the_springs_of_an_axis_that_noise_shakes_loose_are_found_by_a_quicker_sine() {
+    let stiffness_v_per_mm = 37.0;
+    let level_v = 0.115;
+    let mut axis = x().with_mass(2.5);
+    axis.imperfections.encoder_noise_mm = 1.2e-3;
+    axis.delay_s = 3.3e-4;
+    for friction in [&mut axis.friction.positive, &mut axis.friction.negative] {
+        friction.curve.coulomb_v = level_v;
+        friction.curve.breakaway_v = level_v;
+    }
+    axis.model = FrictionParameters::Dahl(DahlParameters {
+        stiffness_v_per_mm,
+        exponent: 1.0,
+    });
+    let mut test_axis = SimulatedTestAxis::new(0, axis, 1).with_travel_mm(20.0);
+    let base = StageSettings::simulated().axes[0].clone();
+    let request = CommissionSettings {
+        trials: false,
+        ..CommissionSettings::default()
+    };
+    let found = commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap();
+    let friction = &found.settings.friction;
+    let at_mm = 2e-3;
+    let found_v = friction
+        .gms
+        .virgin_curve_v(at_mm, friction.mean_breakaway_v());
+    let true_v = level_v * (1.0 - (-stiffness_v_per_mm * at_mm / level_v).exp());
+    // To the slow sine it looks a hundred times as soft.
+    let ratio = found_v / true_v;
+    assert!((0.5..2.0).contains(&ratio), "{found_v} {true_v} V");
+}

@@ -20,6 +20,14 @@ pub struct VirginCurve {
     pub branches: usize,
 }
 
+impl VirginCurve {
+    /// The largest friction on it, V.
+    pub fn top_v(&self) -> f64 {
+        let forces = self.points.iter().map(|point| point.force_v);
+        forces.fold(0.0, f64::max)
+    }
+}
+
 /// Position and voltage without the jitter of encoder and converter.
 #[derive(Clone, Debug)]
 pub(super) struct Smooth {
@@ -30,6 +38,8 @@ pub(super) struct Smooth {
 
 /// Time over which signals are averaged, s; twice, so that the average is triangular and centred.
 const SMOOTHING_S: f64 = 0.03;
+/// The same as a share of a record of quick cycles.
+const SMOOTHING_SHARE: f64 = 1e-3;
 /// Time between the samples that are kept of them, s: much shorter than the smoothing, and every sample costs the refinement
 /// time.
 const STEP_S: f64 = 1e-3;
@@ -40,7 +50,9 @@ const TURNED: f64 = 0.2;
 
 impl Smooth {
     pub(super) fn of(recording: &Recording) -> Self {
-        let half = ((0.5 * SMOOTHING_S / recording.sample_time_s).round() as usize).max(1);
+        let lasts_s = recording.len() as f64 * recording.sample_time_s;
+        let smoothing_s = SMOOTHING_S.min(SMOOTHING_SHARE * lasts_s);
+        let half = ((0.5 * smoothing_s / recording.sample_time_s).round() as usize).max(1);
         let step = ((STEP_S / recording.sample_time_s).round() as usize).max(1);
         let smooth = |signal: &[f64]| -> Vec<f64> {
             let smooth = centred_mean(&centred_mean(signal, half), half);

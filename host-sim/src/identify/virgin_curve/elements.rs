@@ -117,11 +117,7 @@ fn fit_curve(
     knots: &Knots,
     count: usize,
 ) -> Result<Shape, VirginCurveError> {
-    let top_v = curve
-        .points
-        .iter()
-        .map(|point| point.force_v)
-        .fold(0.0, f64::max);
+    let top_v = curve.top_v();
     let rising = curve
         .points
         .partition_point(|point| point.force_v < FITTED * top_v.min(level_v));
