@@ -57,8 +57,9 @@ const SHARES: [f64; 3] = [0.75, 0.5, 0.25];
 const AS_GOOD: f64 = 1.1;
 /// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
 const NO_WORSE: f64 = 1.01;
-/// Counts of the encoder that an error must exceed the PID's by to be larger.
+/// Counts of the encoder that the largest error, and the RMS error, must exceed the PID's by to be larger.
 const UNSEEN_COUNTS: f64 = 0.25;
+const UNSEEN_RMS_COUNTS: f64 = 0.025;
 
 /// The sines that fit an axis.
 pub fn sines(info: &AxisInfo) -> Vec<SineTest> {
@@ -114,9 +115,9 @@ impl LawResult {
             let times = law.at_s.iter().copied();
             law.scores.iter().copied().zip(times).collect()
         };
-        let unseen_mm = UNSEEN_COUNTS * self.settings.encoder.resolution_mm;
-        let ratio = |own_mm: f64, pid_mm: f64| {
-            if (0.0..unseen_mm).contains(&(own_mm - pid_mm)) {
+        let resolution_mm = self.settings.encoder.resolution_mm;
+        let ratio = |own_mm: f64, pid_mm: f64, unseen_counts: f64| {
+            if (0.0..unseen_counts * resolution_mm).contains(&(own_mm - pid_mm)) {
                 1.0
             } else {
                 own_mm / pid_mm
@@ -128,8 +129,8 @@ impl LawResult {
             .flat_map(|((own, own_s), (pid, pid_s))| {
                 let changed = drift.between(pid_s, own_s);
                 [
-                    ratio(own.largest_mm, changed * pid.largest_mm),
-                    ratio(own.rms_mm, changed * pid.rms_mm),
+                    ratio(own.largest_mm, changed * pid.largest_mm, UNSEEN_COUNTS),
+                    ratio(own.rms_mm, changed * pid.rms_mm, UNSEEN_RMS_COUNTS),
                 ]
             })
             .collect();
@@ -192,6 +193,7 @@ pub enum VerifyError {
     Rings(Ringing),
 }
 
+/// True if two oscillations have about the same frequency.
 fn alike(a: &Ringing, b: &Ringing) -> bool {
     (1.0 / SAME..SAME).contains(&(a.frequency_hz / b.frequency_hz))
 }
@@ -566,6 +568,11 @@ mod tests {
         };
         assert_eq!(beside(0.2), 1.0);
         assert!((beside(0.5) - 1.05).abs() < 1e-9);
+        let more = law(&[(10.0 * count_mm, 1.1 * count_mm)], &[]).against(&pid, &drift);
+        assert!(
+            (more.0 - 1.1).abs() < 1e-9,
+            "an RMS error scatters less: {more:?}"
+        );
         // What is better counts in full.
         let mean = law(&[(9.9 * count_mm, 0.9 * count_mm)], &[]).against(&pid, &drift);
         assert!((mean.0 - 0.99).abs() < 1e-9, "{mean:?}");

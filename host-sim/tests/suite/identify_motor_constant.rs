@@ -158,16 +158,7 @@ fn a_motor_on_a_soft_spring_is_pushed_gently_until_its_table_slides() {
 
 #[test]
 fn the_noise_of_the_encoder_is_told_from_a_motor_that_swings_on_its_spring() {
-    let mut truth = StageParameters::real().axes[0].clone();
-    let reduced = 0.25 / truth.gain_mm_per_v_s2;
-    let natural_rad_s = TAU * 60.0;
-    truth.drive = Drive::RackAndPinion(Backlash {
-        width_mm: 0.0,
-        stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-        damping_v_s_per_mm: 0.02 * reduced * natural_rad_s,
-        motor_share: 0.5,
-        encoder: EncoderSide::Motor,
-    });
+    let mut truth = on_a_soft_spring(60.0);
     for noise_mm in [3e-4, 1e-3, 3e-3] {
         truth.imperfections.encoder_noise_mm = noise_mm;
         let counted_mm = truth.resolution_mm / 12.0_f64.sqrt();
