@@ -75,7 +75,7 @@ pub struct Commissioned {
     pub sector_bound: f64,
     /// Settings of the axis, finished.
     pub settings: AxisSettings,
-    /// What was done otherwise than usual, and why, in sentences.
+    /// Departures from the usual course, with their reasons, in sentences.
     pub remarks: Vec<String>,
     /// What was run on the axis, in order; nothing of a commissioning from saved recordings.
     pub ran: Vec<Run>,

@@ -71,7 +71,7 @@ pub(super) struct Controller {
     pub(super) filters: Vec<FilterSettings>,
     /// Largest gain in front of the PID that is shown to be stable with the modes; infinite without any.
     circle_bound: f64,
-    /// What the encoder's noise changed in it, in a sentence.
+    /// The change that the encoder's noise made to it, in a sentence.
     remark: Option<String>,
 }
 
