@@ -434,9 +434,9 @@ fn presliding(
     Ok(best)
 }
 
-/// Share of the least level of sliding that a slow sine meets, or less where the axis is shaken loose, and error of the elements' prediction from which on they say the
-/// same; further sines, each quicker by a
-/// factor, or larger by one while the friction still rises, up to a share of the travel.
+/// Share of the least level of sliding that a slow sine meets, or less where the axis is shaken loose; error of the elements'
+/// prediction from which on it counts as such, too; and further sines: their number, each quicker by a factor, or larger by one while
+/// the friction still rises, up to a share of the travel.
 const MET: f64 = 0.8;
 const POOR_FIT: f64 = 0.2;
 const REPETITIONS: usize = 2;

@@ -88,7 +88,7 @@ pub struct LawResult {
     pub recording: Recording,
     /// The reason why the axis was stopped, if it was.
     pub stopped: Option<String>,
-    /// Oscillations that lasted all through a sine and were most of its error.
+    /// Oscillations that lasted all through a sine and were most of its error, as far as they were looked for.
     rings: Vec<Ringing>,
     /// Times at which the sines had been run, s from the first trial on.
     at_s: Vec<f64>,
@@ -239,6 +239,7 @@ pub fn verify(
         progress,
         done: 0.0,
         used_s: 0.0,
+        listens: true,
     };
     let pid = measuring_settings(settings);
     let npid = AxisSettings {
@@ -264,6 +265,7 @@ pub fn verify(
     if let Some(ringing) = alone.0.rings_alike() {
         return Err(VerifyError::Rings(ringing));
     }
+    bench.listens = false;
     let pid_alone = alone.0.clone();
     let mut drift = Drift::default();
     note(&mut drift, &pid_alone);
@@ -377,6 +379,8 @@ struct Bench<'a> {
     done: f64,
     /// Time for which the axis has run on sines, s.
     used_s: f64,
+    /// True while oscillations are looked for, which takes longer than anything else here: of the PID alone.
+    listens: bool,
 }
 
 impl Bench<'_> {
@@ -432,11 +436,12 @@ impl Bench<'_> {
                     self.used_s += one_lasts_s(&self.sines[index]);
                     result.scores.push(score);
                     result.at_s.push(self.used_s);
-                    let resolution_mm = result.settings.encoder.resolution_mm;
-                    let is_all = |ringing: &Ringing| ringing.amplitude_mm > DOMINANT * score.rms_mm;
-                    result
-                        .rings
-                        .extend(lasting(&recording, resolution_mm).filter(is_all));
+                    if self.listens {
+                        let resolution_mm = result.settings.encoder.resolution_mm;
+                        let found = lasting(&recording, resolution_mm);
+                        let is_all = |found: &Ringing| found.amplitude_mm > DOMINANT * score.rms_mm;
+                        result.rings.extend(found.filter(is_all));
+                    }
                     if index == 0 {
                         result.recording = recording;
                     }

@@ -50,8 +50,7 @@ const TURNED: f64 = 0.2;
 
 impl Smooth {
     pub(super) fn of(recording: &Recording) -> Self {
-        let lasts_s = recording.len() as f64 * recording.sample_time_s;
-        let smoothing_s = SMOOTHING_S.min(SMOOTHING_SHARE * lasts_s);
+        let smoothing_s = SMOOTHING_S.min(SMOOTHING_SHARE * recording.duration_s());
         let half = ((0.5 * smoothing_s / recording.sample_time_s).round() as usize).max(1);
         let step = ((STEP_S / recording.sample_time_s).round() as usize).max(1);
         let smooth = |signal: &[f64]| -> Vec<f64> {
