@@ -17,6 +17,8 @@ const APPROACHES: usize = 4;
 const NEAR: f64 = 0.02;
 /// Distance that is not worth a move, mm.
 const NEAR_MM: f64 = 0.05;
+/// Share of the travel by which a run may begin away from where it should.
+const ASTRAY: f64 = 0.04;
 /// Time for which the position is read, s.
 const LOOK_S: f64 = 0.01;
 
@@ -33,6 +35,23 @@ pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), Expe
     }
     approach_once(test_axis, target_mm)?;
     Ok(())
+}
+
+/// As [`approach`], of an axis that was last seen at `at_mm` if that is away from the target by more than a soft controller's usual
+/// lag: one that lags more one way than the other wanders off from run to run.
+///
+/// # Errors
+/// A move that is stopped.
+pub fn approach_from(
+    test_axis: &mut dyn TestAxis,
+    at_mm: Option<f64>,
+    target_mm: f64,
+) -> Result<(), ExperimentError> {
+    let astray_mm = ASTRAY * test_axis.info().travel_mm;
+    match at_mm {
+        Some(at_mm) if (at_mm - target_mm).abs() > astray_mm => approach(test_axis, target_mm),
+        _ => Ok(()),
+    }
 }
 
 /// Velocity of a move, mm/s.

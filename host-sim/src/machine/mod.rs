@@ -53,7 +53,7 @@ mod timing;
 mod transport;
 mod travel;
 
-pub use approach::{approach, approach_mm_s};
+pub use approach::{approach, approach_from, approach_mm_s};
 #[cfg(all(unix, feature = "emulated"))]
 pub use emulated_link::EmulatedLink;
 pub use error::MachineError;

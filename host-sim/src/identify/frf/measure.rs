@@ -7,7 +7,9 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 use super::estimate::{Estimate, Estimator, estimate};
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::setting::SettingError;
-use crate::machine::{Drive, Experiment, ExperimentError, Sides, TestAxis, approach};
+use crate::machine::{
+    Drive, Experiment, ExperimentError, Sides, TestAxis, approach, approach_from,
+};
 use crate::record::Recording;
 
 /// Parameters of a frequency response measurement.
@@ -225,10 +227,13 @@ pub fn measure(
             (standstill(settings, axis.rate_hz), settings.periods)
         };
         let done = blocks.len() as f64;
+        let forward = recordings.len().is_multiple_of(2);
+        let start_mm = settings.start_mm(axis.travel_mm);
         if settings.two_sided {
-            let forward = recordings.len().is_multiple_of(2);
-            let start_mm = settings.start_mm(axis.travel_mm);
             approach(test_axis, if forward { start_mm } else { -start_mm })?;
+        } else if moves && forward {
+            let last_mm = recordings.last().and_then(|pass| pass.position_mm.last());
+            approach_from(test_axis, last_mm.copied(), start_mm)?;
         }
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);

@@ -4,7 +4,9 @@ use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::map::{FrictionMap, FrictionRun};
 use crate::identify::setting::SettingError;
-use crate::machine::{AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, approach};
+use crate::machine::{
+    AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, approach_from,
+};
 use crate::record::Recording;
 
 /// Parameters of the measurement of the friction-velocity map.
@@ -203,16 +205,12 @@ pub fn measure(
     let mut done_s = 0.0;
     let mut map = FrictionMap::default();
     let mut recordings: Vec<Recording> = Vec::new();
-    let info = test_axis.info();
-    let start_mm = settings.start_mm(info.travel_mm);
+    let start_mm = settings.start_mm(test_axis.info().travel_mm);
     for velocity_mm_s in settings.velocities() {
-        // A soft controller lags more one way than the other: the runs would wander off.
-        let last_mm = recordings.last().and_then(|run| run.position_mm.last());
-        if last_mm.is_some_and(|at_mm| (at_mm - start_mm).abs() > ASTRAY * info.travel_mm) {
-            approach(test_axis, start_mm)?;
-        }
-        for direction in [1.0, -1.0] {
-            let length_mm = settings.length_mm(velocity_mm_s);
+        let length_mm = settings.length_mm(velocity_mm_s);
+        for (direction, from_mm) in [(1.0, start_mm), (-1.0, start_mm + length_mm)] {
+            let last_mm = recordings.last().and_then(|run| run.position_mm.last());
+            approach_from(test_axis, last_mm.copied(), from_mm)?;
             let run_s = length_mm / velocity_mm_s;
             let recording = test_axis.perform(
                 &Experiment {
@@ -322,7 +320,5 @@ fn sticks_and_slips(
     least < STICKING && most > SLIPPING
 }
 
-/// Share of the travel by which a run may begin away from where it should.
-const ASTRAY: f64 = 0.04;
 /// A scatter below which a mean is not believed to be, V.
 const LEAST_DEVIATION_V: f64 = 1e-6;
