@@ -227,7 +227,7 @@ pub(super) fn rough_friction(
 ) -> FrictionSettings {
     let sliding = rough_sliding(directed_v);
     let spring = one_spring(directed_v[0].max(directed_v[1]), STIFF_RANGE_MM);
-    let gms = no_stiffer(spring, plant.stiffest_v_per_mm(1.0 / rate_hz));
+    let gms = resolved(spring, &sliding, plant, rate_hz);
     with_all_models(sliding, gms)
 }
 
@@ -242,17 +242,28 @@ fn one_spring(breakaway_v: f64, range_mm: f64) -> GmsParameters {
     }
 }
 
-/// Elements whose springs sum up to `most_v_per_mm`, V/mm, at most: those of an axis that is stiffer than the control rate resolves
-/// are softer in the same proportion.
-fn no_stiffer(mut gms: GmsParameters, most_v_per_mm: f64) -> GmsParameters {
+/// Elements that the control rate resolves on the plant: those of a stiffer axis are softer in the same proportion, and friction that
+/// would change within one period follows more slowly.
+fn resolved(
+    mut gms: GmsParameters,
+    sliding: &PerDirection<StaticFriction>,
+    plant: &PlantModel,
+    rate_hz: f64,
+) -> GmsParameters {
+    let most_v_per_mm = plant.stiffest_v_per_mm(1.0 / rate_hz);
     let share = (RESOLVED * most_v_per_mm / gms.stiffness_v_per_mm()).min(1.0);
     for element in &mut gms.elements {
         element.stiffness_v_per_mm *= share;
     }
+    let lowest_v = [&sliding.positive, &sliding.negative]
+        .map(|model| model.curve.coulomb_v.min(model.curve.breakaway_v))
+        .into_iter()
+        .fold(f64::INFINITY, f64::min);
+    gms.attraction_v_s = gms.attraction_v_s.min(RESOLVED * lowest_v * rate_hz);
     gms
 }
 
-/// Share of the stiffest spring that is taken: none of it is lost by rounding.
+/// Share of what is resolved at most that is taken: none of it is lost by rounding.
 const RESOLVED: f64 = 0.999;
 
 impl Measurements {
@@ -317,8 +328,9 @@ impl Models {
             |_| one_spring(breakaway_v, ASSUMED_RANGE_MM),
             |found| found.gms.clone(),
         );
-        let elements = no_stiffer(elements, plant.plant.stiffest_v_per_mm(1.0 / rate_hz));
-        settings.friction = with_all_models(friction.models(), elements);
+        let sliding = friction.models();
+        let elements = resolved(elements, &sliding, &plant.plant, rate_hz);
+        settings.friction = with_all_models(sliding, elements);
         settings.feedforward.kind = FeedforwardKind::Combined;
         settings.feedforward.gains = FeedforwardGains {
             level: 1.0,
@@ -417,6 +429,8 @@ fn identify_elements(
 
 #[cfg(test)]
 mod tests {
+    use quadrant::settings::StageSettings;
+
     use super::*;
     use crate::identify::static_friction::FrictionRun;
 
@@ -442,19 +456,39 @@ mod tests {
     }
 
     #[test]
-    fn elements_stiffer_than_the_control_rate_resolves_become_softer_in_proportion() {
+    fn elements_and_attraction_beyond_what_the_control_rate_resolves_are_less_in_proportion() {
         let element = |stiffness_v_per_mm, weight| GmsElement {
             stiffness_v_per_mm,
             weight,
         };
-        let gms = GmsParameters {
-            elements: ShortVec::from_iter([element(300.0, 0.6), element(100.0, 0.4)]),
+        let gms = |share: f64| GmsParameters {
+            elements: ShortVec::from_iter([
+                element(300.0 * share, 0.6),
+                element(100.0 * share, 0.4),
+            ]),
             attraction_v_s: ASSUMED_ATTRACTION_V_S,
         };
-        assert_eq!(no_stiffer(gms.clone(), 500.0), gms);
-        let softer = no_stiffer(gms, 200.0).elements;
-        let [first, second] = [&softer[0], &softer[1]].map(|e| e.stiffness_v_per_mm);
+        let plant = StageSettings::simulated().axes[0].plant.unwrap();
+        let rate_hz = 4000.0;
+        let most = plant.stiffest_v_per_mm(1.0 / rate_hz) / gms(1.0).stiffness_v_per_mm();
+        let usual = rough_sliding([0.1, 0.12]);
+        assert_eq!(
+            resolved(gms(0.5 * most), &usual, &plant, rate_hz),
+            gms(0.5 * most)
+        );
+        let softer = resolved(gms(2.0 * most), &usual, &plant, rate_hz);
+        let [first, second] = [0, 1].map(|index| softer.elements[index].stiffness_v_per_mm);
         assert!((first / second - 3.0).abs() < 1e-12);
-        assert!((199.0..200.0).contains(&(first + second)));
+        assert!((0.99..1.0).contains(&(softer.stiffness_v_per_mm() / (most * 400.0))));
+        let hardly_any = resolved(
+            gms(0.5 * most),
+            &rough_sliding([0.1, 0.001]),
+            &plant,
+            rate_hz,
+        );
+        assert!(
+            (3.9..4.0).contains(&hardly_any.attraction_v_s),
+            "{hardly_any:?}"
+        );
     }
 }
