@@ -85,6 +85,8 @@ pub struct Commissioned {
 
 /// Relative error of the predicted hysteresis from which on it is worth a note.
 const NOTED_HYSTERESIS_ERROR: f64 = 0.10;
+/// Acceleration per volt by the open-loop test and by the response, the larger over the smaller, from which on it is worth a note.
+const NOTED_MOTOR_RATIO: f64 = 1.7;
 /// Change of the PID's error during the commissioning from which on it is worth a note.
 const NOTED_DRIFT: f64 = 0.10;
 
@@ -109,6 +111,14 @@ impl Commissioned {
         let mut notes = Vec::new();
         if !self.ran.is_empty() {
             notes.push(self.account());
+        }
+        let shown = self.motor.gain_mm_per_v_s2 / self.plant.plant.gain_mm_per_v_s2;
+        if !(1.0 / NOTED_MOTOR_RATIO..NOTED_MOTOR_RATIO).contains(&shown) {
+            notes.push(format!(
+                "The open-loop test showed {:.0} % of the acceleration per volt that the frequency response gives, which counts: the \
+                 axis is no rigid body at the test's frequency.",
+                100.0 * shown
+            ));
         }
         notes.extend(self.remarks.iter().cloned());
         let runs = &self.friction.0.runs;

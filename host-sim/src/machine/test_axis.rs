@@ -4,7 +4,7 @@
 //! read from a file is the same.
 
 use quadrant::reference::MotionSettings;
-use quadrant::safety::Fault;
+use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::{AxisSettings, SettingsError};
 
 use super::error::MachineError;
@@ -226,4 +226,25 @@ pub enum ExperimentError {
         /// Part of the experiment that was still to come.
         reason: &'static str,
     },
+}
+
+impl ExperimentError {
+    /// The fault that ended the experiment; none if something else did.
+    pub fn fault(&self) -> Option<FaultCode> {
+        match self {
+            Self::Fault { fault, .. } => Some(fault.code),
+            _ => None,
+        }
+    }
+
+    /// True if the axis was stopped because it moved too far or too fast.
+    pub fn ran_off(&self) -> bool {
+        matches!(self, Self::Travel { .. } | Self::Overspeed { .. })
+            || self.fault() == Some(FaultCode::Overspeed)
+    }
+
+    /// True if the axis was stopped because it was not where it should have been: under another controller it may be.
+    pub fn strayed(&self) -> bool {
+        self.ran_off() || self.fault() == Some(FaultCode::FollowingError)
+    }
 }

@@ -7,7 +7,9 @@ use quadrant_sim::commission::{CommissionSettings, Commissioned, Planned, commis
 use quadrant_sim::machine::{
     AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, Travel,
 };
-use quadrant_sim::plant::{AxisParameters, FrictionParameters, StageParameters};
+use quadrant_sim::plant::{
+    AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, StageParameters,
+};
 use quadrant_sim::record::Recording;
 use rayon::prelude::*;
 
@@ -251,4 +253,47 @@ fn the_springs_of_an_axis_that_noise_shakes_loose_are_found_by_a_quicker_sine() 
     // To the slow sine it looks a hundred times as soft.
     let ratio = found_v / true_v;
     assert!((0.5..2.0).contains(&ratio), "{found_v} {true_v} V");
+}
+
+/// An axis whose motor, half of its mass, drives the table over a spring that resonates at a frequency.
+fn on_a_spring(
+    mut axis: AxisParameters,
+    frequency_hz: f64,
+    encoder: EncoderSide,
+) -> AxisParameters {
+    let reduced = 0.25 / axis.gain_mm_per_v_s2;
+    let natural_rad_s = std::f64::consts::TAU * frequency_hz;
+    axis.drive = Drive::RackAndPinion(Backlash {
+        width_mm: 0.0,
+        stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
+        damping_v_s_per_mm: 0.06 * reduced * natural_rad_s,
+        motor_share: 0.5,
+        encoder,
+    });
+    axis
+}
+
+#[test]
+fn an_axis_whose_first_test_is_quicker_than_its_spring_is_commissioned_on_a_short_stroke() {
+    [
+        (34.0, EncoderSide::Load, 6.2),
+        (42.0, EncoderSide::Load, 12.0),
+        (42.0, EncoderSide::Motor, 25.0),
+    ]
+    .into_par_iter()
+    .for_each(|(frequency_hz, encoder, travel_mm)| {
+        let axis = on_a_spring(x().with_mass(1.5), frequency_hz, encoder);
+        let gain_mm_per_v_s2 = axis.gain_mm_per_v_s2;
+        let found = commissioned(axis, travel_mm);
+        // Which of the masses it shows, the test cannot tell.
+        let shown = found.motor.gain_mm_per_v_s2 / gain_mm_per_v_s2;
+        let ratio = found.plant.plant.gain_mm_per_v_s2 / gain_mm_per_v_s2;
+        println!(
+            "{frequency_hz} Hz: {shown:.2}, {ratio:.2}: {:?}",
+            found.notes()
+        );
+        assert!((0.7..1.4).contains(&ratio), "{frequency_hz} Hz: {ratio}");
+        let verification = found.verification.as_ref().unwrap();
+        assert!(verification.is_better_than_pid(), "{:?}", found.notes());
+    });
 }
