@@ -56,6 +56,9 @@ pub struct Line {
     pub worst_ratio: Option<f64>,
     /// Largest error over that of the PID: the geometric mean.
     pub mean_ratio: Option<f64>,
+    /// The PID's largest error of all judging sines, um.
+    #[serde(default)]
+    pub pid_um: Option<f64>,
     /// Feedforward that was handed over.
     pub feedforward: String,
     /// Time for which the axis was used, min.
@@ -161,6 +164,7 @@ pub fn judge_subject(subject: &Subject) -> Line {
         outcome: Outcome::RefusedWrongly,
         worst_ratio: None,
         mean_ratio: None,
+        pid_um: None,
         feedforward: String::new(),
         axis_min: axis.used_s / 60.0,
         computed_s: 0.0,
@@ -243,6 +247,8 @@ impl Line {
                 let (worst, mean) = worst_and_mean(&ratios);
                 self.worst_ratio = Some(worst);
                 self.mean_ratio = Some(mean);
+                let largest_mm = errors_mm.iter().map(|[_, pid]| *pid);
+                self.pid_um = Some(1e3 * largest_mm.fold(0.0, f64::max));
                 let count_mm = subject.parameters.resolution_mm;
                 let worse = errors_mm
                     .iter()

@@ -148,8 +148,9 @@ impl RandomAxis {
             log_uniform(&mut random, 120.0, 1200.0),
         );
         if random.random::<f64>() < 0.2 {
-            // What hangs, and friction holds.
-            parameters.imperfections.gravity_v = level_v * random.random_range(-0.6..0.6);
+            // What hangs, and friction holds, at rest and sliding, in its weaker direction too.
+            let holding_v = (1.0 - f64::abs(asymmetry)) * level_v.min(breakaway_v);
+            parameters.imperfections.gravity_v = holding_v * random.random_range(-0.6..0.6);
         }
         Self {
             warming,
