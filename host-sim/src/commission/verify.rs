@@ -108,6 +108,39 @@ impl LawResult {
             .map(|pair| pair[0])
     }
 
+    /// Factor on the friction that it feeds forward with which it would have left the least error on the first sine, by the errors
+    /// that the same feedback leaves without; 1 where they do not tell.
+    fn best_scale(&self, without: &Self, drift: &Drift) -> f64 {
+        let (Some(own_s), Some(without_s)) = (self.at_s.first(), without.at_s.first()) else {
+            return 1.0;
+        };
+        let changed = drift.between(*without_s, *own_s);
+        let errors = |law: &Self| -> Vec<f64> {
+            let Recording {
+                reference_mm,
+                position_mm,
+                ..
+            } = &law.recording;
+            let pairs = reference_mm.iter().zip(position_mm);
+            pairs
+                .map(|(reference, position)| reference - position)
+                .collect()
+        };
+        let (mut taken, mut all) = (0.0, 0.0);
+        for (own_mm, without_mm) in errors(self).into_iter().zip(errors(without)) {
+            let without_mm = changed * without_mm;
+            let effect_mm = without_mm - own_mm;
+            taken += without_mm * effect_mm;
+            all += effect_mm * effect_mm;
+        }
+        let scale = taken / all;
+        if scale.is_finite() {
+            scale.clamp(1.0 / MOST_SCALE, MOST_SCALE)
+        } else {
+            1.0
+        }
+    }
+
     /// True if it ran on every sine that the PID ran on, is better on the mean by enough, and worse on none.
     fn is_better_than(&self, pid: &Self, drift: &Drift) -> bool {
         let (worst, mean) = self.against(pid, drift);
@@ -249,7 +282,8 @@ const LEAST_COUNTS: f64 = 4.0;
 const DOMINANT: f64 = 1.0;
 
 /// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, and
-/// less of the best where it is worse than the PID anywhere. Chooses the best of those that are not.
+/// less of the best where it is worse than the PID anywhere, and as much of the chosen one as its errors ask for. Chooses the best of
+/// those that are not worse.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.
@@ -348,11 +382,36 @@ pub fn verify(
         }
         note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
     }
-    let mean = |law: &LawResult| law.against(&pid_alone, &drift).1;
-    let chosen = (1..laws.len())
-        .filter(|&index| laws[index].is_better_than(&pid_alone, &drift))
-        .min_by(|&a, &b| mean(&laws[a]).total_cmp(&mean(&laws[b])))
-        .unwrap_or(0);
+    let choose = |laws: &[LawResult], drift: &Drift| {
+        let mean = |index: &usize| laws[*index].against(&pid_alone, drift).1;
+        (1..laws.len())
+            .filter(|&index| laws[index].is_better_than(&pid_alone, drift))
+            .min_by(|a, b| mean(a).total_cmp(&mean(b)))
+            .unwrap_or(0)
+    };
+    let chosen = choose(&laws, &drift);
+    // What was measured early or slowly may differ by a scale from what acts on the sines.
+    let without = laws.iter().find(|law| {
+        law.settings.feedforward.kind == FeedforwardKind::None
+            && law.settings.feedback == laws[chosen].settings.feedback
+    });
+    let scale = without.map_or(1.0, |without| laws[chosen].best_scale(without, &drift));
+    if (scale - 1.0).abs() > LEAST_CORRECTION {
+        let base = &laws[chosen];
+        let mut settings = base.settings.clone();
+        settings.feedforward.gains.level *= scale;
+        settings.feedforward.gains.gms *= scale;
+        let law = format!("{} x {scale:.2}", base.law);
+        if let Ok((scaled, _)) = bench.try_law(&law, &settings, sines.len()) {
+            let scaled = LawResult {
+                is_share: base.is_share,
+                ..scaled
+            };
+            note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
+            laws.push(scaled);
+        }
+    }
+    let chosen = choose(&laws, &drift);
     // The others are shown, too, after those that ran on every sine.
     laws.extend(kinds.into_iter().map(|(_, law)| law));
     Ok(Verification {
@@ -363,6 +422,9 @@ pub fn verify(
     })
 }
 
+/// Least relative change of the friction that is fed forward that is worth a further trial, and its largest factor.
+const LEAST_CORRECTION: f64 = 0.02;
+const MOST_SCALE: f64 = 1.5;
 /// Name of the PID's further runs.
 const AGAIN: &str = "PID, again";
 
@@ -377,8 +439,8 @@ fn note(drift: &mut Drift, pid: &LawResult) {
 pub(super) fn lasts_s(sines: &[SineTest]) -> f64 {
     let runs = |index: usize| {
         let compared = if index < COMPARED { KINDS.len() } else { 1 };
-        // The PID and the N-PID alone, and the PID again twice.
-        2 + compared + 2 * usize::from(index == 0)
+        // The PID and the N-PID alone, the chosen law once more, and the PID again three times.
+        3 + compared + 3 * usize::from(index == 0)
     };
     sines
         .iter()
@@ -394,7 +456,7 @@ fn one_lasts_s(sine: &SineTest) -> f64 {
 }
 
 /// Runs that all trials make at most, for progress.
-const MOST_RUNS: f64 = 38.0;
+const MOST_RUNS: f64 = 43.0;
 
 struct Bench<'a> {
     test_axis: &'a mut dyn TestAxis,
@@ -613,6 +675,30 @@ mod tests {
         assert!(
             !is_better(&[(0.5, 0.3)], false),
             "stopped on the second sine"
+        );
+    }
+
+    #[test]
+    fn the_scale_that_leaves_the_least_error_is_found_from_two_runs_and_their_times() {
+        let times_s = [0.0, 100.0];
+        let shape = |time: f64| (TAU * time).sin().powi(9);
+        let ran = |error_mm: f64, at_s: f64| LawResult {
+            recording: recording(move |time| -error_mm * shape(time)),
+            at_s: vec![at_s],
+            ..law(&[(error_mm, error_mm)], &[])
+        };
+        // Of the friction, 0.8 is fed forward, and it has grown by a tenth since the run without.
+        let (without, with) = (ran(0.1, times_s[0]), ran(0.11 - 0.08, times_s[1]));
+        let mut drift = Drift::default();
+        for (at_s, error_mm) in times_s.into_iter().zip([0.1, 0.11]) {
+            drift.note(at_s, error_mm);
+        }
+        let scale = with.best_scale(&without, &drift);
+        assert!((scale - 0.11 / 0.08).abs() < 1e-9, "{scale}");
+        assert_eq!(
+            without.best_scale(&without, &Drift::default()),
+            1.0,
+            "nothing to compare"
         );
     }
 
