@@ -467,9 +467,9 @@ const POOR_FIT: f64 = 0.2;
 const REPETITIONS: usize = 2;
 const QUICKER: f64 = 4.0;
 const LARGER: f64 = 2.5;
-const LARGEST_SINE_SHARE: f64 = 0.25;
+pub(super) const LARGEST_SINE_SHARE: f64 = 0.25;
 /// Share of the travel that the slow sine takes at most at first.
-pub(super) const SINE_SHARE: f64 = 0.1;
+const SINE_SHARE: f64 = 0.1;
 /// Factor by which the slowest velocity is raised where the axis sticks and slips.
 const FASTER: f64 = 3.0;
 

@@ -1,6 +1,6 @@
 //! What a commissioning will do to an axis, said before anything moves.
 
-use super::chain::{SINE_SHARE, middle_first, response_settings};
+use super::chain::{LARGEST_SINE_SHARE, middle_first, response_settings};
 use super::commissioned::CommissionSettings;
 use super::guard::FOLLOWING_SHARE;
 use super::verify;
@@ -78,7 +78,7 @@ pub fn plan(info: &AxisInfo, request: &CommissionSettings) -> Vec<Planned> {
     });
     planned.push(Planned {
         step: "pre-sliding friction",
-        within_mm: SINE_SHARE * info.travel_mm,
+        within_mm: LARGEST_SINE_SHARE * info.travel_mm,
         fastest_mm_s: None,
         volts: "the controller's".to_owned(),
         lasts_s: VirginCurveSettings::default().lasts_s(),
@@ -114,7 +114,7 @@ pub fn plan_table(info: &AxisInfo, planned: &[Planned]) -> Table {
         id: "plan".to_owned(),
         caption: format!(
             "What the {} axis will do: about {:.0} min of axis time, within {:.1} mm either way{beside}. An experiment ends when the axis is {:.1} \
-             mm beside its plan, or too fast to stop in time. Positions are known to a count of {} um: errors of two counts are \
+             mm beside its plan, or too fast to stop in time; it is then repeated more gently, which adds to the time. Positions are known to a count of {} um: errors of two counts are \
              the least that can be told",
             info.name,
             total_s / 60.0,
