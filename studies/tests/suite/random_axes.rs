@@ -14,14 +14,15 @@ fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse
         let refused = [Outcome::Refused, Outcome::RefusedWrongly].contains(&line.outcome);
         assert!(!refused || !line.reason.is_empty(), "{line:?}");
     }
-    let rigid = lines
+    let commissioned = lines
         .iter()
-        .filter(|line| RandomAxis::new(line.seed).is_rigid());
-    let commissioned = rigid
-        .clone()
-        .filter(|line| line.outcome == Outcome::Commissioned);
-    let (all, commissioned) = (rigid.count(), commissioned.count());
-    assert!(5 * commissioned >= 4 * all, "{commissioned} of {all}");
+        .filter(|line| line.outcome == Outcome::Commissioned)
+        .count();
+    assert!(
+        10 * commissioned >= 9 * lines.len(),
+        "{commissioned} of {}",
+        lines.len()
+    );
 }
 
 #[test]
