@@ -61,7 +61,7 @@ impl<'a> Watched<'a> {
     }
 
     fn words(&self) -> Vec<u32> {
-        self.capture.words(0).collect()
+        self.capture.words::<f32>(0).collect()
     }
 
     fn ticks(&self) -> Vec<u32> {
@@ -96,10 +96,10 @@ fn a_capture_keeps_its_share_from_before_the_trigger() {
     assert_eq!(watched.run(1000), 0, "it stays as it is");
     assert!(watched.ticks().into_iter().eq(470..570));
     // Pages join without a seam, and there is nothing behind the end.
-    let pages = [0, 60, 120, 180].map(|offset| watched.capture.words(offset).take(60));
+    let pages = [0, 60, 120, 180].map(|offset| watched.capture.words::<f32>(offset).take(60));
     assert!(pages.into_iter().flatten().eq(watched.words()));
-    assert_eq!(watched.capture.words(200).len(), 0);
-    assert_eq!(watched.capture.words(usize::MAX).len(), 0);
+    assert_eq!(watched.capture.words::<f32>(200).len(), 0);
+    assert_eq!(watched.capture.words::<f32>(usize::MAX).len(), 0);
 }
 
 #[test]

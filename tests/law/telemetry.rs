@@ -274,8 +274,8 @@ proptest! {
         let mut blocks: Vec<TelemetryBlock> = Vec::new();
         for sample in &sent {
             // A sample of a selection that is over changes nothing.
-            prop_assert_eq!(packer.push(&Sample { generation: 0, ..*sample }), None);
-            blocks.extend(packer.push(sample));
+            prop_assert_eq!(packer.push::<f32>(&Sample { generation: 0, ..*sample }), None);
+            blocks.extend(packer.push::<f32>(sample));
         }
         blocks.extend(packer.flush());
         prop_assert_eq!(packer.flush(), None);
@@ -309,7 +309,7 @@ fn a_full_block_is_given_without_waiting_for_a_flush() {
     let selection = Selection::new(&[channel("x.error"); 8], 1).expect("eight");
     let mut packer = Packer::new(&selection, 1);
     let blocks: Vec<_> = (0..140)
-        .filter_map(|k| packer.push(&numbered(k, 8)))
+        .filter_map(|k| packer.push::<f32>(&numbered(k, 8)))
         .collect();
     assert_eq!(
         blocks.len(),

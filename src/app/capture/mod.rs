@@ -10,7 +10,7 @@ use core::fmt;
 
 use quadrant_link::message::{CaptureCause, CapturePhase, CaptureRecord, Trigger};
 
-use crate::app::telemetry::{Observation, Selection, SelectionError};
+use crate::app::telemetry::{Observation, Selection, SelectionError, shown};
 use crate::law::scalar::Scalar;
 use trigger::Watch;
 
@@ -233,15 +233,19 @@ impl<'a> Capture<'a> {
     }
 
     /// The words of a frozen capture from `offset` on: sample after sample, the oldest first, the channels in the
-    /// order of the selection. None unless frozen. Slow half only.
-    pub fn words(&self, offset: usize) -> impl ExactSizeIterator<Item = u32> + '_ {
+    /// order of the selection. None unless frozen. `S`: the law's number type. Slow half only.
+    pub fn words<S: Scalar>(&self, offset: usize) -> impl ExactSizeIterator<Item = u32> + '_ {
+        let channels = self.selection.as_ref().map_or(&[][..], Selection::channels);
         let all = match self.phase {
             CapturePhase::Frozen => self.samples() as usize * self.sample_words,
             _ => 0,
         };
         // The oldest word lies `all` words before the next one.
         let start = self.next_word + self.used_words - all;
-        (offset.min(all)..all).map(move |word| self.words[(start + word) % self.used_words])
+        (offset.min(all)..all).map(move |word| {
+            let raw = self.words[(start + word) % self.used_words];
+            shown::<S>(channels[word % self.sample_words], raw)
+        })
     }
 
     const fn samples(&self) -> u32 {

@@ -53,7 +53,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn next_block(&mut self) -> Option<TelemetryBlock> {
         while let Some(sample) = self.ends.samples.dequeue() {
-            if let Some(block) = self.packer.push(&sample) {
+            if let Some(block) = self.packer.push::<S>(&sample) {
                 return Some(block);
             }
         }
@@ -186,7 +186,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             offset,
             ..WordPage::default()
         };
-        let words = capture.words(offset.into());
+        let words = capture.words::<S>(offset.into());
         let _ = page.words.extend(words.take(BLOCK_WORDS));
         Ok(Reply::Words(page))
     }

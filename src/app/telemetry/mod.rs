@@ -10,6 +10,7 @@ mod sampler;
 mod selection;
 
 pub use packer::Packer;
+pub(crate) use read::shown;
 pub use read::{Observation, read};
 pub use sampler::{Sample, Sampler, SamplerState};
 pub use selection::{Selection, SelectionError};

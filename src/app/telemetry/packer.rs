@@ -1,14 +1,17 @@
 //! The slow half of telemetry: samples into blocks for the link, gaps counted.
 
-use quadrant_link::message::{TelemetryBlock, Words};
+use heapless::Vec;
+use quadrant_link::message::{Channel, MAX_CHANNELS, TelemetryBlock, Words};
 
+use super::read::shown;
 use super::sampler::Sample;
 use super::selection::Selection;
+use crate::law::scalar::Scalar;
 
 /// Makes blocks of samples.
 #[derive(Clone, Debug, Default)]
 pub struct Packer {
-    channels: usize,
+    channels: Vec<Channel, MAX_CHANNELS>,
     generation: u8,
     /// The number that the next sample has, unless some were dropped.
     next: u32,
@@ -20,37 +23,39 @@ impl Packer {
     /// For the samples of a selection; those of any other generation are not let in.
     pub fn new(selection: &Selection, generation: u8) -> Self {
         Self {
-            channels: selection.channels().len(),
+            channels: selection.channels.clone(),
             generation,
             ..Self::default()
         }
     }
 
-    /// Takes a sample. Gives the block that it completes, or that it does not follow on.
-    pub fn push(&mut self, sample: &Sample) -> Option<TelemetryBlock> {
-        if self.channels == 0 || sample.generation != self.generation {
+    /// Takes a sample of the law's number type. Gives the block that it completes, or that it does not follow on.
+    pub fn push<S: Scalar>(&mut self, sample: &Sample) -> Option<TelemetryBlock> {
+        if self.channels.is_empty() || sample.generation != self.generation {
             return None;
         }
         let missing = sample.sequence.wrapping_sub(self.next);
         self.next = sample.sequence.wrapping_add(1);
         self.dropped = self.dropped.wrapping_add(missing);
-        let words = &sample.words[..self.channels];
+        let words = self.channels.iter().zip(sample.words);
+        let words = words.map(|(channel, raw)| shown::<S>(*channel, raw));
         let begun = !self.block.words.is_empty();
-        let appended = begun && missing == 0 && self.block.words.extend(words.iter().copied());
-        let finished = if appended { None } else { self.flush() };
-        if !appended {
-            self.block = TelemetryBlock {
-                generation: self.generation,
-                sequence: sample.sequence,
-                tick: sample.tick,
-                dropped: self.dropped,
-                channels: self.channels as u8,
-                words: Words::new(),
-            };
-            // Cannot fail: a block holds many samples.
-            let _ = self.block.words.extend(words.iter().copied());
+        let appended = begun && missing == 0 && self.block.words.extend(words.clone());
+        if appended {
+            return None;
         }
-        finished
+        let mut begun = TelemetryBlock {
+            generation: self.generation,
+            sequence: sample.sequence,
+            tick: sample.tick,
+            dropped: self.dropped,
+            channels: self.channels.len() as u8,
+            words: Words::new(),
+        };
+        // Cannot fail: a block holds many samples.
+        let _ = begun.words.extend(words);
+        let finished = core::mem::replace(&mut self.block, begun);
+        (!finished.words.is_empty()).then_some(finished)
     }
 
     /// Gives what has been gathered, so that slow samples do not wait for a block to fill.

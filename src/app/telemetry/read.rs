@@ -28,9 +28,58 @@ impl<S: Scalar, const N: usize> Observation<'_, S, N> {
     }
 }
 
-/// Reads a channel's word.
+/// Reads a channel's word as the link has it.
 #[inline(always)]
 pub fn read<S: Scalar, const N: usize>(channel: Channel, seen: &Observation<'_, S, N>) -> u32 {
+    shown::<S>(channel, read_raw(channel, seen))
+}
+
+/// Makes a channel's word as the link has it of a [raw](read_raw) one.
+pub(crate) fn shown<S: Scalar>(channel: Channel, raw: u32) -> u32 {
+    match channel {
+        Channel::Axis(_, signal) => {
+            quantity(signal).map_or(raw, |quantity| S::word_to_f32(raw, quantity).to_bits())
+        }
+        Channel::Stage(_) => raw,
+    }
+}
+
+/// The quantity of a signal that is raw in the law's number type.
+const fn quantity(signal: AxisSignal) -> Option<Quantity> {
+    match signal {
+        AxisSignal::Error => Some(Quantity::Length),
+        AxisSignal::Velocity => Some(Quantity::Velocity),
+        AxisSignal::Proportional
+        | AxisSignal::Integral
+        | AxisSignal::Derivative
+        | AxisSignal::Level
+        | AxisSignal::Viscous
+        | AxisSignal::Gms
+        | AxisSignal::Inertia
+        | AxisSignal::BumplessOffset
+        | AxisSignal::Output
+        | AxisSignal::Injection => Some(Quantity::Voltage),
+        AxisSignal::Reference
+        | AxisSignal::Position
+        | AxisSignal::Code
+        | AxisSignal::LimitedBy
+        | AxisSignal::CodeSum
+        | AxisSignal::Glitch
+        | AxisSignal::FrictionScale
+        | AxisSignal::Learning
+        | AxisSignal::VibrationGate
+        | AxisSignal::ErrorSquares
+        | AxisSignal::ErrorSquaresOff => None,
+    }
+}
+
+/// Reads a channel's raw word: a number of the law in its own type, which takes one load. Who reads the recording
+/// converts it.
+#[inline(always)]
+pub(crate) fn read_raw<S: Scalar, const N: usize>(
+    channel: Channel,
+    seen: &Observation<'_, S, N>,
+) -> u32 {
     match channel {
         Channel::Stage(signal) => read_stage(signal, seen),
         Channel::Axis(name, signal) => match seen.stage.axes().get(name as usize) {
@@ -54,24 +103,23 @@ fn read_axis<S: Scalar, const N: usize>(
     glitch_um: impl FnOnce() -> f32,
 ) -> u32 {
     let seen = axis.telemetry();
-    let volts = |value: S| value.to_f32(Quantity::Voltage).to_bits();
     match signal {
         AxisSignal::Reference => (seen.reference.0 >> 8) as u32,
         AxisSignal::Position => seen.measured.0 as u32,
-        AxisSignal::Error => seen.error.to_f32(Quantity::Length).to_bits(),
-        AxisSignal::Velocity => seen.velocity.to_f32(Quantity::Velocity).to_bits(),
-        AxisSignal::Proportional => volts(seen.feedback.proportional),
-        AxisSignal::Integral => volts(seen.feedback.integral),
-        AxisSignal::Derivative => volts(seen.feedback.derivative),
-        AxisSignal::Level => volts(seen.feedforward.level),
-        AxisSignal::Viscous => volts(seen.feedforward.viscous),
-        AxisSignal::Gms => volts(seen.feedforward.gms),
-        AxisSignal::Inertia => volts(seen.feedforward.inertia),
-        AxisSignal::BumplessOffset => volts(seen.bumpless_offset),
-        AxisSignal::Output => volts(seen.output),
+        AxisSignal::Error => seen.error.to_word(),
+        AxisSignal::Velocity => seen.velocity.to_word(),
+        AxisSignal::Proportional => seen.feedback.proportional.to_word(),
+        AxisSignal::Integral => seen.feedback.integral.to_word(),
+        AxisSignal::Derivative => seen.feedback.derivative.to_word(),
+        AxisSignal::Level => seen.feedforward.level.to_word(),
+        AxisSignal::Viscous => seen.feedforward.viscous.to_word(),
+        AxisSignal::Gms => seen.feedforward.gms.to_word(),
+        AxisSignal::Inertia => seen.feedforward.inertia.to_word(),
+        AxisSignal::BumplessOffset => seen.bumpless_offset.to_word(),
+        AxisSignal::Output => seen.output.to_word(),
         AxisSignal::Code => i32::from(seen.code.0) as u32,
         AxisSignal::LimitedBy => seen.limited_by as u32,
-        AxisSignal::Injection => volts(axis.injected()),
+        AxisSignal::Injection => axis.injected().to_word(),
         AxisSignal::CodeSum => seen.code_sum.wrapping_sub(seen.code.0.into()) as u32,
         AxisSignal::Glitch => glitch_um().to_bits(),
         AxisSignal::FrictionScale => axis.learning().scale().to_bits(),

@@ -31,7 +31,7 @@ pub struct Sample {
     pub tick: u32,
     /// The generation of its selection.
     pub generation: u8,
-    /// The channels' words; those beyond the selection are zero.
+    /// The channels' raw words; those beyond the selection are zero.
     pub words: [u32; MAX_CHANNELS],
 }
 

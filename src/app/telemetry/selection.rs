@@ -5,13 +5,14 @@ use core::fmt;
 use heapless::Vec;
 use quadrant_link::message::{Channel, MAX_CHANNELS};
 
-use super::{Observation, read};
+use super::Observation;
+use super::read::read_raw;
 use crate::law::scalar::Scalar;
 
 /// Channels to sample together, checked.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Selection {
-    channels: Vec<Channel, MAX_CHANNELS>,
+    pub(super) channels: Vec<Channel, MAX_CHANNELS>,
     decimation: u16,
 }
 
@@ -65,7 +66,7 @@ impl Selection {
         self.decimation
     }
 
-    /// Reads every channel into the words given; what they have no room for is left out.
+    /// Reads every channel's raw word into those given; what they have no room for is left out.
     #[inline(always)]
     pub(crate) fn read<S: Scalar, const N: usize>(
         &self,
@@ -73,7 +74,7 @@ impl Selection {
         words: &mut [u32],
     ) {
         for (word, channel) in words.iter_mut().zip(&self.channels) {
-            *word = read(*channel, seen);
+            *word = read_raw(*channel, seen);
         }
     }
 }

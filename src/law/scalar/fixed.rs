@@ -149,6 +149,15 @@ impl Scalar for Fixed {
         to_float(self.0, quantity.fraction_bits())
     }
 
+    #[inline(always)]
+    fn to_word(self) -> u32 {
+        self.0 as u32
+    }
+
+    fn word_to_f32(word: u32, quantity: Quantity) -> f32 {
+        Self(word as i32).to_f32(quantity)
+    }
+
     fn to_f64(self, quantity: Quantity) -> f64 {
         f64::from(self.0) / f64::from(1u32 << quantity.fraction_bits())
     }

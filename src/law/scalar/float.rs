@@ -30,6 +30,15 @@ macro_rules! float_scalar {
                 self as f32
             }
 
+            #[inline(always)]
+            fn to_word(self) -> u32 {
+                (self as f32).to_bits()
+            }
+
+            fn word_to_f32(word: u32, _: Quantity) -> f32 {
+                f32::from_bits(word)
+            }
+
             fn to_f64(self, _: Quantity) -> f64 {
                 f64::from(self)
             }

@@ -34,6 +34,12 @@ pub trait Scalar:
     /// The value as `f32`, for telemetry.
     fn to_f32(self, quantity: Quantity) -> f32;
 
+    /// The value's own bits, of 32-bit types; others become `f32`. For recordings that are read later.
+    fn to_word(self) -> u32;
+
+    /// The value of [`to_word`](Self::to_word)'s bits as `f32`. Not for the tick.
+    fn word_to_f32(word: u32, quantity: Quantity) -> f32;
+
     /// The value as `f64`, for the host's metrics; not for the tick.
     fn to_f64(self, quantity: Quantity) -> f64;
 

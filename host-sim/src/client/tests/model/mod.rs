@@ -161,7 +161,7 @@ impl Model {
             if lose_every
                 .is_none_or(|every| !sample.sequence.is_multiple_of(every) || sample.sequence == 0)
             {
-                block = packer.push(&sample);
+                block = packer.push::<f32>(&sample);
             }
         }
         if let Some(block) = block {
