@@ -160,6 +160,14 @@ impl<S: Scalar> GeneratorState<S> {
     pub(crate) fn hold(&mut self) {
         self.mode = MotionMode::Hold;
     }
+
+    /// Holds, and forgets what waits. The memory of a motion is made anew when it starts.
+    #[inline(always)]
+    pub(crate) fn reset(&mut self) {
+        self.hold();
+        self.waiting = 0;
+        self.stream.clear();
+    }
 }
 
 /// Request of the generator to the axis in a tick, beside the reference.

@@ -890,12 +890,12 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *feedback = FeedbackState::default();
         *filters = FiltersState::default();
         *friction = FeedforwardState::default();
-        *generator = GeneratorState::default();
+        generator.reset();
         *plausibility = self.plausibility.start(shown);
         *preview = [here; PREVIEW_ROOM];
         *pulse = None;
-        *learning = self.learning.resume(learning);
-        *cancelling = self.cancelling.start(cancelling);
+        self.learning.resume(learning);
+        self.cancelling.start(cancelling);
     }
 
     /// Starts or ends a motion, from where the reference stands. Only what
@@ -1154,7 +1154,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(always)]
     fn add_cancelling(&self, state: &mut AxisState<S, N>, changed: bool) -> S {
         if changed {
-            state.cancelling = self.cancelling.start(&state.cancelling);
+            self.cancelling.start(&mut state.cancelling);
         }
         self.cancelling.advance(&mut state.cancelling)
     }
@@ -1232,7 +1232,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             state.feedback = FeedbackState::default();
             state.filters = FiltersState::default();
             state.friction = FeedforwardState::default();
-            state.cancelling = self.cancelling.start(&state.cancelling);
+            self.cancelling.start(&mut state.cancelling);
             state.telemetry.bumpless_offset = S::ZERO;
             self.stop(state);
         }

@@ -339,14 +339,14 @@ impl<S: Scalar> Cancelling<S> {
         self.on
     }
 
-    /// A memory of an axis at rest that knows the speed which was told.
-    pub(crate) fn start(&self, state: &CancellingState<S>) -> CancellingState<S> {
-        CancellingState {
+    /// Forgets all but the speed that was told: the axis is at rest.
+    pub(crate) fn start(&self, state: &mut CancellingState<S>) {
+        *state = CancellingState {
             told: state.told,
             speed: self.wanted(state),
             stale: HARMONICS as u8,
             ..CancellingState::default()
-        }
+        };
     }
 
     /// The speed to be followed.

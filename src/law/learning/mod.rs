@@ -300,16 +300,31 @@ impl<S: Scalar> Learning<S> {
     }
 
     /// Goes on with what was learnt on an axis that is enabled: it is at rest, and so is the model.
-    pub(crate) fn resume(&self, state: &LearningState<S>) -> LearningState<S> {
-        LearningState {
-            deviation: state.deviation,
-            sums: state.sums,
-            shaken: state.shaken,
-            lasting: state.lasting,
-            other: state.other,
-            status: state.status,
-            ..LearningState::default()
-        }
+    pub(crate) fn resume(&self, state: &mut LearningState<S>) {
+        let LearningState {
+            deviation: _,
+            sums: _,
+            shaken: _,
+            lasting: _,
+            other: _,
+            status: _,
+            friction,
+            presliding,
+            closed_loop,
+            gate,
+            saturated,
+            steps,
+            settling,
+            block,
+        } = state;
+        *friction = S::ZERO;
+        *presliding = S::ZERO;
+        *closed_loop = ClosedLoopState::default();
+        *gate = GateState::default();
+        *saturated = false;
+        *steps = 0;
+        *settling = 0;
+        *block = Sums::default();
     }
 
     /// Passes the friction of this tick through the gate, and scales it.

@@ -104,7 +104,12 @@ impl StreamState {
 
     /// Breaks the stream off and forgets what is left of it.
     pub fn clear(&mut self) {
-        *self = Self::default();
+        // Field by field: a whole one, made apart, is copied with the room of both segments.
+        self.current = None;
+        self.left = 0;
+        self.displacement = 0;
+        self.next = None;
+        self.begun = false;
     }
 }
 
