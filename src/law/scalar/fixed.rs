@@ -16,15 +16,14 @@ pub struct Fixed(pub i32);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct FixedGain {
     mantissa: i32,
-    shift: u32,
+    /// `shift - 33`, wrapped: 0 and above shift the upper half of a product to the right, and the bit that rounds is left. Of
+    /// what is below, the complement shifts the signal to the left.
+    right: u32,
 }
 
 impl Default for FixedGain {
     fn default() -> Self {
-        Self {
-            mantissa: 0,
-            shift: LARGEST_SHIFT,
-        }
+        Self::new(0, LARGEST_SHIFT)
     }
 }
 
@@ -100,6 +99,18 @@ impl Neg for Fixed {
 }
 
 impl FixedGain {
+    const fn new(mantissa: i32, shift: u32) -> Self {
+        Self {
+            mantissa,
+            right: shift.wrapping_sub(u32::BITS + 1),
+        }
+    }
+
+    #[inline(always)]
+    const fn shift(self) -> u32 {
+        self.right.wrapping_add(u32::BITS + 1)
+    }
+
     /// The product with a 32-bit signal, before rounding: never overflows.
     #[inline(always)]
     const fn product(self, value: i32) -> i64 {
@@ -109,28 +120,26 @@ impl FixedGain {
     /// The product with a 32-bit signal, rounded to the nearest, saturating.
     #[inline(always)]
     const fn scaled(self, value: i32) -> Fixed {
-        if self.shift > u32::BITS {
+        if self.right < u32::BITS {
             // The lower half of the product is less than the half that rounds, so its upper half is enough.
             let upper = (self.product(value) >> u32::BITS) as i32;
-            Fixed(((upper >> ((self.shift - 1) & 31)) + 1) >> 1)
+            Fixed(((upper >> self.right) + 1) >> 1)
         } else {
-            shifted_product(value, self.mantissa, self.shift)
+            shifted_product(value, self.mantissa, !self.right)
         }
     }
 }
 
-/// `value * factor / 2^shift`, rounded to the nearest, saturating; `shift` is 32 at most.
+/// `value * factor / 2^(32 - left)`, rounded to the nearest, saturating; `left` is 32 at most.
 #[inline(always)]
-const fn shifted_product(value: i32, factor: i32, shift: u32) -> Fixed {
+const fn shifted_product(value: i32, factor: i32, left: u32) -> Fixed {
     // Shifted to the left first, where there is room, so that the upper half of the product is the result, which then fits.
-    let left = (u32::BITS - shift) & 31;
-    let shifted = value << left;
-    if shifted >> left == value && shift != 0 {
-        let product = shifted as i64 * factor as i64;
+    if left < u32::BITS && (value << left) >> left == value {
+        let product = (value << left) as i64 * factor as i64;
         return Fixed((product >> u32::BITS) as i32 + (product as u32 >> 31) as i32);
     }
     cold_path();
-    saturate(round_shift(value as i64 * factor as i64, shift))
+    saturate(round_shift(value as i64 * factor as i64, u32::BITS - left))
 }
 
 impl Scalar for Fixed {
@@ -177,10 +186,7 @@ impl Scalar for Fixed {
         } else {
             (libm::scalbn(fraction, 30), shift)
         };
-        FixedGain {
-            mantissa: rounding::round(mantissa) as i32,
-            shift: shift as u32,
-        }
+        FixedGain::new(rounding::round(mantissa) as i32, shift as u32)
     }
 
     #[inline(always)]
@@ -198,20 +204,20 @@ impl Scalar for Fixed {
         const LIMIT: i64 = (1 << 40) - 1;
         // 40 bits of value and 23 of mantissa fit 64; the last 7 bits of the mantissa weigh 1e-7 of a position error.
         const DROPPED: u32 = 8;
-        if let Ok(value) = i32::try_from(value) {
-            let product = i64::from(value) * i64::from(gain.mantissa >> DROPPED);
-            if gain.shift >= DROPPED {
-                return saturate(round_shift(product, gain.shift - DROPPED));
-            }
+        let shift = gain.shift();
+        if let Ok(value) = i32::try_from(value)
+            && shift >= DROPPED
+        {
+            return FixedGain::new(gain.mantissa >> DROPPED, shift - DROPPED).scaled(value);
         }
         cold_path();
         let value = value.clamp(-LIMIT, LIMIT);
         let mantissa = i64::from(gain.mantissa >> DROPPED);
         let product = value * mantissa;
-        if gain.shift >= DROPPED {
-            saturate(round_shift(product, gain.shift - DROPPED))
+        if shift >= DROPPED {
+            saturate(round_shift(product, shift - DROPPED))
         } else {
-            saturate(product.saturating_mul(1 << (DROPPED - gain.shift)))
+            saturate(product.saturating_mul(1 << (DROPPED - shift)))
         }
     }
 
@@ -222,7 +228,8 @@ impl Scalar for Fixed {
 
     #[inline(always)]
     fn times(self, factor: Self, factor_quantity: Quantity) -> Self {
-        shifted_product(self.0, factor.0, factor_quantity.fraction_bits())
+        let left = u32::BITS - factor_quantity.fraction_bits();
+        shifted_product(self.0, factor.0, left)
     }
 
     #[inline(always)]
@@ -259,10 +266,15 @@ impl Scalar for Fixed {
     #[inline(always)]
     fn accumulate(self, sum: i64, gain: FixedGain) -> i64 {
         let product = gain.product(self.0);
-        let term = if gain.shift >= SUM_EXTRA_BITS {
-            round_shift(product, gain.shift - SUM_EXTRA_BITS)
+        let term = if gain.right < u32::BITS {
+            // As `round_shift` does, but each half by itself: a shift of both by an unknown number asks whether it is above 31.
+            let (lower, upper) = (product as u32, (product >> u32::BITS) as i32);
+            let lower = lower >> gain.right | ((upper << 1) << (31 - gain.right)) as u32;
+            let upper = upper >> gain.right;
+            ((i64::from(upper) << u32::BITS | i64::from(lower)) + 1) >> 1
         } else {
-            product.saturating_mul(1 << (SUM_EXTRA_BITS - gain.shift))
+            cold_path();
+            product.saturating_mul(1 << (SUM_EXTRA_BITS - gain.shift()))
         };
         sum.saturating_add(term)
     }
@@ -303,8 +315,8 @@ mod tests {
     fn a_product_is_rounded_as_a_wide_one_is() {
         let wide = |value: i32, gain: FixedGain| {
             let product = i128::from(value) * i128::from(gain.mantissa);
-            let half = (1i128 << gain.shift) >> 1;
-            let rounded = (product + half) >> gain.shift;
+            let half = (1i128 << gain.shift()) >> 1;
+            let rounded = (product + half) >> gain.shift();
             rounded.clamp(i32::MIN.into(), i32::MAX.into()) as i32
         };
         let mut value = 1i32;
@@ -312,9 +324,32 @@ mod tests {
             value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
             let mantissa = value.rotate_left(7) >> 1;
             for shift in 0..=LARGEST_SHIFT {
-                let gain = FixedGain { mantissa, shift };
+                let gain = FixedGain::new(mantissa, shift);
                 for value in [value, value >> (step % 31), i32::MIN, i32::MAX] {
                     assert_eq!(gain.scaled(value).0, wide(value, gain));
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_sum_takes_a_product_rounded_as_a_wide_one_is() {
+        let wide = |value: i32, gain: FixedGain, sum: i64| {
+            let product = (i128::from(value) * i128::from(gain.mantissa)) << SUM_EXTRA_BITS;
+            let half = (1i128 << gain.shift()) >> 1;
+            let term = (product + half) >> gain.shift();
+            let term = term.clamp(i64::MIN.into(), i64::MAX.into());
+            (i128::from(sum) + term).clamp(i64::MIN.into(), i64::MAX.into()) as i64
+        };
+        let mut value = 1i32;
+        for step in 0..300_000 {
+            value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let mantissa = value.rotate_left(7) >> 1;
+            for shift in 0..=LARGEST_SHIFT {
+                let gain = FixedGain::new(mantissa, shift);
+                let sum = i64::from(value.rotate_left(3)) << (step % 32);
+                for value in [value, value >> (step % 31), i32::MIN, i32::MAX] {
+                    assert_eq!(Fixed(value).accumulate(sum, gain), wide(value, gain, sum));
                 }
             }
         }
