@@ -34,7 +34,13 @@ impl EncoderReading {
     /// True if nothing is wrong with the reading and no index pulse passed.
     #[inline(always)]
     pub(crate) const fn is_plain(&self) -> bool {
-        self.index.is_none() && self.fresh && self.valid
+        self.index.is_none() && self.is_good()
+    }
+
+    /// True if nothing is wrong with the reading.
+    #[inline(always)]
+    pub(crate) const fn is_good(&self) -> bool {
+        self.fresh & self.valid
     }
 }
 

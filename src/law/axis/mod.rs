@@ -27,6 +27,7 @@
 pub mod telemetry;
 
 use core::fmt;
+use core::hint::cold_path;
 
 use self::telemetry::{AxisTelemetry, LimitedBy};
 use crate::law::cancelling::{
@@ -697,11 +698,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             && self.encoder.is_plausible(counts)
             && self.is_slow(state)
             && reading.is_plain();
-        if usual {
-            Ok(())
-        } else {
-            self.examine(state, reading, counts, alive, watched)
+        if !usual {
+            return self.examine(state, reading, counts, alive, watched);
         }
+        Ok(())
     }
 
     /// True if the measured speed is within its limits.
@@ -728,6 +728,11 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             Some(raw) => self.take_pulse(state, raw),
             None => true,
         };
+        // An index pulse, and nothing wrong.
+        if indexed && possible && slow && alive && watched.is_ok() && reading.is_good() {
+            return Ok(());
+        }
+        cold_path();
         let agrees = watched != Err(FaultCode::EncoderImplausible);
         // Where counts may be lost, so is the origin.
         if [reading.valid, possible, indexed, agrees].contains(&false) {
@@ -823,6 +828,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
+    #[inline(always)]
     fn take_pulse(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
         let at = self.encoder.count_at(&state.encoder, raw);
         state.pulse = Some(at.position());

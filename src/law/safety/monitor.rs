@@ -180,8 +180,7 @@ impl IndexSpacing {
     }
 
     /// Takes the count at an index pulse, its low 32 bits; returns true if it fits the last one.
-    #[cold]
-    #[inline(never)]
+    #[inline(always)]
     pub fn step(&self, state: &mut IndexState, count: u32) -> bool {
         let last = state.last.replace(count);
         let Some(last) = last else {
