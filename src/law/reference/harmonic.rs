@@ -98,7 +98,7 @@ enum Lead {
 }
 
 /// One, as a Q31 phase speed or lead progress.
-const ONE: u64 = 1 << 31;
+const ONE: u32 = 1 << 31;
 
 /// A sine times an amplitude split in counts and 2^-16 counts, in 2^-16 counts.
 #[inline(always)]
@@ -110,8 +110,15 @@ fn swing(sine: i32, counts: i32, fraction: i32) -> i64 {
 
 /// `rate` times a Q31 factor.
 #[inline(always)]
-fn scaled_phase(rate: u64, factor: u64) -> u64 {
+fn scaled_phase(rate: u64, factor: u32) -> u64 {
+    let factor = u64::from(factor);
     (((rate >> 32) * factor) << 1) + (((rate & 0xFFFF_FFFF) * factor) >> 31)
+}
+
+/// The product of two Q31 numbers from 0 to 1.
+#[inline(always)]
+fn product(a: u32, b: u32) -> u32 {
+    ((u64::from(a) * u64::from(b)) >> 31) as u32
 }
 
 impl<S: Scalar> Harmonic<S> {
@@ -226,19 +233,20 @@ impl<S: Scalar> Harmonic<S> {
     #[inline(never)]
     fn step_lead(&self, state: &mut MotionState, tick: u32, leaving: bool) -> ReferenceSample<S> {
         // The middle of the tick, so that lead-in and lead-out are mirror images. lead_ticks fits 31 bits.
-        let progress = (u64::from(2 * tick + 1) * self.lead_step) >> 32;
-        let square = (progress * progress) >> 31;
-        let speed = (square * (3 * ONE - 2 * progress)) >> 31;
+        let progress = ((u64::from(2 * tick + 1) * self.lead_step) >> 32) as u32;
+        let square = product(progress, progress);
+        let factor = 3 * u64::from(ONE) - 2 * u64::from(progress);
+        let speed = ((u64::from(square) * factor) >> 31) as u32;
         let (full, cosine) = self.turn(state, scaled_phase(self.phase_per_tick, speed));
 
-        let fraction = |q31: u64| S::scale_integer((q31 >> 1) as i32, self.q30);
+        let fraction = |q31: u32| S::scale_integer((q31 >> 1) as i32, self.q30);
         let ratio = fraction(speed);
         let centripetal = full
             .acceleration
             .times(ratio, Quantity::Fraction)
             .times(ratio, Quantity::Fraction);
         // The slope of the smooth step over its largest, 4 p (1 - p).
-        let slope = fraction((progress * (ONE - progress)) >> 29);
+        let slope = fraction(((u64::from(progress) * u64::from(ONE - progress)) >> 29) as u32);
         let along = S::scale_integer(cosine, self.tangential).times(slope, Quantity::Fraction);
         ReferenceSample {
             velocity: full.velocity.times(ratio, Quantity::Fraction),
