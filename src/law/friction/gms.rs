@@ -202,14 +202,11 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         if state.direction != direction {
             state.stick(direction);
         }
-        let slip = |force: S, share: S| {
-            along(share + (along(force) - share).times(sliding.decay, Quantity::Fraction))
-        };
         let elements = self.elements.iter().zip(&mut state.forces);
         let mut total = S::ZERO;
         if state.slipping == Self::ALL {
             for (element, force) in elements {
-                *force = slip(*force, sliding.level.scale(element.weight));
+                *force = sliding.slip(*force, sliding.level.scale(element.weight), &along);
                 total = total + *force;
             }
             return total;
@@ -218,7 +215,7 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         for ((element, force), bit) in elements.zip((0..N).map(|index| 1 << index)) {
             let share = sliding.level.scale(element.weight);
             if slipping & bit != 0 {
-                *force = slip(*force, share);
+                *force = sliding.slip(*force, share, &along);
             } else {
                 let trial = *force + displacement.scale(element.stiffness);
                 // Not so if the trial is not a number.

@@ -149,6 +149,13 @@ fn decay(attraction_v_s: f64, step_s: f64, level_v: f64) -> f64 {
 }
 
 impl<S: Scalar> Sliding<S> {
+    /// The force of an element that slips, one step after `force`: it nears its share of the level. `along` turns a force into
+    /// its component along the motion, and back.
+    #[inline(always)]
+    pub(super) fn slip(&self, force: S, share: S, along: impl Fn(S) -> S) -> S {
+        along(share + (along(force) - share).times(self.decay, Quantity::Fraction))
+    }
+
     /// A surface whose level does not depend on velocity: the one that GMS alone slides on.
     pub fn constant(level_v: f64, attraction_v_s: f64, step_s: f64) -> Self {
         Self {
