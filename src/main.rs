@@ -123,8 +123,10 @@ mod app {
         requests_out: Consumer<'static, Command>,
         commands_in: Producer<'static, Command>,
         commands_out: Consumer<'static, Command>,
-        snapshots_in: Producer<'static, Snapshot<Number>>,
-        snapshots_out: Consumer<'static, Snapshot<Number>>,
+        snapshots_in: Producer<'static, &'static mut Snapshot<Number>>,
+        snapshots_out: Consumer<'static, &'static mut Snapshot<Number>>,
+        rooms_in: Producer<'static, &'static mut Snapshot<Number>>,
+        rooms_out: Consumer<'static, &'static mut Snapshot<Number>>,
         glitches_in: Producer<'static, GlitchReadings>,
         glitches_out: Consumer<'static, GlitchReadings>,
         events_in: Producer<'static, (u32, Event)>,
@@ -138,7 +140,9 @@ mod app {
         storage: StaticStorage<Number, SettingsFlash> = StaticStorage::new(),
         requests: Queue<Command, 4> = Queue::new(),
         commands: Queue<Command, 4> = Queue::new(),
-        snapshots: Queue<Snapshot<Number>, 4> = Queue::new(),
+        snapshots: Queue<&'static mut Snapshot<Number>, 4> = Queue::new(),
+        rooms: Queue<&'static mut Snapshot<Number>, 4> = Queue::new(),
+        storage_of_rooms: [Option<Snapshot<Number>>; 3] = [None; 3],
         glitches: Queue<GlitchReadings, 2> = Queue::new(),
         events: Queue<(u32, Event), 16> = Queue::new(),
         lines: Queue<LogEntry<Number>, 16> = Queue::new(),
@@ -158,6 +162,11 @@ mod app {
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
         let (snapshots_in, snapshots_out) = cx.local.snapshots.split();
+        let (mut rooms_in, rooms_out) = cx.local.rooms.split();
+        for room in cx.local.storage_of_rooms {
+            // The queue has room for all.
+            let _ = rooms_in.enqueue(room.get_or_insert_default());
+        }
         let (glitches_in, glitches_out) = cx.local.glitches.split();
         let (events_in, events_out) = cx.local.events.split();
         let (lines_in, lines_out) = cx.local.lines.split();
@@ -182,6 +191,8 @@ mod app {
             commands_out,
             snapshots_in,
             snapshots_out,
+            rooms_in,
+            rooms_out,
             glitches_in,
             glitches_out,
             events_in,
@@ -203,7 +214,7 @@ mod app {
     /// panic, divide by a helper or compute in f64 can be reached from here (`cargo xtask prove-no-panic`).
     #[task(binds = CONTROL_TICK, priority = 4, local = [
         control, encoders, switches, operator, amplifiers, tick, requests_in, commands_out, snapshots_in,
-        glitches_out, deadline_missed: bool = false,
+        rooms_out, glitches_out, deadline_missed: bool = false,
     ])]
     fn control(cx: control::Context) {
         let began_late = cx.local.tick.begin();
@@ -242,7 +253,11 @@ mod app {
         let elapsed = cx.local.tick.elapsed_cycles();
         if control.observe(elapsed) {
             // A supervising task that is late finds the oldest snapshots and misses the newest.
-            let _ = cx.local.snapshots_in.enqueue(control.snapshot());
+            if let Some(room) = cx.local.rooms_out.dequeue() {
+                control.take_snapshot(room);
+                // As long as there are rooms: it never fails.
+                let _ = cx.local.snapshots_in.enqueue(room);
+            }
             let _ = supervise::spawn();
             if let Some(readings) = cx.local.glitches_out.dequeue() {
                 control.show_glitches(readings);
@@ -265,7 +280,7 @@ mod app {
     /// Receives from the link; passes the operator's requests to the control law or refuses them, reports events to log and
     /// server, and feeds the watchdog while all tasks make progress.
     #[task(priority = 2, shared = [seen, port], local = [
-        intake, snapshots_out, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
+        intake, snapshots_out, rooms_in, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
         runs: u32 = 0,
     ])]
     async fn supervise(mut cx: supervise::Context) {
@@ -278,7 +293,7 @@ mod app {
         }
         while let Some(snapshot) = cx.local.snapshots_out.dequeue() {
             let request = cx.local.requests_out.dequeue();
-            let supervised = cx.local.supervision.run(&snapshot, request);
+            let supervised = cx.local.supervision.run(snapshot, request);
             if let Some(command) = supervised.command {
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
@@ -314,7 +329,9 @@ mod app {
             if let Some(silent_ms) = cx.local.liveness.warning_ms() {
                 log::warn_of_watchdog(silent_ms);
             }
-            cx.shared.seen.lock(|seen| *seen = snapshot);
+            cx.shared.seen.lock(|seen| *seen = *snapshot);
+            // There are as many rooms as it has places.
+            let _ = cx.local.rooms_in.enqueue(snapshot);
         }
         let _ = serve::spawn();
     }

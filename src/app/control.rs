@@ -167,15 +167,20 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         self.state.tick().is_multiple_of(PERIOD_TICKS)
     }
 
-    /// The supervising task's view of the last tick. By itself, as an `Option` of it would be copied once more.
-    #[inline(always)]
+    /// The supervising task's view of the last tick.
     pub fn snapshot(&self) -> Snapshot<S> {
-        Snapshot {
-            switches: self.switches,
-            orders: self.orders,
-            plan_taken: self.plan_taken,
-            ..Snapshot::of(&self.stage(), &self.state)
-        }
+        let mut snapshot = Snapshot::default();
+        self.take_snapshot(&mut snapshot);
+        snapshot
+    }
+
+    /// Puts the supervising task's view of the last tick in the place of an older one.
+    #[inline(never)]
+    pub fn take_snapshot(&self, snapshot: &mut Snapshot<S>) {
+        snapshot.renew(&self.stage(), &self.state);
+        snapshot.switches = self.switches;
+        snapshot.orders = self.orders;
+        snapshot.plan_taken = self.plan_taken;
     }
 
     /// Chooses the command of this tick. `unfit`: the settings are no longer those of a commissioned stage.

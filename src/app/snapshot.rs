@@ -57,30 +57,33 @@ pub struct Snapshot<S> {
 
 impl<S: Scalar> Snapshot<S> {
     /// Takes a snapshot of the stage, which has taken no order yet and whose inputs are not known.
-    #[inline(always)]
     pub fn of(stage: &StageRef<'_, S>, state: &StageState<S, FIRMWARE_ELEMENTS>) -> Self {
-        Self {
-            tick: state.tick(),
-            view: stage.view(state),
-            switches: Switches::NONE,
-            indexed: state.axes().by_ref().map(AxisState::is_indexed),
-            axes: state.axes().each_ref().map(|axis| {
-                let telemetry = axis.telemetry();
-                AxisSnapshot {
-                    measured: telemetry.measured,
-                    reference: telemetry.reference,
-                    ahead: axis.reference(),
-                    error: telemetry.error,
-                    output: telemetry.output,
-                    limited_by: telemetry.limited_by,
-                    following: axis.following(),
-                    learning: axis.learning().reading(),
-                }
-            }),
-            injection: state.injection_progress(),
-            orders: 0,
-            plan_taken: false,
+        let mut snapshot = Self::default();
+        snapshot.renew(stage, state);
+        snapshot
+    }
+
+    /// Takes a snapshot of the stage in the place of an older one; what control alone knows stays.
+    // Field by field: a whole one is more than the registers hold, and passes through the stack.
+    #[inline(always)]
+    pub fn renew(&mut self, stage: &StageRef<'_, S>, state: &StageState<S, FIRMWARE_ELEMENTS>) {
+        for (place, axis) in self.axes.iter_mut().zip(state.axes()) {
+            let telemetry = axis.telemetry();
+            *place = AxisSnapshot {
+                measured: telemetry.measured,
+                reference: telemetry.reference,
+                ahead: axis.reference(),
+                error: telemetry.error,
+                output: telemetry.output,
+                limited_by: telemetry.limited_by,
+                following: axis.following(),
+                learning: axis.learning().reading(),
+            };
         }
+        self.tick = state.tick();
+        self.indexed = state.axes().by_ref().map(AxisState::is_indexed);
+        self.injection = state.injection_progress();
+        self.view = stage.view(state);
     }
 }
 
