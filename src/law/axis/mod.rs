@@ -108,6 +108,8 @@ pub struct Axis<S: Scalar, const N: usize> {
     amplifier: Amplifier<S>,
     bumpless_decay: S,
     travel: Travel,
+    /// It learns or cancels.
+    adapts: bool,
     learns: bool,
     cancels: bool,
     feedback: Feedback<S>,
@@ -217,6 +219,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.reduced_speed = u32::MAX;
         axis.generator = ReferenceGenerator::default();
         axis.commissioning = Commissioning::Done;
+        axis.adapts = false;
         axis.learns = false;
         axis.learning = Learning::off();
         axis.cancels = false;
@@ -340,6 +343,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     pub fn learning(self, learning: Learning<S>) -> Self {
         self.axis.learns = learning.is_on();
         self.axis.learning = learning;
+        self.axis.adapts = self.axis.learns | self.axis.cancels;
         self
     }
 
@@ -350,6 +354,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
             self.axis.cancelling.build_over(settings, of, self.period_s);
         }
         self.axis.cancels = self.axis.cancelling.is_on();
+        self.axis.adapts = self.axis.learns | self.axis.cancels;
         self
     }
 
@@ -649,6 +654,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             reduced_speed: u32::MAX,
             generator: ReferenceGenerator::default(),
             commissioning: Commissioning::Inert,
+            adapts: false,
             learns: false,
             learning: Learning::off(),
             cancels: false,
@@ -761,11 +767,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Compares the encoder with the plant, and watches the load.
     #[inline(never)]
     fn compare(&self, state: &mut AxisState<S, N>) -> Result<(), FaultCode> {
-        if self.learns {
-            self.learn(state);
-        }
-        if self.cancels {
-            self.cancel(state);
+        if self.adapts {
+            if self.learns {
+                self.learn(state);
+            }
+            if self.cancels {
+                self.cancel(state);
+            }
         }
         let shown = state.shown();
         let bears = self
@@ -1120,11 +1128,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         seen.feedforward = self.feedforward.step(&mut state.friction, step);
         let mut total = seen.feedforward.total();
         let error = seen.error;
-        if self.learns {
-            total = self.scale_friction(state, changed);
-        }
-        if self.cancels {
-            total = total + self.add_cancelling(state, changed);
+        if self.adapts {
+            if self.learns {
+                total = self.scale_friction(state, changed);
+            }
+            if self.cancels {
+                total = total + self.add_cancelling(state, changed);
+            }
         }
         let input = FeedbackInput {
             error,
@@ -1187,6 +1197,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         telemetry.code = code;
         telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
         telemetry.limited_by = if telemetry.feedback.saturated {
+            cold_path();
             state.learning.saturate();
             state.cancelling.saturate();
             LimitedBy::OutputLimit
