@@ -307,15 +307,9 @@ mod tests {
     fn a_loop_that_runs_away_is_stopped_within_the_travel_and_its_frequency_is_known() {
         for frequency_hz in [35.0, 60.0, 90.0] {
             let mut parameters = x();
-            let reduced = 0.25 / parameters.gain_mm_per_v_s2;
-            let natural_rad_s = std::f64::consts::TAU * frequency_hz;
-            parameters.drive = DriveTrain::RackAndPinion(Backlash {
-                width_mm: 0.0,
-                stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-                damping_v_s_per_mm: 0.04 * reduced * natural_rad_s,
-                motor_share: 0.5,
-                encoder: EncoderSide::Load,
-            });
+            let gain = parameters.gain_mm_per_v_s2;
+            let spring = Backlash::resonating(frequency_hz, 0.02, 0.5, gain, EncoderSide::Load);
+            parameters.drive = DriveTrain::RackAndPinion(spring);
             let mut axis = SimulatedTestAxis::new(0, parameters, 1).with_travel_mm(TRAVEL_MM);
             let base = StageSettings::simulated().axes[0].clone();
             let mut guard = Guard::new(&mut axis);

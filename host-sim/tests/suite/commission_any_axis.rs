@@ -261,15 +261,9 @@ fn on_a_spring(
     frequency_hz: f64,
     encoder: EncoderSide,
 ) -> AxisParameters {
-    let reduced = 0.25 / axis.gain_mm_per_v_s2;
-    let natural_rad_s = std::f64::consts::TAU * frequency_hz;
-    axis.drive = Drive::RackAndPinion(Backlash {
-        width_mm: 0.0,
-        stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-        damping_v_s_per_mm: 0.06 * reduced * natural_rad_s,
-        motor_share: 0.5,
-        encoder,
-    });
+    let gain = axis.gain_mm_per_v_s2;
+    let spring = Backlash::resonating(frequency_hz, 0.03, 0.5, gain, encoder);
+    axis.drive = Drive::RackAndPinion(spring);
     axis
 }
 

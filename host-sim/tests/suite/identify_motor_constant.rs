@@ -1,7 +1,5 @@
 //! The motor constant of the simulated stage's axes, judged against their truth.
 
-use std::f64::consts::TAU;
-
 use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantError, MotorConstantSettings, evaluate, measure, measure_gently,
 };
@@ -125,16 +123,9 @@ fn a_recording_of_something_else_is_refused() {
 /// The x axis at a third of its mass, its motor on a spring, with the encoder on the motor.
 fn on_a_soft_spring(frequency_hz: f64) -> AxisParameters {
     let mut truth = StageParameters::real().axes[0].clone().with_mass(0.33);
-    let motor_share = 0.5;
-    let reduced = motor_share * (1.0 - motor_share) / truth.gain_mm_per_v_s2;
-    let natural_rad_s = TAU * frequency_hz;
-    truth.drive = Drive::RackAndPinion(Backlash {
-        width_mm: 0.0,
-        stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-        damping_v_s_per_mm: 0.06 * reduced * natural_rad_s,
-        motor_share,
-        encoder: EncoderSide::Motor,
-    });
+    let gain = truth.gain_mm_per_v_s2;
+    let spring = Backlash::resonating(frequency_hz, 0.03, 0.5, gain, EncoderSide::Motor);
+    truth.drive = Drive::RackAndPinion(spring);
     truth
 }
 

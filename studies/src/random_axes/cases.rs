@@ -1,7 +1,5 @@
 //! Named axes unlike the simulated stage's: each with one thing that a commissioning may stumble over.
 
-use std::f64::consts::TAU;
-
 use quadrant::friction::dahl::DahlParameters;
 use quadrant::friction::lugre::LugreParameters;
 use quadrant_cli::say;
@@ -46,15 +44,13 @@ fn with_levels(mut axis: AxisParameters, coulomb: f64, breakaway: f64) -> AxisPa
 
 fn resonant(frequency_hz: f64, encoder: EncoderSide) -> AxisParameters {
     let mut axis = x();
-    let reduced = MOTOR_SHARE * (1.0 - MOTOR_SHARE) / axis.gain_mm_per_v_s2;
-    let natural_rad_s = TAU * frequency_hz;
-    axis.drive = Drive::RackAndPinion(Backlash {
-        width_mm: 0.0,
-        stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-        damping_v_s_per_mm: 2.0 * DAMPING * reduced * natural_rad_s,
-        motor_share: MOTOR_SHARE,
+    axis.drive = Drive::RackAndPinion(Backlash::resonating(
+        frequency_hz,
+        DAMPING,
+        MOTOR_SHARE,
+        axis.gain_mm_per_v_s2,
         encoder,
-    });
+    ));
     axis
 }
 

@@ -1,6 +1,5 @@
 //! Random axes.
 
-use std::f64::consts::TAU;
 use std::fmt;
 
 use quadrant::friction::PerDirection;
@@ -122,15 +121,11 @@ impl RandomAxis {
                 backlash_mm = random.random_range(0.0..0.010);
             }
             let motor_share = random.random_range(0.3..0.7);
-            let reduced = motor_share * (1.0 - motor_share) / parameters.gain_mm_per_v_s2;
-            let natural_rad_s = TAU * frequency_hz;
             let damping = log_uniform(&mut random, 0.01, 0.1);
+            let gain = parameters.gain_mm_per_v_s2;
             parameters.drive = Drive::RackAndPinion(Backlash {
                 width_mm: backlash_mm,
-                stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-                damping_v_s_per_mm: 2.0 * damping * reduced * natural_rad_s,
-                motor_share,
-                encoder,
+                ..Backlash::resonating(frequency_hz, damping, motor_share, gain, encoder)
             });
             resonance = Some((frequency_hz, encoder));
         } else if drive < 0.6 {

@@ -64,14 +64,28 @@ impl Backlash {
     /// A gap between equal halves of a mass of which a volt accelerates the whole by `gain_mm_per_v_s2`: teeth that
     /// oscillate against each other at 500 Hz with a damping ratio of 0.1.
     pub fn chosen(width_mm: f64, gain_mm_per_v_s2: f64, encoder: EncoderSide) -> Self {
-        let motor_share = 0.5;
-        // The reduced mass is a b of the whole, a and b the shares.
-        let reduced = motor_share * (1.0 - motor_share) / gain_mm_per_v_s2;
-        let natural_rad_s = TAU * 500.0;
         Self {
             width_mm,
+            ..Self::resonating(500.0, 0.1, 0.5, gain_mm_per_v_s2, encoder)
+        }
+    }
+
+    /// No gap, but a spring on which motor and table oscillate against each other at a frequency in Hz with a damping ratio; the motor
+    /// has a share of the mass, of which a volt accelerates the whole by `gain_mm_per_v_s2`.
+    pub fn resonating(
+        frequency_hz: f64,
+        damping_ratio: f64,
+        motor_share: f64,
+        gain_mm_per_v_s2: f64,
+        encoder: EncoderSide,
+    ) -> Self {
+        // The reduced mass is a b of the whole, a and b the shares.
+        let reduced = motor_share * (1.0 - motor_share) / gain_mm_per_v_s2;
+        let natural_rad_s = TAU * frequency_hz;
+        Self {
+            width_mm: 0.0,
             stiffness_v_per_mm: reduced * natural_rad_s * natural_rad_s,
-            damping_v_s_per_mm: 2.0 * 0.1 * reduced * natural_rad_s,
+            damping_v_s_per_mm: 2.0 * damping_ratio * reduced * natural_rad_s,
             motor_share,
             encoder,
         }
