@@ -12,6 +12,7 @@ mod cross_check;
 mod drift;
 mod error;
 mod guard;
+mod linear_model;
 mod models;
 pub mod page;
 mod plan;

@@ -1,8 +1,9 @@
 //! What a commissioning will do to an axis, said before anything moves.
 
-use super::chain::{LARGEST_SINE_SHARE, middle_first, response_settings};
+use super::chain::LARGEST_SINE_SHARE;
 use super::commissioned::CommissionSettings;
 use super::guard::FOLLOWING_SHARE;
+use super::linear_model::{middle_first, response_settings};
 use super::verify;
 use crate::identify::motor_constant::MotorConstantSettings;
 use crate::identify::virgin_curve::VirginCurveSettings;
