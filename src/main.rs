@@ -125,8 +125,8 @@ mod app {
         commands_out: Consumer<'static, Command>,
         snapshots_in: Producer<'static, &'static mut Snapshot<Number>>,
         snapshots_out: Consumer<'static, &'static mut Snapshot<Number>>,
-        rooms_in: Producer<'static, &'static mut Snapshot<Number>>,
-        rooms_out: Consumer<'static, &'static mut Snapshot<Number>>,
+        free_snapshots_in: Producer<'static, &'static mut Snapshot<Number>>,
+        free_snapshots_out: Consumer<'static, &'static mut Snapshot<Number>>,
         glitches_in: Producer<'static, GlitchReadings>,
         glitches_out: Consumer<'static, GlitchReadings>,
         events_in: Producer<'static, (u32, Event)>,
@@ -141,8 +141,8 @@ mod app {
         requests: Queue<Command, 4> = Queue::new(),
         commands: Queue<Command, 4> = Queue::new(),
         snapshots: Queue<&'static mut Snapshot<Number>, 4> = Queue::new(),
-        rooms: Queue<&'static mut Snapshot<Number>, 4> = Queue::new(),
-        storage_of_rooms: [Option<Snapshot<Number>>; 3] = [None; 3],
+        free_snapshots: Queue<&'static mut Snapshot<Number>, 4> = Queue::new(),
+        snapshot_buffers: [Option<Snapshot<Number>>; 3] = [None; 3],
         glitches: Queue<GlitchReadings, 2> = Queue::new(),
         events: Queue<(u32, Event), 16> = Queue::new(),
         lines: Queue<LogEntry<Number>, 16> = Queue::new(),
@@ -162,10 +162,10 @@ mod app {
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
         let (snapshots_in, snapshots_out) = cx.local.snapshots.split();
-        let (mut rooms_in, rooms_out) = cx.local.rooms.split();
-        for room in cx.local.storage_of_rooms {
-            // The queue has room for all.
-            let _ = rooms_in.enqueue(room.get_or_insert_default());
+        let (mut free_snapshots_in, free_snapshots_out) = cx.local.free_snapshots.split();
+        for buffer in cx.local.snapshot_buffers {
+            // The queue has places for all.
+            let _ = free_snapshots_in.enqueue(buffer.get_or_insert_default());
         }
         let (glitches_in, glitches_out) = cx.local.glitches.split();
         let (events_in, events_out) = cx.local.events.split();
@@ -191,8 +191,8 @@ mod app {
             commands_out,
             snapshots_in,
             snapshots_out,
-            rooms_in,
-            rooms_out,
+            free_snapshots_in,
+            free_snapshots_out,
             glitches_in,
             glitches_out,
             events_in,
@@ -214,7 +214,7 @@ mod app {
     /// panic, divide by a helper or compute in f64 can be reached from here (`cargo xtask prove-no-panic`).
     #[task(binds = CONTROL_TICK, priority = 4, local = [
         control, encoders, switches, operator, amplifiers, tick, requests_in, commands_out, snapshots_in,
-        rooms_out, glitches_out, deadline_missed: bool = false,
+        free_snapshots_out, glitches_out, deadline_missed: bool = false,
     ])]
     fn control(cx: control::Context) {
         let began_late = cx.local.tick.begin();
@@ -253,10 +253,10 @@ mod app {
         let elapsed = cx.local.tick.elapsed_cycles();
         if control.observe(elapsed) {
             // A supervising task that is late finds the oldest snapshots and misses the newest.
-            if let Some(room) = cx.local.rooms_out.dequeue() {
-                control.take_snapshot(room);
-                // As long as there are rooms: it never fails.
-                let _ = cx.local.snapshots_in.enqueue(room);
+            if let Some(snapshot) = cx.local.free_snapshots_out.dequeue() {
+                control.take_snapshot(snapshot);
+                // The queue has places for all that there are.
+                let _ = cx.local.snapshots_in.enqueue(snapshot);
             }
             let _ = supervise::spawn();
             if let Some(readings) = cx.local.glitches_out.dequeue() {
@@ -280,7 +280,7 @@ mod app {
     /// Receives from the link; passes the operator's requests to the control law or refuses them, reports events to log and
     /// server, and feeds the watchdog while all tasks make progress.
     #[task(priority = 2, shared = [seen, port], local = [
-        intake, snapshots_out, rooms_in, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
+        intake, snapshots_out, free_snapshots_in, requests_out, commands_in, glitches_in, events_in, lines_in, watchdog, supervision, liveness,
         runs: u32 = 0,
     ])]
     async fn supervise(mut cx: supervise::Context) {
@@ -330,8 +330,8 @@ mod app {
                 log::warn_of_watchdog(silent_ms);
             }
             cx.shared.seen.lock(|seen| *seen = *snapshot);
-            // There are as many rooms as it has places.
-            let _ = cx.local.rooms_in.enqueue(snapshot);
+            // The queue has places for all that there are.
+            let _ = cx.local.free_snapshots_in.enqueue(snapshot);
         }
         let _ = serve::spawn();
     }

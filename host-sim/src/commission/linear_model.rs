@@ -50,27 +50,13 @@ pub(super) fn linear_model(
 ) -> Result<Linear, CommissionError> {
     let mut model = |test_axis: &mut Guard<'_>, motor: &MotorConstant, misjudged: f64| {
         test_axis.slowed_by(by_friction(motor.gain_mm_per_v_s2, motor));
-        let guess = MotorConstant {
-            gain_mm_per_v_s2: misjudged * motor.gain_mm_per_v_s2,
-            ..motor.clone()
-        };
         if middle_first(&test_axis.info()).is_some() {
-            to_the_middle(test_axis, base, &guess)?;
+            to_the_middle(test_axis, base, motor, misjudged)?;
         }
-        let feeds_friction = misjudged != 1.0;
-        let found = under_first_controllers(
-            test_axis,
-            base,
-            request,
-            &guess,
-            feeds_friction,
-            &mut *progress,
-        )?;
+        let found =
+            under_first_controllers(test_axis, base, request, motor, misjudged, &mut *progress)?;
         test_axis.slowed_by(by_friction(found.plant.plant.gain_mm_per_v_s2, motor));
-        Ok(Linear {
-            motor: motor.clone(),
-            ..found
-        })
+        Ok(found)
     };
     let first: CommissionError = match model(test_axis, &motor, 1.0) {
         Ok(found) => return Ok(found),
@@ -101,14 +87,16 @@ pub(super) fn middle_first(info: &AxisInfo) -> Option<f64> {
 /// Share of the travel within which an axis counts as in the middle.
 const NEAR_MIDDLE: f64 = 0.1;
 
-/// Moves the axis to the middle of its travel under the first controller, or a softer one where that oscillates.
+/// Moves the axis to the middle of its travel under the first controller, or a softer one where that oscillates. `misjudged`: factor
+/// on the acceleration per volt that the open-loop test showed.
 fn to_the_middle(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
     motor: &MotorConstant,
+    misjudged: f64,
 ) -> Result<(), CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
-    let gain = motor.gain_mm_per_v_s2;
+    let gain = misjudged * motor.gain_mm_per_v_s2;
     let mut outcome = Ok(());
     for share in BOOTSTRAP_SHARES {
         let settings = soft_bootstrap_settings(base, gain, rate_hz, share);
@@ -123,19 +111,20 @@ fn to_the_middle(
 
 /// The response of the sliding axis under a first controller, the linear model, and the controller that is designed on it. A mode
 /// that the first controller excites spoils them: they are repeated with softer ones, as soft as the frequency demands that was seen.
-/// `feeds_friction`: friction is fed forward from the first of them on, and not just from where the axis lags by it.
+/// `misjudged`: factor on the acceleration per volt that the open-loop test showed; where it is not 1, friction is fed forward from the
+/// first of them on, and not just from where the axis lags by it.
 fn under_first_controllers(
     test_axis: &mut Guard<'_>,
     base: &AxisSettings,
     request: &CommissionSettings,
     motor: &MotorConstant,
-    feeds_friction: bool,
+    misjudged: f64,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Linear, CommissionError> {
     let rate_hz = test_axis.info().rate_hz;
-    let gain = motor.gain_mm_per_v_s2;
+    let gain = misjudged * motor.gain_mm_per_v_s2;
     let is_short = test_axis.info().travel_mm < SHORT_TRAVEL_MM;
-    let feeds_at = |share: f64| share < 1.0 || is_short || feeds_friction;
+    let feeds_at = |share: f64| share < 1.0 || is_short || misjudged != 1.0;
     let attempt = |test_axis: &mut Guard<'_>,
                    share: f64,
                    trim: f64,

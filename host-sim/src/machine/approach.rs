@@ -3,6 +3,7 @@
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
+use crate::record::Recording;
 
 /// Limits of the move: unhurried.
 const VELOCITY_MM_S: f64 = 30.0;
@@ -37,18 +38,18 @@ pub fn approach(test_axis: &mut dyn TestAxis, target_mm: f64) -> Result<(), Expe
     Ok(())
 }
 
-/// As [`approach`], of an axis that was last seen at `at_mm` if that is away from the target by more than a soft controller's usual
-/// lag: one that lags more one way than the other wanders off from run to run.
+/// As [`approach`], if the last recording ended away from the target by more than a soft controller's usual lag: an axis that lags
+/// more one way than the other wanders off from run to run.
 ///
 /// # Errors
 /// A move that is stopped.
 pub fn approach_from(
     test_axis: &mut dyn TestAxis,
-    at_mm: Option<f64>,
+    last: Option<&Recording>,
     target_mm: f64,
 ) -> Result<(), ExperimentError> {
     let astray_mm = ASTRAY * test_axis.info().travel_mm;
-    match at_mm {
+    match last.and_then(|recording| recording.position_mm.last()) {
         Some(at_mm) if (at_mm - target_mm).abs() > astray_mm => approach(test_axis, target_mm),
         _ => Ok(()),
     }

@@ -279,14 +279,16 @@ fn an_axis_whose_first_test_is_quicker_than_its_spring_is_commissioned_on_a_shor
         let axis = on_a_spring(x().with_mass(1.5), frequency_hz, encoder);
         let gain_mm_per_v_s2 = axis.gain_mm_per_v_s2;
         let found = commissioned(axis, travel_mm);
-        // Which of the masses it shows, the test cannot tell.
         let shown = found.motor.gain_mm_per_v_s2 / gain_mm_per_v_s2;
         let ratio = found.plant.plant.gain_mm_per_v_s2 / gain_mm_per_v_s2;
         println!(
             "{frequency_hz} Hz: {shown:.2}, {ratio:.2}: {:?}",
             found.notes()
         );
+        assert!(!(0.5..2.0).contains(&shown), "{frequency_hz} Hz: {shown}");
         assert!((0.7..1.4).contains(&ratio), "{frequency_hz} Hz: {ratio}");
+        let said = |note: &String| note.contains("open-loop test showed");
+        assert!(found.notes().iter().any(said), "{:?}", found.notes());
         let verification = found.verification.as_ref().unwrap();
         assert!(verification.is_better_than_pid(), "{:?}", found.notes());
     });

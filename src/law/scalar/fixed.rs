@@ -311,6 +311,21 @@ mod tests {
         }
     }
 
+    /// Calls with many values, gains of every shift, and the number of the draw.
+    fn with_gains(mut check: impl FnMut(i32, FixedGain, u32)) {
+        let mut value = 1i32;
+        for step in 0..300_000 {
+            value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            let mantissa = value.rotate_left(7) >> 1;
+            for shift in 0..=LARGEST_SHIFT {
+                let gain = FixedGain::new(mantissa, shift);
+                for value in [value, value >> (step % 31), i32::MIN, i32::MAX] {
+                    check(value, gain, step);
+                }
+            }
+        }
+    }
+
     #[test]
     fn a_product_is_rounded_as_a_wide_one_is() {
         let wide = |value: i32, gain: FixedGain| {
@@ -319,17 +334,7 @@ mod tests {
             let rounded = (product + half) >> gain.shift();
             rounded.clamp(i32::MIN.into(), i32::MAX.into()) as i32
         };
-        let mut value = 1i32;
-        for step in 0..300_000 {
-            value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let mantissa = value.rotate_left(7) >> 1;
-            for shift in 0..=LARGEST_SHIFT {
-                let gain = FixedGain::new(mantissa, shift);
-                for value in [value, value >> (step % 31), i32::MIN, i32::MAX] {
-                    assert_eq!(gain.scaled(value).0, wide(value, gain));
-                }
-            }
-        }
+        with_gains(|value, gain, _| assert_eq!(gain.scaled(value).0, wide(value, gain)));
     }
 
     #[test]
@@ -341,17 +346,9 @@ mod tests {
             let term = term.clamp(i64::MIN.into(), i64::MAX.into());
             (i128::from(sum) + term).clamp(i64::MIN.into(), i64::MAX.into()) as i64
         };
-        let mut value = 1i32;
-        for step in 0..300_000 {
-            value = value.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-            let mantissa = value.rotate_left(7) >> 1;
-            for shift in 0..=LARGEST_SHIFT {
-                let gain = FixedGain::new(mantissa, shift);
-                let sum = i64::from(value.rotate_left(3)) << (step % 32);
-                for value in [value, value >> (step % 31), i32::MIN, i32::MAX] {
-                    assert_eq!(Fixed(value).accumulate(sum, gain), wide(value, gain, sum));
-                }
-            }
-        }
+        with_gains(|value, gain, step| {
+            let sum = i64::from(value.rotate_left(3)) << (step % 32);
+            assert_eq!(Fixed(value).accumulate(sum, gain), wide(value, gain, sum));
+        });
     }
 }

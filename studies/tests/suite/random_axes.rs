@@ -23,6 +23,10 @@ fn random_axes_are_commissioned_or_refused_within_their_travel_and_none_is_worse
         "{commissioned} of {}",
         lines.len()
     );
+    let mut rigid = lines
+        .iter()
+        .filter(|line| RandomAxis::new(line.seed).is_rigid());
+    assert!(rigid.all(|line| line.outcome == Outcome::Commissioned));
 }
 
 #[test]

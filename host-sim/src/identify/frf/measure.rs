@@ -210,12 +210,9 @@ pub fn measure(
     let mut blocks: Vec<(usize, Range<usize>)> = Vec::new();
     while blocks.len() < settings.periods {
         let missing = settings.periods - blocks.len();
+        let forward = recordings.len().is_multiple_of(2);
         let (experiment, expected) = if moves {
-            let direction = if recordings.len().is_multiple_of(2) {
-                1.0
-            } else {
-                -1.0
-            };
+            let direction = if forward { 1.0 } else { -1.0 };
             // A new realisation in every pass: what depends on the signal (leakage, friction) then scatters, and is seen.
             let mut anew = *settings;
             anew.excitation.seed = settings
@@ -227,13 +224,11 @@ pub fn measure(
             (standstill(settings, axis.rate_hz), settings.periods)
         };
         let done = blocks.len() as f64;
-        let forward = recordings.len().is_multiple_of(2);
         let start_mm = settings.start_mm(axis.travel_mm);
         if settings.two_sided {
             approach(test_axis, if forward { start_mm } else { -start_mm })?;
         } else if moves && forward {
-            let last_mm = recordings.last().and_then(|pass| pass.position_mm.last());
-            approach_from(test_axis, last_mm.copied(), start_mm)?;
+            approach_from(test_axis, recordings.last(), start_mm)?;
         }
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);

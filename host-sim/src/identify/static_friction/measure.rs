@@ -209,8 +209,7 @@ pub fn measure(
     for velocity_mm_s in settings.velocities() {
         let length_mm = settings.length_mm(velocity_mm_s);
         for (direction, from_mm) in [(1.0, start_mm), (-1.0, start_mm + length_mm)] {
-            let last_mm = recordings.last().and_then(|run| run.position_mm.last());
-            approach_from(test_axis, last_mm.copied(), from_mm)?;
+            approach_from(test_axis, recordings.last(), from_mm)?;
             let run_s = length_mm / velocity_mm_s;
             let recording = test_axis.perform(
                 &Experiment {
