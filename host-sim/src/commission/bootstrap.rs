@@ -99,6 +99,17 @@ pub fn with_rough_friction(
     settings
 }
 
+/// `settings`, of a PID, with no more voltage than `most_v`, V.
+pub fn with_output_limit(mut settings: AxisSettings, most_v: f64) -> AxisSettings {
+    let limit_v = settings.amplifier.output_limit_v.min(most_v);
+    settings.amplifier.output_limit_v = limit_v;
+    let integral_limit_v = &mut settings.feedback.integral_limit_v;
+    *integral_limit_v = integral_limit_v.min(limit_v);
+    // Its own voltage may exceed the limit, and it is not in force.
+    settings.feedback.sliding_mode = None;
+    settings
+}
+
 /// Sliding friction that is the same at every speed: in positive and in negative direction, V.
 pub(super) fn rough_sliding(friction_v: [f64; 2]) -> PerDirection<StaticFriction> {
     let sliding = |friction_v: f64| StaticFriction {

@@ -59,6 +59,8 @@ const LEAST_DWELL_S: f64 = 0.0015;
 const OTHER_DWELLS: [f64; 3] = [1.7, 0.6, 2.4];
 /// Share of the travel beyond which the next test begins towards the middle.
 const OUTSIDE: f64 = 0.25;
+/// Share of the travel by which an axis comes nearer to the middle at least that is not held.
+const BACK: f64 = 0.01;
 
 impl MotorConstantSettings {
     /// Shorter levels where the travel, either way, is short: the way goes with the square of the time.
@@ -370,17 +372,20 @@ fn search(
         1.0
     };
     let mut tests_too_far = 0;
+    let mut must_return = false;
     let (mut others, usual_s) = (0, settings.dwell_s);
     while levels
         .iter()
         .all(|level| level.volts <= settings.most_level_v)
     {
         let levels_v = levels.map(|level| level.volts);
+        let passes = if must_return { 1 } else { settings.passes };
+        let test = MotorConstantSettings { passes, ..settings };
         let outcome = test_axis.perform(
             &Experiment {
                 name: test_name(levels_v, settings.upper_ratio),
                 drive: Drive::OpenLoop,
-                injection_v: steps(&settings, levels_v, ahead, axis.rate_hz),
+                injection_v: steps(&test, levels_v, ahead, axis.rate_hz),
                 decimation: 1,
                 time_limit_s: 60.0,
             },
@@ -393,7 +398,11 @@ fn search(
                     settings = settings.shortened();
                     continue;
                 };
+                must_return = ended_farther_out(stopped, axis.travel_mm);
                 ahead = inwards(stopped, 0.0, ahead);
+                if must_return {
+                    levels[usize::from(ahead < 0.0)].raise();
+                }
                 let mut driven = stopped.voltage_v.iter().rev();
                 let last_v = driven.find(|volts| volts.abs() > DRIVING_V);
                 let direction = usize::from(last_v.is_some_and(|volts| *volts < 0.0));
@@ -407,6 +416,14 @@ fn search(
             outcome => outcome?,
         };
         ahead = inwards(&recording, OUTSIDE * axis.travel_mm, ahead);
+        let only_returned = must_return;
+        must_return = ended_farther_out(&recording, axis.travel_mm);
+        if only_returned {
+            if must_return {
+                levels[usize::from(ahead < 0.0)].raise();
+            }
+            continue;
+        }
         let slid = find_passes(&recording, &settings, axis.resolution_mm)?;
         let held = [1.0, -1.0].map(|sign| !slid.iter().any(|(pass, _)| pass.sign == sign));
         if held.contains(&true) {
@@ -469,6 +486,17 @@ fn inwards(recording: &Recording, beyond_mm: f64, before: f64) -> f64 {
         Some(position_mm) if position_mm.abs() > beyond_mm => -position_mm.signum(),
         _ => before,
     }
+}
+
+/// True if an axis stands away from the middle, and came no nearer to it: friction, or what hangs, holds it more than the way out. It
+/// is driven inwards alone then.
+fn ended_farther_out(recording: &Recording, travel_mm: f64) -> bool {
+    let ends = (recording.position_mm.first(), recording.position_mm.last());
+    let (Some(first_mm), Some(last_mm)) = ends else {
+        return false;
+    };
+    let inwards_mm = last_mm.signum() * (first_mm - last_mm);
+    last_mm.abs() > OUTSIDE * travel_mm && inwards_mm < BACK * travel_mm
 }
 
 /// The voltage of all passes, V; the first goes `ahead`, 1 or -1.

@@ -45,6 +45,16 @@ fn the_cheapest_of_the_named_axes_are_commissioned() {
     });
 }
 
+/// Axes that once left their travel: a hanging one, in open loop, and one on which a first controller ran away.
+#[test]
+fn axes_that_hang_or_run_away_stay_within_their_travel() {
+    [11402, 11225].into_par_iter().for_each(|seed| {
+        let line = judge(seed);
+        println!("{line:?}");
+        assert_ne!(line.outcome, Outcome::LeftTravel, "{line:?}");
+    });
+}
+
 #[test]
 fn a_seed_is_the_same_axis_every_time() {
     for seed in 1..50 {
