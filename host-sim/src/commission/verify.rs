@@ -1,5 +1,5 @@
 //! Trials of the commissioned laws on the axis itself, by its own encoder, and the choice among them: nothing is handed over
-//! that is worse than the PID alone on any of the sines.
+//! that is worse than the PID alone on any of the sines, or on those that no law was chosen by.
 
 use std::f64::consts::TAU;
 
@@ -17,8 +17,9 @@ use crate::machine::{
 };
 use crate::record::Recording;
 
-/// The sines on an axis with room: the middle velocity of the thesis first, then short, slow and fast.
-const SINES: [SineTest; 4] = [
+/// The sines on an axis with room: those by which a law is chosen, the middle velocity of the thesis first, then short, slow and fast;
+/// and from [`CHOOSING`] on, those that are withheld until then.
+const SINES: [SineTest; 7] = [
     SineTest {
         amplitude_mm: 5.0,
         velocity_mm_s: 10.0,
@@ -35,8 +36,24 @@ const SINES: [SineTest; 4] = [
         amplitude_mm: 15.0,
         velocity_mm_s: 60.0,
     },
+    SineTest {
+        amplitude_mm: 3.0,
+        velocity_mm_s: 4.0,
+    },
+    SineTest {
+        amplitude_mm: 0.5,
+        velocity_mm_s: 2.0,
+    },
+    SineTest {
+        amplitude_mm: 8.0,
+        velocity_mm_s: 25.0,
+    },
 ];
-/// Sines on which kinds of feedforward are compared; the best then runs on all.
+/// Sines by which a law is chosen.
+const CHOOSING: usize = 4;
+/// Laws that run on the withheld sines at most, the best first, until one is worse than the PID on none.
+const CANDIDATES: usize = 3;
+/// Sines on which kinds of feedforward are compared; the best then runs on all by which one is chosen.
 const COMPARED: usize = 2;
 /// Share of the travel that a sine's amplitude takes at most, and share of the velocity limit.
 const MOST_TRAVEL: f64 = 0.4;
@@ -282,8 +299,8 @@ const LEAST_COUNTS: f64 = 4.0;
 const DOMINANT: f64 = 1.0;
 
 /// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, and
-/// less of the best where it is worse than the PID anywhere, and as much of the chosen one as its errors ask for. Chooses the best of
-/// those that are not worse.
+/// less of the best where it is worse than the PID anywhere, and as much of the best as its errors ask for. Chooses the best of
+/// those that are not worse, on sines either that were withheld until then.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.
@@ -318,7 +335,7 @@ pub fn verify(
         };
         full
     };
-    let alone = bench.try_law("PID", &pid, sines.len())?;
+    let alone = bench.try_law("PID", &pid, CHOOSING)?;
     if let Some(stopped) = alone.1 {
         return Err(stopped.into());
     }
@@ -330,7 +347,7 @@ pub fn verify(
     let mut drift = Drift::default();
     note(&mut drift, &pid_alone);
     let mut laws = vec![alone.0];
-    let nonlinear = bench.try_law("N-PID", &npid, sines.len());
+    let nonlinear = bench.try_law("N-PID", &npid, CHOOSING);
     laws.extend(nonlinear.ok().map(|found| found.0));
 
     let mut kinds: Vec<(FeedforwardKind, LawResult)> = Vec::new();
@@ -350,7 +367,7 @@ pub fn verify(
     let best = means.iter().position(|mean| *mean <= AS_GOOD * smallest);
     if let Some(index) = best {
         let (kind, mut whole) = kinds.remove(index);
-        bench.finish(&mut whole);
+        bench.run_on(&mut whole, CHOOSING);
         let mut worst = whole.against(&pid_alone, &drift).0;
         laws.push(whole);
         // Another kind may be better on the sines that it was not compared on.
@@ -364,7 +381,7 @@ pub fn verify(
                 break;
             }
             let (_, mut other) = kinds.remove(0);
-            bench.finish(&mut other);
+            bench.run_on(&mut other, CHOOSING);
             worst = other.against(&pid_alone, &drift).0;
             laws.push(other);
         }
@@ -374,7 +391,7 @@ pub fn verify(
                 break;
             }
             let law = format!("N-PID + {:.0} % of {}", 100.0 * share, kind.name());
-            if let Ok((mut found, _)) = bench.try_law(&law, &full(kind, share), sines.len()) {
+            if let Ok((mut found, _)) = bench.try_law(&law, &full(kind, share), CHOOSING) {
                 found.is_share = true;
                 is_worse = found.against(&pid_alone, &drift).0 > found.most_worse();
                 laws.push(found);
@@ -382,27 +399,20 @@ pub fn verify(
         }
         note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
     }
-    let choose = |laws: &[LawResult], drift: &Drift| {
-        let mean = |index: &usize| laws[*index].against(&pid_alone, drift).1;
-        (1..laws.len())
-            .filter(|&index| laws[index].is_better_than(&pid_alone, drift))
-            .min_by(|a, b| mean(a).total_cmp(&mean(b)))
-            .unwrap_or(0)
-    };
-    let chosen = choose(&laws, &drift);
     // What was measured early or slowly may differ by a scale from what acts on the sines.
+    let best = &laws[better_than_pid(&laws, &drift).first().copied().unwrap_or(0)];
     let without = laws.iter().find(|law| {
         law.settings.feedforward.kind == FeedforwardKind::None
-            && law.settings.feedback == laws[chosen].settings.feedback
+            && law.settings.feedback == best.settings.feedback
     });
-    let scale = without.map_or(1.0, |without| laws[chosen].best_scale(without, &drift));
+    let scale = without.map_or(1.0, |without| best.best_scale(without, &drift));
     if (scale - 1.0).abs() > LEAST_CORRECTION {
-        let base = &laws[chosen];
+        let base = best;
         let mut settings = base.settings.clone();
         settings.feedforward.gains.level *= scale;
         settings.feedforward.gains.gms *= scale;
         let law = format!("{} x {scale:.2}", base.law);
-        if let Ok((scaled, _)) = bench.try_law(&law, &settings, sines.len()) {
+        if let Ok((scaled, _)) = bench.try_law(&law, &settings, CHOOSING) {
             let scaled = LawResult {
                 is_share: base.is_share,
                 ..scaled
@@ -411,7 +421,7 @@ pub fn verify(
             laws.push(scaled);
         }
     }
-    let chosen = choose(&laws, &drift);
+    let chosen = bench.withheld(&mut laws, &drift)?;
     // The others are shown, too, after those that ran on every sine.
     laws.extend(kinds.into_iter().map(|(_, law)| law));
     Ok(Verification {
@@ -420,6 +430,16 @@ pub fn verify(
         chosen,
         drift,
     })
+}
+
+/// The laws that are better than the PID, the first of them, by their indices: the best first.
+fn better_than_pid(laws: &[LawResult], drift: &Drift) -> Vec<usize> {
+    let mean = |index: &usize| laws[*index].against(&laws[0], drift).1;
+    let mut better: Vec<usize> = (1..laws.len())
+        .filter(|&index| laws[index].is_better_than(&laws[0], drift))
+        .collect();
+    better.sort_by(|a, b| mean(a).total_cmp(&mean(b)));
+    better
 }
 
 /// Least relative change of the friction that is fed forward that is worth a further trial, and its largest factor.
@@ -438,8 +458,11 @@ fn note(drift: &mut Drift, pid: &LawResult) {
 /// Time that trials take on sines where no share of the friction is to be tried, s.
 pub(super) fn lasts_s(sines: &[SineTest]) -> f64 {
     let runs = |index: usize| {
+        if index >= CHOOSING {
+            return 2;
+        }
         let compared = if index < COMPARED { KINDS.len() } else { 1 };
-        // The PID and the N-PID alone, the chosen law once more, and the PID again three times.
+        // The PID and the N-PID alone, the best law once more, and the PID again three times.
         3 + compared + 3 * usize::from(index == 0)
     };
     sines
@@ -456,7 +479,7 @@ fn one_lasts_s(sine: &SineTest) -> f64 {
 }
 
 /// Runs that all trials make at most, for progress.
-const MOST_RUNS: f64 = 43.0;
+const MOST_RUNS: f64 = 55.0;
 
 struct Bench<'a> {
     test_axis: &'a mut dyn TestAxis,
@@ -492,18 +515,39 @@ impl Bench<'_> {
             at_s: Vec::new(),
             settings,
         };
-        let stopped = self.run_on(&mut result, count);
+        let stopped = self.run(&mut result, count);
         Ok((result, stopped))
     }
 
-    /// The sines that a law has not run on yet.
-    fn finish(&mut self, result: &mut LawResult) {
-        if result.stopped.is_none() && self.test_axis.apply(&result.settings).is_ok() {
-            self.run_on(result, self.sines.len());
+    /// The law that is handed over, by its index: the best that is worse than the PID, the first of them, on none of the sines that
+    /// were withheld either.
+    fn withheld(&mut self, laws: &mut [LawResult], drift: &Drift) -> Result<usize, VerifyError> {
+        let better = better_than_pid(laws, drift);
+        if better.is_empty() {
+            return Ok(0);
         }
+        if let Some(stopped) = self.run_on(&mut laws[0], self.sines.len()) {
+            return Err(stopped.into());
+        }
+        for index in better.into_iter().take(CANDIDATES) {
+            self.run_on(&mut laws[index], self.sines.len());
+            if laws[index].is_better_than(&laws[0], drift) {
+                return Ok(index);
+            }
+        }
+        Ok(0)
     }
 
+    /// Runs a law that was not stopped on those of the first sines that it has not run on; the error that stops it.
     fn run_on(&mut self, result: &mut LawResult, count: usize) -> Option<ExperimentError> {
+        if result.stopped.is_some() || self.test_axis.apply(&result.settings).is_err() {
+            return None;
+        }
+        self.run(result, count)
+    }
+
+    /// The same of one that was just put into force.
+    fn run(&mut self, result: &mut LawResult, count: usize) -> Option<ExperimentError> {
         for index in result.scores.len()..count {
             let done = self.done;
             let progress = &mut *self.progress;
