@@ -11,6 +11,7 @@ use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
 use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::friction::{FrictionSettings, PerDirection};
+use quadrant::settings::leaves::LEAST_STIFFNESS_V_PER_MM;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
 
 use super::bootstrap::rough_sliding;
@@ -32,7 +33,7 @@ use crate::identify::virgin_curve::{
 use crate::record::Recording;
 
 /// Pre-sliding range of a stiff axis, mm: before any is identified.
-const STIFF_RANGE_MM: f64 = 0.005;
+const STIFF_RANGE_MM: f64 = 0.001;
 /// Elements that find their own knots.
 const FEW_ELEMENTS: usize = 4;
 /// Share of the largest force at which the pre-sliding range ends, the last knot over that range, and the exponent with which
@@ -253,7 +254,8 @@ fn resolved(
     let most_v_per_mm = plant.stiffest_v_per_mm(1.0 / rate_hz);
     let share = (RESOLVED * most_v_per_mm / gms.stiffness_v_per_mm()).min(1.0);
     for element in &mut gms.elements {
-        element.stiffness_v_per_mm *= share;
+        element.stiffness_v_per_mm =
+            (share * element.stiffness_v_per_mm).max(LEAST_STIFFNESS_V_PER_MM);
     }
     let lowest_v = [&sliding.positive, &sliding.negative]
         .map(|model| model.curve.coulomb_v.min(model.curve.breakaway_v))

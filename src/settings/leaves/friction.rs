@@ -8,6 +8,9 @@ use crate::law::cancelling::{HARMONICS, MOST_RPM};
 use crate::law::feedforward::FeedforwardKind;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 
+/// The softest spring of a block of the GMS model, V/mm.
+pub const LEAST_STIFFNESS_V_PER_MM: f64 = 1e-6;
+
 #[rustfmt::skip]
 pub(super) const LEAVES: &[LeafInfo] = &[
     number("friction.sliding.positive.curve.coulomb_v", "V", at(1e-6), at(10.0), 1e-6,
@@ -34,7 +37,7 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "sigma, viscous friction."),
     list("friction.gms.elements", FIRMWARE_ELEMENTS,
         "The blocks of the GMS model; their weights sum to 1."),
-    point("friction.gms.elements.stiffness_v_per_mm", "V/mm", at(1e-6), at(1e5), 1e-6,
+    point("friction.gms.elements.stiffness_v_per_mm", "V/mm", at(LEAST_STIFFNESS_V_PER_MM), at(1e5), LEAST_STIFFNESS_V_PER_MM,
         |a, i| Some(a.friction.gms.elements.get(i)?.stiffness_v_per_mm),
         "k, the spring of the block; with a plant, the sum is held to what the control rate resolves."),
     point("friction.gms.elements.weight", "", at(0.0), at(1.0), 1.0,

@@ -16,6 +16,7 @@ pub(super) mod rules;
 mod stage;
 mod table;
 
+pub use friction::LEAST_STIFFNESS_V_PER_MM;
 pub use row::{Bound, Exchange, LeafInfo, Range, UNSET};
 pub use table::{all, find};
 pub(super) use table::{default, default_of};

@@ -80,7 +80,7 @@ pub enum FrictionFitError {
 }
 
 /// Fewest runs of a direction.
-const LEAST_RUNS: usize = 6;
+pub(super) const LEAST_RUNS: usize = 6;
 /// Residuals of a level that rises with the speed, over those of one that does not, from which on it is taken: a rise is easily
 /// mistaken for viscous friction.
 const RISING: f64 = 0.7;

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::fit::LEAST_RUNS;
 use crate::identify::measured_table::{Columns, TableError};
 
 /// One run at constant velocity.
@@ -13,7 +14,7 @@ pub struct FrictionRun {
     pub voltage_v: f64,
     /// Standard deviation of that mean, from the scatter within the run, V.
     pub deviation_v: f64,
-    /// The axis stuck and slipped instead of moving evenly: the mean is no friction at this velocity.
+    /// The axis stuck and slipped instead of moving evenly, or was shaken loose: the mean is no friction at this velocity.
     pub stick_slip: bool,
 }
 
@@ -23,6 +24,11 @@ pub struct FrictionMap {
     /// The runs, by rising velocity.
     pub runs: Vec<FrictionRun>,
 }
+
+/// Exponent of the speed that friction falls with, from one run to the next slower one, of an axis that is shaken loose.
+const PROPORTIONAL: f64 = 0.5;
+/// Share of the speed from which on it is not, below which runs are marked.
+const BELOW: f64 = 0.95;
 
 const COLUMNS: Columns<4> = Columns {
     what: "a friction map",
@@ -76,6 +82,32 @@ impl FrictionMap {
         Ok(Self { runs })
     }
 
+    /// Marks the slowest runs in which friction falls nearly in proportion to speed: noise or a vibration that is quicker than the
+    /// axis shakes it loose there. Nothing of an axis that has hardly any friction but that.
+    pub(super) fn mark_shaken(&mut self) {
+        let shaken = [1.0, -1.0].map(|sign| {
+            let runs = self.direction(sign);
+            let falls = |pair: &&[FrictionRun]| {
+                let [slow, fast] = [pair[0], pair[1]];
+                let volts = fast.voltage_v / slow.voltage_v;
+                slow.voltage_v <= 0.0
+                    || volts.ln() > PROPORTIONAL * (fast.velocity_mm_s / slow.velocity_mm_s).ln()
+            };
+            let count = runs.windows(2).take_while(falls).count();
+            if runs.len() < count + LEAST_RUNS {
+                return None;
+            }
+            Some(runs[count].velocity_mm_s).filter(|_| count > 0)
+        });
+        let Some(below_mm_s) = shaken.into_iter().flatten().reduce(f64::max) else {
+            return;
+        };
+        // The two directions' speeds differ by what the axis did not follow.
+        for run in &mut self.runs {
+            run.stick_slip |= run.velocity_mm_s.abs() < BELOW * below_mm_s;
+        }
+    }
+
     /// The runs of one direction that moved evenly, speeds and friction positive, by rising speed. `sign` is 1 or -1.
     pub(super) fn direction(&self, sign: f64) -> Vec<FrictionRun> {
         let mut runs: Vec<FrictionRun> = self
@@ -115,6 +147,38 @@ mod tests {
         };
         map.write_csv(&path).unwrap();
         assert_eq!(FrictionMap::read_csv(&path).unwrap(), map);
+    }
+
+    #[test]
+    fn the_slowest_runs_are_marked_in_which_friction_falls_with_speed_as_where_it_is_shaken_loose()
+    {
+        let speeds = (0..12).map(|index| 0.1 * 1.35_f64.powi(index));
+        let marked = |friction_v: fn(f64) -> f64| {
+            let mut map = FrictionMap {
+                runs: speeds
+                    .clone()
+                    .flat_map(|speed| [speed, -speed])
+                    .map(|velocity_mm_s| FrictionRun {
+                        voltage_v: friction_v(velocity_mm_s.abs()) * velocity_mm_s.signum(),
+                        ..run(velocity_mm_s, false)
+                    })
+                    .collect(),
+            };
+            map.mark_shaken();
+            map.runs.iter().filter(|run| run.stick_slip).count()
+        };
+        assert_eq!(marked(|speed| 0.25 + 0.02 * speed), 0);
+        assert_eq!(marked(|speed| 0.25 + 0.2 * (-speed).exp()), 0, "Stribeck");
+        assert_eq!(marked(|speed| 0.1 * speed), 0, "nothing but viscous");
+        // 0.1, 0.135, 0.182 and 0.246 mm/s.
+        let shaken = |speed: f64| {
+            if speed < 0.3 {
+                speed
+            } else {
+                0.3 + 0.02 * speed
+            }
+        };
+        assert_eq!(marked(shaken), 8);
     }
 
     #[test]

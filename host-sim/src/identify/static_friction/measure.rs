@@ -238,6 +238,7 @@ pub fn measure(
     }
     map.runs
         .sort_by(|a, b| a.velocity_mm_s.total_cmp(&b.velocity_mm_s));
+    map.mark_shaken();
     Ok((map, recordings))
 }
 
