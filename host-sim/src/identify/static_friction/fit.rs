@@ -3,7 +3,7 @@
 use quadrant::friction::PerDirection;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 
-use super::map::{FrictionMap, FrictionRun};
+use super::map::{FrictionMap, FrictionRun, LEAST_RUNS};
 use crate::identify::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
 
 /// Treatment of delta, the exponent of the Stribeck curve.
@@ -79,8 +79,6 @@ pub enum FrictionFitError {
     Fit(#[from] FitError),
 }
 
-/// Fewest runs of a direction.
-pub(super) const LEAST_RUNS: usize = 6;
 /// Residuals of a level that rises with the speed, over those of one that does not, from which on it is taken: a rise is easily
 /// mistaken for viscous friction.
 const RISING: f64 = 0.7;

@@ -2,7 +2,6 @@
 
 use std::path::Path;
 
-use super::fit::LEAST_RUNS;
 use crate::identify::measured_table::{Columns, TableError};
 
 /// One run at constant velocity.
@@ -29,6 +28,9 @@ pub struct FrictionMap {
 const PROPORTIONAL: f64 = 0.5;
 /// Share of the speed from which on it is not, below which runs are marked.
 const BELOW: f64 = 0.95;
+
+/// Fewest even runs of a direction by which its friction is known.
+pub(super) const LEAST_RUNS: usize = 6;
 
 const COLUMNS: Columns<4> = Columns {
     what: "a friction map",
