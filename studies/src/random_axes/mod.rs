@@ -59,6 +59,12 @@ pub struct Line {
     /// The PID's largest error of all judging sines, um.
     #[serde(default)]
     pub pid_um: Option<f64>,
+    /// Error over that of the PID, the worst of the trials by which the commissioning handed its law over.
+    #[serde(default)]
+    pub trial_worst: Option<f64>,
+    /// Acceleration per volt that was identified, over the true one.
+    #[serde(default)]
+    pub gain_ratio: Option<f64>,
     /// Feedforward that was handed over.
     pub feedforward: String,
     /// Time for which the axis was used, min.
@@ -165,6 +171,8 @@ pub fn judge_subject(subject: &Subject) -> Line {
         worst_ratio: None,
         mean_ratio: None,
         pid_um: None,
+        trial_worst: None,
+        gain_ratio: None,
         feedforward: String::new(),
         axis_min: axis.used_s / 60.0,
         computed_s: 0.0,
@@ -208,15 +216,16 @@ const NAMED: f64 = 1.5;
 
 impl Line {
     fn fill(&mut self, found: &Commissioned, subject: &Subject) {
-        let better = found
-            .verification
-            .as_ref()
-            .is_some_and(|verification| verification.is_better_than_pid());
+        let trials = found.verification.as_ref();
+        let trials = trials.filter(|trials| trials.is_better_than_pid());
+        self.trial_worst = trials.map(|trials| trials.against_pid(trials.chosen()).0);
+        let true_gain = subject.parameters.gain_mm_per_v_s2;
+        self.gain_ratio = Some(found.plant.plant.gain_mm_per_v_s2 / true_gain);
         self.feedforward = match found.settings.feedforward.kind {
             FeedforwardKind::None => "none".to_owned(),
             kind => kind.name().to_owned(),
         };
-        if !better {
+        if trials.is_none() {
             self.outcome = Outcome::PidAlone;
             return;
         }
