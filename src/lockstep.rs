@@ -15,6 +15,8 @@ use crate::law::stage::{Inputs, Outputs};
 use crate::law::units::DacCode;
 use crate::settings::{PlanSettings, StageSettings};
 
+/// Address of the memory on the target: its PSRAM, which the host backs by a shared file.
+pub const BASE: usize = 0x2100_0000;
 /// Size of the memory.
 pub const MEMORY_BYTES: usize = 16 << 20;
 

@@ -8,11 +8,10 @@ use anyhow::{Result, bail};
 use quadrant::lockstep::Job;
 use serde::{Deserialize, Serialize};
 
-use crate::kinds::{Kinds, emulated, rehearse, trace};
-use crate::reference_model::SETTLING_TICKS;
+use crate::kinds::{Kinds, USUAL, emulated, usual};
 use crate::trace::Tick;
 use xtask::golden::Golden;
-use xtask::image::{Image, Scalar};
+use xtask::image::Scalar;
 use xtask::toolchain::Toolchain;
 
 /// Tolerance above the expected count, %.
@@ -42,37 +41,30 @@ const GOLDEN: Golden = Golden {
     head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",
 };
 
-/// Counts the default job stage by stage, and the kinds of ticks that cost more than the usual ones; prints, and holds the
-/// figures against the committed ones.
+/// Counts the usual ticks stage by stage, and every other kind; prints, and holds the figures against the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
     let image = emulated(toolchain, scalar)?;
     let kinds = Kinds::traced(&image, ticks)?;
-    let count = summary(kinds.usual());
+    println!("{}: instructions per control tick", image.target);
     println!(
-        "{}: instructions per control tick over {ticks} ticks",
-        image.target
+        "  {:<20} {:>6} {:>9} {:>6} {:>6}",
+        "stage or kind", "ticks", "mean", "min", "max"
     );
-    println!("  {:<20} {:>9} {:>6} {:>6}", "stage", "mean", "min", "max");
-    let rows = count
-        .stages
-        .iter()
-        .map(|(stage, figure)| (stage.as_str(), figure));
-    for (stage, figure) in rows.chain([("total", &count.total)]) {
-        println!(
-            "  {stage:<20} {:>9.1} {:>6} {:>6}",
-            figure.mean, figure.min, figure.max
-        );
-    }
     let scalar = image.target.scalar_name();
-    let mut counts = vec![(scalar.clone(), count)];
-    for (name, ticks) in kinds.others() {
-        let kind = Count {
-            stages: BTreeMap::new(),
-            ..summary(ticks)
-        };
-        let Figure { mean, min, max } = kind.total;
-        println!("  {name:<20} {mean:>9.1} {min:>6} {max:>6}");
-        counts.push((format!("{scalar}, {name}"), kind));
+    let mut counts = Vec::new();
+    for (name, ticks) in kinds.each() {
+        let count = summary(ticks);
+        if name == USUAL {
+            for (stage, figure) in &count.stages {
+                print_row(stage, count.ticks, figure);
+            }
+        }
+        print_row(name, count.ticks, &count.total);
+        counts.push(if name == USUAL {
+            (scalar.clone(), count)
+        } else {
+            (format!("{scalar}, {name}"), count.whole())
+        });
     }
     if overwrite {
         return GOLDEN.store(Some(&image.compiler), counts);
@@ -101,14 +93,13 @@ pub(crate) fn run_all(
     );
     let mut counts = Vec::new();
     for (name, job) in jobs {
-        let count = count(&image, job, ticks)?;
+        let count = summary(&usual(&image, job, ticks)?);
         let Figure { mean, min, max } = count.total;
         println!("  {name:<28} {mean:>9.1} {min:>6} {max:>6}");
-        let whole = Count {
-            stages: BTreeMap::new(),
-            ..count
-        };
-        counts.push((format!("{}, {name}", image.target.scalar_name()), whole));
+        counts.push((
+            format!("{}, {name}", image.target.scalar_name()),
+            count.whole(),
+        ));
     }
     if overwrite {
         return GOLDEN.store(Some(&image.compiler), counts);
@@ -118,12 +109,19 @@ pub(crate) fn run_all(
         .try_for_each(|(key, count)| compare(key, count, &image.compiler))
 }
 
-/// Runs the image and counts.
-fn count(image: &Image, job: Job, ticks: u32) -> Result<Count> {
-    // The beginning is spent at rest and is not counted.
-    let inputs = rehearse(image, &job, SETTLING_TICKS + ticks)?;
-    let closed = trace(image, &job, &inputs)?;
-    Ok(summary(&closed[SETTLING_TICKS as usize..]))
+impl Count {
+    /// The same without its stages.
+    fn whole(self) -> Self {
+        Self {
+            stages: BTreeMap::new(),
+            ..self
+        }
+    }
+}
+
+fn print_row(name: &str, ticks: u32, figure: &Figure) {
+    let Figure { mean, min, max } = figure;
+    println!("  {name:<20} {ticks:>6} {mean:>9.1} {min:>6} {max:>6}");
 }
 
 fn summary<'a>(closed: impl IntoIterator<Item = &'a Tick>) -> Count {

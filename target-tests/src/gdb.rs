@@ -136,6 +136,13 @@ impl Debugger {
         self.order(&format!("z0,{address:x},2"))
     }
 
+    /// Runs until a word of memory has been written.
+    pub(crate) fn run_to_write(&mut self, address: u32) -> Result<()> {
+        self.order(&format!("Z2,{address:x},4"))?;
+        self.ask("c")?;
+        self.order(&format!("z2,{address:x},4"))
+    }
+
     /// Runs on.
     pub(crate) fn resume(&mut self) -> Result<()> {
         self.send("c")

@@ -8,6 +8,7 @@ use anyhow::Result;
 use quadrant::command::Command;
 
 use crate::faults::approach::moving;
+use crate::faults::case::configuration;
 use crate::faults::fixture::Fixture;
 use crate::trace::{self, Tracer, for_each_instruction};
 use crate::traced_run;
@@ -41,6 +42,7 @@ pub(crate) fn longest(image: &Image) -> Result<BTreeMap<String, u32>> {
         .collect();
     traced_run::run(
         image,
+        configuration(),
         |memory| trace::start(image, memory, &ranges.join(",")),
         drive,
         |lines| Stretches::of(&listing).read(lines),

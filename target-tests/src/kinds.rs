@@ -1,14 +1,15 @@
-//! The ticks whose cost is looked at: those of the default job once its motions have reached their speed, and the kinds that cost
-//! more than the usual ones.
+//! The ticks whose cost is looked at, by kind: those of homed axes on recorded inputs, and those of a machine with a host.
 
 use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
-use quadrant::lockstep::{InputRecord, Job, Mode};
+use quadrant::lockstep::{BASE, InputRecord, Job, Mode, OutputRecord, RECORDED_OUTPUTS};
 use quadrant::safety::Switches;
 use quadrant_sim::machine::emulator::Memory;
 
+use crate::hosted;
 use crate::lockstep;
+use crate::near_home::{ENABLE_TICK, HOME_TICK, RUN_TICK};
 use crate::reference_model::{self, ReferenceModel, SETTLING_TICKS};
 use crate::trace::{Tick, Trace};
 use xtask::image::{self, Board, Image, Scalar, Target};
@@ -23,88 +24,80 @@ pub(crate) fn emulated(toolchain: Toolchain, scalar: Scalar) -> Result<Image> {
     image::build(toolchain, target)
 }
 
-/// Traced ticks of the default job.
+/// Traced ticks, by kind.
 pub(crate) struct Kinds {
-    closed: Vec<Tick>,
-    ticks: u32,
-    seldom: Seldom,
+    /// All, in the order of execution.
+    ticks: Vec<Tick>,
+    /// The indices of each kind's, the usual kind first.
+    kinds: Vec<(&'static str, Vec<usize>)>,
 }
 
 impl Kinds {
-    /// Runs the image on the default job, with as many usual ticks.
+    /// Runs the image on the default job, with as many usual ticks, and with a host.
     pub(crate) fn traced(image: &Image, ticks: u32) -> Result<Self> {
-        let seldom = Seldom::after(ticks);
-        let job = reference_model::job();
-        let mut inputs = rehearse(image, &job, seldom.fault + 1)?;
-        seldom.mark(&mut inputs);
-        Ok(Self {
-            closed: trace(image, &job, &inputs)?,
-            ticks,
-            seldom,
+        let recorded = Recorded::with_usual(ticks);
+        let mut rehearsal = rehearse(image, reference_model::job(), recorded.fault + 1)?;
+        recorded.mark(&mut rehearsal.inputs);
+        let mut all = trace(image, &rehearsal, 0)?;
+        let mut kinds = recorded.kinds();
+        for (name, hosted) in hosted::traced(image)? {
+            kinds.push((name, (all.len()..all.len() + hosted.len()).collect()));
+            all.extend(hosted);
+        }
+        Ok(Self { ticks: all, kinds })
+    }
+
+    /// All ticks, in the order of execution.
+    pub(crate) fn all(&self) -> &[Tick] {
+        &self.ticks
+    }
+
+    /// Each kind with its name, the usual one first.
+    pub(crate) fn each(&self) -> impl Iterator<Item = (&'static str, Vec<&Tick>)> {
+        self.kinds.iter().map(|(name, indices)| {
+            let ticks = indices.iter().map(|index| &self.ticks[*index]);
+            (*name, ticks.collect())
         })
     }
-
-    /// All ticks, from the first.
-    pub(crate) fn all(&self) -> &[Tick] {
-        &self.closed
-    }
-
-    /// The usual ones.
-    pub(crate) fn usual(&self) -> &[Tick] {
-        let settled = SETTLING_TICKS as usize;
-        &self.closed[settled..settled + self.ticks as usize]
-    }
-
-    /// The others, each kind with its name.
-    pub(crate) fn others(&self) -> [(&'static str, Vec<&Tick>); 5] {
-        let settled = SETTLING_TICKS as usize;
-        let snapshots = self.closed[..settled + self.ticks as usize]
-            .iter()
-            .skip(settled.next_multiple_of(SNAPSHOT_TICKS) + SNAPSHOT_TICKS - 1)
-            .step_by(SNAPSHOT_TICKS)
-            .collect();
-        let (index, fault) = (self.seldom.index as usize, self.seldom.fault as usize);
-        [
-            ("start", self.closed[START].iter().collect()),
-            ("lead-in", self.closed[LEAD_IN].iter().collect()),
-            ("snapshot", snapshots),
-            ("index pulse", self.closed[index..fault].iter().collect()),
-            ("fault", self.closed[fault..].iter().collect()),
-        ]
-    }
 }
+
+/// Name of the kind that a machine spends its time with.
+pub(crate) const USUAL: &str = "usual";
 
 /// Control ticks from one snapshot for the supervising task to the next.
 const SNAPSHOT_TICKS: usize = 10;
 
-/// Ticks in which the outputs are enabled and the motions started.
-const START: Range<usize> = 0..250;
+/// Ticks around a request that are of its kind.
+const AROUND_REQUEST: Range<u32> = 0..50;
 
-/// Ticks of a lead-in that are counted: it begins in tick 210 or so, and takes 500.
-const LEAD_IN: Range<usize> = 250..650;
+/// Ticks of a lead-in that are counted, from the request of the plan on: it takes 500.
+const LEAD_IN: Range<u32> = 50..450;
+
+/// Tick in which the motions of the plan have reached their speed.
+const SETTLED: u32 = RUN_TICK + SETTLING_TICKS;
 
 /// Ticks in which all axes meet an index pulse.
 const INDEX_TICKS: u32 = 10;
 
-/// Ticks that cost more than the usual ones and come after them.
-struct Seldom {
-    /// The first with an index pulse.
+/// The ticks of a run on recorded inputs.
+struct Recorded {
+    /// The first with an index pulse: the usual ones have ended.
     index: u32,
     /// The one in which the emergency stop is pressed: a fault, which triggers the capture.
     fault: u32,
 }
 
-impl Seldom {
-    /// After the usual ticks.
-    fn after(ticks: u32) -> Self {
-        let index = SETTLING_TICKS + ticks;
+impl Recorded {
+    /// A run with as many usual ticks.
+    fn with_usual(ticks: u32) -> Self {
+        let index = SETTLED + ticks;
         Self {
             index,
             fault: index + INDEX_TICKS,
         }
     }
 
-    /// Writes what happens in them into the inputs.
+    /// Writes into the inputs what happens after the usual ticks.
     fn mark(&self, inputs: &mut [InputRecord]) {
         for (tick, input) in (0..).zip(inputs) {
             if (self.index..self.fault).contains(&tick) {
@@ -117,29 +110,75 @@ impl Seldom {
             }
         }
     }
+
+    /// The indices of each kind's ticks.
+    fn kinds(&self) -> Vec<(&'static str, Vec<usize>)> {
+        let indices = |ticks: Range<u32>| (ticks.start as usize..ticks.end as usize).collect();
+        let after = |tick: u32, ticks: Range<u32>| tick + ticks.start..tick + ticks.end;
+        let snapshots = (SETTLED as usize..self.index as usize)
+            .filter(|index| (index + 1).is_multiple_of(SNAPSHOT_TICKS))
+            .collect();
+        vec![
+            (USUAL, indices(SETTLED..self.index)),
+            ("snapshot", snapshots),
+            ("enable", indices(after(ENABLE_TICK, AROUND_REQUEST))),
+            ("homing", indices(HOME_TICK..RUN_TICK)),
+            ("motions start", indices(after(RUN_TICK, AROUND_REQUEST))),
+            ("lead-in", indices(after(RUN_TICK, LEAD_IN))),
+            ("index pulse", indices(self.index..self.fault)),
+            ("fault", indices(self.fault..self.fault + 1)),
+        ]
+    }
 }
 
-/// The inputs that the reference model reads in closed loop.
-pub(crate) fn rehearse(image: &Image, job: &Job, ticks: u32) -> Result<Vec<InputRecord>> {
-    let model = ReferenceModel::of(image.target.scalar, job.clone())?;
-    Ok(model.run_alone(ticks).0)
+/// A job and the inputs that the reference model has read while it ran it in closed loop.
+pub(crate) struct Rehearsal {
+    job: Job,
+    inputs: Vec<InputRecord>,
 }
 
-/// Runs the image on recorded inputs; one count of each tick.
-pub(crate) fn trace(image: &Image, job: &Job, inputs: &[InputRecord]) -> Result<Vec<Tick>> {
+/// Runs the plan of a job on homed axes, for ticks from [`SETTLED`] on at least.
+fn rehearse(image: &Image, job: Job, ticks: u32) -> Result<Rehearsal> {
+    let mut model = ReferenceModel::homed(image.target.scalar, job)?;
+    let (inputs, _) = model.run_alone(ticks);
+    ensure!(
+        model.runs_homed(),
+        "tick {ticks}: the axes are not homed, or do not follow the plan"
+    );
+    Ok(Rehearsal {
+        job: model.job().clone(),
+        inputs,
+    })
+}
+
+/// Runs the image on a job with homed axes; as many usual ticks.
+pub(crate) fn usual(image: &Image, job: Job, ticks: u32) -> Result<Vec<Tick>> {
+    let rehearsal = rehearse(image, job, SETTLED + ticks)?;
+    trace(image, &rehearsal, SETTLED)
+}
+
+/// Runs the image on recorded inputs; the ticks from one on.
+fn trace(image: &Image, rehearsal: &Rehearsal, from: u32) -> Result<Vec<Tick>> {
+    let Rehearsal { job, inputs } = rehearsal;
     let trace = Trace::of(image)?;
     let memory = Memory::create()?;
     lockstep::load(&memory, Mode::Unpaced, job, inputs)?;
     let (mut emulator, mut tracer) = trace.start(image, &memory)?;
     let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
-    tracer.trace_from(trace.root())?;
+    match from.checked_sub(1) {
+        None => tracer.trace_from(trace.root())?,
+        Some(before) => {
+            let output = RECORDED_OUTPUTS + OutputRecord::BYTES * before as usize;
+            tracer.trace_from_write(u32::try_from(BASE + output)?)?;
+        }
+    }
     let closed = trace.read(image, lines)?;
     emulator.wait()?;
     ensure!(
-        closed.len() == inputs.len(),
+        closed.len() + from as usize == inputs.len(),
         "{} control ticks seen in the trace instead of {}",
         closed.len(),
-        inputs.len()
+        inputs.len() - from as usize
     );
     Ok(closed)
 }

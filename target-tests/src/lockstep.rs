@@ -122,7 +122,7 @@ fn progress(ticks: u32) -> ProgressBar {
 }
 
 /// Lets the hardware timer pace the firmware on the inputs of a rehearsal, and compares the answers.
-fn recorded(image: &Image, model: ReferenceModel, ticks: u32) -> Result<Run> {
+fn recorded(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
     let job = model.job().clone();
     let (inputs, expected) = model.run_alone(ticks);

@@ -10,10 +10,12 @@ mod count;
 mod cycles;
 mod faults;
 mod gdb;
+mod hosted;
 mod interrupt_latency;
 mod kinds;
 mod lockstep;
 mod longest_path;
+mod near_home;
 mod reference_model;
 mod saturation;
 mod stages;
@@ -50,7 +52,7 @@ enum Verb {
     BoardSmoke,
     /// Inject every fault into the emulated firmware, and tell how it was found
     Faults(FaultArgs),
-    /// Count the instructions of one control tick, stage by stage
+    /// Count the instructions of one control tick, by stage and by kind of tick
     Count(CountArgs),
     /// Calculate the cycles of one control tick, and a bound of them
     Cycles(CountArgs),

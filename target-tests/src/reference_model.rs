@@ -4,8 +4,11 @@ use std::marker::PhantomData;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
+use quadrant::axes::AxisName;
+use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::lockstep::{InputRecord, Job};
+use quadrant::motion::MotionMode;
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant::stage::Outputs;
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
@@ -14,6 +17,7 @@ use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::settings_file::SettingsFile;
 
+use crate::near_home;
 use xtask::image::{self, Image};
 
 /// Seed of the simulated stage's noise.
@@ -56,11 +60,18 @@ pub(crate) fn encode(job: &Job) -> Result<Vec<u8>> {
 pub(crate) trait Law {
     /// One control period.
     fn tick(&mut self, input: &InputRecord) -> Outputs;
+    /// True if all axes are homed and follow the plan.
+    fn runs_homed(&self) -> bool;
 }
 
 impl<S: Scalar> Law for LawMachine<S, FIRMWARE_ELEMENTS> {
     fn tick(&mut self, input: &InputRecord) -> Outputs {
         LawMachine::tick(self, input)
+    }
+
+    fn runs_homed(&self) -> bool {
+        let mut axes = self.state().axes().iter();
+        axes.all(|axis| axis.is_homed() && axis.mode() == MotionMode::Plan)
     }
 }
 
@@ -110,6 +121,26 @@ impl ReferenceModel {
         })
     }
 
+    /// The same on axes that stand where [`near_home`] says, which it homes before it runs the plan.
+    pub(crate) fn homed(scalar: image::Scalar, mut job: Job) -> Result<Self> {
+        let marks = near_home::prepare(&mut job.stage);
+        let mut model = Self::of(scalar, job)?;
+        model.plant.set_marks([marks; 3]);
+        model.operator = Operator::follows([
+            (near_home::ENABLE_TICK, Command::Enable),
+            (near_home::HOME_TICK, Command::Home(AxisName::X)),
+            (near_home::HOME_TICK + 10, Command::Home(AxisName::Y)),
+            (near_home::HOME_TICK + 20, Command::Home(AxisName::Z)),
+            (near_home::RUN_TICK, Command::Run),
+        ]);
+        Ok(model)
+    }
+
+    /// True if all axes are homed and follow the plan.
+    pub(crate) fn runs_homed(&self) -> bool {
+        self.law.runs_homed()
+    }
+
     /// Returns the job that it runs.
     pub(crate) fn job(&self) -> &Job {
         &self.job
@@ -117,8 +148,7 @@ impl ReferenceModel {
 
     /// Returns the inputs of the next tick, for firmware and reference model.
     pub(crate) fn input(&mut self) -> InputRecord {
-        let counts = self.plant.read_counters();
-        InputRecord::of_counts(counts, self.operator.request(self.tick))
+        self.plant.read_inputs(self.operator.request(self.tick))
     }
 
     /// The reference model's own answer.
@@ -144,7 +174,7 @@ impl ReferenceModel {
     }
 
     /// The reference model alone in closed loop, for `ticks` ticks: what it read and what it answered.
-    pub(crate) fn run_alone(mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
+    pub(crate) fn run_alone(&mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
         (0..ticks)
             .map(|_| {
                 let input = self.input();

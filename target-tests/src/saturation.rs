@@ -9,6 +9,7 @@ use quadrant::link::message::{AxisSignal, Channel, MAX_CHANNELS};
 use quadrant::link::message::{Body, Request, TelemetryRequest};
 
 use crate::faults::approach::moving;
+use crate::faults::case::configuration;
 use crate::faults::fixture::Fixture;
 use crate::interrupt_latency;
 use crate::trace::{Trace, Tracer};
@@ -160,6 +161,7 @@ fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
     let trace = Trace::of(image)?;
     let ticks = traced_run::run(
         image,
+        configuration(),
         |memory| trace.start(image, memory),
         |fixture, tracer| drive(fixture, tracer, load),
         |lines| trace.read(image, lines),

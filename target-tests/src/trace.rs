@@ -114,10 +114,23 @@ impl Tracer {
         self.switch_on()
     }
 
+    /// Runs without a trace until a word of memory has been written, and with a trace from there on.
+    pub(crate) fn trace_from_write(&mut self, address: u32) -> Result<()> {
+        self.debugger.run_to_write(address)?;
+        self.switch_on()
+    }
+
     /// Traces from now on.
     pub(crate) fn trace(&mut self) -> Result<()> {
         self.debugger.stop()?;
         self.switch_on()
+    }
+
+    /// Traces no longer.
+    pub(crate) fn pause(&mut self) -> Result<()> {
+        self.debugger.stop()?;
+        self.debugger.monitor("log none")?;
+        self.debugger.resume()
     }
 
     fn switch_on(&mut self) -> Result<()> {

@@ -5,21 +5,21 @@ use std::process::ChildStderr;
 use anyhow::{Context, Result, anyhow};
 use quadrant_sim::machine::emulator::{Emulator, Memory};
 
-use crate::faults::case::configuration;
-use crate::faults::fixture::Fixture;
+use crate::faults::fixture::{Configuration, Fixture};
 use crate::trace::Tracer;
 use xtask::image::Image;
 
 /// Runs a fixture while its trace is read.
 pub(crate) fn run<T: Send>(
     image: &Image,
+    configuration: Configuration,
     start: impl FnOnce(&Memory) -> Result<(Emulator, Tracer)>,
     drive: impl FnOnce(Fixture, &mut Tracer) -> Result<()>,
     read: impl FnOnce(ChildStderr) -> Result<T> + Send,
 ) -> Result<T> {
     std::thread::scope(|scope| {
         let mut begun = None;
-        let fixture = Fixture::start_with(image, configuration(), |memory| {
+        let fixture = Fixture::start_with(image, configuration, |memory| {
             let (mut emulator, mut tracer) = start(memory)?;
             let lines = emulator.take_stderr().context("QEMU's trace is a pipe")?;
             tracer.run()?;

@@ -57,7 +57,7 @@ enum Verb {
     BoardSmoke(Forwarded),
     /// Inject every fault into the emulated firmware, and tell how it was found
     Faults(Forwarded),
-    /// Count the instructions of one control tick, stage by stage
+    /// Count the instructions of one control tick, by stage and by kind of tick
     Count(Forwarded),
     /// Calculate the cycles of one control tick on the reference board, and a bound of them
     Cycles(Forwarded),

@@ -153,8 +153,13 @@ const RUN_TICK: u32 = 200;
 impl Operator {
     /// Enables, and starts the plan.
     pub fn runs_the_plan() -> Self {
+        Self::follows([(ENABLE_TICK, Command::Enable), (RUN_TICK, Command::Run)])
+    }
+
+    /// Makes requests at their ticks, given in their order.
+    pub fn follows(script: impl IntoIterator<Item = (u32, Command)>) -> Self {
         Self {
-            script: VecDeque::from([(ENABLE_TICK, Command::Enable), (RUN_TICK, Command::Run)]),
+            script: script.into_iter().collect(),
         }
     }
 

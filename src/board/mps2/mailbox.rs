@@ -3,11 +3,8 @@
 use core::sync::atomic::{Ordering, fence};
 
 use quadrant::lockstep::{
-    BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, OUTPUT, RECORDED_TICKS, RESET, Reset,
+    BASE, BOOT, BootBlock, JOB, MEMORY_BYTES, Mode, OUTPUT, RECORDED_TICKS, RESET, Reset,
 };
-
-/// Base address of the PSRAM, which the host backs by a shared file.
-const BASE: usize = 0x2100_0000;
 
 /// The run that the host asked for.
 #[derive(Clone, Copy)]

@@ -7,9 +7,9 @@ use quadrant::link::message::{AxisSet, Body};
 use super::fixture::{A_WHILE, Fixture};
 
 /// Largest speed of the motions, mm/s.
-pub(super) const SPEED_MM_S: f64 = 30.0;
+pub(crate) const SPEED_MM_S: f64 = 30.0;
 /// Ticks within which anything is found here.
-pub(super) const LONGEST: u32 = 40_000;
+pub(crate) const LONGEST: u32 = 40_000;
 
 /// The outputs enabled, long enough for the firmware to have seen it.
 pub(super) fn enabled(fixture: &mut Fixture) -> Result<()> {
@@ -27,7 +27,7 @@ pub(crate) fn moving(fixture: &mut Fixture, direction: f64) -> Result<()> {
 }
 
 /// All axes homed, and at rest where they park.
-pub(super) fn homed(fixture: &mut Fixture) -> Result<()> {
+pub(crate) fn homed(fixture: &mut Fixture) -> Result<()> {
     enabled(fixture)?;
     fixture.done(Body::Home(AxisSet::ALL))?;
     for _ in 0..LONGEST / 1_000 {

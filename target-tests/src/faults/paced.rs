@@ -33,7 +33,7 @@ impl Run {
         adjust: impl FnOnce(&mut [InputRecord]),
         prepare: impl FnOnce(&Memory) -> Result<()>,
     ) -> Result<Self> {
-        let model = ReferenceModel::of(image.target.scalar, reference_model::job())?;
+        let mut model = ReferenceModel::of(image.target.scalar, reference_model::job())?;
         let job = model.job().clone();
         let (mut inputs, expected) = model.run_alone(TICKS);
         adjust(&mut inputs);
