@@ -16,6 +16,7 @@ mod kinds;
 mod lockstep;
 mod longest_path;
 mod near_home;
+mod peer;
 mod reference_model;
 mod saturation;
 mod stages;
@@ -53,7 +54,13 @@ enum Verb {
     /// Inject every fault into the emulated firmware, and tell how it was found
     Faults(FaultArgs),
     /// Count the instructions of one control tick, by stage and by kind of tick
-    Count(CountArgs),
+    Count {
+        /// Instead, those of the control law alone beside the same law in C
+        #[arg(long, exclusive = true)]
+        peer: bool,
+        #[command(flatten)]
+        args: CountArgs,
+    },
     /// Calculate the cycles of one control tick, and a bound of them
     Cycles(CountArgs),
     /// Run every feedback law with every feedforward in lockstep, and count what each costs
@@ -151,7 +158,8 @@ fn run(cli: Cli) -> Result<()> {
             faults::run(toolchain, args.scalar, only, args.overwrite_expected)
         }
         Verb::Saturation { scalar } => saturation::run(toolchain, scalar),
-        Verb::Count(args) => {
+        Verb::Count { peer: true, .. } => peer::run(toolchain),
+        Verb::Count { args, .. } => {
             count::run(toolchain, args.scalar, args.ticks, args.overwrite_expected)
         }
         Verb::Cycles(args) => {

@@ -38,7 +38,11 @@ struct Cli {
 #[derive(Subcommand)]
 enum Verb {
     /// Find or install what building and emulating the firmware take
-    Setup,
+    Setup {
+        /// Also the C compiler of `count --peer`
+        #[arg(long)]
+        peer: bool,
+    },
     /// Build an image and print how much flash and RAM it uses
     Build(TargetArgs),
     /// Check where an image lies in the memories, and its sizes against the committed ones
@@ -151,8 +155,8 @@ fn run(cli: Cli) -> Result<bool> {
     // Setup looks at what is there; everything else takes what setup chose.
     let toolchain = || Toolchain::chosen(cli.toolchain);
     match cli.verb {
-        Verb::Setup => {
-            setup::run(cli.toolchain.unwrap_or(Choice::Auto))?;
+        Verb::Setup { peer } => {
+            setup::run(cli.toolchain.unwrap_or(Choice::Auto), peer)?;
         }
         Verb::Build(args) => {
             let image = image::build(toolchain()?, args.into())?;

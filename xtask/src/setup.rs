@@ -37,6 +37,12 @@ const TOOLS: [Tool; 4] = [
     },
 ];
 
+/// What `cargo xtask count --peer` takes besides.
+const PEER_TOOL: Tool = Tool {
+    program: "arm-none-eabi-gcc",
+    package: "gcc-arm-none-eabi",
+};
+
 /// Packages of Debian's compiler, by a file of each.
 const COMPILER: [(&str, &str); 4] = [
     ("/usr/bin/rustc", "rustc-web"),
@@ -48,8 +54,8 @@ const COMPILER: [(&str, &str); 4] = [
     ),
 ];
 
-/// Makes sure of everything and remembers the toolchain.
-pub(crate) fn run(choice: Choice) -> Result<Toolchain> {
+/// Makes sure of everything and remembers the toolchain; `with_peer`: also of the compiler of the law in C.
+pub(crate) fn run(choice: Choice, with_peer: bool) -> Result<Toolchain> {
     let toolchain = match choice {
         Choice::Rustup => {
             add_targets()?;
@@ -58,7 +64,10 @@ pub(crate) fn run(choice: Choice) -> Result<Toolchain> {
         Choice::Debian => Toolchain::Debian,
         Choice::Auto => choose()?,
     };
-    let missing = missing(toolchain);
+    let mut missing = missing(toolchain);
+    if with_peer && !command::exists(PEER_TOOL.program) {
+        missing.push(PEER_TOOL.package);
+    }
     if missing.is_empty() {
         println!("setup: QEMU, binutils, npm and Chromium are installed");
     } else {
@@ -143,8 +152,8 @@ fn install(packages: &[&str]) -> Result<()> {
     if !command::exists("apt-get") {
         bail!(
             "there is no apt-get here to install it with: please install QEMU for Arm (qemu-system-arm), the \
-             GNU binutils for arm-none-eabi (arm-none-eabi-objdump), npm and Chromium (chromium) by your system's \
-             own means, then try again"
+             GNU binutils for arm-none-eabi (arm-none-eabi-objdump), npm and Chromium (chromium), for a law in C the \
+             GNU compiler for arm-none-eabi (arm-none-eabi-gcc), by your system's own means, then try again"
         );
     }
     command::run(apt().arg("update"))?;

@@ -68,7 +68,7 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
     let mut report = Report::default();
     // Without its tools nothing else can be expected to work.
     println!("\n== setup");
-    let toolchain = setup::run(choice)?;
+    let toolchain = setup::run(choice, false)?;
     report
         .steps
         .push(("setup".into(), started.elapsed().as_secs_f64(), Ok(())));

@@ -1,0 +1,218 @@
+/* The control law of three axes in C: N-PID beside the feedforward of static friction and GMS, with the operations of the Rust
+   law in their order, so that every word is the same. And a bare PID in the form of CMSIS-DSP's arm_pid_f32, which does less. */
+
+#include <stdint.h>
+
+enum { AXES = 3, ELEMENTS = 4, NODES = 226, INTERVAL_BITS = 4 };
+
+/* Intervals of a table: one from zero to `bound`, then 16 in every octave. */
+struct octaves {
+    uint32_t key; /* exponent and leading mantissa bits of `bound` */
+    float below;  /* turns an argument below `bound` into a place within the first interval */
+    float bound;
+};
+
+struct parameters {
+    float limit; /* of the output, V */
+    /* Feedback: gains per tick, and the largest error (mm) and integral (V). */
+    float proportional, derivative, pole, integral, error_limit, integral_limit;
+    /* Feedforward: for positive and for negative velocities, for accelerations, and the elements' share. */
+    float viscous[2], inertia, share;
+    float stiffness[ELEMENTS], weight[ELEMENTS];
+    /* Tables: the gain of an error up to `range` mm, and level (V) and decay of the sliding surface for both senses. */
+    float range, largest;
+    struct octaves gain_octaves, surface_octaves[2];
+    float gain[NODES], surface[2][NODES][2];
+};
+
+struct state {
+    float forces[ELEMENTS]; /* V */
+    uint32_t slipping;      /* a bit for each element */
+    uint32_t backward;      /* the sense of the last motion */
+    float integral, lost;   /* V, and what its last rounding lost */
+    float derivative;       /* V */
+    float last_error;       /* mm */
+};
+
+struct input {
+    float error;        /* mm */
+    float displacement; /* mm in this tick */
+    float velocity;     /* mm/s */
+    float acceleration; /* mm/s^2 */
+};
+
+/* `value` between `low` and `high`; zero if it is not a number. */
+static inline float limited(float value, float low, float high)
+{
+    if (value <= high)
+        return value >= low ? value : low;
+    return value > high ? high : 0.0f;
+}
+
+static inline float within(float value, float most)
+{
+    return __builtin_fabsf(value) <= most ? value : limited(value, -most, most);
+}
+
+/* The interval of a non-negative argument; `place` within it is 0 to 1. */
+static inline uint32_t interval(const struct octaves *octaves, float argument, float *place)
+{
+    enum { SHIFT = 23 - INTERVAL_BITS };
+    union {
+        float value;
+        uint32_t bits;
+    } number = { .value = argument };
+
+    if (argument < octaves->bound) {
+        *place = argument * octaves->below;
+        return 0;
+    }
+    *place = (float)(int32_t)(number.bits & ((1u << SHIFT) - 1)) * (1.0f / (1u << SHIFT));
+    return (number.bits >> SHIFT) - octaves->key + 1;
+}
+
+/* k(e) e. */
+static inline float scaled_error(const struct parameters *law, float error)
+{
+    float size = __builtin_fabsf(error), place, gain;
+    uint32_t at = interval(&law->gain_octaves, size < law->range ? size : law->range, &place);
+
+    if (at >= NODES - 1)
+        gain = law->gain[NODES - 1];
+    else
+        gain = law->gain[at] + (law->gain[at + 1] - law->gain[at]) * place;
+    return error * (gain < law->largest ? gain : law->largest);
+}
+
+/* The elements' force after a displacement over a surface, V; `sign` is the sense of the displacement. */
+static inline float advance(const struct parameters *law, struct state *state, float displacement,
+                            float level, float decay, float sign)
+{
+    const uint32_t backward = sign < 0.0f, all = (1u << ELEMENTS) - 1;
+    float total = 0.0f;
+
+    if (state->backward != backward) {
+        state->backward = backward;
+        state->slipping = 0;
+    }
+    if (state->slipping == all) {
+        for (int i = 0; i < ELEMENTS; i++) {
+            float share = level * law->weight[i];
+            float force = sign * (share + (sign * state->forces[i] - share) * decay);
+            state->forces[i] = force;
+            total += force;
+        }
+        return total;
+    }
+    for (int i = 0; i < ELEMENTS; i++) {
+        float share = level * law->weight[i], force;
+        if (state->slipping >> i & 1) {
+            force = sign * (share + (sign * state->forces[i] - share) * decay);
+        } else {
+            force = state->forces[i] + displacement * law->stiffness[i];
+            if (!(sign * force < share)) {
+                state->slipping |= 1u << i;
+                force = sign * share;
+            }
+        }
+        state->forces[i] = force;
+        total += force;
+    }
+    return total;
+}
+
+static inline float friction(const struct parameters *law, struct state *state, const struct input *input,
+                             uint32_t sense)
+{
+    float place, level, decay, total = 0.0f;
+    uint32_t at = interval(&law->surface_octaves[sense], __builtin_fabsf(input->velocity), &place);
+    const float(*nodes)[2] = law->surface[sense];
+
+    if (at >= NODES - 1) {
+        level = nodes[NODES - 1][0];
+        decay = nodes[NODES - 1][1];
+    } else {
+        level = nodes[at][0] + (nodes[at + 1][0] - nodes[at][0]) * place;
+        decay = nodes[at][1] + (nodes[at + 1][1] - nodes[at][1]) * place;
+    }
+    if (input->displacement > 0.0f)
+        return advance(law, state, input->displacement, level, decay, 1.0f);
+    if (input->displacement < 0.0f)
+        return advance(law, state, input->displacement, level, decay, -1.0f);
+    for (int i = 0; i < ELEMENTS; i++)
+        total += state->forces[i];
+    return total;
+}
+
+static inline float feedforward(const struct parameters *law, struct state *state, const struct input *input)
+{
+    uint32_t sense = input->velocity < 0.0f;
+    float inertia = input->acceleration * law->inertia;
+    float viscous = input->velocity * law->viscous[sense];
+
+    return 0.0f + viscous + friction(law, state, input, sense) * law->share + inertia;
+}
+
+static inline float feedback(const struct parameters *law, struct state *state, float error, float low,
+                             float high)
+{
+    float proportional, derivative, fast, term, integral, lost, wanted;
+
+    error = within(scaled_error(law, error), law->error_limit);
+    proportional = error * law->proportional;
+    derivative = state->derivative * law->pole + (error - state->last_error) * law->derivative;
+    state->derivative = derivative;
+    state->last_error = error;
+
+    fast = proportional + derivative;
+    term = error * law->integral + state->lost;
+    integral = state->integral + term;
+    lost = term - (integral - state->integral);
+    wanted = fast + integral;
+    if (wanted <= high && wanted >= low && __builtin_fabsf(integral) <= law->integral_limit) {
+        state->integral = integral;
+        state->lost = lost;
+        return wanted;
+    }
+    /* At a bound: the integral takes nothing that would push the output further out. */
+    if (wanted > high ? error > 0.0f : wanted < low && error < 0.0f) {
+        integral = state->integral;
+    } else {
+        float bounded = within(integral, law->integral_limit);
+        state->lost = bounded == integral ? lost : 0.0f;
+        state->integral = integral = bounded;
+    }
+    return limited(fast + integral, low, high);
+}
+
+void c_law(const struct parameters laws[AXES], struct state states[AXES], const struct input inputs[AXES],
+           float outputs[AXES])
+{
+    for (int axis = 0; axis < AXES; axis++) {
+        const struct parameters *law = &laws[axis];
+        float base = feedforward(law, &states[axis], &inputs[axis]);
+        float rest = feedback(law, &states[axis], inputs[axis].error, -law->limit - base, law->limit - base);
+
+        outputs[axis] = within(rest + base, law->limit);
+    }
+}
+
+/* A PID without bounds, filter or anti-windup: the output and two errors are kept. */
+struct bare_pid {
+    float a0, a1, a2;
+    float last[2], output;
+};
+
+void c_pid(struct bare_pid pids[AXES], const struct input inputs[AXES], float outputs[AXES])
+{
+    for (int axis = 0; axis < AXES; axis++) {
+        struct bare_pid *pid = &pids[axis];
+        float error = inputs[axis].error;
+        float output = pid->a0 * error + pid->a1 * pid->last[0] + pid->a2 * pid->last[1] + pid->output;
+
+        pid->last[1] = pid->last[0];
+        pid->last[0] = error;
+        pid->output = output;
+        outputs[axis] = output;
+    }
+}
