@@ -1,34 +1,88 @@
-//! `cargo xtask combinations`: every feedback law with every feedforward on the emulated target, bit for bit, and what
-//! each law and each feedforward costs.
+//! `cargo xtask combinations`: every feedback law with every feedforward, and the N-PID with what adapts itself, on the emulated
+//! target, bit for bit, and what each law and each feedforward costs.
 
 use anyhow::{Result, ensure};
+use quadrant::cancelling::CancellingSettings;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
+use quadrant::learning::LearningSettings;
 use quadrant::lockstep::Job;
+use quadrant::settings::AxisSettings;
 
 use crate::reference_model::{self, ReferenceModel};
 use crate::{count, lockstep};
 use xtask::image::{self, Board, Scalar, Target};
 use xtask::toolchain::Toolchain;
 
-/// A law and a feedforward.
-type Combination = (LawKind, FeedforwardKind);
+/// A law and a feedforward, with what adapts itself.
+#[derive(Clone, Copy, Debug)]
+struct Combination {
+    law: LawKind,
+    kind: FeedforwardKind,
+    learns: bool,
+    cancels: bool,
+}
+
+impl Combination {
+    fn of(law: LawKind, kind: FeedforwardKind) -> Self {
+        Self {
+            law,
+            kind,
+            learns: false,
+            cancels: false,
+        }
+    }
+
+    fn put_into(self, axis: &mut AxisSettings) {
+        axis.feedback.law = self.law;
+        axis.feedforward.kind = self.kind;
+        axis.feedforward.learning = self.learns.then(LearningSettings::default);
+        axis.feedforward.cancelling = self.cancels.then(|| CancellingSettings {
+            spindle_rpm: SPINDLE_RPM,
+            ..CancellingSettings::default()
+        });
+    }
+
+    fn name(self) -> String {
+        let Self {
+            law,
+            kind,
+            learns,
+            cancels,
+        } = self;
+        let learning = if learns { ", learning" } else { "" };
+        let cancelling = if cancels { ", cancelling" } else { "" };
+        format!("{law:?}, {kind:?}{learning}{cancelling}")
+    }
+}
+
+/// Speed of the spindle whose vibration is cancelled, rpm.
+const SPINDLE_RPM: f64 = 3000.0;
 
 /// Control ticks of each comparison.
 const TICKS: u32 = 4_000;
 
 /// All of them.
 fn all() -> Vec<Combination> {
-    let kinds = |law| FeedforwardKind::ALL.map(|kind| (law, kind));
-    LawKind::ALL.into_iter().flat_map(kinds).collect()
+    let kinds = |law| FeedforwardKind::ALL.map(|kind| Combination::of(law, kind));
+    let fixed = LawKind::ALL.into_iter().flat_map(kinds);
+    fixed.chain(adaptive()).collect()
+}
+
+/// The N-PID with combined feedforward that learns, cancels, or both.
+fn adaptive() -> [Combination; 3] {
+    [(true, false), (false, true), (true, true)].map(|(learns, cancels)| Combination {
+        learns,
+        cancels,
+        ..Combination::of(LawKind::NPid, FeedforwardKind::Combined)
+    })
 }
 
 /// The job of an emulated run, each axis with a combination of its own.
 fn job(axes: [Combination; 3]) -> Job {
     let mut job = reference_model::job();
-    for (axis, (law, kind)) in job.stage.axes.iter_mut().zip(axes) {
-        axis.feedback.law = law;
-        axis.feedforward.kind = kind;
+    for (axis, combination) in job.stage.axes.iter_mut().zip(axes) {
+        combination.put_into(axis);
     }
     job
 }
@@ -66,25 +120,24 @@ pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
     Ok(())
 }
 
-/// Counts the instructions of every law with combined feedforward, and of every feedforward with the PID, on all axes.
+/// Counts the instructions of every law with combined feedforward, of every feedforward with the PID, and of what adapts itself, on
+/// all axes.
 pub(crate) fn count(
     toolchain: Toolchain,
     scalar: Scalar,
     ticks: u32,
     overwrite: bool,
 ) -> Result<()> {
-    let laws = LawKind::ALL.map(|law| (law, FeedforwardKind::Combined));
+    let laws = LawKind::ALL.map(|law| Combination::of(law, FeedforwardKind::Combined));
     let kinds = FeedforwardKind::ALL
         .into_iter()
         .filter(|kind| *kind != FeedforwardKind::Combined)
-        .map(|kind| (LawKind::Pid, kind));
+        .map(|kind| Combination::of(LawKind::Pid, kind));
     let jobs: Vec<(String, Job)> = laws
         .into_iter()
         .chain(kinds)
-        .map(|combination| {
-            let (law, kind) = combination;
-            (format!("{law:?}, {kind:?}"), job([combination; 3]))
-        })
+        .chain(adaptive())
+        .map(|combination| (combination.name(), job([combination; 3])))
         .collect();
     count::run_all(toolchain, scalar, jobs, ticks, overwrite)
 }
