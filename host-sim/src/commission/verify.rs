@@ -76,8 +76,11 @@ const AS_GOOD: f64 = 1.1;
 const LEAPS: f64 = 3.0;
 /// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
 const NO_WORSE: f64 = 1.01;
-/// Mean of the errors over the PID's from which on a law is not worth its risk on motions that are not tried.
+/// Mean of the errors over the PID's, and largest error on a withheld sine, from which on a law is not worth its risk on motions that
+/// are not tried.
 const WORTH: f64 = 0.95;
+/// Counts of the encoder that are the least error that can be told.
+const SEEN_COUNTS: f64 = 2.0;
 /// Counts of the encoder that the largest error, and the RMS error, must exceed the PID's by to be larger.
 const UNSEEN_COUNTS: f64 = 0.25;
 const UNSEEN_RMS_COUNTS: f64 = 0.025;
@@ -164,6 +167,18 @@ impl LawResult {
     fn is_better_than(&self, pid: &Self, drift: &Drift) -> bool {
         let (worst, mean) = self.against(pid, drift);
         self.scores.len() == pid.scores.len() && worst <= self.most_worse() && mean <= WORTH
+    }
+
+    /// True if its largest error on every withheld sine is below the PID's by enough, or all but what the encoder shows: what is just
+    /// no worse there may be worse on the next motion.
+    fn keeps_clear_of(&self, pid: &Self, drift: &Drift) -> bool {
+        let seen_mm = SEEN_COUNTS * self.settings.encoder.resolution_mm;
+        let own = self.scores.iter().zip(&self.at_s);
+        let pairs = own.zip(pid.scores.iter().zip(&pid.at_s));
+        pairs.skip(CHOOSING).all(|((own, own_s), (pid, pid_s))| {
+            let pid_mm = drift.between(*pid_s, *own_s) * pid.largest_mm;
+            own.largest_mm <= seen_mm.max(WORTH * pid_mm)
+        })
     }
 
     /// Errors over the PID's up to which it counts as no worse: more of the same is known to be, and that is no scatter.
@@ -542,7 +557,8 @@ impl Bench<'_> {
         }
         for index in better.into_iter().take(CANDIDATES) {
             self.run_on(&mut laws[index], self.sines.len());
-            if laws[index].is_better_than(&laws[0], drift) {
+            let law = &laws[index];
+            if law.is_better_than(&laws[0], drift) && law.keeps_clear_of(&laws[0], drift) {
                 return Ok(index);
             }
         }
@@ -731,6 +747,22 @@ mod tests {
             !is_better(&[(0.5, 0.3)], false),
             "stopped on the second sine"
         );
+    }
+
+    #[test]
+    fn a_law_keeps_clear_of_the_pid_on_withheld_sines_or_is_as_good_as_the_encoder() {
+        let drift = Drift::default();
+        let count_mm = StageSettings::simulated().axes[0].encoder.resolution_mm;
+        let ran = |withheld: [f64; 2]| {
+            let chosen_by = [(0.1, 0.05); CHOOSING];
+            let withheld = withheld.map(|largest_mm| (largest_mm, 0.05));
+            law(&[&chosen_by[..], &withheld].concat(), &[])
+        };
+        let pid = ran([1.0, 1.5 * count_mm]);
+        assert!(ran([0.9, 1.4 * count_mm]).keeps_clear_of(&pid, &drift));
+        assert!(ran([0.9, 2.0 * count_mm]).keeps_clear_of(&pid, &drift));
+        assert!(!ran([0.9, 2.1 * count_mm]).keeps_clear_of(&pid, &drift));
+        assert!(!ran([0.98, 1.4 * count_mm]).keeps_clear_of(&pid, &drift));
     }
 
     #[test]
