@@ -310,14 +310,17 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     }
 
     /// Passes the axes the next segments of a stream, if they have room.
-    #[inline(always)]
+    #[cold]
+    #[inline(never)]
     fn take_segments(&mut self) {
         if self.state.axes().iter().all(|axis| axis.wants_segment())
-            && let Some(StreamItem::Segments(segments)) = self.ends.stream_items.dequeue()
+            && let Some(StreamItem::Segments(segments)) = self.ends.stream_items.peek()
         {
             for (name, segment) in AxisName::ALL.into_iter().zip(segments) {
                 self.state.offer_segment(name, segment);
             }
+            // Each was copied once, from its place in the queue to its slot. What is taken out here is not read.
+            let _ = self.ends.stream_items.dequeue();
         }
     }
 

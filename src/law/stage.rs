@@ -219,7 +219,7 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
 
     /// Gives an axis the next segment of a stream; call it when [`AxisState::wants_segment`].
     #[inline(always)]
-    pub fn offer_segment(&mut self, axis: AxisName, segment: Segment) {
+    pub fn offer_segment(&mut self, axis: AxisName, segment: &Segment) {
         self.axes[axis].offer_segment(segment);
     }
 

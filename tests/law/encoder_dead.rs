@@ -212,7 +212,7 @@ impl<S: Scalar> Bench<S> {
                 && let Some(segments) = self.segments.pop_front()
             {
                 for (name, segment) in AxisName::ALL.into_iter().zip(segments) {
-                    self.rig.state.offer_segment(name, segment);
+                    self.rig.state.offer_segment(name, &segment);
                 }
             }
         }

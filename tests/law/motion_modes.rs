@@ -162,7 +162,7 @@ impl Feed {
             if rig.state.axes()[index].wants_segment()
                 && let Some(segments) = self.segments.get(self.next[index])
             {
-                rig.state.offer_segment(name, segments[index]);
+                rig.state.offer_segment(name, &segments[index]);
                 self.next[index] += 1;
             }
         }

@@ -63,7 +63,7 @@ fn play<S: Scalar>(segments: &[Segment]) -> (Vec<ReferenceSample<S>>, bool) {
         if state.wants_segment()
             && let Some(segment) = queue.next()
         {
-            state.offer(*segment);
+            state.offer(segment);
         }
         match stream.step(&mut state) {
             StreamStep::Moving(sample) => samples.push(sample),
@@ -202,13 +202,13 @@ fn what_is_left_of_a_stream_that_was_broken_off_is_dropped() {
         })
         .collect();
     let mut state = StreamState::default();
-    state.offer(old[0]);
+    state.offer(&old[0]);
     assert!(state.is_ready(Position::ZERO));
     assert!(!state.is_ready(Position(1)), "the axis stands elsewhere");
     state.clear();
-    state.offer(old[1]);
+    state.offer(&old[1]);
     assert!(state.wants_segment(), "dropped");
-    state.offer(old[0]);
+    state.offer(&old[0]);
     assert!(!state.wants_segment(), "a new stream");
 }
 

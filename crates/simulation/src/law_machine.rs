@@ -98,7 +98,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
             if self.state.axes()[name as usize].wants_segment()
                 && let Some(segment) = queue.pop_front()
             {
-                self.state.offer_segment(name, segment);
+                self.state.offer_segment(name, &segment);
             }
         }
     }

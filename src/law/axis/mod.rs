@@ -572,7 +572,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// Gives the axis the next segment of a stream; call it when [`AxisState::wants_segment`]. What is left of a stream
     /// that was broken off is dropped.
     #[inline(always)]
-    pub(crate) fn offer_segment(&mut self, segment: Segment) {
+    pub(crate) fn offer_segment(&mut self, segment: &Segment) {
         self.generator.stream.offer(segment);
     }
 

@@ -16,13 +16,13 @@ const VELOCITY_SHIFT: u32 = 56;
 const ACCELERATION_SHIFT: u32 = 48;
 
 /// The way of one axis from one set point to the next.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Segment {
     /// Position at the start of the segment.
     pub(super) start: Position,
     /// The forward differences of the position at the start, first to fifth.
     pub(super) differences: [i128; 5],
-    /// Duration in ticks; at least one.
+    /// Ticks left of it; at least one when it is handed over.
     pub(super) ticks: u32,
     /// It begins a stream.
     pub(super) first: bool,
@@ -39,6 +39,17 @@ impl Segment {
     /// Duration of the segment in ticks.
     pub const fn ticks(&self) -> u32 {
         self.ticks
+    }
+
+    /// Takes the place of an older one. Number by number, as a whole would be copied by a loop of five instructions a word.
+    #[inline(always)]
+    const fn replace(&mut self, other: &Self) {
+        let [first, second, third, fourth, fifth] = &mut self.differences;
+        self.start = other.start;
+        [*first, *second, *third, *fourth, *fifth] = other.differences;
+        self.ticks = other.ticks;
+        self.first = other.first;
+        self.last = other.last;
     }
 
     /// Advances the differences by a tick; the displacement since the segment's start goes into `position`.
@@ -64,51 +75,56 @@ pub enum StreamStep<S> {
     Underrun,
 }
 
-/// The segment under way and the one after it.
+/// The segment under way and the one after it. Neither moves: when the one under way has run out, they change roles.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct StreamState {
-    current: Option<Segment>,
-    /// Ticks left of the segment under way.
-    left: u32,
-    /// Displacement since the segment's start.
-    displacement: i128,
-    next: Option<Segment>,
+    /// No ticks: it has run out, or none was put there.
+    slots: [Segment; 2],
+    /// The second slot holds the segment under way.
+    turned: bool,
     /// A stream is under way, or its first segments are there.
     begun: bool,
+    /// Displacement since the segment's start.
+    displacement: i128,
 }
 
 impl StreamState {
+    /// The segment under way and the one after it.
+    #[inline(always)]
+    const fn segments(&self) -> (&Segment, &Segment) {
+        match (&self.slots, self.turned) {
+            ([current, next], false) | ([next, current], true) => (current, next),
+        }
+    }
+
     /// True if there is room for a segment.
     #[inline(always)]
     pub const fn wants_segment(&self) -> bool {
-        self.next.is_none()
+        self.segments().1.ticks == 0
     }
 
     /// Takes a segment from the queue; call it when [`StreamState::wants_segment`]. What is left of a stream that was
     /// broken off is dropped: then only the first segment of another one is taken.
-    pub fn offer(&mut self, segment: Segment) {
+    pub fn offer(&mut self, segment: &Segment) {
         if self.begun || segment.first {
             self.begun = true;
-            self.next = Some(segment);
+            let [first, second] = &mut self.slots;
+            let next = if self.turned { first } else { second };
+            next.replace(segment);
         }
     }
 
     /// True if a stream can start from a reference at rest at `position`.
     pub fn is_ready(&self, position: Position) -> bool {
-        self.current.is_none()
-            && self
-                .next
-                .as_ref()
-                .is_some_and(|segment| segment.first && segment.start == position)
+        let (current, next) = self.segments();
+        current.ticks == 0 && next.ticks > 0 && next.first && next.start == position
     }
 
     /// Breaks the stream off and forgets what is left of it.
     pub fn clear(&mut self) {
-        // Field by field: a whole one, made apart, is copied with the room of both segments.
-        self.current = None;
-        self.left = 0;
-        self.displacement = 0;
-        self.next = None;
+        let [first, second] = &mut self.slots;
+        first.ticks = 0;
+        second.ticks = 0;
         self.begun = false;
     }
 }
@@ -143,17 +159,15 @@ impl<S: Scalar> Stream<S> {
     // Not inlined: its wide integers would crowd the registers of the motions that run for hours.
     #[inline(never)]
     pub fn step(&self, state: &mut StreamState) -> StreamStep<S> {
-        if state.left == 0 {
-            let Some(next) = state.next.take() else {
-                return StreamStep::Underrun;
-            };
-            state.left = next.ticks;
+        if state.segments().0.ticks == 0 {
+            state.turned = !state.turned;
             state.displacement = 0;
-            state.current = Some(next);
         }
-        let Some(segment) = &mut state.current else {
+        let [first, second] = &mut state.slots;
+        let segment = if state.turned { second } else { first };
+        if segment.ticks == 0 {
             return StreamStep::Underrun;
-        };
+        }
         let [before, second, ..] = segment.differences;
         segment.advance(&mut state.displacement);
         let [after, ..] = segment.differences;
@@ -165,9 +179,8 @@ impl<S: Scalar> Stream<S> {
             velocity: S::scale_wide(velocity as i64, self.velocity),
             acceleration: S::scale_wide((second >> ACCELERATION_SHIFT) as i64, self.acceleration),
         };
-        let ends = segment.last;
-        state.left -= 1;
-        if state.left == 0 && ends {
+        segment.ticks -= 1;
+        if segment.ticks == 0 && segment.last {
             state.clear();
             return StreamStep::Finished(ReferenceSample {
                 position: sample.position,
