@@ -10,6 +10,8 @@ use crate::law::control::feedback::LawKind;
 use crate::law::control::pid::PidGains;
 use crate::law::encoder::Encoder;
 use crate::law::feedforward::FeedforwardKind;
+use crate::law::friction::PerDirection;
+use crate::law::friction::stribeck::StribeckCurve;
 use crate::law::learning::{Learning, LearningLoop};
 use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
@@ -236,12 +238,10 @@ impl AxisSettings {
             let breakaway_v = OPEN_SHARE * limit_v;
             return Plausibility::without_model(OPEN_BUDGET_V_S, breakaway_v, words, period_s);
         };
-        let sliding = &self.friction.sliding;
-        let breakaway_v = sliding
-            .positive
-            .curve
-            .breakaway_v
-            .max(sliding.negative.curve.breakaway_v);
+        // Where the level rises with the speed, a vibration may have hidden some of it at rest.
+        let PerDirection { positive, negative } = &self.friction.sliding;
+        let level_v = |curve: &StribeckCurve| curve.breakaway_v.max(curve.coulomb_v);
+        let breakaway_v = level_v(&positive.curve).max(level_v(&negative.curve));
         // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
         let seen_mm = HELD_COUNTS * resolution_mm;
         let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
