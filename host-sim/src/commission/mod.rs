@@ -16,6 +16,7 @@ mod linear_model;
 mod models;
 pub mod page;
 mod plan;
+mod quiet_pid;
 mod ringing;
 pub mod verify;
 

@@ -17,6 +17,7 @@ use quadrant::settings::{AxisSettings, FeedbackSettings};
 use super::bootstrap::rough_sliding;
 use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
 use super::error::CommissionError;
+use super::ringing::Ringing;
 use super::verify::VerifyError;
 use crate::design::npid::{NonlinearRule, Range, choose_nonlinear};
 use crate::design::{Form, PidRequest, Process, best_pid, design_pid, modal_pid, noise_voltage_v};
@@ -72,8 +73,10 @@ pub(super) struct Controller {
     pub(super) filters: Vec<FilterSettings>,
     /// Largest gain in front of the PID that is shown to be stable with the modes; infinite without any.
     circle_bound: f64,
-    /// The change that the encoder's noise made to it, in a sentence.
-    remark: Option<String>,
+    /// Share of the crossover that it was designed with.
+    softened: f64,
+    /// The changes that what was seen of the axis made to it, a sentence each.
+    remarks: Vec<String>,
 }
 
 impl Controller {
@@ -82,6 +85,24 @@ impl Controller {
         settings.feedback.pid = self.pid;
         settings.feedback.filters =
             (!self.filters.is_empty()).then(|| self.filters.iter().copied().collect());
+    }
+
+    /// Takes a softer PID, and no nonlinear gain: the model lacks something.
+    pub(super) fn soften(&mut self) {
+        self.pid = softer(&self.pid);
+        self.circle_bound = 1.0;
+        self.softened *= SOFTER;
+    }
+
+    /// Remarks that it was softened because of an oscillation while friction held the axis.
+    pub(super) fn tell(&mut self, seen: &Ringing) {
+        self.remarks.push(format!(
+            "While friction held the axis, the PID oscillated at {:.0} Hz ({:.1} um): a softer one took its place, with {:.0} % of its \
+             crossover and without a nonlinear gain.",
+            seen.frequency_hz,
+            1e3 * seen.amplitude_mm,
+            100.0 * self.softened,
+        ));
     }
 }
 
@@ -118,11 +139,12 @@ pub(super) fn controller(
     motor: &MotorConstant,
     rate_hz: f64,
 ) -> Result<Controller, CommissionError> {
-    let alone = |pid| Controller {
+    let alone = |pid: PidGains| Controller {
         pid,
         filters: Vec::new(),
         circle_bound: f64::INFINITY,
-        remark: None,
+        softened: 1.0,
+        remarks: Vec::new(),
     };
     let filter_s = base.feedback.pid.derivative_filter_s;
     let Some(target) = request.target else {
@@ -134,10 +156,9 @@ pub(super) fn controller(
             }
             let found = modal_pid(&plant.plant, &plant.modes, form, filter_s)?;
             Ok(Controller {
-                pid: found.gains,
                 filters: found.filters,
                 circle_bound: found.circle_bound,
-                remark: None,
+                ..alone(found.gains)
             })
         };
         let noise_mm = motor.noise_mm();
@@ -152,12 +173,12 @@ pub(super) fn controller(
             match best(SLOWER_FILTER.powi(step) * filter_s) {
                 Ok(quieter) => {
                     found = quieter;
-                    found.remark = Some(format!(
+                    found.remarks = vec![format!(
                         "The encoder's noise of {:.2} um RMS would have shaken the axis out of its friction of {friction_v:.3} V: the \
                          derivative is filtered over {:.2} ms.",
                         1e3 * noise_mm,
                         1e3 * found.pid.derivative_filter_s,
-                    ));
+                    )];
                 }
                 // So slow a filter leaves no loop.
                 Err(_) => break,
@@ -352,7 +373,7 @@ impl Models {
             presliding: (gms, measurements.presliding),
             sector_bound: bound,
             settings,
-            remarks: controller.remark.into_iter().collect(),
+            remarks: controller.remarks,
             ran: Vec::new(),
             verification: None,
         }
@@ -374,6 +395,18 @@ fn feedback(
 
 /// Crossover of a softer PID over that of one which oscillates.
 const SOFTER: f64 = 0.75;
+/// Softer PIDs that are tried where the one that is designed oscillates on the axis, or does not hold it.
+pub(super) const SOFTENINGS: usize = 6;
+
+/// A PID of the same shape at a lower crossover.
+fn softer(pid: &PidGains) -> PidGains {
+    PidGains {
+        kp_v_per_mm: SOFTER.powi(2) * pid.kp_v_per_mm,
+        ki_v_per_mm_s: SOFTER.powi(3) * pid.ki_v_per_mm_s,
+        kd_v_s_per_mm: SOFTER * pid.kd_v_s_per_mm,
+        ..*pid
+    }
+}
 
 impl Commissioned {
     /// Replaces the law by a PID of the same shape at a lower crossover, for an axis on which it oscillates: the model lacks something,
@@ -383,13 +416,7 @@ impl Commissioned {
             "{seen}: a softer one took its place, with {:.0} % of its crossover and without a nonlinear gain.",
             100.0 * SOFTER
         ));
-        let old = self.settings.feedback.pid;
-        let pid = PidGains {
-            kp_v_per_mm: SOFTER.powi(2) * old.kp_v_per_mm,
-            ki_v_per_mm_s: SOFTER.powi(3) * old.ki_v_per_mm_s,
-            kd_v_s_per_mm: SOFTER * old.kd_v_s_per_mm,
-            ..old
-        };
+        let pid = softer(&self.settings.feedback.pid);
         let filters = self.settings.feedback.filters.take();
         self.settings.feedback = FeedbackSettings {
             filters,

@@ -15,6 +15,14 @@ pub struct Ringing {
     pub share: f64,
 }
 
+impl Ringing {
+    /// True if it is faster than the reference ever is, mm/s: then the axis moves to and fro in every period of it, as no ripple makes
+    /// it do.
+    pub(super) fn outruns(&self, fastest_mm_s: f64) -> bool {
+        TAU * self.frequency_hz * self.amplitude_mm > fastest_mm_s
+    }
+}
+
 /// The time at the end that is looked at, s: the oscillation grew before.
 const WINDOWS_S: [f64; 4] = [0.02, 0.05, 0.15, 0.4];
 /// Growths that are tried, 1/s.
@@ -56,6 +64,34 @@ pub fn ringing(recording: &Recording) -> Option<Ringing> {
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, found)| found)
 }
+
+/// True if two oscillations have about the same frequency.
+pub(super) fn alike(a: &Ringing, b: &Ringing) -> bool {
+    (1.0 / SAME..SAME).contains(&(a.frequency_hz / b.frequency_hz))
+}
+
+/// The oscillation that lasts all through a recording, if there is one that is larger than some counts of the encoder.
+pub(super) fn lasting(recording: &Recording, resolution_mm: f64) -> Option<Ringing> {
+    let part = recording.len() / PARTS;
+    let parts: Option<Vec<Ringing>> = (0..PARTS)
+        .map(|index| ringing(&recording.slice(index * part..(index + 1) * part)))
+        .collect();
+    let parts = parts?;
+    let first = parts[0];
+    let lasts = parts.iter().all(|found| {
+        alike(found, &first)
+            && found.amplitude_mm > LEAST_COUNTS * resolution_mm
+            && found.frequency_hz > LEAST_HZ
+    });
+    lasts.then_some(first)
+}
+
+/// Parts of a recording in each of which an oscillation is found that lasts; ratio of their frequencies, lowest of them, Hz, and least
+/// amplitude, counts.
+const PARTS: usize = 4;
+const SAME: f64 = 1.3;
+const LEAST_HZ: f64 = 8.0;
+const LEAST_COUNTS: f64 = 4.0;
 
 /// Worth of a find: few periods can look like much.
 fn score(found: &Ringing, window_s: f64) -> f64 {
@@ -141,6 +177,18 @@ mod tests {
                 .collect(),
             ..Recording::default()
         }
+    }
+
+    #[test]
+    fn an_oscillation_outruns_a_slow_motion_that_it_turns_around_in_every_period() {
+        let found = Ringing {
+            frequency_hz: 100.0,
+            amplitude_mm: 0.01,
+            share: 1.0,
+        };
+        // 6.3 mm/s.
+        assert!(found.outruns(6.0));
+        assert!(!found.outruns(6.5));
     }
 
     #[test]

@@ -9,7 +9,7 @@ use quadrant::settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
 use super::drift::Drift;
-use super::ringing::{Ringing, ringing};
+use super::ringing::{Ringing, alike, lasting};
 use crate::experiment::metrics::{Score, score, worst_and_mean};
 use crate::experiment::sine_test::SineTest;
 use crate::machine::{
@@ -286,33 +286,7 @@ impl VerifyError {
     }
 }
 
-/// True if two oscillations have about the same frequency.
-fn alike(a: &Ringing, b: &Ringing) -> bool {
-    (1.0 / SAME..SAME).contains(&(a.frequency_hz / b.frequency_hz))
-}
-
-/// The oscillation that lasts all through a recording, if there is one that is larger than some counts of the encoder.
-fn lasting(recording: &Recording, resolution_mm: f64) -> Option<Ringing> {
-    let part = recording.len() / PARTS;
-    let parts: Option<Vec<Ringing>> = (0..PARTS)
-        .map(|index| ringing(&recording.slice(index * part..(index + 1) * part)))
-        .collect();
-    let parts = parts?;
-    let first = parts[0];
-    let lasts = parts.iter().all(|found| {
-        alike(found, &first)
-            && found.amplitude_mm > LEAST_COUNTS * resolution_mm
-            && found.frequency_hz > LEAST_HZ
-    });
-    lasts.then_some(first)
-}
-
-/// Parts of a recording in each of which an oscillation is found that lasts; ratio of their frequencies, lowest of them, Hz, least
-/// amplitude, counts, and over the RMS error: a reversal is followed by an oscillation, too, but by one that decays.
-const PARTS: usize = 4;
-const SAME: f64 = 1.3;
-const LEAST_HZ: f64 = 8.0;
-const LEAST_COUNTS: f64 = 4.0;
+/// Amplitude over the RMS error from which on an oscillation is most of the error: a reversal is followed by one, too, but it decays.
 const DOMINANT: f64 = 1.0;
 
 /// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, and

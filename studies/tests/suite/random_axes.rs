@@ -55,6 +55,17 @@ fn axes_that_hang_or_run_away_stay_within_their_travel() {
     });
 }
 
+/// Axes whose motor oscillated against a table that friction held: nothing that was fed forward was better than so restless a PID.
+#[test]
+fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_commissioned() {
+    [13044, 13366].into_par_iter().for_each(|seed| {
+        let line = judge(seed);
+        println!("{line:?}");
+        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.3, "{line:?}");
+    });
+}
+
 #[test]
 fn a_seed_is_the_same_axis_every_time() {
     for seed in 1..50 {
