@@ -252,6 +252,8 @@ const LEAST_FRICTION: f64 = 0.457;
 const MOST_FRICTION: f64 = 0.857;
 /// Factor by which the level is lowered of a direction in which the axis went too far.
 const LOWER: f64 = 1.2;
+/// Factor from a level at which the axis went too far to the largest that is tried after it, in shorter tests.
+const RECKLESS: f64 = 1.7;
 /// Least factor from a level that holds to one that goes too far between which another one is tried.
 const NARROW: f64 = 1.06;
 /// Levels at the beginning of a pass that do not count: the axis breaks away.
@@ -285,6 +287,8 @@ struct Level {
     held_v: f64,
     /// Smallest at which it went too far, V.
     too_far_v: f64,
+    /// The same, of tests of other lengths as well.
+    ever_too_far_v: f64,
 }
 
 impl Level {
@@ -294,6 +298,15 @@ impl Level {
             volts,
             held_v: 0.0,
             too_far_v: f64::INFINITY,
+            ever_too_far_v: f64::INFINITY,
+        }
+    }
+
+    /// For a test of another length.
+    fn renewed(&self) -> Self {
+        Self {
+            ever_too_far_v: self.ever_too_far_v,
+            ..Self::at(self.volts)
         }
     }
 
@@ -306,6 +319,7 @@ impl Level {
     /// The next one after a test in which the axis went too far.
     fn lower(&mut self) {
         self.too_far_v = self.too_far_v.min(self.volts);
+        self.ever_too_far_v = self.ever_too_far_v.min(self.volts);
         self.volts = (self.volts / LOWER).max(self.between());
     }
 
@@ -317,6 +331,12 @@ impl Level {
     /// True if there is no level left between what holds and what goes too far.
     fn is_narrow(&self) -> bool {
         self.too_far_v < NARROW * self.held_v
+    }
+
+    /// True if it is so far above one at which the axis went too far that no shorter test makes up for it: the axis gathers speed before it
+    /// can be stopped.
+    fn is_reckless(&self) -> bool {
+        self.volts > RECKLESS * self.ever_too_far_v
     }
 
     /// True if no level below one that goes too far is known to be worth a try: nothing holds, as where something hangs, or
@@ -372,12 +392,16 @@ fn search(
         1.0
     };
     let mut tests_too_far = 0;
+    let mut too_far = None;
     let mut must_return = false;
     let (mut others, usual_s) = (0, settings.dwell_s);
     while levels
         .iter()
         .all(|level| level.volts <= settings.most_level_v)
     {
+        if let Some(error) = too_far.take_if(|_| levels.iter().any(Level::is_reckless)) {
+            return Err(MotorConstantError::Experiment(error));
+        }
         let levels_v = levels.map(|level| level.volts);
         let passes = if must_return { 1 } else { settings.passes };
         let test = MotorConstantSettings { passes, ..settings };
@@ -409,8 +433,9 @@ fn search(
                 levels[direction].lower();
                 if !settings.is_gentle() || levels[direction].leaves_none() {
                     settings = settings.shortened();
-                    levels = levels.map(|level| Level::at(level.volts));
+                    levels = levels.map(|level| level.renewed());
                 }
+                too_far = Some(error);
                 continue;
             }
             outcome => outcome?,
@@ -435,7 +460,7 @@ fn search(
             }
             if settings.is_gentle() && levels.iter().any(Level::is_narrow) {
                 settings = settings.shortened();
-                levels = levels.map(|level| Level::at(level.volts));
+                levels = levels.map(|level| level.renewed());
             }
             continue;
         }

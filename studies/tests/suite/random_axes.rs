@@ -45,10 +45,11 @@ fn the_cheapest_of_the_named_axes_are_commissioned() {
     });
 }
 
-/// Axes that once left their travel: a hanging one, in open loop, and one on which a first controller ran away.
+/// Axes that once left their travel: a hanging one, in open loop, one on which a first controller ran away, and one of a soft spring, in
+/// ever shorter and stronger tests.
 #[test]
 fn axes_that_hang_or_run_away_stay_within_their_travel() {
-    [11402, 11225].into_par_iter().for_each(|seed| {
+    [11402, 11225, 14099].into_par_iter().for_each(|seed| {
         let line = judge(seed);
         println!("{line:?}");
         assert_ne!(line.outcome, Outcome::LeftTravel, "{line:?}");
