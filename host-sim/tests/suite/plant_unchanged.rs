@@ -3,8 +3,9 @@
 use quadrant::friction::Direction;
 use quadrant::friction::gms::{Gms, GmsState};
 use quadrant::friction::stribeck::SlidingTable;
+use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
-use quadrant_sim::plant::{PLANT_ELEMENTS, SimulatedAxis, StageParameters};
+use quadrant_sim::plant::{PLANT_ELEMENTS, SimulatedAxis, SimulatedStage, StageParameters};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
@@ -60,5 +61,41 @@ fn a_plain_axis_moves_by_the_equations_of_old() {
             );
         }
         assert!(position.abs() > 1.0);
+    }
+}
+
+#[test]
+fn the_axes_of_a_stage_move_as_each_would_alone() {
+    let truth = StageParameters::real();
+    let mut stage = SimulatedStage::new(&truth, RATE_HZ, 7);
+    let mut index = 0;
+    let mut alone = truth.axes.map(|axis| {
+        index += 1;
+        SimulatedAxis::new(axis, RATE_HZ, 7 * 3 + index - 1)
+    });
+    for tick in 0..20_000 {
+        let code = |period: f64| DacCode((1000.0 * (TAU * f64::from(tick) / period).sin()) as i16);
+        let codes = [4000.0, 3100.0, 1700.0].map(code);
+        let enabled = tick % 7000 < 6500;
+        stage.step(&Outputs {
+            codes: codes.into(),
+            enabled,
+            ..Outputs::default()
+        });
+        for (axis, code) in alone.iter_mut().zip(codes) {
+            axis.step(code, enabled);
+        }
+        let counters = alone.each_mut().map(SimulatedAxis::read_counter);
+        assert_eq!(stage.read_counters(), counters, "tick {tick}");
+    }
+    for (together, alone) in stage.axes().iter().zip(&alone) {
+        assert_eq!(
+            together.position_mm().to_bits(),
+            alone.position_mm().to_bits()
+        );
+        assert_eq!(
+            together.friction_v().to_bits(),
+            alone.friction_v().to_bits()
+        );
     }
 }

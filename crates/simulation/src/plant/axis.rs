@@ -1,6 +1,5 @@
 //! One simulated axis.
 
-use std::collections::VecDeque;
 use std::f64::consts::TAU;
 
 use quadrant::friction::Direction;
@@ -9,10 +8,20 @@ use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
 
+use super::delay::Delay;
 use super::{AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, Presliding};
 
 /// Steps of the integration in a control period.
-const SUBSTEPS: usize = 4;
+pub(super) const SUBSTEPS: usize = 4;
+
+/// Forces that an axis takes for the whole of a control period, V at the amplifier's input.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct PeriodForces {
+    /// Output of the amplifier, before the plant's delay.
+    driven_v: f64,
+    /// Load, ripple, cogging and gravity.
+    external_v: f64,
+}
 
 /// One simulated axis in motion.
 #[derive(Clone, Debug)]
@@ -20,8 +29,8 @@ pub struct SimulatedAxis {
     truth: AxisParameters,
     step_s: f64,
     volts_per_code: f64,
-    /// Amplifier voltages on their way, one a substep: the plant's delay.
-    pipeline: VecDeque<f64>,
+    /// The plant's delay, of one amplifier voltage a substep.
+    delay: Delay,
     presliding: Presliding,
     /// Friction without its viscous part, V.
     presliding_v: f64,
@@ -42,7 +51,7 @@ impl SimulatedAxis {
         Self {
             step_s,
             volts_per_code: truth.full_scale_v / DacCode::FULL_SCALE,
-            pipeline: VecDeque::from(vec![0.0; delay]),
+            delay: Delay::of(delay),
             presliding: Presliding::new(&truth, step_s),
             presliding_v: 0.0,
             friction_v: 0.0,
@@ -59,12 +68,7 @@ impl SimulatedAxis {
     /// as after a drop of oil.
     pub fn change(&mut self, truth: AxisParameters) {
         let delay = (truth.delay_s / self.step_s).round() as usize;
-        let latest = self.pipeline.back().copied().unwrap_or(0.0);
-        // The oldest voltages are those that arrive next.
-        while self.pipeline.len() > delay {
-            self.pipeline.pop_front();
-        }
-        self.pipeline.resize(delay, latest);
+        self.delay.resize(delay);
         self.volts_per_code = truth.full_scale_v / DacCode::FULL_SCALE;
         self.presliding.change(&truth, self.step_s);
         self.truth = truth;
@@ -120,6 +124,14 @@ impl SimulatedAxis {
 
     /// One control period with the converter at `code` (or the amplifier disabled).
     pub fn step(&mut self, code: DacCode, enabled: bool) {
+        let forces = self.period_forces(code, enabled);
+        for _ in 0..SUBSTEPS {
+            self.substep(forces);
+        }
+    }
+
+    /// The forces of a control period with the converter at `code` (or the amplifier disabled).
+    pub(super) fn period_forces(&self, code: DacCode, enabled: bool) -> PeriodForces {
         let Self { truth, .. } = self;
         let imperfections = &truth.imperfections;
         let limit = truth.full_scale_v;
@@ -142,14 +154,17 @@ impl SimulatedAxis {
         } else {
             external + imperfections.gravity_v
         };
-        for _ in 0..SUBSTEPS {
-            self.pipeline.push_back(driven);
-            let arriving = self.pipeline.pop_front().unwrap_or(driven);
-            self.substep(arriving, external);
+        PeriodForces {
+            driven_v: driven,
+            external_v: external,
         }
     }
 
-    fn substep(&mut self, driven_v: f64, external_v: f64) {
+    /// One step of the integration.
+    #[inline(always)]
+    pub(super) fn substep(&mut self, forces: PeriodForces) {
+        let driven_v = self.delay.pass(forces.driven_v);
+        let external_v = forces.external_v;
         let along = |velocity: f64| {
             if velocity < 0.0 {
                 Direction::Negative

@@ -5,6 +5,7 @@
 
 mod axis;
 pub mod cutting;
+mod delay;
 mod drive;
 mod friction;
 pub mod load;

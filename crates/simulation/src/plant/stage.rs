@@ -8,6 +8,7 @@ use quadrant::safety::Switches;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 
+use super::axis::{PeriodForces, SUBSTEPS};
 use super::{MarkParameters, Marks, SimulatedAxis, StageParameters};
 
 /// The simulated stage in motion.
@@ -84,8 +85,15 @@ impl SimulatedStage {
                 *code = DacCode(shaper.step(state, *code) << 4);
             }
         }
-        for (axis, code) in self.axes.iter_mut().zip(codes) {
-            axis.step(code, outputs.enabled);
+        let forces: [PeriodForces; 3] = std::array::from_fn(|index| {
+            self.axes[index].period_forces(codes[index], outputs.enabled)
+        });
+        // A step of an axis waits for its own results, a division and a sum of many terms: the processor fills that time with
+        // the other axes.
+        for _ in 0..SUBSTEPS {
+            for (axis, forces) in self.axes.iter_mut().zip(forces) {
+                axis.substep(forces);
+            }
         }
     }
 }
