@@ -6,6 +6,7 @@ mod documented;
 mod frames;
 mod layout;
 mod modules;
+mod peers;
 mod setup;
 mod stack;
 mod test;
@@ -69,6 +70,8 @@ enum Verb {
     Combinations(Forwarded),
     /// Count the instructions of a control tick while link, queues and log are overloaded
     Saturation(Forwarded),
+    /// Time the host simulation beside the same job in C++, Numba and NumPy
+    Peers,
     /// Build the page of the bench, which a browser opens
     Web(WebArgs),
     /// Run the commands that README and docs show, in folders below target/documented
@@ -181,6 +184,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Cycles(args) => forward(toolchain()?, "cycles", args)?,
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
+        Verb::Peers => peers::run()?,
         Verb::Documented(options) => documented::run(&options)?,
         Verb::Web(args) => {
             let page = web::build(toolchain()?)?;

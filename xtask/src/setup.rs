@@ -147,7 +147,7 @@ fn link_debian() -> Result<()> {
 }
 
 /// Installs Debian packages.
-fn install(packages: &[&str]) -> Result<()> {
+pub(crate) fn install(packages: &[&str]) -> Result<()> {
     println!("setup: missing {}", packages.join(", "));
     if !command::exists("apt-get") {
         bail!(

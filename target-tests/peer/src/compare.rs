@@ -12,7 +12,8 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::{Feedforward, FeedforwardKind};
 use quadrant::settings::{AxisSettings, StageSettings};
 
-use crate::c::{BarePid, Input, Parameters, State, c_law, c_pid};
+use crate::c::{BarePid, Input, State, c_law, c_pid};
+use crate::parameters::Parameters;
 use crate::rust::{self, Law, rust_law, rust_pid};
 
 /// Ticks: more than a cycle of every axis.

@@ -7,6 +7,8 @@ mod c;
 #[cfg(target_os = "none")]
 mod compare;
 #[cfg(target_os = "none")]
+mod parameters;
+#[cfg(target_os = "none")]
 mod rust;
 
 /// Explains how to run it: on a host there is nothing to count.

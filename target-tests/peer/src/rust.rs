@@ -5,7 +5,8 @@ use quadrant::control::terms::{FeedbackInput, FeedbackState};
 use quadrant::feedforward::{Feedforward, FeedforwardState, ReferenceStep};
 use quadrant::scalar::Scalar;
 
-use crate::c::{ELEMENTS, Input};
+use crate::c::Input;
+use crate::parameters::ELEMENTS;
 
 /// The law of an axis, its parts in the order of the firmware's axis: tables last.
 #[repr(C)]
