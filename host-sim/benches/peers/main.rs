@@ -24,14 +24,14 @@ use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::{AxisParameters, PLANT_ELEMENTS, SimulatedStage, StageParameters};
+use quadrant_sim::plant::{
+    AxisParameters, PLANT_ELEMENTS, SUBSTEPS, SimulatedStage, StageParameters,
+};
 
 /// Control periods of the job: 10 s.
 const TICKS: usize = 100_000;
 /// Rate of the control law, Hz.
 const RATE_HZ: f64 = 10e3;
-/// Steps of the plant in a control period.
-const SUBSTEPS: f64 = 4.0;
 /// Control periods after which the positions are compared first: what the slowest program does.
 const FIRST_TICKS: usize = 2000;
 /// Repetitions, of which the shortest counts.
@@ -248,7 +248,7 @@ fn job(
 
 /// The plant's numbers, in the order of the other programs' parameters.
 fn plant(axis: &AxisSettings, truth: &AxisParameters) -> Vec<f64> {
-    let step_s = 1.0 / (RATE_HZ * SUBSTEPS);
+    let step_s = 1.0 / (RATE_HZ * SUBSTEPS as f64);
     let odd = &truth.imperfections;
     let mut numbers = vec![
         truth.gain_mm_per_v_s2,

@@ -73,8 +73,6 @@ pub(super) struct Controller {
     pub(super) filters: Vec<FilterSettings>,
     /// Largest gain in front of the PID that is shown to be stable with the modes; infinite without any.
     circle_bound: f64,
-    /// Share of the crossover that it was designed with.
-    softened: f64,
     /// The changes that what was seen of the axis made to it, a sentence each.
     remarks: Vec<String>,
 }
@@ -91,17 +89,15 @@ impl Controller {
     pub(super) fn soften(&mut self) {
         self.pid = softer(&self.pid);
         self.circle_bound = 1.0;
-        self.softened *= SOFTER;
     }
 
-    /// Remarks that it was softened because of an oscillation while friction held the axis.
-    pub(super) fn tell(&mut self, seen: &Ringing) {
+    /// Remarks how often it was softened because of an oscillation while friction held the axis.
+    pub(super) fn tell(&mut self, seen: &Ringing, softenings: i32) {
         self.remarks.push(format!(
-            "While friction held the axis, the PID oscillated at {:.0} Hz ({:.1} um): a softer one took its place, with {:.0} % of its \
-             crossover and without a nonlinear gain.",
+            "While friction held the axis, the PID oscillated at {:.0} Hz ({:.1} um): {}",
             seen.frequency_hz,
             1e3 * seen.amplitude_mm,
-            100.0 * self.softened,
+            softer_remark(softenings),
         ));
     }
 }
@@ -139,11 +135,10 @@ pub(super) fn controller(
     motor: &MotorConstant,
     rate_hz: f64,
 ) -> Result<Controller, CommissionError> {
-    let alone = |pid: PidGains| Controller {
+    let alone = |pid| Controller {
         pid,
         filters: Vec::new(),
         circle_bound: f64::INFINITY,
-        softened: 1.0,
         remarks: Vec::new(),
     };
     let filter_s = base.feedback.pid.derivative_filter_s;
@@ -396,7 +391,7 @@ fn feedback(
 /// Crossover of a softer PID over that of one which oscillates.
 const SOFTER: f64 = 0.75;
 /// Softer PIDs that are tried where the one that is designed oscillates on the axis, or does not hold it.
-pub(super) const SOFTENINGS: usize = 6;
+pub(super) const SOFTENINGS: i32 = 6;
 
 /// A PID of the same shape at a lower crossover.
 fn softer(pid: &PidGains) -> PidGains {
@@ -408,14 +403,19 @@ fn softer(pid: &PidGains) -> PidGains {
     }
 }
 
+/// What took the place of a PID that was softened, for a person.
+fn softer_remark(softenings: i32) -> String {
+    format!(
+        "a softer one took its place, with {:.0} % of its crossover and without a nonlinear gain.",
+        100.0 * SOFTER.powi(softenings)
+    )
+}
+
 impl Commissioned {
     /// Replaces the law by a PID of the same shape at a lower crossover, for an axis on which it oscillates: the model lacks something,
     /// so there is no nonlinear gain either.
     pub(super) fn soften(&mut self, seen: &VerifyError, rate_hz: f64) {
-        self.remarks.push(format!(
-            "{seen}: a softer one took its place, with {:.0} % of its crossover and without a nonlinear gain.",
-            100.0 * SOFTER
-        ));
+        self.remarks.push(format!("{seen}: {}", softer_remark(1)));
         let pid = softer(&self.settings.feedback.pid);
         let filters = self.settings.feedback.filters.take();
         self.settings.feedback = FeedbackSettings {

@@ -1,10 +1,13 @@
-//! The PID alone on a slow sine, where the friction that was measured under it is uneven. While friction holds the axis, it is not the one that the PID
-//! was designed on: its springs resonate, and the motor does against a table that stands still. A PID that oscillates there shakes the
-//! axis loose, and the friction that is measured or fed forward is not the one that acts.
+//! The PID alone on a slow sine, where the friction that was measured under it is uneven.
+//!
+//! While friction holds the axis, it is not the one that the PID was designed on: its springs resonate, and the motor does against a
+//! table that stands still. A PID that oscillates there shakes the axis loose, and the friction that is measured or fed forward is not
+//! the one that acts.
 
 use quadrant::settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
+use super::linear_model::HOME_MM;
 use super::models::{Controller, SOFTENINGS};
 use super::ringing::{Ringing, lasting};
 use super::verify::{run_sine, sines};
@@ -28,14 +31,14 @@ pub(super) fn soften(
     settings: &AxisSettings,
     controller: &mut Controller,
 ) -> Result<bool, MachineError> {
+    let mut settings = settings.clone();
     let mut softer = controller.clone();
     let mut first = None;
-    for _ in 0..SOFTENINGS {
-        let mut settings = settings.clone();
+    for softenings in 0..SOFTENINGS {
         softer.put_into(&mut settings);
         let Some(ringing) = oscillation(test_axis, &settings)? else {
             if let Some(ringing) = first {
-                softer.tell(&ringing);
+                softer.tell(&ringing, softenings);
                 *controller = softer;
             }
             return Ok(first.is_some());
@@ -54,7 +57,8 @@ fn oscillation(
     let info = test_axis.info();
     let sine = slow_sine(&info);
     test_axis.apply(&measuring_settings(settings))?;
-    let run = approach(test_axis, 0.0).and_then(|()| run_sine(test_axis, "PID", sine, &mut |_| {}));
+    let run =
+        approach(test_axis, HOME_MM).and_then(|()| run_sine(test_axis, "PID", sine, &mut |_| {}));
     Ok(run.ok().and_then(|(_, recording)| {
         lasting(&recording, info.resolution_mm).filter(|found| found.outruns(sine.velocity_mm_s))
     }))

@@ -303,7 +303,7 @@ impl Level {
     }
 
     /// For a test of another length.
-    fn renewed(&self) -> Self {
+    fn renewed(self) -> Self {
         Self {
             ever_too_far_v: self.ever_too_far_v,
             ..Self::at(self.volts)
@@ -399,7 +399,9 @@ fn search(
         .iter()
         .all(|level| level.volts <= settings.most_level_v)
     {
-        if let Some(error) = too_far.take_if(|_| levels.iter().any(Level::is_reckless)) {
+        if levels.iter().any(Level::is_reckless)
+            && let Some(error) = too_far.take()
+        {
             return Err(MotorConstantError::Experiment(error));
         }
         let levels_v = levels.map(|level| level.volts);
@@ -433,7 +435,7 @@ fn search(
                 levels[direction].lower();
                 if !settings.is_gentle() || levels[direction].leaves_none() {
                     settings = settings.shortened();
-                    levels = levels.map(|level| level.renewed());
+                    levels = levels.map(Level::renewed);
                 }
                 too_far = Some(error);
                 continue;
@@ -460,7 +462,7 @@ fn search(
             }
             if settings.is_gentle() && levels.iter().any(Level::is_narrow) {
                 settings = settings.shortened();
-                levels = levels.map(|level| level.renewed());
+                levels = levels.map(Level::renewed);
             }
             continue;
         }

@@ -68,11 +68,10 @@ fn a_plain_axis_moves_by_the_equations_of_old() {
 fn the_axes_of_a_stage_move_as_each_would_alone() {
     let truth = StageParameters::real();
     let mut stage = SimulatedStage::new(&truth, RATE_HZ, 7);
-    let mut index = 0;
-    let mut alone = truth.axes.map(|axis| {
-        index += 1;
-        SimulatedAxis::new(axis, RATE_HZ, 7 * 3 + index - 1)
-    });
+    let mut seeds = 7 * 3..;
+    let mut alone = truth
+        .axes
+        .map(|axis| SimulatedAxis::new(axis, RATE_HZ, seeds.next().unwrap()));
     for tick in 0..20_000 {
         let code = |period: f64| DacCode((1000.0 * (TAU * f64::from(tick) / period).sin()) as i16);
         let codes = [4000.0, 3100.0, 1700.0].map(code);

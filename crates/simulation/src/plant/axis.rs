@@ -12,7 +12,7 @@ use super::delay::Delay;
 use super::{AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, Presliding};
 
 /// Steps of the integration in a control period.
-pub(super) const SUBSTEPS: usize = 4;
+pub const SUBSTEPS: usize = 4;
 
 /// Forces that an axis takes for the whole of a control period, V at the amplifier's input.
 #[derive(Clone, Copy, Debug)]

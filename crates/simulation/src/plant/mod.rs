@@ -15,7 +15,7 @@ mod stage;
 mod transmission;
 mod variation;
 
-pub use axis::SimulatedAxis;
+pub use axis::{SUBSTEPS, SimulatedAxis};
 pub use drive::{Backlash, Cogging, Drive, EncoderSide};
 pub use friction::Presliding;
 pub use marks::{MarkParameters, Marks};

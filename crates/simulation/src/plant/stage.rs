@@ -8,8 +8,8 @@ use quadrant::safety::Switches;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 
-use super::axis::{PeriodForces, SUBSTEPS};
-use super::{MarkParameters, Marks, SimulatedAxis, StageParameters};
+use super::axis::PeriodForces;
+use super::{MarkParameters, Marks, SUBSTEPS, SimulatedAxis, StageParameters};
 
 /// The simulated stage in motion.
 #[derive(Clone, Debug)]
