@@ -26,7 +26,8 @@ struct parameters {
 };
 
 struct state {
-    float forces[ELEMENTS]; /* V */
+    float forces[ELEMENTS]; /* V; while all slip, how far each was from its share of `sum` */
+    float sum, left;        /* while all slip: the sum, V, and what is left of those distances */
     uint32_t slipping;      /* a bit for each element */
     uint32_t backward;      /* the sense of the last motion */
     float integral, lost;   /* V, and what its last rounding lost */
@@ -93,30 +94,35 @@ static inline float advance(const struct parameters *law, struct state *state, f
 
     if (state->backward != backward) {
         state->backward = backward;
+        if (state->slipping == all)
+            for (int i = 0; i < ELEMENTS; i++)
+                state->forces[i] = state->sum * law->weight[i] + state->forces[i] * state->left;
         state->slipping = 0;
-    }
-    if (state->slipping == all) {
-        for (int i = 0; i < ELEMENTS; i++) {
-            float share = level * law->weight[i];
-            float force = sign * (share + (sign * state->forces[i] - share) * decay);
-            state->forces[i] = force;
-            total += force;
-        }
-        return total;
+    } else if (state->slipping == all) {
+        state->sum = sign * (level + (sign * state->sum - level) * decay);
+        state->left *= decay;
+        return state->sum;
     }
     for (int i = 0; i < ELEMENTS; i++) {
-        float share = level * law->weight[i], force;
-        if (state->slipping >> i & 1) {
-            force = sign * (share + (sign * state->forces[i] - share) * decay);
+        float share = level * law->weight[i], force = state->forces[i];
+        float trial = force + displacement * law->stiffness[i];
+        if (state->slipping >> i & 1 || sign * force > share) {
+            state->slipping |= 1u << i;
+            force = sign * (share + (sign * force - share) * decay);
+        } else if (sign * trial < share) {
+            force = trial;
         } else {
-            force = state->forces[i] + displacement * law->stiffness[i];
-            if (!(sign * force < share)) {
-                state->slipping |= 1u << i;
-                force = sign * share;
-            }
+            state->slipping |= 1u << i;
+            force = sign * share;
         }
         state->forces[i] = force;
         total += force;
+    }
+    if (state->slipping == all) {
+        state->sum = total;
+        state->left = 1.0f;
+        for (int i = 0; i < ELEMENTS; i++)
+            state->forces[i] -= total * law->weight[i];
     }
     return total;
 }
@@ -139,6 +145,8 @@ static inline float friction(const struct parameters *law, struct state *state, 
         return advance(law, state, input->displacement, level, decay, 1.0f);
     if (input->displacement < 0.0f)
         return advance(law, state, input->displacement, level, decay, -1.0f);
+    if (state->slipping == (1u << ELEMENTS) - 1)
+        return state->sum;
     for (int i = 0; i < ELEMENTS; i++)
         total += state->forces[i];
     return total;

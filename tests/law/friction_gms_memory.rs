@@ -49,6 +49,17 @@ impl<const N: usize> Block<N> {
     }
 }
 
+/// The first elements alone, with the whole of the load.
+fn first(elements: &[GmsElement], count: usize) -> Vec<GmsElement> {
+    let kept = &elements[..count.min(elements.len())];
+    let sum: f64 = kept.iter().map(|element| element.weight).sum();
+    let share = |element: &GmsElement| GmsElement {
+        weight: element.weight / sum,
+        ..*element
+    };
+    kept.iter().map(share).collect()
+}
+
 fn virgin_curve_and_doubling<const N: usize>(
     elements: &[GmsElement],
     turn_mm: f64,
@@ -85,10 +96,8 @@ proptest! {
     ) {
         let back_mm = share * turn_mm;
         virgin_curve_and_doubling::<10>(&elements, turn_mm, back_mm, steps)?;
-        let mut four = elements.clone();
-        four.truncate(4);
-        virgin_curve_and_doubling::<4>(&four, turn_mm, back_mm, steps)?;
-        virgin_curve_and_doubling::<1>(&elements[..1], turn_mm, back_mm, steps)?;
+        virgin_curve_and_doubling::<4>(&first(&elements, 4), turn_mm, back_mm, steps)?;
+        virgin_curve_and_doubling::<1>(&first(&elements, 1), turn_mm, back_mm, steps)?;
     }
 
     /// An inner loop, and one within it, leave no trace once they are closed.

@@ -44,7 +44,8 @@ struct reference {
 struct plant {
     std::vector<double> delayed; // V, the oldest at `next`
     std::size_t next = 0;
-    double forces[PLANT_ELEMENTS] = {};
+    double forces[PLANT_ELEMENTS] = {}; // V; while all slip, how far each was from its share of `sum`
+    double sum = 0.0, left = 0.0;       // while all slip: the sum, V, and what is left of those distances
     std::uint32_t slipping = 0;
     bool backward = false;
     double friction_v = 0.0, position_mm = 0.0, velocity_mm_s = 0.0;
@@ -77,29 +78,34 @@ double move_elements(const plant_parameters &truth, plant &axis, double displace
 
     if (axis.backward != backward) {
         axis.backward = backward;
+        if (axis.slipping == ALL)
+            for (int i = 0; i < PLANT_ELEMENTS; i++)
+                axis.forces[i] = axis.sum * truth.weight[i] + axis.forces[i] * axis.left;
         axis.slipping = 0;
-    }
-    if (axis.slipping == ALL) {
-        for (int i = 0; i < PLANT_ELEMENTS; i++) {
-            double share = sliding.level * truth.weight[i];
-            axis.forces[i] = sign * (share + (sign * axis.forces[i] - share) * sliding.decay);
-            total += axis.forces[i];
-        }
-        return total;
+    } else if (axis.slipping == ALL) {
+        axis.sum = sign * (sliding.level + (sign * axis.sum - sliding.level) * sliding.decay);
+        axis.left *= sliding.decay;
+        return axis.sum;
     }
     for (int i = 0; i < PLANT_ELEMENTS; i++) {
         double share = sliding.level * truth.weight[i];
-        if (axis.slipping >> i & 1) {
+        double trial = axis.forces[i] + displacement * truth.stiffness[i];
+        if (axis.slipping >> i & 1 || sign * axis.forces[i] > share) {
+            axis.slipping |= 1u << i;
             axis.forces[i] = sign * (share + (sign * axis.forces[i] - share) * sliding.decay);
-        } else {
-            double trial = axis.forces[i] + displacement * truth.stiffness[i];
-            if (!(sign * trial < share)) {
-                axis.slipping |= 1u << i;
-                trial = sign * share;
-            }
+        } else if (sign * trial < share) {
             axis.forces[i] = trial;
+        } else {
+            axis.slipping |= 1u << i;
+            axis.forces[i] = sign * share;
         }
         total += axis.forces[i];
+    }
+    if (axis.slipping == ALL) {
+        axis.sum = total;
+        axis.left = 1.0;
+        for (int i = 0; i < PLANT_ELEMENTS; i++)
+            axis.forces[i] -= total * truth.weight[i];
     }
     return total;
 }

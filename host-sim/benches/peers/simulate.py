@@ -81,23 +81,38 @@ def run_numba(ticks, first, plant, law, references):
         return level, nodes[at, 1] + (nodes[at + 1, 1] - nodes[at, 1]) * place
 
     @njit(inline="always")
-    def move_elements(forces, memory, stiffness, weight, displacement, level, decay, sign, total):
-        """`memory`: a bit for each element that slips, and 1 for backward."""
+    def move_elements(forces, joint, memory, stiffness, weight, displacement, level, decay, sign, total):
+        """`memory`: a bit for each element that slips, and 1 for backward; `joint`, while all slip: the sum of the forces, and what
+        is left of the distances from its shares that `forces` has then."""
         backward = 1 if sign < 0 else 0
+        everything = (1 << len(forces)) - 1
         if memory[1] != backward:
             memory[1] = backward
+            if memory[0] == everything:
+                for i in range(len(forces)):
+                    forces[i] = joint[0] * weight[i] + forces[i] * joint[1]
             memory[0] = 0
+        elif memory[0] == everything:
+            joint[0] = sign * (level + (sign * joint[0] - level) * decay)
+            joint[1] *= decay
+            return joint[0]
         for i in range(len(forces)):
             share = level * weight[i]
-            if memory[0] >> i & 1:
+            trial = forces[i] + displacement * stiffness[i]
+            if memory[0] >> i & 1 or sign * forces[i] > share:
+                memory[0] |= 1 << i
                 forces[i] = sign * (share + (sign * forces[i] - share) * decay)
+            elif sign * trial < share:
+                forces[i] = trial
             else:
-                force = forces[i] + displacement * stiffness[i]
-                if not sign * force < share:
-                    memory[0] |= 1 << i
-                    force = sign * share
-                forces[i] = force
+                memory[0] |= 1 << i
+                forces[i] = sign * share
             total += forces[i]
+        if memory[0] == everything:
+            joint[0] = total
+            joint[1] = sign * sign
+            for i in range(len(forces)):
+                forces[i] -= total * weight[i]
         return total
 
     @njit(inline="always")
@@ -105,7 +120,7 @@ def run_numba(ticks, first, plant, law, references):
         return high if value > high else low if value < low else value
 
     @njit(inline="always")
-    def law_step(law, forces, memory, pid, error, wanted):
+    def law_step(law, forces, joint, memory, pid, error, wanted):
         """`pid`: integral, what it lost, derivative and last error."""
         velocity, displacement = wanted["velocity"], wanted["displacement"]
         sense = 1 if velocity < zero else 0
@@ -115,8 +130,10 @@ def run_numba(ticks, first, plant, law, references):
         if displacement != zero:
             sign = one if displacement > zero else -one
             friction = move_elements(
-                forces, memory, law["stiffness"], law["weight"], displacement, level, decay, sign, zero
+                forces, joint, memory, law["stiffness"], law["weight"], displacement, level, decay, sign, zero
             )
+        elif memory[0] == (1 << ELEMENTS) - 1:
+            friction = joint[0]
         else:
             for i in range(ELEMENTS):
                 friction += forces[i]
@@ -159,6 +176,7 @@ def run_numba(ticks, first, plant, law, references):
     def loop(ticks, first, plant, law, references, delayed, digests, positions):
         forces, memory = np.zeros((3, PLANT_ELEMENTS)), np.zeros((3, 2), np.int64)
         law_forces, law_memory = np.zeros((3, ELEMENTS), np.float32), np.zeros((3, 2), np.int64)
+        joint, law_joint = np.zeros((3, 2)), np.zeros((3, 2), np.float32)
         pids = np.zeros((3, 4), np.float32)
         position, velocity, friction = np.zeros(3), np.zeros(3), np.zeros(3)
         following = np.zeros(3, np.int64)
@@ -174,7 +192,9 @@ def run_numba(ticks, first, plant, law, references):
                 digest = (digest * 31 + counter) & 0xFFFFFFFF
                 wanted = references[tick, axis]
                 error = np.float32(wanted["position_mm"] - counter * truth["resolution_mm"])
-                output = law_step(law[axis], law_forces[axis], law_memory[axis], pids[axis], error, wanted)
+                output = law_step(
+                    law[axis], law_forces[axis], law_joint[axis], law_memory[axis], pids[axis], error, wanted
+                )
                 scaled = output * np.float32(truth["codes_per_volt"])
                 code = int(scaled + (-half if scaled < zero else half))
                 code = min(max(code, -32768), 32767)
@@ -201,8 +221,8 @@ def run_numba(ticks, first, plant, law, references):
                     if displacement != 0.0:
                         sign = 1.0 if displacement > 0.0 else -1.0
                         friction[axis] = move_elements(
-                            forces[axis], memory[axis], truth["stiffness"], truth["weight"], displacement, level, decay,
-                            sign, 0.0,
+                            forces[axis], joint[axis], memory[axis], truth["stiffness"], truth["weight"], displacement,
+                            level, decay, sign, 0.0,
                         )
         digests[1] = digest
         positions[1] = position
@@ -240,25 +260,39 @@ def run_numpy(ticks, plant, law, references):
         low, high = nodes[rows, at], nodes[rows, at + 1]
         return (low + (high - low) * place[:, None]).T
 
-    def move_elements(forces, slipping, backward, stiffness, weight, displacement, level, decay):
+    def move_elements(forces, joint, slipping, backward, stiffness, weight, displacement, level, decay):
+        """`joint`, where all elements slip: the sum of the forces, and what is left of the distances from its shares that `forces`
+        has then."""
         moves = displacement != 0
         turned = moves & ((displacement < 0) != backward)
         backward ^= turned
+        parts = turned & slipping.all(axis=1)
+        forces[parts] = joint[parts, :1] * weight[parts] + forces[parts] * joint[parts, 1:]
         slipping[turned] = False
-        sign = np.where(displacement < 0, level.dtype.type(-1), level.dtype.type(1))[:, None]
-        share = level[:, None] * weight
+        sign = np.where(displacement < 0, level.dtype.type(-1), level.dtype.type(1))
+        together = slipping.all(axis=1)
+        slides = moves & together
+        joint[slides, 0] = (sign * (level + (sign * joint[:, 0] - level) * decay))[slides]
+        joint[slides, 1] *= decay[slides]
+        apart = moves & ~together
+        sign, share = sign[:, None], level[:, None] * weight
         slipped = share + (sign * forces - share) * decay[:, None]
         trial = sign * (forces + displacement[:, None] * stiffness)
-        stuck = ~slipping & (trial < share)
-        moved = sign * np.where(slipping, slipped, np.where(stuck, trial, share))
-        forces[moves] = moved[moves]
-        slipping |= moves[:, None] & ~stuck
+        slips = slipping | (sign * forces > share)
+        stuck = ~slips & (trial < share)
+        moved = sign * np.where(slips, slipped, np.where(stuck, trial, share))
+        forces[apart] = moved[apart]
+        slipping |= apart[:, None] & ~stuck
         total = np.zeros(3, level.dtype)
         for column in forces.T:
             total += column
-        return total
+        joins = apart & slipping.all(axis=1)
+        joint[joins, 0], joint[joins, 1] = total[joins], 1
+        forces[joins] -= (total[:, None] * weight)[joins]
+        return np.where(together, joint[:, 0], total)
 
     forces, slipping, backward = np.zeros((3, PLANT_ELEMENTS)), np.zeros((3, PLANT_ELEMENTS), bool), np.zeros(3, bool)
+    joint, law_joint = np.zeros((3, 2)), np.zeros((3, 2), single)
     law_forces, law_slipping, law_backward = np.zeros((3, ELEMENTS), single), np.zeros((3, ELEMENTS), bool), np.zeros(3, bool)
     integral, lost, derivative, last = (np.zeros(3, single) for _ in range(4))
     position, velocity, friction = np.zeros(3), np.zeros(3), np.zeros(3)
@@ -279,7 +313,7 @@ def run_numpy(ticks, plant, law, references):
         octaves = law["surface_octaves"][rows, sense]
         level, decay = slide(octaves["bound"], law["surface"][rows, sense], np.abs(wanted["velocity"]))
         carried = move_elements(
-            law_forces, law_slipping, law_backward, law["stiffness"], law["weight"], wanted["displacement"], level, decay
+            law_forces, law_joint, law_slipping, law_backward, law["stiffness"], law["weight"], wanted["displacement"], level, decay
         )
         viscous = wanted["velocity"] * law["viscous"][rows, sense]
         base = viscous + carried * law["share"] + wanted["acceleration"] * law["inertia"]
@@ -320,7 +354,7 @@ def run_numpy(ticks, plant, law, references):
             surface = plant["surfaces"][rows, (displacement < 0).astype(int)]
             level, decay = slide(surface["bound"], surface["nodes"], np.abs(after))
             friction = move_elements(
-                forces, slipping, backward, plant["stiffness"], plant["weight"], displacement, level, decay
+                forces, joint, slipping, backward, plant["stiffness"], plant["weight"], displacement, level, decay
             )
     taken = (time.perf_counter() - start) / ticks * 1e9
     return taken, [digest], [position]

@@ -6,8 +6,13 @@
 //! Source: Lampaert, Al-Bender and Swevers, *A generalized Maxwell-slip friction model appropriate for control
 //! purposes*, IEEE PhysCon 2003.
 //!
+//! A block slips from the force that it carries: a surface that has fallen below it while it stuck takes the force down by
+//! the slip equation, not in one step.
+//!
 //! Discretised by the exact step of each branch: sticking by the displacement, slipping by the exponential. An
-//! explicit step of the slip equation overshoots when `C Ts / s` is not small.
+//! explicit step of the slip equation overshoots when `C Ts / s` is not small. Blocks that all slip obey one equation, which
+//! is linear in the forces over the shares: their sum takes one step, and how far each is from its share of the sum shrinks by
+//! the same factor for all.
 
 use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
@@ -97,7 +102,12 @@ pub struct Gms<S: Scalar, const N: usize> {
 /// The memory of the GMS model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GmsState<S: Scalar, const N: usize> {
+    /// The elements' forces, V; while all slip, how far each was from its share of their sum when the last began to.
     pub(super) forces: [S; N],
+    /// The sum of the forces while all slip, V.
+    sum: S,
+    /// What is left of the distances in `forces` while all slip, as a [`Quantity::Fraction`].
+    left: S,
     /// A bit for each element.
     slipping: u32,
     direction: Direction,
@@ -108,6 +118,8 @@ impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
     fn default() -> Self {
         Self {
             forces: [S::ZERO; N],
+            sum: S::ZERO,
+            left: S::ZERO,
             slipping: 0,
             direction: Direction::Positive,
         }
@@ -124,14 +136,31 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
         state
     }
 
+    /// The bits of all elements.
+    const ALL: u32 = {
+        assert!(N < 32);
+        (1 << N) - 1
+    };
+
+    /// True if every element slips.
+    #[inline(always)]
+    fn all_slip(&self) -> bool {
+        self.slipping == Self::ALL
+    }
+
     /// The forces of the elements, V.
-    pub fn forces(&self) -> &[S; N] {
-        &self.forces
+    pub(super) fn forces_by(&self, weights: impl Iterator<Item = S::Gain>) -> [S; N] {
+        let mut stuck = self.clone();
+        stuck.stick(self.direction, weights);
+        stuck.forces
     }
 
     /// The friction, the sum of the elements' forces, V.
     #[inline(always)]
     pub fn total(&self) -> S {
+        if self.all_slip() {
+            return self.sum;
+        }
         let mut force = S::ZERO;
         for element in self.forces {
             force = force + element;
@@ -139,21 +168,30 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
         force
     }
 
-    /// Forgets that elements slip, as a reversal does: for a model that does not remember it.
+    /// Goes on with the sum of the elements, which all slip from now on.
     #[inline(always)]
-    pub(super) fn stick(&mut self, direction: Direction) {
+    fn join(&mut self, sum: S, weights: impl Iterator<Item = S::Gain>) {
+        self.sum = sum;
+        self.left = S::quantise(1.0, Quantity::Fraction);
+        for (force, weight) in self.forces.iter_mut().zip(weights) {
+            *force = *force - sum.scale(weight);
+        }
+    }
+
+    /// Lets every element stick, as a reversal does, or as a model asks for that does not remember which ones slip.
+    #[inline(always)]
+    pub(super) fn stick(&mut self, direction: Direction, weights: impl Iterator<Item = S::Gain>) {
         self.direction = direction;
+        if self.all_slip() {
+            for (force, weight) in self.forces.iter_mut().zip(weights) {
+                *force = self.sum.scale(weight) + force.times(self.left, Quantity::Fraction);
+            }
+        }
         self.slipping = 0;
     }
 }
 
 impl<S: Scalar, const N: usize> Gms<S, N> {
-    /// The bits of all elements.
-    const ALL: u32 = {
-        assert!(N < 32);
-        (1 << N) - 1
-    };
-
     /// Makes the model from its elements, at most `N` of them; any beyond are left out, so settings are checked
     /// against `N` before they come here. Settings time only.
     pub fn build(elements: &[GmsElement]) -> Self {
@@ -173,7 +211,17 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
 
     /// Sticking elements that carry `force` by their weights.
     pub fn spread(&self, force: S) -> GmsState<S, N> {
-        GmsState::carrying(force, self.elements.iter().map(|element| element.weight))
+        GmsState::carrying(force, self.weights())
+    }
+
+    /// The forces of the elements, V.
+    pub fn forces(&self, state: &GmsState<S, N>) -> [S; N] {
+        state.forces_by(self.weights())
+    }
+
+    #[inline(always)]
+    fn weights(&self) -> impl Iterator<Item = S::Gain> {
+        self.elements.iter().map(|element| element.weight)
     }
 
     /// The friction in V after moving by `displacement` (mm) over the surface `sliding`; without a displacement
@@ -200,35 +248,34 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         along: impl Fn(S) -> S,
     ) -> S {
         if state.direction != direction {
-            state.stick(direction);
-        }
-        let elements = self.elements.iter().zip(&mut state.forces);
-        let mut total = S::ZERO;
-        if state.slipping == Self::ALL {
-            for (element, force) in elements {
-                *force = sliding.slip(*force, sliding.level.scale(element.weight), &along);
-                total = total + *force;
-            }
-            return total;
+            state.stick(direction, self.weights());
+        } else if state.all_slip() {
+            state.sum = sliding.slip(state.sum, sliding.level, &along);
+            state.left = state.left.times(sliding.decay, Quantity::Fraction);
+            return state.sum;
         }
         let mut slipping = state.slipping;
+        let mut total = S::ZERO;
+        let elements = self.elements.iter().zip(&mut state.forces);
         for ((element, force), bit) in elements.zip((0..N).map(|index| 1 << index)) {
             let share = sliding.level.scale(element.weight);
-            if slipping & bit != 0 {
-                *force = sliding.slip(*force, share, &along);
+            let trial = *force + displacement.scale(element.stiffness);
+            // Neither holds of what is not a number.
+            *force = if slipping & bit != 0 || along(*force) > share {
+                slipping |= bit;
+                sliding.slip(*force, share, &along)
+            } else if along(trial) < share {
+                trial
             } else {
-                let trial = *force + displacement.scale(element.stiffness);
-                // Not so if the trial is not a number.
-                if along(trial) < share {
-                    *force = trial;
-                } else {
-                    slipping |= bit;
-                    *force = along(share);
-                }
-            }
+                slipping |= bit;
+                along(share)
+            };
             total = total + *force;
         }
         state.slipping = slipping;
+        if state.all_slip() {
+            state.join(total, self.weights());
+        }
         total
     }
 }

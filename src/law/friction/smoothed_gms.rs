@@ -83,7 +83,17 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
 
     /// Elements that carry `force` by their weights.
     pub fn spread(&self, force: S) -> GmsState<S, N> {
-        GmsState::carrying(force, self.elements.iter().map(|element| element.weight))
+        GmsState::carrying(force, self.weights())
+    }
+
+    /// The forces of the elements, V.
+    pub fn forces(&self, state: &GmsState<S, N>) -> [S; N] {
+        state.forces_by(self.weights())
+    }
+
+    #[inline(always)]
+    fn weights(&self) -> impl Iterator<Item = S::Gain> {
+        self.elements.iter().map(|element| element.weight)
     }
 
     /// The friction in V after moving by `displacement` (mm) over the surface `sliding`; without a displacement
@@ -92,10 +102,10 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
     pub fn step(&self, state: &mut GmsState<S, N>, displacement: S, sliding: Sliding<S>) -> S {
         // Neither holds of a displacement that is not a number.
         if displacement > S::ZERO {
-            state.stick(Direction::Positive);
+            state.stick(Direction::Positive, self.weights());
             self.advance(state, displacement, sliding, |f| f);
         } else if displacement < S::ZERO {
-            state.stick(Direction::Negative);
+            state.stick(Direction::Negative, self.weights());
             self.advance(state, -displacement, sliding, |f| -f);
         }
         state.total()

@@ -9,6 +9,8 @@ use crate::parameters::{ELEMENTS, Parameters};
 #[derive(Default)]
 pub(crate) struct State {
     forces: [f32; ELEMENTS],
+    sum: f32,
+    left: f32,
     slipping: u32,
     backward: u32,
     integral: f32,
