@@ -135,7 +135,7 @@ pub fn fit_with_step(
     search(parameters, loss, (step, step > STEP), residuals)
 }
 
-/// As [`fit`], but where the search stands when its patience is out will do: for the start of another.
+/// As [`fit`], but where the search stands when its patience is out will do: for the start of another, or for what is judged otherwise.
 ///
 /// # Errors
 /// As [`fit`], but for the last.

@@ -7,7 +7,7 @@ use super::error::MotionFitError;
 use super::model::{Change, Estimate, MotionModel, Structure, sliding};
 use super::regressors::{Part, Regression, Term, Way, solve};
 use super::signals::MotionFitSettings;
-use crate::identify::fit::{Loss, Parameter, fit};
+use crate::identify::fit::{Loss, Parameter, fit_nearest};
 
 /// Largest dead time, s.
 pub(super) const MOST_DEAD_TIME_S: f64 = 0.02;
@@ -79,7 +79,8 @@ impl Solution {
         if searched.is_empty() {
             return solved(&[]).ok_or_else(dependent);
         }
-        let found = fit(&searched, Loss::Squares, |values| {
+        // Where a search stands when its patience is out is judged as every other result is: by motion that is withheld.
+        let found = fit_nearest(&searched, Loss::Squares, |values| {
             solved(values).map_or_else(
                 || vec![f64::NAN; rows.len()],
                 |solution| solution.residual(regression, rows).as_slice().to_vec(),
