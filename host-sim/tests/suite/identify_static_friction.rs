@@ -3,8 +3,8 @@
 use quadrant::friction::PerDirection;
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::static_friction::{
-    Exponent, FrictionFitError, FrictionMap, StaticFrictionError, StaticFrictionSettings, fit_map,
-    measure,
+    Exponent, FrictionFitError, FrictionMap, FrictionRun, StaticFrictionError,
+    StaticFrictionSettings, fit_map, measure,
 };
 use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::{AxisParameters, StageParameters};
@@ -200,4 +200,36 @@ fn runs_that_cannot_be_made_are_refused_before_the_axis_moves() {
         let error = measure(&mut test_axis, &settings, &mut |_| {}).unwrap_err();
         assert!(matches!(error, StaticFrictionError::Setting(_)), "{error}");
     }
+}
+
+#[test]
+fn the_level_at_rest_is_near_what_was_measured_where_no_run_was_slow() {
+    // Speed, mm/s, mean voltage and its deviation, V: the screw's cogging is in the means.
+    let seen = [
+        (17.067, 0.0970, 0.0015),
+        (19.005, 0.1020, 0.0019),
+        (21.089, 0.0848, 0.0007),
+        (29.066, 0.1041, 0.0015),
+        (32.286, 0.0935, 0.0016),
+        (36.009, 0.1162, 0.0007),
+        (39.981, 0.1074, 0.0016),
+    ];
+    let run = |sign: f64, (speed, voltage_v, deviation_v): (f64, f64, f64)| FrictionRun {
+        velocity_mm_s: sign * speed,
+        voltage_v: sign * voltage_v,
+        deviation_v,
+        stick_slip: false,
+    };
+    let backward = seen.into_iter().rev().map(|seen| run(-1.0, seen));
+    let map = FrictionMap {
+        runs: backward
+            .chain(seen.into_iter().map(|seen| run(1.0, seen)))
+            .collect(),
+    };
+    let found = fit_map(&map, Exponent::Fixed(1.0)).unwrap();
+    let (coulomb_v, breakaway_v) = found.mean_levels_v();
+    assert!(
+        breakaway_v < 1.5 * 0.1162 && coulomb_v > 0.0,
+        "{coulomb_v} {breakaway_v}"
+    );
 }

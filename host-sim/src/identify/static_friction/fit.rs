@@ -84,6 +84,8 @@ pub enum FrictionFitError {
 const RISING: f64 = 0.7;
 /// Level at rest, over that at high speed, below which a rise is no friction's.
 const LEAST_LEVEL: f64 = 0.2;
+/// Level at rest over the largest voltage of any run up to which it was measured: beyond, only the curve says so.
+const MEASURED: f64 = 1.25;
 /// An error of each mean that does not scatter within its run, over the voltage.
 const SYSTEMATIC: f64 = 2e-4;
 
@@ -190,6 +192,12 @@ fn fit_direction(
         found => found,
     };
     let mut fit = search(&parameters)?;
+    if fit.values[0] + fit.values[1] > MEASURED * most {
+        parameters[1].bounds.1 = (MEASURED - 1.0) * most;
+        parameters[1].start = parameters[1].start.min(0.5 * parameters[1].bounds.1);
+        parameters[2].bounds.0 = low;
+        fit = search(&parameters)?;
+    }
     let mut rising = parameters;
     rising[1] = Parameter {
         start: slowest.voltage_v - fastest.voltage_v,
