@@ -68,7 +68,7 @@ fn a_law_is_not_refused_because_the_axis_warmed_before_it_was_tried() {
     settings.feedforward.gains.gms = 0.0;
     let mut warming = Warming {
         axis: SimulatedTestAxis::new(0, x(), 2),
-        rises_per_s: 0.012,
+        rises_per_s: 0.010,
         used_s: 0.0,
     };
     let verification =
@@ -81,6 +81,37 @@ fn a_law_is_not_refused_because_the_axis_warmed_before_it_was_tried() {
     println!("drift {drift:.2}, N-PID {worst:.3} {mean:.3}, unheeded {unheeded:.3}");
     assert!(unheeded > 1.01 && worst <= 1.01, "{unheeded} {worst}");
     assert!(verification.is_better_than_pid());
+}
+
+#[test]
+fn a_pre_sliding_range_that_was_measured_wrong_is_mended_by_the_trials() {
+    let base = StageSettings::simulated().axes[0].clone();
+    let right = commissioned(x(), 200.0).settings;
+    for wrong in [0.1, 8.0] {
+        let mut settings = right.clone();
+        settings.limits = base.limits;
+        for element in &mut settings.friction.gms.elements {
+            element.stiffness_v_per_mm *= wrong;
+        }
+        // Only the elements are to be judged.
+        settings.friction.lugre = None;
+        settings.friction.dahl = None;
+        let mut axis = SimulatedTestAxis::new(0, x(), 2);
+        let verification =
+            quadrant_sim::commission::verify::verify(&mut axis, &settings, &mut |_| {}).unwrap();
+        let law = verification.chosen();
+        let (worst, mean) = verification.against_pid(law);
+        let unmended = verification
+            .laws
+            .iter()
+            .find(|law| law.law.ends_with("static + GMS"));
+        let (_, unmended) = verification.against_pid(unmended.unwrap());
+        println!(
+            "stiffness x {wrong}: {unmended:.2} without, {} {mean:.2} {worst:.2}",
+            law.law
+        );
+        assert!(mean < 0.5 * unmended, "{mean} {unmended}");
+    }
 }
 
 fn lugre(mut axis: AxisParameters) -> AxisParameters {
