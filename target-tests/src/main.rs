@@ -5,6 +5,7 @@
 mod attribution;
 mod board_smoke;
 mod combinations;
+mod converter;
 mod cortex_m;
 mod count;
 mod cycles;
