@@ -20,12 +20,17 @@ pub trait Encoders {
 
 /// The three axes' amplifiers: converters, their common enable line, and the holding brake.
 pub trait Amplifiers {
-    /// Sets all three converters together, the enable line and the current of the brake. When disabling, line and brake go
-    /// first.
+    /// Begins a tick: checks that what the last [`write`](Self::write) started came to its end, and starts what can go on beside
+    /// the computation. If it did not, the amplifiers are disabled, and [`mismatches`](Self::mismatches) says so.
+    #[inline(always)]
+    fn begin(&mut self) {}
+
+    /// Sets all three converters together, or starts to, the enable line and the current of the brake. When disabling, line and
+    /// brake go first.
     fn write(&mut self, outputs: &Outputs);
 
-    /// Whose converters held something else than they were told when the last call of [`write`](Self::write) looked.
-    /// If any did, that call has disabled the amplifiers.
+    /// Whose converters held something else than they were told when the last call of [`begin`](Self::begin) or
+    /// [`write`](Self::write) looked. If any did, that call has disabled the amplifiers.
     fn mismatches(&self) -> [bool; 3] {
         [false; 3]
     }

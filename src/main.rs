@@ -218,6 +218,7 @@ mod app {
     ])]
     fn control(cx: control::Context) {
         let began_late = cx.local.tick.begin();
+        cx.local.amplifiers.begin();
         // A tick that begins late because of the one before it is that one's fault, and counted there.
         let delayed = began_late && !*cx.local.deadline_missed;
         let mut switches = cx.local.switches.read();

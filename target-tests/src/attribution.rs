@@ -36,6 +36,12 @@ impl Attribution {
     }
 
     fn look_up(&self, address: u32) -> Result<Option<&'static str>> {
+        let functions = self.functions(address)?;
+        Ok(stages::of(functions.iter().rev().map(String::as_str)))
+    }
+
+    /// The functions that the instruction at an address was inlined into, innermost first.
+    pub(crate) fn functions(&self, address: u32) -> Result<Vec<String>> {
         let unreadable = |error| anyhow!("debug information at {address:#x}: {error}");
         let mut frames = self
             .loader
@@ -47,6 +53,6 @@ impl Attribution {
                 functions.push(function.demangle().map_err(unreadable)?.into_owned());
             }
         }
-        Ok(stages::of(functions.iter().rev().map(String::as_str)))
+        Ok(functions)
     }
 }

@@ -1,6 +1,6 @@
 //! `cargo xtask board-smoke`: the reference board's own image in QEMU's model of a near relative of its chip.
 //!
-//! QEMU's STM32F405 has the memory map, the SPI and the processor, and nothing behind RCC, GPIO, DMA, TIM7 and the watchdog:
+//! QEMU's STM32F405 has the memory map, the SPI and the processor, and nothing behind RCC, GPIO, DMA, TIM1, TIM7 and the watchdog:
 //! those read as zero. Two things are done for it from the debugger's port: flags that the clock set-up waits for read as
 //! ones, and the control interrupt is made pending as TIM7 would.
 
@@ -35,7 +35,7 @@ const TIM7: u32 = 1 << (55 - 32);
 /// `str r0, [r1]` and a branch to itself, at the bottom of the stack, where nobody is.
 const PEND: [u8; 4] = [0x08, 0x60, 0xFE, 0xE7];
 const SCRATCH: u32 = 0x2000_0000;
-/// Lines that the log must have: SPI was asked and answered zero, the flash was found empty and the board not
+/// Lines that the log must have: the converter's memory holds zero instead of an answer, the flash was found empty and the board not
 /// commissioned, initialisation came to its end; and that a full stack ended it.
 const EXPECTED: [&str; 6] = [
     "the converter answers 0x0000 instead of 0x0004",

@@ -4,13 +4,14 @@
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::command::Command;
 use quadrant::link::message::{
-    AxisName, AxisSignal, Body, CaptureRequest, Channel, Edge, Level, MAX_CHANNELS, Reply,
-    SetPoint, StreamRequest, Trigger,
+    AxisName, AxisSignal, Body, CaptureRequest, Channel, Edge, Level, Reply, SetPoint,
+    StreamRequest, Trigger,
 };
 
 use crate::faults::approach::{LONGEST, SPEED_MM_S, homed};
 use crate::faults::case::configuration;
 use crate::faults::fixture::{A_WHILE, Configuration, Fixture};
+use crate::load;
 use crate::near_home::{self, PARK_MM};
 use crate::trace::{Tick, Trace, Tracer};
 use crate::traced_run;
@@ -82,7 +83,7 @@ pub(crate) fn traced(image: &Image) -> Result<Vec<Kind>> {
 }
 
 /// The configuration of the faults, with a short way to the reference mark.
-fn homed_configuration() -> Configuration {
+pub(crate) fn homed_configuration() -> Configuration {
     let mut configuration = configuration();
     configuration.marks = near_home::prepare(&mut configuration.job.stage);
     configuration
@@ -193,13 +194,8 @@ impl Run<'_> {
 
     /// Arms the capture with as many channels as there may be.
     fn arm(&mut self, trigger: Trigger) -> Result<()> {
-        let channels = [AxisSignal::Error, AxisSignal::Output, AxisSignal::Position]
-            .into_iter()
-            .flat_map(|signal| AxisName::ALL.map(|axis| Channel::Axis(axis, signal)))
-            .take(MAX_CHANNELS)
-            .collect();
         let request = CaptureRequest::Arm {
-            channels,
+            channels: load::busy_channels().collect(),
             decimation: 1,
             pre_trigger_percent: BEFORE_PERCENT,
             trigger,

@@ -5,6 +5,7 @@
 mod attribution;
 mod board_smoke;
 mod combinations;
+mod converter;
 mod cortex_m;
 mod count;
 mod cycles;
@@ -12,7 +13,9 @@ mod faults;
 mod gdb;
 mod hosted;
 mod interrupt_latency;
+mod jitter;
 mod kinds;
+mod load;
 mod lockstep;
 mod longest_path;
 mod near_home;
@@ -70,6 +73,9 @@ enum Verb {
         /// The firmware's number type
         #[arg(long, value_enum, default_value_t = Scalar::F32)]
         scalar: Scalar,
+        /// Write the jitter to the file that later runs are held against
+        #[arg(long)]
+        overwrite_expected: bool,
     },
 }
 
@@ -157,7 +163,10 @@ fn run(cli: Cli) -> Result<()> {
             let only = args.only.as_deref();
             faults::run(toolchain, args.scalar, only, args.overwrite_expected)
         }
-        Verb::Saturation { scalar } => saturation::run(toolchain, scalar),
+        Verb::Saturation {
+            scalar,
+            overwrite_expected,
+        } => saturation::run(toolchain, scalar, overwrite_expected),
         Verb::Count { peer: true, .. } => peer::run(toolchain),
         Verb::Count { args, .. } => {
             count::run(toolchain, args.scalar, args.ticks, args.overwrite_expected)

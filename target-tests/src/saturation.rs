@@ -1,17 +1,15 @@
 //! `cargo xtask saturation`: what a control tick costs while everything around it is overloaded, tick by tick against the
 //! same motion in quiet.
 
-use anyhow::{Context, Result, anyhow, ensure};
-use quadrant::axes::AxisName;
+use anyhow::{Context, Result, ensure};
 use quadrant::command::Command;
-use quadrant::link::frame::{self, FRAME_BYTES};
-use quadrant::link::message::{AxisSignal, Channel, MAX_CHANNELS};
-use quadrant::link::message::{Body, Request, TelemetryRequest};
 
 use crate::faults::approach::moving;
 use crate::faults::case::configuration;
 use crate::faults::fixture::Fixture;
 use crate::interrupt_latency;
+use crate::jitter;
+use crate::load;
 use crate::trace::{Trace, Tracer};
 use crate::traced_run;
 use xtask::image::{self, Board, Image, Scalar, Target};
@@ -111,8 +109,8 @@ const LOADS: [(&str, Load, usize); 6] = [
     ),
 ];
 
-/// Counts under every load, prints the table, and fails if a load lengthens a tick.
-pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
+/// Counts under every load, prints the table, and fails if a load lengthens a tick, or if the jitter has grown.
+pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, overwrite: bool) -> Result<()> {
     let board = Board::Mps2;
     let image = image::build(toolchain, Target { board, scalar })?;
     println!(
@@ -153,7 +151,7 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
     for (place, length) in interrupt_latency::longest(&image)? {
         println!("  {length:>6}  {place}");
     }
-    Ok(())
+    jitter::run(&image, overwrite)
 }
 
 /// The instructions of each tick under a load.
@@ -176,16 +174,7 @@ fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
 fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
     moving(&mut fixture, 1.0)?;
     if load.telemetry {
-        let signals = [AxisSignal::Error, AxisSignal::Output, AxisSignal::Position];
-        let channels = signals
-            .into_iter()
-            .flat_map(|signal| AxisName::ALL.map(|axis| Channel::Axis(axis.into(), signal)))
-            .take(MAX_CHANNELS)
-            .collect();
-        fixture.done(Body::Telemetry(TelemetryRequest::Select {
-            channels,
-            decimation: 1,
-        }))?;
+        load::select_telemetry(&mut fixture)?;
     }
     if load.stops_reading {
         fixture.stop_reading();
@@ -198,31 +187,10 @@ fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
         if fixture.tick() == FROM {
             tracer.trace()?;
         }
-        while load.flood && fixture.unsent() < 2 * FRAME_BYTES {
-            let flood = flood(fixture.tick())?;
-            fixture.send_bytes(&flood);
+        if load.flood {
+            load::flood(&mut fixture)?;
         }
         fixture.run(1)?;
     }
     fixture.end().map(drop)
-}
-
-/// A few requests and some garbage, which depends on the tick.
-fn flood(tick: u32) -> Result<Vec<u8>> {
-    let mut buffer = [0; FRAME_BYTES];
-    let request = Request {
-        id: tick as u16,
-        body: Body::Status,
-    };
-    let frame = frame::encode(&request, &mut buffer).map_err(|error| anyhow!("{error}"))?;
-    let mut bytes = frame.repeat(8);
-    let mut noise = tick | 1;
-    for _ in 0..256 {
-        noise ^= noise << 13;
-        noise ^= noise >> 17;
-        noise ^= noise << 5;
-        bytes.push(noise as u8);
-    }
-    bytes.push(frame::DELIMITER);
-    Ok(bytes)
 }

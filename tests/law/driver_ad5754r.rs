@@ -1,218 +1,429 @@
-//! The converter's driver, byte for byte, against a mock of the bus and its pins.
+//! The converter's driver against a chip at the pins: a timer, DMA that is late, an SPI, and an AD5754R that checks every time.
 
 use std::cell::RefCell;
 use std::rc::Rc;
 
 use embedded_hal_mock::eh1::delay::NoopDelay;
 use embedded_hal_mock::eh1::digital::{Mock as Pin, State, Transaction as Level};
-use embedded_hal_mock::eh1::spi::{Mock as Spi, Transaction};
-use quadrant::drivers::ad5754r::{self, ALL_ZERO, Ad5754r, Clock, Error, Item, Pins, SelectClock};
+use quadrant::drivers::ad5754r::steps::{
+    BYTE_AT, FRAME_STEPS, FRAMES_AT, Hardware, MAX_STEPS, PIN_CHANGES, PINS_AT, PinChange,
+};
+use quadrant::drivers::ad5754r::{ALL_ZERO, Ad5754r, Error, Item, Sequencer};
 
-use embedded_hal::spi::{ErrorKind, ErrorType, SpiBus};
+#[path = "../../src/board/nucleo_f446re/bus_times.rs"]
+mod bus_times;
 
-/// The mock bus, which also keeps the clocks that were selected and can be told to fail.
-struct Bus {
-    spi: Spi<u8>,
-    clocks: Rc<RefCell<Vec<Clock>>>,
-    fails: bool,
+use bus_times::{READING, TIMER_HZ, WRITING};
+
+/// Nanoseconds of a number of cycles.
+fn ns(cycles: u64) -> f64 {
+    cycles as f64 * 1e9 / f64::from(TIMER_HZ)
 }
 
-impl ErrorType for Bus {
-    type Error = ErrorKind;
+/// A frame that ended, and the cycle at which it did.
+type Frame = (u64, [u8; 3]);
+
+/// The chip: what it sees at its pins, and what it minds.
+struct Chip {
+    selected: bool,
+    sync_changed: u64,
+    load_fell: Option<u64>,
+    /// The last falling edge of the clock.
+    edge: u64,
+    bits: Vec<bool>,
+    /// What SDO shifts out in the frame that goes on.
+    answer: [u8; 3],
+    /// What the next frame answers to.
+    question: Option<u8>,
+    frames: Vec<Frame>,
+    loads: Vec<u64>,
+    inputs: [u16; 3],
+    codes: [u16; 3],
+    power: u16,
+    range: u16,
+    minded: Vec<String>,
+    /// It hears nothing and answers ones.
+    is_missing: bool,
+    /// Bits of an answer that are wrong, by the register asked for.
+    wrong: Option<(u8, u16)>,
 }
 
-impl Bus {
-    fn verdict(&self) -> Result<(), ErrorKind> {
-        if self.fails {
-            Err(ErrorKind::Overrun)
-        } else {
-            Ok(())
+impl Chip {
+    fn new() -> Self {
+        Self {
+            selected: false,
+            sync_changed: 0,
+            load_fell: None,
+            edge: 0,
+            bits: Vec::new(),
+            answer: [0xFF; 3],
+            question: None,
+            frames: Vec::new(),
+            loads: Vec::new(),
+            inputs: [0; 3],
+            codes: [0; 3],
+            power: 0,
+            range: 0,
+            minded: Vec::new(),
+            is_missing: false,
+            wrong: None,
         }
     }
-}
 
-impl SpiBus for Bus {
-    fn read(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
-        SpiBus::read(&mut self.spi, words)
-    }
-    fn write(&mut self, words: &[u8]) -> Result<(), ErrorKind> {
-        self.verdict()?;
-        SpiBus::write(&mut self.spi, words)
-    }
-    fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), ErrorKind> {
-        self.spi.transfer(read, write)
-    }
-    fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), ErrorKind> {
-        self.verdict()?;
-        self.spi.transfer_in_place(words)
-    }
-    fn flush(&mut self) -> Result<(), ErrorKind> {
-        SpiBus::flush(&mut self.spi)
-    }
-}
-
-impl SelectClock for Bus {
-    fn select(&mut self, clock: Clock) {
-        self.clocks.borrow_mut().push(clock);
-    }
-}
-
-/// The transfers and pin levels that are expected.
-#[derive(Default)]
-struct Script {
-    bus: Vec<Transaction<u8>>,
-    sync: Vec<Level>,
-    load: Vec<Level>,
-    clear: Vec<Level>,
-    clocks: Vec<Clock>,
-}
-
-impl Script {
-    fn frame(mut self, bytes: [u8; 3]) -> Self {
-        self.bus
-            .extend([Transaction::write_vec(bytes.to_vec()), Transaction::flush()]);
-        self.sync
-            .extend([Level::set(State::Low), Level::set(State::High)]);
-        self
+    fn at_least(&mut self, what: &str, cycles: u64, least_ns: f64) {
+        if ns(cycles) < least_ns {
+            let words = format!("{what}: {:.0} ns instead of {least_ns}", ns(cycles));
+            self.minded.push(words);
+        }
     }
 
-    fn answered_frame(mut self, bytes: [u8; 3], answer: [u8; 3]) -> Self {
-        self.bus.extend([
-            Transaction::transfer_in_place(bytes.to_vec(), answer.to_vec()),
-            Transaction::flush(),
-        ]);
-        self.sync
-            .extend([Level::set(State::Low), Level::set(State::High)]);
-        self.clocks.extend([Clock::Reading, Clock::Writing]);
-        self
+    fn pins(&mut self, now: u64, change: PinChange) {
+        match change {
+            PinChange::Keep => {}
+            PinChange::Select => self.select(now),
+            PinChange::Release => self.release(now),
+            PinChange::Load => {
+                self.at_least("/SYNC to /LDAC", now - self.sync_changed, 130.0);
+                assert!(!self.selected, "/LDAC falls in a frame");
+                self.load_fell = Some(now);
+                self.loads.push(now);
+                if !self.is_missing {
+                    self.codes = self.inputs;
+                }
+            }
+            PinChange::EndLoad => {
+                let fell = self.load_fell.take().expect("/LDAC is low");
+                self.at_least("/LDAC low", now - fell, 20.0);
+            }
+        }
     }
 
-    fn update(mut self) -> Self {
-        self.load
-            .extend([Level::set(State::Low), Level::set(State::High)]);
-        self
-    }
-
-    /// A converter that is held at zero volts and not started.
-    fn held() -> Self {
-        let mut script = Self::default();
-        script.clear.push(Level::set(State::Low));
-        script.sync.push(Level::set(State::High));
-        script.load.push(Level::set(State::High));
-        script
-    }
-
-    /// The start, up to the answers.
-    fn powered() -> Self {
-        let mut script = Self::held();
-        script.clocks.push(Clock::Writing);
-        script
-            .frame([0x0C, 0x00, 0x04])
-            .frame([0x19, 0x00, 0x0C])
-            .frame([0x04, 0x00, 0x00])
-            .update()
-            .frame([0x10, 0x00, 0x1F])
-            .frame([0x04, 0x00, 0x00])
-            .update()
-    }
-
-    /// A start that goes well.
-    fn started() -> Self {
-        let mut script = Self::powered()
-            .frame([0x88, 0x00, 0x00])
-            .answered_frame([0x18, 0x00, 0x00], [0x00, 0x00, 0x04])
-            .frame([0x90, 0x00, 0x00])
-            .answered_frame([0x18, 0x00, 0x00], [0x00, 0x00, 0x1F]);
-        script.clear.push(Level::set(State::High));
-        script
-    }
-
-    /// A call of `write`: what it asks for, the answer, the codes.
-    fn write(self, question: u8, answer: u16, codes: [i16; 3]) -> Self {
-        let [a, b, c] = codes.map(i16::to_be_bytes);
-        let [high, low] = answer.to_be_bytes();
-        self.frame([question, 0, 0])
-            .answered_frame([0x00, a[0], a[1]], [0x80, high, low])
-            .frame([0x01, b[0], b[1]])
-            .frame([0x02, c[0], c[1]])
-            .update()
-    }
-
-    /// Runs `body` on a converter, and checks that exactly this happened.
-    fn run(self, body: impl FnOnce(&mut Converter)) {
-        let mut spi = Spi::new(&self.bus);
-        let mut sync = Pin::new(&self.sync);
-        let mut load = Pin::new(&self.load);
-        let mut clear = Pin::new(&self.clear);
-        let clocks = Rc::new(RefCell::new(Vec::new()));
-        let bus = Bus {
-            spi: spi.clone(),
-            clocks: clocks.clone(),
-            fails: false,
+    fn select(&mut self, now: u64) {
+        assert!(!self.selected, "/SYNC falls twice");
+        let least = if self.question.is_some() {
+            200.0
+        } else {
+            100.0
         };
-        let pins = Pins {
-            sync: sync.clone(),
-            load: load.clone(),
-            clear: clear.clone(),
+        self.at_least("/SYNC high", now - self.sync_changed, least);
+        (self.selected, self.sync_changed) = (true, now);
+        self.bits.clear();
+        let question = self.question.take();
+        let flipped = match self.wrong {
+            Some((address, bits)) if question == Some(address) => bits,
+            _ => 0,
         };
-        body(&mut Ad5754r::new(bus, pins, NoopDelay::new()));
-        spi.done();
-        sync.done();
-        load.done();
-        clear.done();
-        assert_eq!(*clocks.borrow(), self.clocks);
+        let register = match question {
+            _ if self.is_missing => 0xFFFF,
+            Some(address @ 0..=2) => self.codes[usize::from(address)],
+            Some(0x08) => self.range,
+            Some(0x10) => self.power,
+            _ => 0,
+        } ^ flipped;
+        let [high, low] = register.to_be_bytes();
+        self.answer = [if self.is_missing { 0xFF } else { 0 }, high, low];
+    }
+
+    fn release(&mut self, now: u64) {
+        assert!(self.selected, "/SYNC rises twice");
+        self.at_least("clock to /SYNC", now - self.edge, 13.0);
+        (self.selected, self.sync_changed) = (false, now);
+        if self.bits.len() != 24 {
+            let words = format!("a frame of {} bits", self.bits.len());
+            self.minded.push(words);
+            return;
+        }
+        let mut frame = [0; 3];
+        for (byte, bits) in frame.iter_mut().zip(self.bits.chunks(8)) {
+            *byte = bits.iter().fold(0, |byte, bit| byte << 1 | u8::from(*bit));
+        }
+        self.frames.push((now, frame));
+        let [address, high, low] = frame;
+        let data = u16::from_be_bytes([high, low]);
+        match address {
+            _ if self.is_missing => {}
+            0..=2 => self.inputs[usize::from(address)] = data,
+            0x04 => self.inputs = [data; 3],
+            0x0C => self.range = data,
+            0x10 => self.power = data,
+            asked if asked & 0x80 != 0 => self.question = Some(asked & 0x7F),
+            _ => {}
+        }
+    }
+
+    /// A byte on the bus, the first bit from `begin` on; returns what SDO holds when the master samples it.
+    fn byte(&mut self, begin: u64, byte: u8, bit_cycles: u64) -> u8 {
+        let mut received = 0;
+        for bit in 0..8 {
+            let (rise, fall) = (
+                begin + bit * bit_cycles,
+                begin + bit * bit_cycles + bit_cycles / 2,
+            );
+            if self.selected {
+                if self.bits.is_empty() {
+                    self.at_least("/SYNC to clock", fall - self.sync_changed, 13.0);
+                }
+                let place = self.bits.len();
+                self.bits.push(byte >> (7 - bit) & 1 == 1);
+                // SDO follows the rising edge after 40 ns; before that it is anything, here the other level.
+                let valid = ns(fall - rise) > 40.0;
+                let level = self
+                    .answer
+                    .get(place / 8)
+                    .is_some_and(|byte| byte >> (7 - place % 8) & 1 == 1);
+                received = received << 1 | u8::from(level == valid);
+            } else {
+                // Nobody drives SDO: the pull-up does.
+                received = received << 1 | 1;
+            }
+            self.edge = fall;
+        }
+        received
     }
 }
 
-type Converter = Ad5754r<Bus, Pin, Pin, Pin, NoopDelay>;
+/// The board's timer, DMA and SPI, and the time.
+struct Model {
+    now: u64,
+    chip: Chip,
+    /// The cycle at which what was started ends.
+    end: u64,
+    received: Vec<u8>,
+    /// Delay of each write in turn.
+    delays: Box<dyn FnMut() -> u64>,
+    /// Cycles by which a step is shorter than it should be.
+    hurry: u32,
+    /// The bus does nothing.
+    is_dead: bool,
+    /// Cycles that `finish` has waited.
+    waited: u64,
+}
 
-const STARTED: Result<(), Error<ErrorKind>> = Ok(());
+#[derive(Clone)]
+struct Bus(Rc<RefCell<Model>>);
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Stuck;
+
+impl Model {
+    /// Takes all steps of a sequence that begins now.
+    fn run(&mut self, bytes: &[u8], hardware: Hardware) {
+        assert!(self.end <= self.now, "the timer was still counting");
+        self.received.clear();
+        if self.is_dead {
+            self.end = u64::MAX;
+            return;
+        }
+        let step = u64::from(hardware.step_cycles() - self.hurry);
+        let begin = self.now;
+        // One controller makes all writes, one after the other, each some cycles long.
+        let mut free = 0;
+        let mut write = |due: u64, delay: u64| {
+            free = (due + delay).max(free + 4);
+            free
+        };
+        let mut spi_free = 0;
+        for (index, (change, byte)) in (0..).zip(PIN_CHANGES.into_iter().zip(bytes)) {
+            let delay = (self.delays)();
+            let at = write(begin + index * step + u64::from(PINS_AT), delay);
+            self.chip.pins(at, change);
+            let delay = (self.delays)();
+            let at = write(begin + index * step + u64::from(BYTE_AT), delay);
+            // It starts at once or as late as it may; both with the delay.
+            let start = u64::from(hardware.start_cycles) * delay / u64::from(hardware.late_cycles);
+            assert!(at >= spi_free, "a byte is written over");
+            let bit = u64::from(hardware.bit_cycles);
+            let received = self.chip.byte(at + start, *byte, bit);
+            spi_free = at + start + 8 * bit;
+            self.received.push(received);
+        }
+        self.end = begin + bytes.len() as u64 * step;
+    }
+}
+
+impl Sequencer for Bus {
+    type Error = Stuck;
+
+    fn start_writing(&mut self, frames: [[u8; 3]; 4]) {
+        let mut bytes = [0; MAX_STEPS];
+        for (at, frame) in FRAMES_AT.into_iter().zip(frames) {
+            bytes[at..at + 3].copy_from_slice(&frame);
+        }
+        self.0.borrow_mut().run(&bytes, WRITING);
+    }
+
+    fn start_reading(&mut self, [first, second, third]: [u8; 3]) {
+        let bytes: [u8; FRAME_STEPS] = [first, second, third, 0];
+        self.0.borrow_mut().run(&bytes, READING);
+    }
+
+    fn finish(&mut self) -> Result<[u8; 3], Stuck> {
+        let mut model = self.0.borrow_mut();
+        if model.end == u64::MAX {
+            model.end = model.now;
+            return Err(Stuck);
+        }
+        model.waited += model.end.saturating_sub(model.now);
+        model.now = model.now.max(model.end);
+        Ok([model.received[0], model.received[1], model.received[2]])
+    }
+}
+
+type Converter = Ad5754r<Bus, Pin, NoopDelay>;
+
+/// A converter at its chip.
+struct Bench {
+    converter: Converter,
+    model: Rc<RefCell<Model>>,
+    clear: Pin,
+}
+
+/// A control period at 10 kHz, and the share of it between the beginning of a tick and its write, in cycles.
+const PERIOD: u64 = 18_000;
+const COMPUTING: u64 = 5_000;
+
+type Outcome = Result<(), Error<Stuck>>;
+
+impl Bench {
+    /// A converter whose /CLR will take these levels, and whose writes are delayed.
+    fn new(clear: &[State], delays: impl FnMut() -> u64 + 'static) -> Self {
+        let model = Rc::new(RefCell::new(Model {
+            now: PERIOD,
+            chip: Chip::new(),
+            end: 0,
+            received: Vec::new(),
+            delays: Box::new(delays),
+            hurry: 0,
+            is_dead: false,
+            waited: 0,
+        }));
+        let levels: Vec<_> = clear.iter().map(|level| Level::set(*level)).collect();
+        let clear = Pin::new(&levels);
+        let bus = Bus(model.clone());
+        Self {
+            converter: Ad5754r::new(bus, clear.clone(), NoopDelay::new()),
+            model,
+            clear,
+        }
+    }
+
+    /// One that has been started, with further levels of /CLR.
+    fn started(clear: &[State], delays: impl FnMut() -> u64 + 'static) -> Self {
+        let mut levels = vec![State::Low, State::High];
+        levels.extend(clear);
+        let mut bench = Self::new(&levels, delays);
+        assert_eq!(bench.converter.start(), Ok(()));
+        bench.pass(PERIOD);
+        bench.chip(|chip| chip.frames.clear());
+        bench
+    }
+
+    fn chip<T>(&self, look: impl FnOnce(&mut Chip) -> T) -> T {
+        look(&mut self.model.borrow_mut().chip)
+    }
+
+    fn pass(&mut self, cycles: u64) {
+        self.model.borrow_mut().now += cycles;
+    }
+
+    /// A tick that computes for some cycles; the outcome, with the time from its write until /LDAC fell.
+    fn tick_after(&mut self, codes: [i16; 3], computing: u64) -> Outcome {
+        let begun = self.converter.begin();
+        self.pass(computing);
+        let written = self.converter.write(codes);
+        assert!(begun.is_ok() || written == begun, "both report a dead bus");
+        written
+    }
+
+    fn tick(&mut self, codes: [i16; 3]) -> Outcome {
+        let written = self.tick_after(codes, COMPUTING);
+        self.pass(PERIOD - COMPUTING);
+        written
+    }
+
+    /// Ends it: nothing was minded, and /CLR took all its levels.
+    fn done(mut self) {
+        assert_eq!(self.chip(|chip| chip.minded.clone()), Vec::<String>::new());
+        self.clear.done();
+    }
+}
+
+/// Delays from zero to the largest, differently in each run.
+fn random(seed: u64) -> impl FnMut() -> u64 {
+    let mut state = seed | 1;
+    move || {
+        state ^= state << 13;
+        state ^= state >> 7;
+        state ^= state << 17;
+        state % (u64::from(WRITING.late_cycles) + 1)
+    }
+}
+
+/// Either none or the largest delay.
+fn extreme(seed: u64) -> impl FnMut() -> u64 {
+    let mut random = random(seed);
+    move || (random() & 1) * u64::from(WRITING.late_cycles)
+}
+
+fn none() -> u64 {
+    0
+}
 
 #[test]
 fn powers_up_in_the_bipolar_range_at_zero_and_then_lets_go_of_clear() {
-    Script::started().run(|converter| assert_eq!(converter.start(), STARTED));
+    let mut bench = Bench::new(&[State::Low, State::High], none);
+    assert_eq!(bench.converter.start(), Ok(()));
+    let frames: Vec<_> = bench.chip(|chip| chip.frames.iter().map(|frame| frame.1).collect());
+    assert_eq!(
+        frames[..4],
+        [[0x0C, 0, 4], [0x19, 0, 0x0C], ALL_ZERO, [0x10, 0, 0x1F]]
+    );
+    assert_eq!(bench.chip(|chip| (chip.range, chip.power)), (4, 0x1F));
+    bench.done();
 }
 
 #[test]
 fn is_held_at_zero_volts_until_it_is_started() {
-    Script::held().run(|_| {});
+    Bench::new(&[State::Low], none).done();
 }
 
 #[test]
 fn a_chip_that_is_not_there_stays_cleared_and_is_reported() {
-    // A floating SDO reads as ones.
-    let script = Script::powered()
-        .frame([0x88, 0x00, 0x00])
-        .answered_frame([0x18, 0x00, 0x00], [0xFF; 3]);
-    script.run(|converter| {
-        let error = Error::Mismatch {
-            item: Item::Range,
-            expected: 4,
-            answered: 0xFFFF,
-        };
-        assert_eq!(converter.start(), Err(error));
-    });
+    let mut bench = Bench::new(&[State::Low], none);
+    bench.chip(|chip| chip.is_missing = true);
+    let error = Error::Mismatch {
+        item: Item::Range,
+        expected: 4,
+        answered: 0xFFFF,
+    };
+    assert_eq!(bench.converter.start(), Err(error));
+    bench.done();
+}
+
+#[test]
+fn a_bus_that_is_dead_at_the_start_stays_cleared_and_is_reported() {
+    let mut bench = Bench::new(&[State::Low], none);
+    bench.model.borrow_mut().is_dead = true;
+    assert_eq!(bench.converter.start(), Err(Error::Bus(Stuck)));
+    bench.done();
 }
 
 #[test]
 fn a_chip_that_does_not_power_up_is_reported() {
-    let script = Script::powered()
-        .frame([0x88, 0x00, 0x00])
-        .answered_frame([0x18, 0x00, 0x00], [0x00, 0x00, 0x04])
-        .frame([0x90, 0x00, 0x00])
-        .answered_frame([0x18, 0x00, 0x00], [0x00, 0x00, 0x0F]);
-    script.run(|converter| {
-        let error = Error::Mismatch {
-            item: Item::Power,
-            expected: 0x1F,
-            answered: 0x0F,
-        };
-        assert_eq!(converter.start(), Err(error));
-    });
+    let mut bench = Bench::new(&[State::Low], none);
+    bench.chip(|chip| chip.wrong = Some((0x10, 0x10)));
+    let error = Error::Mismatch {
+        item: Item::Power,
+        expected: 0x1F,
+        answered: 0x0F,
+    };
+    assert_eq!(bench.converter.start(), Err(error));
+    bench.done();
 }
 
 #[test]
-fn writes_three_codes_that_take_effect_together_and_reads_back_one_register_after_the_other() {
+fn three_codes_take_effect_together_in_every_tick_and_one_register_is_read_after_the_other() {
+    let mut bench = Bench::started(&[], none);
     let codes = [
         [1, -1, 0x1234],
         [i16::MIN, i16::MAX, 0],
@@ -220,172 +431,252 @@ fn writes_three_codes_that_take_effect_together_and_reads_back_one_register_afte
         [5, 6, 7],
         [8, 9, 10],
     ];
-    Script::started()
-        .write(0x80, 0x0000, codes[0])
-        .write(0x81, 0xFFFF, codes[1])
-        .write(0x82, 0x0000, codes[2])
-        .write(0x90, 0x001F, codes[3])
-        .write(0x80, 0x0005, codes[4])
-        .run(|converter| {
-            assert_eq!(converter.start(), STARTED);
-            for codes in codes {
-                assert_eq!(converter.write(codes), STARTED, "{codes:?}");
-            }
+    let questions = [0x81, 0x82, 0x90, 0x80, 0x81];
+    for (codes, question) in codes.into_iter().zip(questions) {
+        bench.chip(|chip| {
+            chip.frames.clear();
+            chip.loads.clear();
         });
+        assert_eq!(bench.tick(codes), Ok(()), "{codes:?}");
+        let [a, b, c] = codes.map(i16::to_be_bytes);
+        let expected = [
+            [0x18, 0, 0],
+            [0, a[0], a[1]],
+            [1, b[0], b[1]],
+            [2, c[0], c[1]],
+            [question, 0, 0],
+        ];
+        bench.chip(|chip| {
+            let frames: Vec<_> = chip.frames.iter().map(|frame| frame.1).collect();
+            assert_eq!(frames, expected);
+            assert_eq!(chip.codes, codes.map(i16::cast_unsigned));
+            let [load] = chip.loads[..] else {
+                panic!("one /LDAC a tick, not {:?}", chip.loads);
+            };
+            assert!(chip.frames[3].0 < load && load < chip.frames[4].0);
+        });
+    }
+    bench.done();
+}
+
+#[test]
+fn the_chip_minds_no_time_however_late_dma_is() {
+    for seed in 1..200 {
+        for extremely in [false, true] {
+            let delays: Box<dyn FnMut() -> u64> = if extremely {
+                Box::new(extreme(seed))
+            } else {
+                Box::new(random(seed))
+            };
+            let mut bench = Bench::started(&[], delays);
+            for tick in 0..12 {
+                let code = (seed as i16).wrapping_mul(7919).wrapping_add(tick);
+                assert_eq!(bench.tick([code, -code, !code]), Ok(()), "seed {seed}");
+            }
+            bench.done();
+        }
+    }
+}
+
+#[test]
+fn a_step_that_is_shorter_by_more_than_half_a_bit_is_minded() {
+    let mut bench = Bench::started(&[], extreme(3));
+    bench.model.borrow_mut().hurry = WRITING.bit_cycles / 2 + 1;
+    for tick in 0..200 {
+        let _ = bench.tick_after([tick; 3], COMPUTING);
+        bench.pass(PERIOD);
+    }
+    let minded = bench.chip(|chip| std::mem::take(&mut chip.minded));
+    assert!(
+        minded
+            .iter()
+            .any(|words| words.starts_with("clock to /SYNC")),
+        "{minded:?}"
+    );
+    bench.done();
+}
+
+#[test]
+fn the_codes_are_out_before_a_write_with_waits_had_them_out_and_nobody_waits() {
+    let mut bench = Bench::started(&[], extreme(5));
+    bench.model.borrow_mut().waited = 0;
+    let mut latest = 0;
+    for tick in 0..100 {
+        let begun = bench.model.borrow().now;
+        assert_eq!(bench.tick([tick, 0, 0]), Ok(()));
+        let loaded = bench.chip(|chip| *chip.loads.last().unwrap());
+        latest = latest.max(loaded - begun - COMPUTING);
+    }
+    println!("write to /LDAC: at most {:.0} ns", ns(latest));
+    assert!(ns(latest) <= f64::from(WRITING.load_ns()));
+    // What three fast frames, a slow one and the waits between them took before /LDAC, bus and pins alone.
+    assert!(WRITING.load_ns() < 8_135);
+    assert_eq!(bench.model.borrow().waited, 0);
+    bench.done();
+}
+
+#[test]
+fn a_tick_that_follows_the_one_before_at_once_waits_for_its_end_and_loses_nothing() {
+    let mut bench = Bench::started(&[], random(9));
+    for tick in 0..40 {
+        // Overrun: the next tick begins with the write of this one under way, and its own reading is not over when it writes.
+        let codes = [tick, 2 * tick, -tick];
+        assert_eq!(bench.tick_after(codes, 300), Ok(()), "tick {tick}");
+        bench.pass(500);
+    }
+    bench.pass(PERIOD);
+    assert_eq!(bench.chip(|chip| chip.frames.len()), 40 * 5);
+    let codes = [39, 78, -39].map(i16::cast_unsigned);
+    assert_eq!(bench.chip(|chip| chip.codes), codes);
+    let waited = bench.model.borrow().waited;
+    let (writing, reading) = (
+        WRITING.step_cycles() * MAX_STEPS as u32,
+        READING.step_cycles() * FRAME_STEPS as u32,
+    );
+    assert!(waited > 0 && waited <= 41 * u64::from(writing + reading));
+    bench.done();
+}
+
+#[test]
+fn a_tick_that_is_late_loses_nothing() {
+    let mut bench = Bench::started(&[], random(11));
+    for tick in 0..20 {
+        assert_eq!(bench.tick([tick, 1, 2]), Ok(()));
+        bench.pass(u64::from(tick as u16) * 10 * PERIOD);
+    }
+    assert_eq!(bench.chip(|chip| chip.frames.len()), 20 * 5);
+    bench.done();
 }
 
 #[test]
 fn every_wrong_bit_of_every_register_is_reported_and_the_codes_are_written_all_the_same() {
     // Bits 6 and 11..15 of the power register mean nothing.
-    let questions = [
-        (0x80, Item::Code(0), 100_u16, u16::MAX),
-        (0x81, Item::Code(1), 200, u16::MAX),
-        (0x82, Item::Code(2), 300, u16::MAX),
-        (0x90, Item::Power, 0x1F, 0x07BF),
+    let registers = [
+        (0x00, Item::Code(0), 100_u16, u16::MAX),
+        (0x01, Item::Code(1), 200, u16::MAX),
+        (0x02, Item::Code(2), 300, u16::MAX),
+        (0x10, Item::Power, 0x1F, 0x07BF),
     ];
     let codes = [100, 200, 300];
-    let wrong = |turn: usize, bit: u16| questions[turn].2 ^ (1 << bit);
-    // In the first round the codes of the call before are zero.
-    let mut script = Script::started().write(questions[0].0, 0, codes);
-    for (question, _, expected, _) in &questions[1..] {
-        script = script.write(*question, *expected, codes);
-    }
-    for bit in 0..16 {
-        for (turn, (question, ..)) in questions.iter().enumerate() {
-            script = script.write(*question, wrong(turn, bit), codes);
-        }
-    }
-    // Pulled once, and held as long as nothing else is written.
-    script.clear.push(Level::set(State::Low));
-    script.run(|converter| {
-        assert_eq!(converter.start(), STARTED);
-        for _ in 0..4 {
-            assert_eq!(converter.write(codes), STARTED);
-        }
+    for (address, item, expected, bits) in registers {
         for bit in 0..16 {
-            for (turn, (_, item, expected, bits)) in questions.into_iter().enumerate() {
-                // A bit that means nothing leaves the mismatch of the register before.
-                let found = if bits >> bit & 1 == 1 {
-                    Error::Mismatch {
-                        item,
-                        expected,
-                        answered: wrong(turn, bit),
-                    }
-                } else {
-                    Error::Mismatch {
-                        item: questions[2].1,
-                        expected: questions[2].2,
-                        answered: wrong(2, bit),
-                    }
-                };
-                assert_eq!(converter.write(codes), Err(found), "bit {bit} of {item:?}");
+            let minds = bits >> bit & 1 == 1;
+            let levels: &[State] = if minds { &[State::Low] } else { &[] };
+            let mut bench = Bench::started(levels, none);
+            for _ in 0..4 {
+                assert_eq!(bench.tick(codes), Ok(()));
             }
+            bench.chip(|chip| chip.wrong = Some((address, 1 << bit)));
+            let found: Vec<_> = (0..4).map(|_| bench.tick(codes)).collect();
+            let error = Error::Mismatch {
+                item,
+                expected,
+                answered: expected ^ 1 << bit,
+            };
+            let reported = found.iter().filter(|found| **found == Err(error)).count();
+            assert_eq!(reported > 0, minds, "bit {bit} of {item:?}: {found:?}");
+            assert_eq!(bench.chip(|chip| chip.codes), [100, 200, 300]);
+            bench.done();
         }
-    });
+    }
 }
 
 #[test]
 fn a_chip_that_lost_its_supply_is_reported_by_every_write_until_it_is_powered_up() {
-    let codes = [0; 3];
-    let questions = [0x80, 0x81, 0x82, 0x90];
-    let mut script = Script::started();
-    for power in [0, 0, 0x1F] {
-        for question in questions {
-            let answer = if question == 0x90 { power } else { 0 };
-            script = script.write(question, answer, codes);
-        }
-    }
-    script
-        .clear
-        .extend([Level::set(State::Low), Level::set(State::High)]);
-    script.run(|converter| {
-        assert_eq!(converter.start(), STARTED);
-        let off = Err(Error::Mismatch {
-            item: Item::Power,
-            expected: 0x1F,
-            answered: 0,
-        });
-        let found: Vec<_> = (0..12).map(|_| converter.write(codes)).collect();
-        assert_eq!(found[..3], [STARTED; 3]);
-        assert_eq!(
-            found[3..11],
-            [off; 8],
-            "the codes read right, the chip is off"
-        );
-        assert_eq!(found[11], STARTED);
+    let mut bench = Bench::started(&[State::Low, State::High], none);
+    bench.chip(|chip| chip.power = 0);
+    let off = Err(Error::Mismatch {
+        item: Item::Power,
+        expected: 0x1F,
+        answered: 0,
     });
+    let mut found: Vec<_> = (0..8).map(|_| bench.tick([0; 3])).collect();
+    bench.chip(|chip| chip.power = 0x1F);
+    found.extend((0..4).map(|_| bench.tick([0; 3])));
+    assert_eq!(found[..3], [Ok(()); 3]);
+    assert_eq!(
+        found[3..11],
+        [off; 8],
+        "the codes read right, the chip is off"
+    );
+    assert_eq!(found[11], Ok(()));
+    bench.done();
 }
 
 #[test]
 fn a_mismatch_clears_the_outputs_until_two_writes_of_zero_succeed() {
-    let mut script = Script::started()
-        .write(0x80, 0, [7, 0, 0])
-        .write(0x81, 1, [7, 0, 0])
-        .write(0x82, 0, [0; 3])
-        .write(0x90, 0x1F, [0; 3])
-        .write(0x80, 0, [0; 3])
-        .write(0x81, 0, [0; 3])
-        .write(0x82, 0, [1, 2, 3]);
-    script
-        .clear
-        .extend([Level::set(State::Low), Level::set(State::High)]);
-    script.run(|converter| {
-        assert_eq!(converter.start(), STARTED);
-        assert_eq!(converter.write([7, 0, 0]), STARTED);
-        let found = Err(Error::Mismatch {
-            item: Item::Code(1),
-            expected: 0,
-            answered: 1,
-        });
-        assert_eq!(converter.write([7, 0, 0]), found);
-        for _ in 0..3 {
-            assert_eq!(converter.write([0; 3]), found);
-        }
-        assert_eq!(converter.write([0; 3]), STARTED);
-        assert_eq!(converter.write([1, 2, 3]), STARTED);
+    let mut bench = Bench::started(&[State::Low, State::High], none);
+    assert_eq!(bench.tick([7, 0, 0]), Ok(()));
+    bench.chip(|chip| chip.wrong = Some((1, 1)));
+    let found = Err(Error::Mismatch {
+        item: Item::Code(1),
+        expected: 0,
+        answered: 1,
     });
+    assert_eq!(bench.tick([7, 0, 0]), found);
+    bench.chip(|chip| chip.wrong = None);
+    for _ in 0..3 {
+        assert_eq!(bench.tick([0; 3]), found);
+    }
+    assert_eq!(bench.tick([0; 3]), Ok(()));
+    assert_eq!(bench.tick([1, 2, 3]), Ok(()));
+    bench.done();
+}
+
+#[test]
+fn a_chip_that_is_gone_is_found_in_the_next_tick() {
+    let mut bench = Bench::started(&[State::Low], none);
+    assert_eq!(bench.tick([7, 0, 0]), Ok(()));
+    bench.chip(|chip| chip.is_missing = true);
+    let found = bench.tick([7, 0, 0]);
+    assert!(matches!(
+        found,
+        Err(Error::Mismatch {
+            answered: 0xFFFF,
+            ..
+        })
+    ));
+    bench.done();
 }
 
 /// The second channel: it needs no bus.
 #[test]
-fn a_bus_that_fails_is_reported_clears_the_outputs_and_loads_nothing() {
-    let mut spi = Spi::new(&[]);
-    let mut sync = Pin::new(&[
-        Level::set(State::High),
-        Level::set(State::Low),
-        Level::set(State::High),
-    ]);
-    let mut load = Pin::new(&[Level::set(State::High)]);
-    let mut clear = Pin::new(&[Level::set(State::Low), Level::set(State::Low)]);
-    let bus = Bus {
-        spi: spi.clone(),
-        clocks: Rc::default(),
-        fails: true,
-    };
-    let pins = Pins {
-        sync: sync.clone(),
-        load: load.clone(),
-        clear: clear.clone(),
-    };
-    let mut converter = Ad5754r::new(bus, pins, NoopDelay::new());
-    assert_eq!(
-        converter.write([1, 2, 3]),
-        Err(Error::Bus(ErrorKind::Overrun))
+fn a_write_that_does_not_come_to_its_end_clears_the_outputs_at_the_beginning_of_the_next_tick() {
+    let mut bench = Bench::started(&[State::Low, State::High], none);
+    assert_eq!(bench.tick([7, 0, 0]), Ok(()));
+    bench.pass(PERIOD);
+    let begun = bench.converter.begin();
+    assert_eq!(begun, Ok(()));
+    bench.model.borrow_mut().is_dead = true;
+    // Its reading has come to its end already.
+    assert_eq!(bench.converter.write([8, 0, 0]), Ok(()));
+    bench.pass(PERIOD);
+    assert_eq!(bench.converter.begin(), Err(Error::Bus(Stuck)));
+    assert_eq!(bench.converter.write([9, 0, 0]), Err(Error::Bus(Stuck)));
+    // The bus works again: the outputs stay cleared until two writes of zero have got through.
+    bench.model.borrow_mut().is_dead = false;
+    bench.pass(PERIOD);
+    assert_eq!(bench.tick([0; 3]), Err(Error::Bus(Stuck)));
+    assert_eq!(bench.tick([0; 3]), Ok(()));
+    assert_eq!(bench.tick([0; 3]), Ok(()));
+    bench.done();
+}
+
+#[test]
+fn a_reading_that_does_not_come_to_its_end_is_reported_by_the_write() {
+    let mut bench = Bench::started(&[State::Low], none);
+    bench.model.borrow_mut().is_dead = true;
+    assert_eq!(bench.tick([7, 0, 0]), Err(Error::Bus(Stuck)));
+    bench.done();
+}
+
+#[test]
+fn a_write_ends_well_within_a_control_period_at_the_highest_rate() {
+    let (load, writing, reading) = (
+        WRITING.load_ns(),
+        WRITING.steps_ns(MAX_STEPS),
+        READING.steps_ns(FRAME_STEPS),
     );
-    spi.done();
-    sync.done();
-    load.done();
-    clear.done();
-}
-
-#[test]
-fn all_zero_is_the_frame_that_the_start_sends() {
-    assert_eq!(ALL_ZERO, [0x04, 0x00, 0x00]);
-}
-
-#[test]
-fn a_write_takes_a_twelfth_of_a_control_period_at_10_khz() {
-    let microseconds = ad5754r::write_ns(22_500_000, 5_625_000) as f64 * 1e-3;
-    println!("bus and pins of one write: {microseconds:.2} us");
-    assert!((8.1..8.2).contains(&microseconds), "{microseconds} us");
+    println!("write to /LDAC {load} ns, all of a write {writing} ns, a reading {reading} ns");
+    assert_eq!((load, writing, reading), (7_812, 11_500, 7_356));
 }

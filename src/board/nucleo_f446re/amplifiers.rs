@@ -1,26 +1,27 @@
 //! Three amplifiers: their command voltages through the external converter, their enable line through a pin.
 
 use embedded_hal::delay::DelayNs;
-use quadrant::drivers::ad5754r::{self, ALL_ZERO, Ad5754r, Error, Item};
+use quadrant::drivers::ad5754r::steps::FRAME_STEPS;
+use quadrant::drivers::ad5754r::{ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
 use quadrant::stage::Outputs;
-use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB5, PB12, PB13, PB14, PB15, PC9, Speed};
-use stm32f4xx_hal::pac::{self, SPI2};
+use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB5, PB12, PB13, PB14, PB15, PC9};
+use stm32f4xx_hal::pac::{self, DMA2, SPI2, TIM1};
 use stm32f4xx_hal::rcc::Rcc;
 
 use super::CORE_HZ;
-use super::converter_bus::{ConverterBus, READING_HZ, WRITING_HZ};
-use super::pins::{BRAKE, ENABLE};
+use super::bus_times::{READING, WRITING};
+use super::converter_bus::{self, ConverterBus};
+use super::pins::{BRAKE, ENABLE, LOAD, SYNC};
 
-/// Numbers of /SYNC, /LDAC and /CLR in port B.
-const SYNC: u8 = 12;
-const LOAD: u8 = 1;
+/// Number of /CLR in port B.
 const CLEAR: u8 = 2;
 /// Largest number of polls of the bus before giving up, in the emergency path: far more than one byte takes.
 const PATIENCE: u32 = 10_000;
 
-// A tenth of a control period at 10 kHz is what the outputs may take.
-const _: () = assert!(ad5754r::write_ns(WRITING_HZ, READING_HZ) < 10_000);
+// A tenth of a control period at 10 kHz is what the outputs may take, and the reading is over before the shortest tick writes.
+const _: () = assert!(WRITING.load_ns() < 10_000);
+const _: () = assert!(READING.steps_ns(FRAME_STEPS) < 8_000);
 
 /// The pins of the amplifiers, as they are after reset.
 pub(super) struct Pins {
@@ -34,7 +35,7 @@ pub(super) struct Pins {
     pub(super) brake: PB5,
 }
 
-type Converter = Ad5754r<ConverterBus, PB12<Output>, PB1<Output>, PB2<Output>, CoreDelay>;
+type Converter = Ad5754r<ConverterBus, PB2<Output>, CoreDelay>;
 
 /// Three amplifiers.
 pub(crate) struct Amplifiers {
@@ -48,18 +49,22 @@ pub(crate) struct Amplifiers {
 
 impl Amplifiers {
     /// Starts the converter with zero volts and the amplifiers disabled.
-    pub(super) fn new(spi: SPI2, pins: Pins, rcc: &mut Rcc) -> Self {
+    pub(super) fn new(parts: (SPI2, TIM1, DMA2), pins: Pins, rcc: &mut Rcc) -> Self {
         let mut enable = pins.enable.into_push_pull_output();
         enable.set_low();
         let mut brake = pins.brake.into_push_pull_output();
         brake.set_low();
-        let outputs = ad5754r::Pins {
-            sync: pins.sync.into_push_pull_output().speed(Speed::VeryHigh),
-            load: pins.load.into_push_pull_output().speed(Speed::VeryHigh),
-            clear: pins.clear.into_push_pull_output(),
+        let clear = pins.clear.into_push_pull_output();
+        let (spi, timer, dma) = parts;
+        let bus = converter_bus::Pins {
+            clock: pins.clock,
+            answer: pins.answer,
+            data: pins.data,
+            sync: pins.sync,
+            load: pins.load,
         };
-        let bus = ConverterBus::new(spi, pins.clock, pins.answer, pins.data, rcc);
-        let mut converter = Ad5754r::new(bus, outputs, CoreDelay);
+        let bus = ConverterBus::new(spi, timer, dma, bus, rcc);
+        let mut converter = Ad5754r::new(bus, clear, CoreDelay);
         let is_present = match converter.start() {
             Ok(()) => true,
             Err(Error::Bus(_)) => {
@@ -89,7 +94,17 @@ impl Amplifiers {
 }
 
 impl hal::Amplifiers for Amplifiers {
-    /// Disabled before the codes change, enabled after; the brake with them.
+    #[inline(always)]
+    fn begin(&mut self) {
+        if self.is_present && self.converter.begin().is_err() {
+            self.enable.set_low();
+            self.brake.set_low();
+            self.mismatches = [true; 3];
+        }
+    }
+
+    /// Disabled before the codes change. Enabled while they are on their way: until they are there the outputs are at zero volts,
+    /// as a stage that is not enabled has no other codes.
     #[inline(always)]
     fn write(&mut self, outputs: &Outputs) {
         if !outputs.enabled {
@@ -151,8 +166,15 @@ impl DelayNs for CoreDelay {
 pub(crate) fn outputs_off() {
     // SAFETY: whoever owns these peripherals is not coming back: this runs with interrupts disabled on the way to
     // `halt`. Only single register writes are made, each valid in any state the owner left.
-    let (port_b, port_c, bus) =
-        unsafe { (pac::GPIOB::steal(), pac::GPIOC::steal(), pac::SPI2::steal()) };
+    let (port_b, port_c, bus, timer, dma) = unsafe {
+        (
+            pac::GPIOB::steal(),
+            pac::GPIOC::steal(),
+            pac::SPI2::steal(),
+            pac::TIM1::steal(),
+            pac::DMA2::steal(),
+        )
+    };
     // First of all, and independent of the bus.
     port_c.bsrr().write(|w| w.br(ENABLE).set_bit());
     port_b.bsrr().write(|w| w.br(BRAKE).set_bit());
@@ -160,8 +182,14 @@ pub(crate) fn outputs_off() {
 
     // /CLR holds the outputs at zero; should that wire be broken, the zero codes do. End the frame that may be under way;
     // the chip ignores it unless it is complete.
+    timer.cr1().reset();
+    for stream in dma.st_iter() {
+        stream.cr().reset();
+    }
     wait_for(|| !bus.sr().read().bsy().bit_is_set());
-    port_b.bsrr().write(|w| w.bs(SYNC).set_bit());
+    port_b
+        .bsrr()
+        .write(|w| w.bs(SYNC).set_bit().bs(LOAD).set_bit());
     CoreDelay.delay_us(1);
     port_b.bsrr().write(|w| w.br(SYNC).set_bit());
     for byte in ALL_ZERO {

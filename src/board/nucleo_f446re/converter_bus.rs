@@ -1,136 +1,285 @@
-//! SPI 2, as the converter wants it: mode 1, a choice of two clocks, and no wait without an end.
+//! The converter's bus: SPI 2 in mode 1, /SYNC and /LDAC, all three moved by timer 1 and DMA.
+//!
+//! In every step of timer 1 (`quadrant::drivers::ad5754r::steps`) its first channel makes DMA 2 write a word to port B, its
+//! second one a byte to the SPI; DMA 1 takes the byte that comes back. The timer's repetition counter counts the steps, and
+//! its one-pulse mode stops it behind the last one. The processor fills the table of bytes, arms the streams and starts
+//! the timer.
 
-use embedded_hal::spi::{Error, ErrorKind, ErrorType, SpiBus};
-use quadrant::drivers::ad5754r::{Clock, SelectClock};
-use stm32f4xx_hal::gpio::{PB13, PB14, PB15, Pull, Speed};
-use stm32f4xx_hal::pac::SPI2;
+use core::cell::UnsafeCell;
+use core::sync::atomic::{Ordering, fence};
+
+use quadrant::drivers::ad5754r::Sequencer;
+use quadrant::drivers::ad5754r::steps::{
+    BYTE_AT, FRAME_STEPS, FRAMES_AT, MAX_STEPS, PIN_CHANGES, PINS_AT, PinChange,
+};
+use stm32f4xx_hal::gpio::{Output, PB1, PB12, PB13, PB14, PB15, Pull, Speed};
+use stm32f4xx_hal::pac::{DMA1, DMA2, GPIOB, SPI2, TIM1};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
-/// Clock of the bus, Hz: 45 MHz divided by two; the converter listens at up to 30 MHz.
-pub(super) const WRITING_HZ: u32 = 22_500_000;
-/// Clock of the bus while the converter answers, Hz: 45 MHz divided by eight. A quarter would leave 44 ns from edge to
-/// edge, of which SDO may take 40 ns and the processor's input needs some.
-pub(super) const READING_HZ: u32 = 5_625_000;
+use super::CORE_HZ;
+use super::bus_times::{READING, TIMER_HZ, WRITING};
+use super::pins::{LOAD, SYNC};
+
+const _: () = assert!(TIMER_HZ == CORE_HZ);
 
 /// SPI_CR1 (RM0390, 26.7.1): clock phase 1 (CPHA), master (MSTR), on (SPE), and slave select by software (SSI, SSM).
-const CR1: u16 = 1 | 1 << 2 | 1 << 6 | 1 << 8 | 1 << 9;
+const SPI_CR1: u16 = 1 | 1 << 2 | 1 << 6 | 1 << 8 | 1 << 9;
 /// SPI_CR1, bits BR: the peripheral clock divided by 2 and by 8.
 const BY_2: u16 = 0b000 << 3;
 const BY_8: u16 = 0b010 << 3;
 
-/// Largest number of polls of the bus before giving up. A byte takes 256 cycles of the processor at the slow clock, a look
-/// about ten.
-const PATIENCE: u32 = 400;
+/// TIM1_CR1 (RM0390, 16.4.1): only the counter's end is an update (URS), which stops it (OPM); with and without its start (CEN).
+const TIMER_STOPPED: u32 = 1 << 2 | 1 << 3;
+const TIMER_STARTED: u32 = TIMER_STOPPED | 1;
+
+/// Streams of DMA 2 (RM0390, table 29): TIM1_CH1 is stream 1, TIM1_CH2 is stream 2, both on channel 6.
+const PINS: usize = 1;
+const BYTES: usize = 2;
+/// Stream of DMA 1 (RM0390, table 28): SPI2_RX is stream 3, on channel 0.
+const RECEIVER: usize = 3;
+/// DMA_SxCR (RM0390, 9.5.5): channel (CHSEL), priority (PL), sizes in memory and at the peripheral (MSIZE, PSIZE: 0 a byte, 2 a
+/// word), memory incremented (MINC), from memory (DIR).
+const PINS_CR: u32 = 6 << 25 | 0b11 << 16 | 2 << 13 | 2 << 11 | 1 << 10 | 0b01 << 6;
+const BYTES_CR: u32 = 6 << 25 | 0b10 << 16 | 1 << 10 | 0b01 << 6;
+const RECEIVER_CR: u32 = 0b11 << 16 | 1 << 10;
+/// DMA_SxCR, EN.
+const ON: u32 = 1;
+/// DMA_LIFCR: all five flags of streams 1 and 2, and of stream 3.
+const CLEAR_PINS_AND_BYTES: u32 = 0b11_1101 << 6 | 0b11_1101 << 16;
+const CLEAR_RECEIVER: u32 = 0b11_1101 << 22;
+
+/// Largest number of polls of what was started before giving up: the longest takes some 2100 cycles, a look nine at least.
+const PATIENCE: u32 = 300;
+
+/// Memory that a DMA stream reads or writes by itself.
+struct Shared<T, const N: usize>(UnsafeCell<[T; N]>);
+
+// SAFETY: `ConverterBus` exists once, as it owns the SPI, and only it touches these, with volatile accesses, while the streams
+// are off.
+unsafe impl<T, const N: usize> Sync for Shared<T, N> {}
+
+/// Words for the set/reset register of port B, in RAM: flash cannot be read while it is erased.
+static PIN_WORDS: Shared<u32, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
+/// Bytes to send, zero where the chip does not hear them.
+static TO_SEND: Shared<u8, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
+static RECEIVED: Shared<u8, MAX_STEPS> = Shared(UnsafeCell::new([0; MAX_STEPS]));
+
+impl<T: Copy, const N: usize> Shared<T, N> {
+    fn address(&self) -> u32 {
+        self.0.get() as u32
+    }
+
+    fn place(&self, index: usize) -> *mut T {
+        debug_assert!(index < N);
+        self.0.get().cast::<T>().wrapping_add(index)
+    }
+
+    /// Writes items from a place on.
+    #[inline(always)]
+    fn write<const COUNT: usize>(&self, first: usize, items: [T; COUNT]) {
+        for (index, item) in (first..).zip(items) {
+            // SAFETY: one of the items, which live for ever.
+            unsafe { self.place(index).write_volatile(item) };
+        }
+    }
+}
 
 /// The bus did not do its work in time: it is not clocked, or was switched off.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stuck;
 
-impl Error for Stuck {
-    fn kind(&self) -> ErrorKind {
-        ErrorKind::Other
-    }
+/// The pins of the bus, as they are after reset.
+pub(super) struct Pins {
+    pub(super) clock: PB13,
+    pub(super) answer: PB14,
+    pub(super) data: PB15,
+    pub(super) sync: PB12,
+    pub(super) load: PB1,
 }
 
 /// The converter's bus.
 pub(super) struct ConverterBus {
     spi: SPI2,
+    timer: TIM1,
+    dma: DMA2,
+    sync: PB12<Output>,
+    load: PB1<Output>,
+}
+
+/// The controller of the receiving stream.
+fn receiver_dma() -> DMA1 {
+    // SAFETY: the link's port owns this controller for streams 5 and 6; here only stream 3 is used, and a register of flags
+    // that ones clear and zeros leave alone.
+    unsafe { DMA1::steal() }
 }
 
 impl ConverterBus {
-    /// Starts the bus.
-    pub(super) fn new(spi: SPI2, clock: PB13, answer: PB14, data: PB15, rcc: &mut Rcc) -> Self {
-        let _ = clock.into_alternate::<5>().speed(Speed::VeryHigh);
-        let _ = data.into_alternate::<5>().speed(Speed::VeryHigh);
+    /// Starts the bus, with both pins high. DMA 1 is clocked.
+    pub(super) fn new(spi: SPI2, timer: TIM1, dma: DMA2, pins: Pins, rcc: &mut Rcc) -> Self {
+        let mut sync = pins.sync.into_push_pull_output().speed(Speed::VeryHigh);
+        sync.set_high();
+        let mut load = pins.load.into_push_pull_output().speed(Speed::VeryHigh);
+        load.set_high();
+        let _ = pins.clock.into_alternate::<5>().speed(Speed::VeryHigh);
+        let _ = pins.data.into_alternate::<5>().speed(Speed::VeryHigh);
         // A converter that is not there answers with ones.
-        let _ = answer.into_alternate::<5>().internal_resistor(Pull::Up);
+        let _ = pins
+            .answer
+            .into_alternate::<5>()
+            .internal_resistor(Pull::Up);
         SPI2::enable(rcc);
         SPI2::reset(rcc);
-        let mut bus = Self { spi };
-        bus.select(Clock::Writing);
-        bus
-    }
+        TIM1::enable(rcc);
+        TIM1::reset(rcc);
+        DMA2::enable(rcc);
+        DMA2::reset(rcc);
+        spi.cr2().write(|w| w.rxdmaen().set_bit());
+        PIN_WORDS.write(0, PIN_CHANGES.map(word));
 
-    /// Exchanges one byte.
-    #[inline(always)]
-    fn exchange(&mut self, byte: u8) -> Result<u8, Stuck> {
-        self.spi.dr8().write(|w| w.dr().set(byte));
-        // The byte is in when the last edge of the clock has passed.
-        for _ in 0..PATIENCE {
-            if self.spi.sr().read().rxne().bit_is_set() {
-                return Ok(self.spi.dr8().read().dr().bits());
+        // SAFETY: counts of the timer, whose step they lie in.
+        unsafe {
+            timer.cr1().write(|w| w.bits(TIMER_STOPPED));
+            timer.ccr1().write(|w| w.bits(PINS_AT));
+            timer.ccr2().write(|w| w.bits(BYTE_AT));
+        }
+        timer
+            .dier()
+            .write(|w| w.cc1de().enabled().cc2de().enabled());
+
+        // SAFETY: only the register's address is taken.
+        let port = unsafe { GPIOB::steal() }.bsrr().as_ptr() as u32;
+        let data_register = spi.dr8().as_ptr() as u32;
+        let receiver = receiver_dma();
+        for (stream, peripheral, memory, configuration) in [
+            (dma.st(PINS), port, PIN_WORDS.address(), PINS_CR),
+            (dma.st(BYTES), data_register, TO_SEND.address(), BYTES_CR),
+            (
+                receiver.st(RECEIVER),
+                data_register,
+                RECEIVED.address(),
+                RECEIVER_CR,
+            ),
+        ] {
+            // SAFETY: the addresses are those of registers and of memory that lives for ever; the configuration is the manual's.
+            unsafe {
+                stream.par().write(|w| w.pa().bits(peripheral));
+                stream.m0ar().write(|w| w.m0a().bits(memory));
+                stream.cr().write(|w| w.bits(configuration));
             }
         }
-        Err(Stuck)
+        Self {
+            spi,
+            timer,
+            dma,
+            sync,
+            load,
+        }
     }
-}
 
-impl SelectClock for ConverterBus {
-    /// "These bits should not be changed when communication is ongoing": between frames it is not.
+    /// Starts steps of the tables from their beginning. The timer rests, and so do the streams.
     #[inline(always)]
-    fn select(&mut self, clock: Clock) {
-        let rate = match clock {
-            Clock::Writing => BY_2,
-            Clock::Reading => BY_8,
-        };
-        // SAFETY: the value is the manual's, as the constants say.
-        self.spi.cr1().write(|w| unsafe { w.bits(CR1 | rate) });
-        // A byte that came too late for its exchange must not be taken for the next one's.
-        if self.spi.sr().read().rxne().bit_is_set() {
-            let _ = self.spi.dr8().read();
-        }
-    }
-}
-
-impl ErrorType for ConverterBus {
-    type Error = Stuck;
-}
-
-impl SpiBus for ConverterBus {
-    fn read(&mut self, words: &mut [u8]) -> Result<(), Stuck> {
-        for word in words {
-            *word = self.exchange(0)?;
-        }
-        Ok(())
-    }
-
-    #[inline(always)]
-    fn write(&mut self, words: &[u8]) -> Result<(), Stuck> {
-        for word in words {
-            self.exchange(*word)?;
-        }
-        Ok(())
-    }
-
-    fn transfer(&mut self, read: &mut [u8], write: &[u8]) -> Result<(), Stuck> {
-        let longest = read.len().max(write.len());
-        let mut sent = write.iter();
-        let mut received = read.iter_mut();
-        for _ in 0..longest {
-            let word = self.exchange(sent.next().copied().unwrap_or(0))?;
-            if let Some(slot) = received.next() {
-                *slot = word;
+    fn start(&mut self, steps: usize, step_cycles: u32, rate: u16) {
+        let receiver = receiver_dma();
+        // What was filled in is there before the streams look for it.
+        fence(Ordering::Release);
+        // SAFETY: ones clear the flags of these streams; the rest are values of the manual, as the constants say. The streams'
+        // configuration is that of `new`, and only this switches them on.
+        unsafe {
+            self.spi.cr1().write(|w| w.bits(SPI_CR1 | rate));
+            self.dma.lifcr().write(|w| w.bits(CLEAR_PINS_AND_BYTES));
+            receiver.lifcr().write(|w| w.bits(CLEAR_RECEIVER));
+            for (stream, configuration) in [
+                (receiver.st(RECEIVER), RECEIVER_CR),
+                (self.dma.st(PINS), PINS_CR),
+                (self.dma.st(BYTES), BYTES_CR),
+            ] {
+                stream.ndtr().write(|w| w.bits(steps as u32));
+                stream.cr().write(|w| w.bits(configuration | ON));
             }
+            self.timer.arr().write(|w| w.bits(step_cycles - 1));
+            self.timer.rcr().write(|w| w.bits(steps as u32 - 1));
+            // Takes the number of repetitions over.
+            self.timer.egr().write(|w| w.ug().set_bit());
+            self.timer.cr1().write(|w| w.bits(TIMER_STARTED));
         }
-        Ok(())
     }
 
+    /// True if all steps were taken, and a byte came back in each.
     #[inline(always)]
-    fn transfer_in_place(&mut self, words: &mut [u8]) -> Result<(), Stuck> {
-        for word in words {
-            *word = self.exchange(*word)?;
-        }
-        Ok(())
+    fn has_ended(&self) -> bool {
+        !self.timer.cr1().read().cen().is_enabled()
+            && receiver_dma().st(RECEIVER).ndtr().read().bits() == 0
     }
 
-    /// Every byte sent was also received, which is at the middle of its last bit; waits for the rest of that bit.
-    #[inline(always)]
-    fn flush(&mut self) -> Result<(), Stuck> {
+    /// Waits for the end of what was started, in a tick that follows the one before at once; stops what does not come to it.
+    #[cold]
+    #[inline(never)]
+    fn wait(&mut self) -> Result<(), Stuck> {
         for _ in 0..PATIENCE {
-            if !self.spi.sr().read().bsy().bit_is_set() {
+            if self.has_ended() {
                 return Ok(());
             }
         }
+        // SAFETY: the configuration is that of `new`.
+        unsafe {
+            self.timer.cr1().write(|w| w.bits(TIMER_STOPPED));
+            self.dma.st(PINS).cr().write(|w| w.bits(PINS_CR));
+            self.dma.st(BYTES).cr().write(|w| w.bits(BYTES_CR));
+            receiver_dma()
+                .st(RECEIVER)
+                .cr()
+                .write(|w| w.bits(RECEIVER_CR));
+        }
+        self.sync.set_high();
+        self.load.set_high();
+        // A byte that came too late must not be taken for the next one's; reading both also clears an overrun.
+        let _ = self.spi.dr8().read();
+        let _ = self.spi.sr().read();
         Err(Stuck)
+    }
+}
+
+impl Sequencer for ConverterBus {
+    type Error = Stuck;
+
+    #[inline(always)]
+    fn start_writing(&mut self, frames: [[u8; 3]; 4]) {
+        let [first, second, third, fourth] = frames;
+        let [at_first, at_second, at_third, at_fourth] = FRAMES_AT;
+        TO_SEND.write(at_first, first);
+        TO_SEND.write(at_second, second);
+        TO_SEND.write(at_third, third);
+        TO_SEND.write(at_fourth, fourth);
+        self.start(MAX_STEPS, const { WRITING.step_cycles() }, BY_2);
+    }
+
+    #[inline(always)]
+    fn start_reading(&mut self, frame: [u8; 3]) {
+        TO_SEND.write(0, frame);
+        self.start(FRAME_STEPS, const { READING.step_cycles() }, BY_8);
+    }
+
+    #[inline(always)]
+    fn finish(&mut self) -> Result<[u8; 3], Stuck> {
+        if !self.has_ended() {
+            self.wait()?;
+        }
+        // What was received is read after the counter.
+        fence(Ordering::Acquire);
+        Ok([0, 1, 2].map(|index| {
+            // SAFETY: one of the items, which live for ever.
+            unsafe { RECEIVED.place(index).read_volatile() }
+        }))
+    }
+}
+
+/// The set/reset register's word for a change (RM0390, 7.4.7): the lower half sets pins, the upper half resets them.
+const fn word(change: PinChange) -> u32 {
+    match change {
+        PinChange::Keep => 0,
+        PinChange::Select => 1 << (16 + SYNC),
+        PinChange::Release => 1 << SYNC,
+        PinChange::Load => 1 << (16 + LOAD),
+        PinChange::EndLoad => 1 << LOAD,
     }
 }

@@ -7,8 +7,8 @@
 //! | encoder x: A, B, index          | PB8, PB9, PB10         | TIM2, 32 bit |
 //! | encoder y: A, B, index          | PA6, PA7, PB0          | TIM3, 16 bit, extended |
 //! | encoder z: A, B, index          | PC6, PC7, PC8          | TIM8, 16 bit, extended |
-//! | DAC: SCLK, SDIN, SDO            | PB13, PB15, PB14       | SPI2 |
-//! | DAC: /SYNC, /LDAC, /CLR         | PB12, PB1, PB2         | |
+//! | DAC: SCLK, SDIN, SDO            | PB13, PB15, PB14       | SPI2, DMA1 |
+//! | DAC: /SYNC, /LDAC, /CLR         | PB12, PB1, PB2         | TIM1 and DMA2, /CLR by hand |
 //! | amplifier enable                | PC9, high enables      | |
 //! | holding brake                   | PB5, high releases     | |
 //! | emergency stop, amplifiers ready | PA0, PA1              | low while all is well |
@@ -29,6 +29,8 @@ mod amplifiers;
 #[path = "on_chip.rs"]
 mod amplifiers;
 #[cfg(not(feature = "output-on-chip"))]
+mod bus_times;
+#[cfg(not(feature = "output-on-chip"))]
 mod converter_bus;
 pub(crate) mod device;
 mod encoders;
@@ -42,9 +44,9 @@ mod wiring;
 
 use defmt_rtt as _;
 use stm32f4xx_hal::gpio::{Input, PC13};
-use stm32f4xx_hal::pac::{self, PWR};
+use stm32f4xx_hal::pac::{self, DMA1, PWR};
 use stm32f4xx_hal::prelude::*;
-use stm32f4xx_hal::rcc::{Config, Enable as _};
+use stm32f4xx_hal::rcc::{Config, Enable as _, Reset as _};
 
 pub(crate) use self::amplifiers::{Amplifiers, outputs_off};
 pub(crate) use self::encoders::Encoders;
@@ -108,6 +110,9 @@ impl Board {
         let port_b = chip.GPIOB.split(&mut rcc);
         let port_c = chip.GPIOC.split(&mut rcc);
 
+        // Two pieces use streams of it.
+        DMA1::enable(&mut rcc);
+        DMA1::reset(&mut rcc);
         // First of all pins, as the amplifiers float until then.
         #[cfg(not(feature = "output-on-chip"))]
         let amplifiers = {
@@ -121,7 +126,7 @@ impl Board {
                 enable: port_c.pc9,
                 brake: port_b.pb5,
             };
-            Amplifiers::new(chip.SPI2, pins, &mut rcc)
+            Amplifiers::new((chip.SPI2, chip.TIM1, chip.DMA2), pins, &mut rcc)
         };
         #[cfg(feature = "output-on-chip")]
         let amplifiers = Amplifiers::new(
@@ -170,7 +175,7 @@ impl Board {
 }
 
 /// Control rates, Hz: slower, the supervising task would feed the watchdog too late, which may bite after 6.8 ms; faster,
-/// the tick's 3200 instructions and the converter's 10 us leave too little to the other tasks.
+/// the tick leaves too little to the other tasks.
 pub(crate) const RATES_HZ: (f64, f64) = (2.5e3, 1.5e4);
 
 /// The board's name.

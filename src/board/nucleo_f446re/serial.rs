@@ -55,15 +55,13 @@ pub(crate) struct Serial {
 }
 
 impl Serial {
-    /// Starts to receive.
+    /// Starts to receive. DMA 1 is clocked.
     pub(super) fn new(usart: USART2, dma: DMA1, pins: (PA2, PA3), rcc: &mut Rcc) -> Self {
         let _ = pins.0.into_alternate::<7>();
         // Without the probe's chip the line would be read as noise.
         let _ = pins.1.into_alternate::<7>().internal_resistor(Pull::Up);
         USART2::enable(rcc);
         USART2::reset(rcc);
-        DMA1::enable(rcc);
-        DMA1::reset(rcc);
         // Oversampling by 16: USART_BRR is the divider itself (RM0390, 25.4.4).
         let divider = (rcc.clocks.pclk1().raw() + BAUD / 2) / BAUD;
         // SAFETY: mantissa and fraction together are the divider.

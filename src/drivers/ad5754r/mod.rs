@@ -6,16 +6,21 @@
 //! are at zero volts, whatever the bus does. The pin BIN//2sCOMP must be tied low: codes are then two's complement, and
 //! zero is zero volts.
 //!
+//! # Beside the computation
+//! Nobody waits for the bus. [`Ad5754r::write`] starts three frames with the codes, /LDAC and a fourth frame, and returns; hardware
+//! sends them ([`steps`]). [`Ad5754r::begin`], at the beginning of the next tick, checks that all of it left.
+//!
 //! # Read-back
 //! A frame with bit 23 set asks for a register; the chip shifts it out through SDO in the frame that follows, whatever
 //! that one writes. SDO is valid up to 40 ns after the clock's rising edge and is sampled at the falling one, so that
-//! frame needs a clock below about 10 MHz ([`Clock::Reading`]). [`Ad5754r::write`] asks for one register per call, the
-//! codes of A, B and C and the power register in turn: a wrong code, a chip that lost its supply, an overloaded or
-//! overheated output and a broken SDO are found within four calls.
+//! frame needs a clock below about 10 MHz. The fourth frame of a write asks, and the chip answers in a slow one that
+//! [`Ad5754r::begin`] starts: the codes of A, B and C and the power register in turn. A wrong code, a chip that lost its
+//! supply, an overloaded or overheated output and a broken SDO are found within four ticks.
+
+pub mod steps;
 
 use embedded_hal::delay::DelayNs;
 use embedded_hal::digital::OutputPin;
-use embedded_hal::spi::SpiBus;
 
 /// Bits 21..19 of a frame: the register.
 mod register {
@@ -51,14 +56,6 @@ const POWER_UP: u16 = 0b1_1111;
 const POWER_BITS: u16 = 0b111_1011_1111;
 const ALL_BITS: u16 = u16::MAX;
 
-/// /SYNC high between two frames: at least 100 ns.
-const BETWEEN_FRAMES_NS: u32 = 100;
-/// /SYNC high before the frame in which the chip answers: at least 200 ns.
-const BEFORE_ANSWER_NS: u32 = 200;
-/// From the last /SYNC to /LDAC: at least 130 ns.
-const BEFORE_LOAD_NS: u32 = 130;
-/// /LDAC low: at least 20 ns.
-const LOAD_NS: u32 = 20;
 /// From power-up until outputs may be written: at least 10 us.
 const POWER_UP_US: u32 = 20;
 
@@ -72,27 +69,27 @@ const fn frame(address: u8, data: u16) -> [u8; 3] {
 /// The frame that sets all channels to zero volts, for paths that cannot own the driver.
 pub const ALL_ZERO: [u8; 3] = frame(register::DAC | ALL_CHANNELS, 0);
 
-/// Time that one [`Ad5754r::write`] keeps bus and pins busy, ns, without what the processor adds: three frames at
-/// `writing_hz`, one at `reading_hz` (both Hz, above zero), and the waits.
-pub const fn write_ns(writing_hz: u32, reading_hz: u32) -> u64 {
-    const FRAME: u64 = 24 * 1_000_000_000;
-    let waits = 3 * BETWEEN_FRAMES_NS + BEFORE_ANSWER_NS + BEFORE_LOAD_NS + LOAD_NS;
-    (3 * FRAME).div_ceil(writing_hz as u64) + FRAME.div_ceil(reading_hz as u64) + waits as u64
-}
+/// The frame that changes nothing, in which the chip answers.
+const NOTHING: [u8; 3] = frame(register::CONTROL | CONTROL_NOTHING, 0);
 
-/// The clock of the bus.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Clock {
-    /// As fast as the chip can listen, 30 MHz at most.
-    Writing,
-    /// As slow as its answer takes: half a period covers SDO's 40 ns and the bus' own setup time.
-    Reading,
-}
+/// The bus, /SYNC and /LDAC, which work on their own.
+pub trait Sequencer {
+    /// The error of a bus that did not work.
+    type Error: Copy;
 
-/// A bus whose clock can be chosen between frames.
-pub trait SelectClock {
-    /// Chooses the clock of the frames that follow; the bus is idle.
-    fn select(&mut self, clock: Clock);
+    /// Starts to send three frames, to pulse /LDAC, and to send the fourth frame, as fast as the chip can listen. Returns at once;
+    /// what was started before has been finished.
+    fn start_writing(&mut self, frames: [[u8; 3]; 4]);
+
+    /// Starts to send a frame as slowly as the chip can answer. Returns at once; what was started before has been finished.
+    fn start_reading(&mut self, frame: [u8; 3]);
+
+    /// Returns what was received in the first frame of what was started last. Waits for its end if it has not come, but not for
+    /// longer than it takes.
+    ///
+    /// # Errors
+    /// It has not come to its end; it is stopped, and the pins are high.
+    fn finish(&mut self) -> Result<[u8; 3], Self::Error>;
 }
 
 /// A register read back.
@@ -128,25 +125,18 @@ impl<E> From<E> for Error<E> {
     }
 }
 
-/// The pins of the chip that are no part of the bus.
-pub struct Pins<Sync, Load, Clear> {
-    /// /SYNC: low during a frame.
-    pub sync: Sync,
-    /// /LDAC: codes go to the outputs when it falls.
-    pub load: Load,
-    /// /CLR: outputs are at zero volts while it is low.
-    pub clear: Clear,
-}
-
 /// The converter with its bus to itself.
-pub struct Ad5754r<Bus, Sync, Load, Clear, Delay> {
+pub struct Ad5754r<Bus: Sequencer, Clear, Delay> {
     bus: Bus,
-    pins: Pins<Sync, Load, Clear>,
+    /// /CLR: outputs are at zero volts while it is low.
+    clear: Clear,
     delay: Delay,
     /// The codes written last.
     codes: [i16; 3],
-    /// The register to read back next: 0 to 2 a code, 3 the power register.
+    /// The register asked for last: 0 to 2 a code, 3 the power register.
     turn: u8,
+    /// The failure of what was started last, found at the beginning of this tick.
+    failed: Option<Bus::Error>,
     /// A register that read wrong, until it reads right.
     wrong: Option<Wrong>,
     /// /CLR holds the outputs at zero volts since a write failed.
@@ -162,26 +152,23 @@ struct Wrong {
     answered: u16,
 }
 
-impl<Bus, Sync, Load, Clear, Delay> Ad5754r<Bus, Sync, Load, Clear, Delay>
+impl<Bus, Clear, Delay> Ad5754r<Bus, Clear, Delay>
 where
-    Bus: SpiBus + SelectClock,
-    Sync: OutputPin,
-    Load: OutputPin,
+    Bus: Sequencer,
     Clear: OutputPin,
     Delay: DelayNs,
 {
     /// A converter that was not started: its outputs are held at zero volts by /CLR.
-    pub fn new(bus: Bus, mut pins: Pins<Sync, Load, Clear>, delay: Delay) -> Self {
-        // These pins belong to the processor and cannot fail.
-        let _ = pins.clear.set_low();
-        let _ = pins.sync.set_high();
-        let _ = pins.load.set_high();
+    pub fn new(bus: Bus, mut clear: Clear, delay: Delay) -> Self {
+        // The pin belongs to the processor and cannot fail.
+        let _ = clear.set_low();
         Self {
             bus,
-            pins,
+            clear,
             delay,
             codes: [0; 3],
             turn: 0,
+            failed: None,
             wrong: None,
             cleared: false,
         }
@@ -193,40 +180,65 @@ where
     /// # Errors
     /// The bus' error, or a chip that does not answer as it should: not powered, not wired, another chip.
     pub fn start(&mut self) -> Result<(), Error<Bus::Error>> {
-        self.bus.select(Clock::Writing);
         // The range goes first: at power-up the outputs come on in whatever range is set then.
-        self.send(frame(register::RANGE | ALL_CHANNELS, RANGE_10_V_BIPOLAR))?;
-        self.send(frame(register::CONTROL | CONTROL_OPTIONS, OPTIONS))?;
-        self.send(ALL_ZERO)?;
-        self.update();
-        self.send(frame(register::POWER, POWER_UP))?;
+        self.bus.start_writing([
+            frame(register::RANGE | ALL_CHANNELS, RANGE_10_V_BIPOLAR),
+            frame(register::CONTROL | CONTROL_OPTIONS, OPTIONS),
+            ALL_ZERO,
+            frame(register::POWER, POWER_UP),
+        ]);
+        self.bus.finish()?;
         self.delay.delay_us(POWER_UP_US);
-        self.send(ALL_ZERO)?;
-        self.update();
-        self.codes = [0; 3];
-        self.turn = 0;
-        self.wrong = None;
-        self.cleared = false;
         for (address, bits, item, expected) in [
             (register::RANGE, RANGE_BITS, Item::Range, RANGE_10_V_BIPOLAR),
             (register::POWER, POWER_BITS, Item::Power, POWER_UP),
         ] {
-            self.ask(address)?;
-            let answer = self.send_and_listen(frame(register::CONTROL | CONTROL_NOTHING, 0))?;
-            if answer & bits != expected {
+            self.zero_and_ask(address);
+            self.bus.finish()?;
+            self.bus.start_reading(NOTHING);
+            let answered = data(self.bus.finish()?);
+            if answered & bits != expected {
                 return Err(Error::Mismatch {
                     item,
                     expected,
-                    answered: answer,
+                    answered,
                 });
             }
         }
-        let _ = self.pins.clear.set_high();
+        self.zero_and_ask(register::DAC);
+        let _ = self.clear.set_high();
         Ok(())
     }
 
-    /// Sets channels A, B and C at the same instant, and compares one register with what it should hold: the codes of
-    /// the call before, and the power register, in turn.
+    /// Starts to set all outputs to zero volts, and to ask for a register.
+    fn zero_and_ask(&mut self, address: u8) {
+        self.bus
+            .start_writing([ALL_ZERO, NOTHING, NOTHING, question(address)]);
+    }
+
+    /// Checks that the last write came to its end, and starts to read what it asked for. To be called at the beginning of a tick,
+    /// once before each [`write`](Self::write).
+    ///
+    /// # Errors
+    /// The bus' error. It pulls /CLR, as that of `write`, which will report it as well.
+    #[inline(always)]
+    pub fn begin(&mut self) -> Result<(), Error<Bus::Error>> {
+        match self.bus.finish() {
+            Ok(_) => {
+                self.bus.start_reading(NOTHING);
+                self.failed = None;
+                Ok(())
+            }
+            Err(error) => {
+                self.failed = Some(error);
+                self.hold_at_zero();
+                Err(error.into())
+            }
+        }
+    }
+
+    /// Starts to set channels A, B and C, which change at the same instant, and compares one register with what it should hold:
+    /// the codes of the call before, and the power register, in turn.
     ///
     /// # Errors
     /// The bus' error, or a mismatch. Either pulls /CLR, which needs no bus: the outputs are at zero volts, not at the last
@@ -235,36 +247,61 @@ where
     /// sent, but is no longer powered up.
     #[inline(always)]
     pub fn write(&mut self, codes: [i16; 3]) -> Result<(), Error<Bus::Error>> {
-        let before = self.codes;
-        let written = self.write_and_compare(codes);
-        if written.is_err() && !self.cleared {
-            let _ = self.pins.clear.set_low();
-            self.cleared = true;
-        } else if written.is_ok() && self.cleared && before == [0; 3] && codes == [0; 3] {
-            let _ = self.pins.clear.set_high();
+        let received = match self.failed {
+            None => self.bus.finish(),
+            Some(error) => Err(error),
+        };
+        let (turn, before) = (self.turn, self.codes);
+        self.turn = (turn + 1) & 3;
+        self.codes = codes;
+        let address = match self.turn {
+            3 => register::POWER,
+            channel => register::DAC | channel,
+        };
+        let [a, b, c] = codes.map(i16::cast_unsigned);
+        self.bus.start_writing([
+            frame(register::DAC, a),
+            frame(register::DAC | 1, b),
+            frame(register::DAC | 2, c),
+            question(address),
+        ]);
+        let written = match received {
+            Ok(received) => self.compare(turn, before, data(received)),
+            Err(error) => Err(Error::Bus(error)),
+        };
+        if written.is_err() {
+            self.hold_at_zero();
+        } else if self.cleared && before == [0; 3] && codes == [0; 3] {
+            let _ = self.clear.set_high();
             self.cleared = false;
         }
         written
     }
 
+    /// Pulls /CLR, once.
     #[inline(always)]
-    fn write_and_compare(&mut self, codes: [i16; 3]) -> Result<(), Error<Bus::Error>> {
-        let [a, b, c] = self.codes.map(i16::cast_unsigned);
-        let (address, bits, item, expected) = match self.turn {
-            0 => (register::DAC, ALL_BITS, Item::Code(0), a),
-            1 => (register::DAC | 1, ALL_BITS, Item::Code(1), b),
-            2 => (register::DAC | 2, ALL_BITS, Item::Code(2), c),
-            _ => (register::POWER, POWER_BITS, Item::Power, POWER_UP),
-        };
-        let turn = self.turn;
-        self.turn = (turn + 1) & 3;
+    fn hold_at_zero(&mut self) {
+        if !self.cleared {
+            let _ = self.clear.set_low();
+            self.cleared = true;
+        }
+    }
+
+    /// Compares an answer with what its register should hold, and remembers a wrong one.
+    #[inline(always)]
+    fn compare(
+        &mut self,
+        turn: u8,
+        codes: [i16; 3],
+        answered: u16,
+    ) -> Result<(), Error<Bus::Error>> {
         let [a, b, c] = codes.map(i16::cast_unsigned);
-        self.ask(address)?;
-        let answered = self.send_and_listen(frame(register::DAC, a))?;
-        self.send(frame(register::DAC | 1, b))?;
-        self.send(frame(register::DAC | 2, c))?;
-        self.update();
-        self.codes = codes;
+        let (bits, item, expected) = match turn {
+            0 => (ALL_BITS, Item::Code(0), a),
+            1 => (ALL_BITS, Item::Code(1), b),
+            2 => (ALL_BITS, Item::Code(2), c),
+            _ => (POWER_BITS, Item::Power, POWER_UP),
+        };
         if answered & bits != expected {
             self.wrong = Some(Wrong {
                 turn,
@@ -284,47 +321,16 @@ where
             }),
         }
     }
+}
 
-    /// Asks for a register: the answer comes in the next frame.
-    #[inline(always)]
-    fn ask(&mut self, address: u8) -> Result<(), Bus::Error> {
-        self.send(frame(READ | address, 0))?;
-        self.delay.delay_ns(BEFORE_ANSWER_NS - BETWEEN_FRAMES_NS);
-        Ok(())
-    }
+/// The frame that asks for a register.
+#[inline(always)]
+const fn question(address: u8) -> [u8; 3] {
+    frame(READ | address, 0)
+}
 
-    /// Sends one frame. A frame cut short by an error is ignored by the chip, which counts clocks.
-    #[inline(always)]
-    fn send(&mut self, frame: [u8; 3]) -> Result<(), Bus::Error> {
-        let _ = self.pins.sync.set_low();
-        let sent = self.bus.write(&frame).and_then(|()| self.bus.flush());
-        let _ = self.pins.sync.set_high();
-        self.delay.delay_ns(BETWEEN_FRAMES_NS);
-        sent
-    }
-
-    /// Sends one frame, slowly, and returns the data that the chip answered to the one before.
-    #[inline(always)]
-    fn send_and_listen(&mut self, mut frame: [u8; 3]) -> Result<u16, Bus::Error> {
-        self.bus.select(Clock::Reading);
-        let _ = self.pins.sync.set_low();
-        let sent = self
-            .bus
-            .transfer_in_place(&mut frame)
-            .and_then(|()| self.bus.flush());
-        let _ = self.pins.sync.set_high();
-        self.bus.select(Clock::Writing);
-        self.delay.delay_ns(BETWEEN_FRAMES_NS);
-        let [_, high, low] = frame;
-        sent.map(|()| u16::from_be_bytes([high, low]))
-    }
-
-    /// Moves what was sent to the outputs.
-    #[inline(always)]
-    fn update(&mut self) {
-        self.delay.delay_ns(BEFORE_LOAD_NS);
-        let _ = self.pins.load.set_low();
-        self.delay.delay_ns(LOAD_NS);
-        let _ = self.pins.load.set_high();
-    }
+/// The data of a frame.
+#[inline(always)]
+const fn data([_, high, low]: [u8; 3]) -> u16 {
+    u16::from_be_bytes([high, low])
 }
