@@ -368,10 +368,17 @@ pub fn verify(
     if let Some(index) = best {
         let (kind, compared) = kinds.remove(index);
         let mut whole = bench.stretched(&compared, &pid_alone, &drift);
-        if whole.law != compared.law {
-            kinds.push((kind, compared));
-        }
         bench.run_on(&mut whole, CHOOSING);
+        if whole.law != compared.law {
+            // One over another range that is stopped on a further sine goes back to the range that was measured.
+            if whole.stopped.is_some() {
+                laws.push(whole);
+                whole = compared;
+                bench.run_on(&mut whole, CHOOSING);
+            } else {
+                kinds.push((kind, compared));
+            }
+        }
         let mut worst = whole.against(&pid_alone, &drift).0;
         let (law, settings) = (whole.law.clone(), whole.settings.clone());
         laws.push(whole);
