@@ -106,14 +106,12 @@ static inline float advance(const struct parameters *law, struct state *state, f
     for (int i = 0; i < ELEMENTS; i++) {
         float share = level * law->weight[i], force = state->forces[i];
         float trial = force + displacement * law->stiffness[i];
-        if (state->slipping >> i & 1 || sign * force > share) {
-            state->slipping |= 1u << i;
-            force = sign * (share + (sign * force - share) * decay);
-        } else if (sign * trial < share) {
+        uint32_t slips = state->slipping >> i & 1;
+        if (!slips && sign * trial < share) {
             force = trial;
         } else {
             state->slipping |= 1u << i;
-            force = sign * share;
+            force = sign * (slips || sign * force > share ? share + (sign * force - share) * decay : share);
         }
         state->forces[i] = force;
         total += force;

@@ -259,16 +259,18 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         let elements = self.elements.iter().zip(&mut state.forces);
         for ((element, force), bit) in elements.zip((0..N).map(|index| 1 << index)) {
             let share = sliding.level.scale(element.weight);
+            let slips = slipping & bit != 0;
             let trial = *force + displacement.scale(element.stiffness);
             // Neither holds of what is not a number.
-            *force = if slipping & bit != 0 || along(*force) > share {
-                slipping |= bit;
-                sliding.slip(*force, share, &along)
-            } else if along(trial) < share {
+            *force = if !slips && along(trial) < share {
                 trial
             } else {
                 slipping |= bit;
-                along(share)
+                if slips || along(*force) > share {
+                    sliding.slip(*force, share, &along)
+                } else {
+                    along(share)
+                }
             };
             total = total + *force;
         }
