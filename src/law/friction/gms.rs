@@ -97,6 +97,7 @@ struct ElementConfig<S: Scalar> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gms<S: Scalar, const N: usize> {
     elements: [ElementConfig<S>; N],
+    one: S,
 }
 
 /// The memory of the GMS model.
@@ -168,11 +169,11 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
         force
     }
 
-    /// Goes on with the sum of the elements, which all slip from now on.
+    /// Goes on with the sum of the elements, which all slip from now on; `one` is all of their distances.
     #[inline(always)]
-    fn join(&mut self, sum: S, weights: impl Iterator<Item = S::Gain>) {
+    fn join(&mut self, sum: S, one: S, weights: impl Iterator<Item = S::Gain>) {
         self.sum = sum;
-        self.left = S::quantise(1.0, Quantity::Fraction);
+        self.left = one;
         for (force, weight) in self.forces.iter_mut().zip(weights) {
             *force = *force - sum.scale(weight);
         }
@@ -206,6 +207,7 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
                     weight: S::gain(weight, Quantity::Voltage, Quantity::Voltage),
                 }
             }),
+            one: S::quantise(1.0, Quantity::Fraction),
         }
     }
 
@@ -276,7 +278,7 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         }
         state.slipping = slipping;
         if state.all_slip() {
-            state.join(total, self.weights());
+            state.join(total, self.one, self.weights());
         }
         total
     }
