@@ -31,9 +31,9 @@ struct Chip {
     /// The last falling edge of the clock.
     edge: u64,
     bits: Vec<bool>,
-    /// What SDO shifts out in the frame that goes on.
+    /// Word that SDO shifts out in the frame that goes on.
     answer: [u8; 3],
-    /// What the next frame answers to.
+    /// Register that the next frame answers with.
     question: Option<u8>,
     frames: Vec<Frame>,
     loads: Vec<u64>,

@@ -5,13 +5,14 @@ use quadrant::drivers::ad5754r::steps::FRAME_STEPS;
 use quadrant::drivers::ad5754r::{ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
 use quadrant::stage::Outputs;
-use stm32f4xx_hal::gpio::{Output, PB1, PB2, PB5, PB12, PB13, PB14, PB15, PC9};
+use stm32f4xx_hal::gpio::{Output, PB2, PB5, PC9};
 use stm32f4xx_hal::pac::{self, DMA2, SPI2, TIM1};
 use stm32f4xx_hal::rcc::Rcc;
 
 use super::CORE_HZ;
 use super::bus_times::{READING, WRITING};
-use super::converter_bus::{self, ConverterBus};
+use super::converter_bus::ConverterBus;
+pub(super) use super::converter_bus::Pins as BusPins;
 use super::pins::{BRAKE, ENABLE, LOAD, SYNC};
 
 /// Number of /CLR in port B.
@@ -25,11 +26,7 @@ const _: () = assert!(READING.steps_ns(FRAME_STEPS) < 8_000);
 
 /// The pins of the amplifiers, as they are after reset.
 pub(super) struct Pins {
-    pub(super) clock: PB13,
-    pub(super) answer: PB14,
-    pub(super) data: PB15,
-    pub(super) sync: PB12,
-    pub(super) load: PB1,
+    pub(super) bus: BusPins,
     pub(super) clear: PB2,
     pub(super) enable: PC9,
     pub(super) brake: PB5,
@@ -56,14 +53,7 @@ impl Amplifiers {
         brake.set_low();
         let clear = pins.clear.into_push_pull_output();
         let (spi, timer, dma) = parts;
-        let bus = converter_bus::Pins {
-            clock: pins.clock,
-            answer: pins.answer,
-            data: pins.data,
-            sync: pins.sync,
-            load: pins.load,
-        };
-        let bus = ConverterBus::new(spi, timer, dma, bus, rcc);
+        let bus = ConverterBus::new(spi, timer, dma, pins.bus, rcc);
         let mut converter = Ad5754r::new(bus, clear, CoreDelay);
         let is_present = match converter.start() {
             Ok(()) => true,

@@ -117,11 +117,13 @@ impl Board {
         #[cfg(not(feature = "output-on-chip"))]
         let amplifiers = {
             let pins = amplifiers::Pins {
-                clock: port_b.pb13,
-                answer: port_b.pb14,
-                data: port_b.pb15,
-                sync: port_b.pb12,
-                load: port_b.pb1,
+                bus: amplifiers::BusPins {
+                    clock: port_b.pb13,
+                    answer: port_b.pb14,
+                    data: port_b.pb15,
+                    sync: port_b.pb12,
+                    load: port_b.pb1,
+                },
                 clear: port_b.pb2,
                 enable: port_c.pc9,
                 brake: port_b.pb5,

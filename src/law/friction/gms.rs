@@ -107,7 +107,7 @@ pub struct GmsState<S: Scalar, const N: usize> {
     pub(super) forces: [S; N],
     /// The sum of the forces while all slip, V.
     sum: S,
-    /// What is left of the distances in `forces` while all slip, as a [`Quantity::Fraction`].
+    /// Share that is left of the distances in `forces` while all slip, a [`Quantity::Fraction`].
     left: S,
     /// A bit for each element.
     slipping: u32,
