@@ -63,6 +63,8 @@ impl std::error::Error for MarginError {}
 
 /// Points, even on a log scale, between which crossings and peaks are bracketed.
 const BRACKETS: usize = 4000;
+/// Halvings of a bracket in which the phase turns by more than a quarter.
+const HALVINGS: usize = 20;
 
 /// Margins and peaks of a loop, or why it has none.
 ///
@@ -89,9 +91,13 @@ impl<'a, L: OpenLoop> LoopGains<'a, L> {
     /// # Errors
     /// A phase that does not.
     pub fn falling_phase_crossover(&self) -> Result<f64, MarginError> {
-        let falls = |&omega: &f64| self.0.direction(omega) < 0;
-        let first = self.0.phase_crossovers().into_iter().find(falls);
-        first.ok_or(MarginError::NoPhaseCrossover)
+        let first = self
+            .0
+            .phase_crossovers()
+            .into_iter()
+            .find(|root| root.rises);
+        let found = first.map(|root| root.omega_rad_s);
+        found.ok_or(MarginError::NoPhaseCrossover)
     }
 
     /// [`margins`] of the loop with a factor above zero.
@@ -128,26 +134,62 @@ impl<L: OpenLoop> OpenLoop for Scaled<'_, L> {
     }
 }
 
+/// A root of a function of the response.
+struct Root {
+    omega_rad_s: f64,
+    /// True if the function is below zero before it. As the points on both sides tell: close to the root, rounding decides the sign.
+    rises: bool,
+}
+
 /// A loop's response over its band, coarsely.
 struct Scan<'a, L: OpenLoop> {
     open_loop: &'a L,
     points: Vec<(f64, Complex64)>,
 }
 
+/// Adds points between two of them, until the phase turns by less than a quarter from each to the next: a resonance may be narrower
+/// than the scan's steps, and what it encircles must not be stepped over.
+///
+/// # Errors
+/// [`MarginError::NotFinite`] for a resonance without damping.
+fn between(
+    open_loop: &impl OpenLoop,
+    below: (f64, Complex64),
+    above: (f64, Complex64),
+    halvings: usize,
+    points: &mut Vec<(f64, Complex64)>,
+) -> Result<(), MarginError> {
+    let turns = below.1.re * above.1.re + below.1.im * above.1.im < 0.0;
+    if !turns {
+        return Ok(());
+    }
+    let omega = (below.0 * above.0).sqrt();
+    let middle = (omega, open_loop.response(omega));
+    if halvings == 0 || !middle.1.is_finite() {
+        return Err(MarginError::NotFinite);
+    }
+    between(open_loop, below, middle, halvings - 1, points)?;
+    points.push(middle);
+    between(open_loop, middle, above, halvings - 1, points)
+}
+
 impl<'a, L: OpenLoop> Scan<'a, L> {
     fn new(open_loop: &'a L) -> Result<Self, MarginError> {
         let (lowest, highest) = open_loop.band_rad_s();
         let ratio = highest / lowest;
-        let points: Vec<_> = (0..=BRACKETS)
-            .map(|i| lowest * ratio.powf(i as f64 / BRACKETS as f64))
-            .map(|omega| (omega, open_loop.response(omega)))
-            .collect();
-        let finite = points
-            .iter()
-            .all(|(omega, l)| omega.is_finite() && l.is_finite());
-        finite
-            .then_some(Self { open_loop, points })
-            .ok_or(MarginError::NotFinite)
+        let mut points: Vec<(f64, Complex64)> = Vec::with_capacity(BRACKETS + 1);
+        for index in 0..=BRACKETS {
+            let omega = lowest * ratio.powf(index as f64 / BRACKETS as f64);
+            let l = open_loop.response(omega);
+            if !(omega.is_finite() && l.is_finite()) {
+                return Err(MarginError::NotFinite);
+            }
+            if let Some(&before) = points.last() {
+                between(open_loop, before, (omega, l), HALVINGS, &mut points)?;
+            }
+            points.push((omega, l));
+        }
+        Ok(Self { open_loop, points })
     }
 
     fn margins(&self) -> Result<Margins, MarginError> {
@@ -159,13 +201,15 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
         }
         let (gain_margin, phase_crossover) = phase_crossovers
             .iter()
-            .map(|&omega| (open_loop.response(omega).norm().recip(), omega))
+            .map(|root| root.omega_rad_s)
+            .map(|omega| (open_loop.response(omega).norm().recip(), omega))
             .filter(|&(factor, _)| factor > 1.0)
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .ok_or(MarginError::NoPhaseCrossover)?;
         let (phase_margin, gain_crossover) = gain_crossovers
             .iter()
-            .map(|&omega| ((-open_loop.response(omega)).arg().abs(), omega))
+            .map(|root| root.omega_rad_s)
+            .map(|omega| ((-open_loop.response(omega)).arg().abs(), omega))
             .min_by(|a, b| a.0.total_cmp(&b.0))
             .ok_or(MarginError::NoGainCrossover)?;
         let (sensitivity_peak, sensitivity_omega) = self.peak(|l| (l + 1.0).norm().recip());
@@ -182,13 +226,13 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
         })
     }
 
-    /// Frequencies at which the response is real and negative, ascending.
-    fn phase_crossovers(&self) -> Vec<f64> {
+    /// Frequencies at which the response is real and negative, ascending; where its imaginary part rises, the phase falls.
+    fn phase_crossovers(&self) -> Vec<Root> {
         self.roots(|l| l.im, |l| l.re < 0.0)
     }
 
     /// Frequencies at which the gain is one, ascending.
-    fn gain_crossovers(&self) -> Vec<f64> {
+    fn gain_crossovers(&self) -> Vec<Root> {
         self.roots(|l| l.norm_sqr() - 1.0, |_| true)
     }
 
@@ -197,39 +241,37 @@ impl<'a, L: OpenLoop> Scan<'a, L> {
         &self,
         function: impl Fn(Complex64) -> f64,
         counts: impl Fn(Complex64) -> bool,
-    ) -> Vec<f64> {
+    ) -> Vec<Root> {
         let brackets = self.points.windows(2).filter(|pair| {
             let ends = [pair[0].1, pair[1].1];
             ends.into_iter().all(&counts) && (function(ends[0]) < 0.0) != (function(ends[1]) < 0.0)
         });
         brackets
             .map(|pair| {
-                let negative_below = function(pair[0].1) < 0.0;
-                bisect(pair[0].0, pair[1].0, |omega| {
-                    (function(self.open_loop.response(omega)) < 0.0) == negative_below
-                })
+                let rises = function(pair[0].1) < 0.0;
+                let omega_rad_s = bisect(pair[0].0, pair[1].0, |omega| {
+                    (function(self.open_loop.response(omega)) < 0.0) == rises
+                });
+                Root { omega_rad_s, rises }
             })
             .collect()
     }
 
-    /// Returns +1 if the phase rises through -180 degrees at a phase crossover, -1 if it falls.
-    fn direction(&self, omega: f64) -> i32 {
-        let above = self.open_loop.response(omega * (1.0 + 1e-7));
-        if above.im > 0.0 { -1 } else { 1 }
-    }
-
     /// Half the encirclements of -1: those of positive frequencies.
-    fn encirclements(&self, phase_crossovers: &[f64]) -> i32 {
+    fn encirclements(&self, phase_crossovers: &[Root]) -> i32 {
         // Two integrators and any lag, or three, start below -180 degrees: the arc at infinity has crossed the axis.
         let start = self.points[0].1;
-        let on_the_arc = if start.re < 0.0 && start.im > 0.0 {
+        let on_the_arc = if start.im > 0.0 && start.re < start.im {
             -1
         } else {
             0
         };
-        let beyond = |omega: &&f64| self.open_loop.response(**omega).norm() > 1.0;
+        let beyond = |root: &&Root| self.open_loop.response(root.omega_rad_s).norm() > 1.0;
         let crossings = phase_crossovers.iter().filter(beyond);
-        on_the_arc + crossings.map(|&omega| self.direction(omega)).sum::<i32>()
+        on_the_arc
+            + crossings
+                .map(|root| if root.rises { -1 } else { 1 })
+                .sum::<i32>()
     }
 
     /// The largest value of a function of the response, and its frequency in rad/s.
@@ -288,6 +330,29 @@ mod tests {
             (value - expected).abs() < tolerance,
             "{value}, expected {expected}"
         );
+    }
+
+    #[test]
+    fn a_resonance_narrower_than_the_scans_steps_is_not_stepped_over() {
+        // Hardly damped, the axis as it sticks turns by half around its own frequency; far more gain than the dead time allows follows.
+        let with = |damping_per_s: f64| {
+            let plant = PlantModel {
+                damping_per_s,
+                ..X_PLANT
+            };
+            let gains = PidGains {
+                kp_v_per_mm: 87.3,
+                ki_v_per_mm_s: 0.0,
+                kd_v_s_per_mm: 0.0082,
+                ..X_GAINS
+            };
+            margins(&SampledLoop::new(&plant, &gains, 1e-4, 0.0))
+        };
+        for damping_per_s in [10.0, 0.1, 1e-3] {
+            let found = with(damping_per_s);
+            assert_eq!(found, Err(MarginError::Unstable), "{damping_per_s} 1/s");
+        }
+        assert_eq!(with(0.0), Err(MarginError::NotFinite));
     }
 
     #[test]
