@@ -81,6 +81,8 @@ pub fn load_step_error(process: &Process, gains: &PidGains, form: Form) -> f64 {
 
 #[cfg(test)]
 mod tests {
+    use quadrant::control::plant_model::PlantModel;
+
     use super::*;
     use crate::design::fixtures::{FILTER_S, X_PLANT, Y_PLANT, Z_PLANT};
 
@@ -88,6 +90,28 @@ mod tests {
         sample_time_s: 1e-4,
         computation_delay_s: 0.0,
     };
+
+    #[test]
+    fn an_axis_without_damping_gets_the_pid_of_one_with_hardly_any() {
+        let pid = |damping_per_s: f64| {
+            let plant = PlantModel {
+                damping_per_s,
+                stiffness_per_s2: 0.0,
+                ..X_PLANT
+            };
+            best_pid(&Process::Model(plant), SAMPLED, FILTER_S)
+                .unwrap()
+                .gains
+        };
+        let (without, hardly_any) = (pid(0.0), pid(0.01));
+        for (one, other) in [
+            (without.kp_v_per_mm, hardly_any.kp_v_per_mm),
+            (without.ki_v_per_mm_s, hardly_any.ki_v_per_mm_s),
+            (without.kd_v_s_per_mm, hardly_any.kd_v_s_per_mm),
+        ] {
+            assert!((one / other - 1.0).abs() < 0.01, "{one} and {other}");
+        }
+    }
 
     #[test]
     fn the_best_pid_keeps_its_bounds_and_beats_the_thesis_criterion_on_every_axis() {
@@ -119,7 +143,7 @@ mod tests {
     #[test]
     fn the_error_of_a_stiff_spring_under_integral_action_is_that_of_the_formula() {
         // Slow: the plant is its spring, 1/k; with L = Ki/(k s) the error is exp(-Ki t / k) / k.
-        let plant = quadrant::control::plant_model::PlantModel {
+        let plant = PlantModel {
             gain_mm_per_v_s2: 1e8,
             damping_per_s: 1e4,
             stiffness_per_s2: 1e8,

@@ -175,13 +175,18 @@ impl Process {
     }
 
     /// The frequency at which the phase of the process alone reaches -180 degrees, Hz: without derivative action no
-    /// crossover lies above it; of the rigid axis where there are modes. Nothing when the band does not hold it.
+    /// crossover lies above it; of the rigid axis where there are modes, and with some damping ([`LEAST_DAMPING`]): without, the phase
+    /// begins there. Nothing when the band does not hold it.
     pub fn half_turn_hz(&self) -> Option<f64> {
         match self {
             Self::Model(plant) | Self::Modelled { plant, .. } => {
+                let damped = PlantModel {
+                    damping_per_s: plant.damping_per_s.max(LEAST_DAMPING / plant.delay_s),
+                    ..*plant
+                };
                 // Above the resonance, where delay and inertia turn on: from there the phase only falls.
                 let lag = |omega: f64| {
-                    (-plant.denominator(omega).arg()) - omega * plant.delay_s
+                    (-damped.denominator(omega).arg()) - omega * plant.delay_s
                         > -std::f64::consts::PI
                 };
                 let lowest = plant.stiffness_per_s2.sqrt().max(1e-3);
@@ -193,3 +198,6 @@ impl Process {
         }
     }
 }
+
+/// Least damping over mass, times the dead time, of an axis whose half turn is asked for.
+const LEAST_DAMPING: f64 = 0.01;
