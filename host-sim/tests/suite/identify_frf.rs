@@ -210,6 +210,21 @@ fn an_excitation_that_stops_the_axis_is_refused() {
     assert!(matches!(error, FrfError::NotSliding { .. }), "{error}");
 }
 
+#[test]
+fn the_noise_of_a_coarse_encoder_is_no_standstill() {
+    let mut truth = x_truth();
+    truth.resolution_mm = 2e-3;
+    truth.imperfections.encoder_noise_mm = 2e-3;
+    let mut axis = SimulatedTestAxis::new(0, truth.clone(), 1);
+    let mut settings = bootstrap_settings(axis.settings(), truth.gain_mm_per_v_s2, 1e4);
+    settings.encoder.resolution_mm = truth.resolution_mm;
+    axis.apply(&settings).unwrap();
+    let mut slow = gentle();
+    slow.bias_velocity_mm_s = 7.0;
+    slow.excitation.rms_v = 0.01;
+    measured(&mut axis, &slow);
+}
+
 /// A short measurement, its recordings written and read back.
 fn saved(settings: &FrfSettings) -> (FrfMeasurement, Vec<Recording>) {
     let found = measured(&mut slow_rig(&x_truth(), 1), settings);

@@ -235,7 +235,7 @@ pub fn measure(
         })?;
         let period = in_samples(period, &recording, axis.rate_hz)?;
         let steady = steady_range(&recording, settings);
-        check_sliding(&recording, &steady, settings)?;
+        check_sliding(&recording, &steady, settings, axis.resolution_mm)?;
         // Blocks begin where a period does, so that the excitation is the same in each; they overlap by half.
         let first = steady.start.div_ceil(period);
         let found = (first..)
@@ -393,12 +393,14 @@ fn check_sliding(
     recording: &Recording,
     steady: &Range<usize>,
     settings: &FrfSettings,
+    resolution_mm: f64,
 ) -> Result<(), FrfError> {
     let bias = settings.bias_velocity_mm_s;
     if bias == 0.0 {
         return Ok(());
     }
-    let span = ((SPEED_S / recording.sample_time_s) as usize).max(1);
+    let seen_s = SPEED_COUNTS * resolution_mm / bias.abs();
+    let span = ((SPEED_S.max(seen_s) / recording.sample_time_s) as usize).max(1);
     let along = if recording.reference_mm.first() < recording.reference_mm.last() {
         1.0
     } else {
@@ -418,8 +420,10 @@ fn check_sliding(
     Ok(())
 }
 
-/// Time over which the velocity is taken, s, and the share of the bias that it may fall to.
+/// Time over which the velocity is taken, s, at least, and that in which the bias moves by so many counts of the encoder: a noise of a count
+/// is no standstill then; and the share of the bias that it may fall to.
 const SPEED_S: f64 = 2e-3;
+const SPEED_COUNTS: f64 = 12.0;
 const LEAST_SPEED: f64 = 0.25;
 
 /// Samples over which the reference's velocity is looked at.
