@@ -36,6 +36,11 @@ impl Mode {
         above / second_order(self.frequency_hz, self.damping)
     }
 
+    /// True if the encoder is on the motor's side of the spring.
+    pub fn is_at_motor(&self) -> bool {
+        self.anti.is_some_and(|(_, damping)| damping < TRANSMITS)
+    }
+
     /// The mode at other frequencies by a factor, as when a mass on the axis has changed.
     #[must_use]
     pub fn shifted(&self, factor: f64) -> Self {

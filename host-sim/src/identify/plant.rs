@@ -238,7 +238,7 @@ fn fit_lines(
             mode_hz: model.modes.first().map(|mode| mode.frequency_hz),
         });
     }
-    check_support(lines, &plant, &found, settings.negligible_damping)?;
+    check_support(lines, &model, &found, settings.negligible_damping)?;
     Ok(PlantFit {
         plant,
         modes: model.modes,
@@ -572,13 +572,13 @@ fn search(
 /// Checks that the data determine what was fitted.
 fn check_support(
     lines: &[ResponsePoint],
-    plant: &PlantModel,
+    model: &Model,
     found: &Fit,
     negligible_damping: bool,
 ) -> Result<(), PlantError> {
     let low_hz = lines.first().map_or(0.0, |line| line.frequency_hz);
     let high_hz = lines.last().map_or(0.0, |line| line.frequency_hz);
-    let corner_hz = plant.damping_per_s / TAU;
+    let corner_hz = model.plant.damping_per_s / TAU;
     let relative = |index: usize| found.standard_errors[index] / found.values[index].abs();
     let uncertain = |index: usize| {
         let deviation = relative(index);
@@ -595,8 +595,11 @@ fn check_support(
             wanted_high_hz: 4.0 * corner_hz,
         });
     }
-    // A dead time is known well enough when the phase it turns is, at the highest line.
-    let turned = TAU * high_hz * found.standard_errors[2];
+    // A dead time is known well enough when the phase it turns is, at the highest line that a loop can use: below a mode between motor and
+    // encoder.
+    let between = model.modes.iter().filter(|mode| !mode.is_at_motor());
+    let used_hz = between.fold(high_hz, |used_hz, mode| used_hz.min(mode.frequency_hz));
+    let turned = TAU * used_hz * found.standard_errors[2];
     if turned.is_nan() || turned > MOST_UNCERTAIN {
         return Err(PlantError::Undetermined {
             parameter: "Td",
@@ -705,6 +708,30 @@ mod tests {
             error_hz > 0.0 && error_hz < 0.01 * mode.frequency_hz,
             "{error_hz} Hz"
         );
+    }
+
+    #[test]
+    fn a_dead_time_need_not_be_known_better_than_a_loop_below_the_mode_needs_it() {
+        let lines = response(&[]).points;
+        let mut found = fit_plant(&response(&[]), &SLIDING).unwrap();
+        // 8 deg at 32 Hz, 100 deg at the highest line.
+        found.fit.standard_errors[2] = 7e-4;
+        let checked = |anti: &[Option<(f64, f64)>]| {
+            let mode = |anti: &Option<(f64, f64)>| Mode {
+                frequency_hz: 32.0,
+                damping: 0.02,
+                anti: *anti,
+            };
+            let model = Model {
+                plant: found.plant,
+                modes: anti.iter().map(mode).collect(),
+            };
+            check_support(&lines, &model, &found.fit, false)
+        };
+        let refused = |anti| matches!(checked(anti), Err(PlantError::Undetermined { .. }));
+        assert!(refused(&[]));
+        assert!(refused(&[Some((22.0, 0.02))]), "encoder on the motor");
+        assert_eq!(checked(&[None]), Ok(()), "encoder on the table");
     }
 
     #[test]
