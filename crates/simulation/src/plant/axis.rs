@@ -21,6 +21,8 @@ pub(super) struct PeriodForces {
     driven_v: f64,
     /// Load, ripple, cogging and gravity.
     external_v: f64,
+    /// Friction where the axis is over its mean.
+    friction_factor: f64,
 }
 
 /// One simulated axis in motion.
@@ -141,7 +143,8 @@ impl SimulatedAxis {
         } else {
             0.0
         };
-        // The screw turns by a thousandth in a control period: its force is taken once.
+        // In a control period the screw turns by a thousandth, and the axis moves by a thousandth of what friction varies over: both are
+        // taken once.
         let ripple = if imperfections.ripple_v > 0.0 {
             imperfections.ripple_v * (TAU * self.position_mm / imperfections.lead_mm).sin()
         } else {
@@ -157,6 +160,7 @@ impl SimulatedAxis {
         PeriodForces {
             driven_v: driven,
             external_v: external,
+            friction_factor: imperfections.friction_factor(self.position_mm),
         }
     }
 
@@ -181,7 +185,7 @@ impl SimulatedAxis {
             Drive::RackAndPinion(gap) => self.move_geared(&gap, driven_v, external_v, viscous),
             Drive::BallScrew | Drive::Direct(_) => self.move_rigid(driven_v + external_v, viscous),
         };
-        let factor = self.truth.imperfections.friction_factor(self.position_mm);
+        let factor = forces.friction_factor;
         let after = self.velocity_mm_s;
         self.presliding_v = factor * self.presliding.step(displacement, after.abs(), self.step_s);
         self.friction_v = self.presliding_v + viscous * after;
