@@ -1,9 +1,14 @@
 //! From bytes to columns of finite numbers.
+//!
+//! A file is read in blocks, and each block is parsed in as many parts as there are threads; rows end where lines do. Where a quotation
+//! mark stands, a line break may be part of a cell: from there on the rows are read one after the other.
 
 use super::error::RecordError;
 use super::limits::MIN_ROWS;
-use csv::{ByteRecord, Reader, ReaderBuilder};
+use csv::{ByteRecord, ReaderBuilder};
+use rayon::prelude::*;
 use std::fs::File;
+use std::io::{Cursor, Read};
 use std::path::Path;
 
 /// The columns of a record, as labelled.
@@ -17,7 +22,7 @@ pub(super) struct Columns {
 }
 
 /// One column of a file.
-#[derive(Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct Column {
     pub(super) name: &'static str,
     /// Millimetres in one unit of a position column; 1 for others.
@@ -50,11 +55,33 @@ impl Column {
     }
 
     fn push(&mut self, value: f64, line: u64) {
-        let index = self.values.len();
+        self.begin_run(self.values.len(), line);
+        self.values.push(value);
+    }
+
+    /// Adds the rows of a part that follows.
+    fn append(&mut self, part: Self) {
+        let before = self.values.len();
+        for (index, line) in part.lines {
+            self.begin_run(before + index, line);
+        }
+        self.values.extend(part.values);
+    }
+
+    /// Notes the line of a value where it does not follow from those before.
+    fn begin_run(&mut self, index: usize, line: u64) {
         if self.lines.is_empty() || self.line(index) != line {
             self.lines.push((index, line));
         }
-        self.values.push(value);
+    }
+
+    /// The same column of another part of the file.
+    fn emptied(&self) -> Self {
+        Self {
+            values: Vec::new(),
+            lines: Vec::new(),
+            ..*self
+        }
     }
 }
 
@@ -81,8 +108,8 @@ pub(super) enum Purpose {
     Experiment,
 }
 
-/// Rows between two reports of progress.
-const PROGRESS_ROWS: usize = 1 << 16;
+/// Bytes of a block: the columns of a long recording take far more memory.
+const BLOCK_BYTES: u64 = 1 << 22;
 
 /// Most rows of a record: more than an hour at 10 kHz. All columns of an experiment then take less than 3 GiB of memory.
 const MOST_ROWS: usize = 50_000_000;
@@ -102,7 +129,7 @@ fn read_at_most(
     most_rows: usize,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Columns, RecordError> {
-    let (mut reader, header) = open(path)?;
+    let (source, header) = Source::open(path)?;
     let mut time = header.required("t_s", TIME)?;
     let mut reference = header.optional("reference", REFERENCE)?;
     let mut position = header.optional("position", POSITION)?;
@@ -126,9 +153,7 @@ fn read_at_most(
         voltage.as_mut(),
         injection.as_mut(),
     ];
-    fill(
-        &mut reader,
-        path,
+    source.fill(
         &mut columns.into_iter().flatten().collect::<Vec<_>>(),
         most_rows,
         progress,
@@ -144,7 +169,7 @@ fn read_at_most(
 
 /// The time, and the forces of x, y and z where they are recorded, of a file with one of them at least.
 pub(super) fn read_forces(path: &Path) -> Result<(Column, [Option<Column>; 3]), RecordError> {
-    let (mut reader, header) = open(path)?;
+    let (source, header) = Source::open(path)?;
     let mut time = header.required("t_s", TIME)?;
     let mut forces = [None, None, None];
     for (force, names) in forces.iter_mut().zip(FORCES) {
@@ -155,7 +180,7 @@ pub(super) fn read_forces(path: &Path) -> Result<(Column, [Option<Column>; 3]), 
     }
     let mut columns: Vec<&mut Place> = forces.iter_mut().flatten().collect();
     columns.push(&mut time);
-    fill(&mut reader, path, &mut columns, MOST_ROWS, &mut |_| {})?;
+    source.fill(&mut columns, MOST_ROWS, &mut |_| {})?;
     Ok((time.0, forces.map(|force| force.map(|(column, _)| column))))
 }
 
@@ -169,61 +194,231 @@ fn printable(text: &str) -> String {
         .collect()
 }
 
-/// A file, and its header read.
-fn open(path: &Path) -> Result<(Reader<File>, Header<'_>), RecordError> {
-    let mut reader = ReaderBuilder::new()
-        .from_path(path)
-        .map_err(|error| refuse(path, error))?;
-    let header = reader
-        .byte_headers()
-        .map_err(|error| refuse(path, error))?
-        .clone();
-    let names = header
-        .iter()
-        .map(|name| String::from_utf8_lossy(name).trim().to_owned())
-        .collect();
-    Ok((reader, Header { path, names }))
+/// A file behind its header.
+struct Source<'a> {
+    rows: Rows<'a>,
+    file: File,
+    /// Length of the file, bytes; zero where it is not known beforehand.
+    bytes: u64,
+    /// Bytes that were read.
+    read: u64,
+    /// Those that are not parsed yet.
+    text: Vec<u8>,
+    /// Line that they begin in.
+    line: u64,
 }
 
-/// Reads all rows into the columns, of which there is at least one.
-fn fill(
-    reader: &mut Reader<File>,
-    path: &Path,
-    columns: &mut [&mut Place],
-    most_rows: usize,
-    progress: &mut dyn FnMut(f64),
-) -> Result<(), RecordError> {
-    let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
-    let mut row = ByteRecord::new();
-    let mut rows: usize = 0;
-    while reader
-        .read_byte_record(&mut row)
-        .map_err(|error| refuse(path, error))?
-    {
-        let line = row.position().map_or(0, csv::Position::line);
-        if rows.is_multiple_of(PROGRESS_ROWS) {
-            let read = row.position().map_or(0, csv::Position::byte);
-            progress((read as f64 / bytes.max(1) as f64).min(1.0));
+/// What all rows of a file have in common.
+#[derive(Clone, Copy)]
+struct Rows<'a> {
+    path: &'a Path,
+    cells: usize,
+}
+
+/// Rows that follow each other, up to the first that is refused.
+struct Part {
+    columns: Vec<Place>,
+    rows: usize,
+    refused: Option<RecordError>,
+}
+
+impl<'a> Source<'a> {
+    fn open(path: &'a Path) -> Result<(Self, Header<'a>), RecordError> {
+        let file = File::open(path).map_err(|error| refuse(path, error.into()))?;
+        let mut source = Self {
+            rows: Rows { path, cells: 0 },
+            bytes: file.metadata().map_or(0, |file| file.len()),
+            file,
+            read: 0,
+            text: Vec::new(),
+            line: 1,
+        };
+        source.read_block()?;
+        let mut reader = ReaderBuilder::new().from_reader(&source.text[..]);
+        let header = reader
+            .byte_headers()
+            .map_err(|error| refuse(path, error))?
+            .clone();
+        let end = reader.position().clone();
+        source.text.drain(..end.byte() as usize);
+        source.line = end.line();
+        source.rows.cells = header.len();
+        let names = header
+            .iter()
+            .map(|name| String::from_utf8_lossy(name).trim().to_owned())
+            .collect();
+        Ok((source, Header { path, names }))
+    }
+
+    /// Reads a block more; returns false at the end of the file.
+    fn read_block(&mut self) -> Result<bool, RecordError> {
+        let mut block = self.file.by_ref().take(BLOCK_BYTES);
+        let read = block.read_to_end(&mut self.text);
+        let read = read.map_err(|error| refuse(self.rows.path, error.into()))?;
+        self.read += read as u64;
+        Ok(read > 0)
+    }
+
+    /// Reads all rows into the columns, of which there is at least one.
+    fn fill(
+        mut self,
+        columns: &mut [&mut Place],
+        most_rows: usize,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(), RecordError> {
+        let empty: Vec<Place> = columns
+            .iter()
+            .map(|(column, index)| (column.emptied(), *index))
+            .collect();
+        let bytes = self.bytes.max(1) as f64;
+        let mut share = |parsed: u64| progress((parsed as f64 / bytes).min(1.0));
+        let mut rows = 0;
+        let mut goes_on = true;
+        while goes_on {
+            let parsed = self.read - self.text.len() as u64;
+            share(parsed);
+            goes_on = self.read_block()?;
+            let room = most_rows - rows;
+            let parts = if self.text.contains(&b'"') {
+                goes_on = false;
+                let text = std::mem::take(&mut self.text);
+                let text = Cursor::new(text).chain(&mut self.file);
+                let mut share = |within: u64| share(parsed + within);
+                vec![
+                    self.rows
+                        .parse(text, self.line, empty.clone(), room, &mut share),
+                ]
+            } else {
+                let end = if goes_on {
+                    let last = self.text.iter().rposition(ends_line);
+                    last.map_or(0, |last| last + 1)
+                } else {
+                    self.text.len()
+                };
+                let parts = self.parse_lines(&self.text[..end], &empty, room);
+                self.line += line_breaks(&self.text[..end]);
+                self.text.drain(..end);
+                parts
+            };
+            for part in parts {
+                rows += part.rows;
+                if rows > most_rows {
+                    return Err(RecordError::TooManyRows {
+                        path: self.rows.path.to_owned(),
+                        most_rows,
+                    });
+                }
+                if let Some(error) = part.refused {
+                    return Err(error);
+                }
+                for ((column, _), (more, _)) in columns.iter_mut().zip(part.columns) {
+                    column.append(more);
+                }
+            }
         }
-        rows += 1;
-        if rows > most_rows {
-            return Err(RecordError::TooManyRows {
-                path: path.to_owned(),
-                most_rows,
+        if rows < MIN_ROWS {
+            return Err(RecordError::TooFewRows {
+                path: self.rows.path.to_owned(),
+                rows,
             });
         }
-        for (column, index) in columns.iter_mut() {
-            let value = number(path, column.name, line, &row[*index])?;
+        Ok(())
+    }
+
+    /// The parts of whole lines, each parsed on a thread of its own.
+    fn parse_lines(&self, lines: &[u8], empty: &[Place], room: usize) -> Vec<Part> {
+        let share = lines.len().div_ceil(rayon::current_num_threads()).max(1);
+        let mut parts = Vec::new();
+        let (mut rest, mut line) = (lines, self.line);
+        while !rest.is_empty() {
+            let end = rest.iter().skip(share - 1).position(ends_line);
+            let (part, after) = rest.split_at(end.map_or(rest.len(), |end| share + end));
+            parts.push((part, line));
+            line += line_breaks(part);
+            rest = after;
+        }
+        parts
+            .into_par_iter()
+            .map(|(part, line)| {
+                self.rows
+                    .parse(part, line, empty.to_vec(), room, &mut |_| {})
+            })
+            .collect()
+    }
+}
+
+/// True for a byte with which a line ends, or nearly.
+fn ends_line(byte: &u8) -> bool {
+    matches!(byte, b'\n' | b'\r')
+}
+
+/// Lines that end in a text.
+fn line_breaks(text: &[u8]) -> u64 {
+    text.iter().filter(|byte| **byte == b'\n').count() as u64
+}
+
+/// Rows between two reports of progress.
+const PROGRESS_ROWS: usize = 1 << 16;
+
+impl Rows<'_> {
+    /// Rows of a text that begins in a line of the file, into columns that are empty; one beyond `room` ends it. `progress` is told how
+    /// many bytes were parsed.
+    fn parse(
+        &self,
+        text: impl Read,
+        line: u64,
+        columns: Vec<Place>,
+        room: usize,
+        progress: &mut dyn FnMut(u64),
+    ) -> Part {
+        let mut part = Part {
+            columns,
+            rows: 0,
+            refused: None,
+        };
+        // The first row says nothing about the length of the others; the header does.
+        let mut reader = ReaderBuilder::new()
+            .has_headers(false)
+            .flexible(true)
+            .from_reader(text);
+        let mut row = ByteRecord::new();
+        while part.refused.is_none() && part.rows <= room {
+            match reader.read_byte_record(&mut row) {
+                Ok(true) => {}
+                Ok(false) => break,
+                Err(error) => {
+                    part.refused = Some(refuse(self.path, error));
+                    break;
+                }
+            }
+            let place = row.position().map_or((1, 0), |at| (at.line(), at.byte()));
+            if part.rows.is_multiple_of(PROGRESS_ROWS) {
+                progress(place.1);
+            }
+            part.rows += 1;
+            part.refused = self.take(&row, line + place.0 - 1, &mut part.columns).err();
+        }
+        part
+    }
+
+    /// Takes a row, which stands in a line of the file, into the columns.
+    fn take(&self, row: &ByteRecord, line: u64, columns: &mut [Place]) -> Result<(), RecordError> {
+        if row.len() != self.cells {
+            let (found, expected) = (row.len(), self.cells);
+            let message = format!(
+                "line {line} has {found} cells, the header has {expected}; every row needs as many"
+            );
+            return Err(RecordError::Malformed {
+                path: self.path.to_owned(),
+                message,
+            });
+        }
+        for (column, index) in columns {
+            let value = number(self.path, column.name, line, &row[*index])?;
             column.push(value, line);
         }
+        Ok(())
     }
-    if rows < MIN_ROWS {
-        return Err(RecordError::TooFewRows {
-            path: path.to_owned(),
-            rows,
-        });
-    }
-    Ok(())
 }
 
 fn number(path: &Path, column: &str, line: u64, cell: &[u8]) -> Result<f64, RecordError> {
@@ -247,26 +442,14 @@ fn number(path: &Path, column: &str, line: u64, cell: &[u8]) -> Result<f64, Reco
     }
 }
 
-/// The CSV reader's complaints, which name lines, as ours, which name the file too.
+/// The CSV reader's complaints as ours, which name the file.
 fn refuse(path: &Path, error: csv::Error) -> RecordError {
     let path = path.to_owned();
-    let line = error.position().map(csv::Position::line);
     match error.into_kind() {
         csv::ErrorKind::Io(source) => RecordError::Read { path, source },
-        csv::ErrorKind::UnequalLengths {
-            pos,
-            expected_len,
-            len,
-        } => {
-            let line = pos.map(|pos| pos.line()).or(line).unwrap_or(0);
-            let message = format!(
-                "line {line} has {len} cells, the header has {expected_len}; every row needs as many"
-            );
-            RecordError::Malformed { path, message }
-        }
         other => RecordError::Malformed {
             path,
-            message: format!("line {}: not CSV: {other:?}", line.unwrap_or(0)),
+            message: format!("not CSV: {other:?}"),
         },
     }
 }
@@ -345,6 +528,57 @@ impl Header<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// Rows of which some have blank lines before them, with a note each.
+    fn text(rows: usize, note: &str) -> String {
+        let row = |index: usize| {
+            let blank = if index % 1000 == 7 { "\r\n\n" } else { "" };
+            format!("{blank}{index},{}.5,{note}\n", index % 97)
+        };
+        let rows: String = (0..rows).map(row).collect();
+        format!("t_s,reference_mm,note\n{rows}")
+    }
+
+    #[test]
+    fn a_file_of_many_blocks_reads_as_row_by_row() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("long.csv");
+        let rows = 700_000;
+        let read = |note: &str| {
+            let text = text(rows, note);
+            assert!(text.len() as u64 > 2 * BLOCK_BYTES);
+            std::fs::write(&path, &text).unwrap();
+            read(&path, Purpose::Motion, &mut |_| {}).unwrap()
+        };
+        let (in_parts, by_row) = (read("a note"), read("\"a note\""));
+        let lines = |columns: &Columns| (0..rows).map(|row| columns.time.line(row)).collect();
+        let (in_parts_at, by_row_at): (Vec<u64>, Vec<u64>) = (lines(&in_parts), lines(&by_row));
+        for row in 0..rows {
+            assert_eq!(in_parts.time.values[row], row as f64);
+            // Behind blank lines, a row counts from the first of them unless a part begins with it.
+            assert!((by_row_at[row]..by_row_at[row] + 3).contains(&in_parts_at[row]));
+        }
+        assert_eq!(in_parts_at[rows - 1], by_row_at[rows - 1]);
+        assert_eq!(in_parts.time.values, by_row.time.values);
+        let reference = |columns: Columns| columns.reference.unwrap().values;
+        assert_eq!(reference(in_parts), reference(by_row));
+    }
+
+    #[test]
+    fn the_first_row_that_is_refused_is_named_whatever_part_it_is_in() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("spoilt.csv");
+        let spoilt = text(700_000, "")
+            .replace("\n600000,", "\n600000,x")
+            .replace("\n650000,", "\n650000,1,");
+        std::fs::write(&path, spoilt).unwrap();
+        let error = read(&path, Purpose::Motion, &mut |_| {}).unwrap_err();
+        // The header, 600 times two blank lines, and the row itself.
+        assert!(
+            matches!(error, RecordError::Cell { line: 601_202, .. }),
+            "{error}"
+        );
+    }
 
     #[test]
     fn a_file_of_more_rows_than_memory_bears_is_refused_while_it_is_read() {

@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::sync::Arc;
 
 use num_complex::Complex64;
+use rayon::prelude::*;
 use rustfft::{Fft, FftPlanner};
 
 use super::super::response::{FrequencyResponse, ResponsePoint};
@@ -65,7 +66,7 @@ pub fn estimate(
     let transform = Transform::new(length);
     // Of each block only the lines are kept: an hour's recording has thousands of blocks.
     let spectra: Vec<[Vec<Complex64>; 3]> = blocks
-        .iter()
+        .par_iter()
         .map(|(recording, range)| {
             let range = range.clone();
             [
