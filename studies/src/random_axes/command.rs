@@ -1,14 +1,17 @@
 //! `quadrant-studies axes`.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
 
+use anyhow::Context;
 use clap::Args;
 
 use super::cases::table;
-use super::{Line, Outcome, RandomAxis, judge};
+use super::page::page;
+use super::{Line, Outcome, RandomAxis, judged};
 use crate::campaign::{Campaign, Seeded};
-use quadrant_cli::say;
+use quadrant_cli::{say, warn};
 
 /// Options of `quadrant-studies axes`.
 #[derive(Clone, Debug, Args)]
@@ -18,11 +21,14 @@ pub struct Arguments {
     /// Results, a line a seed: those that are there already are not run again.
     #[arg(long, default_value = "axes.csv", value_name = "FILE")]
     results: PathBuf,
+    /// Folder for a page of each axis: what was found beside what is true, and everything that was tried.
+    #[arg(long, value_name = "FOLDER")]
+    pages: Option<PathBuf>,
     /// Only axes without a resonance.
     #[arg(long)]
     rigid: bool,
     /// Named axes instead, each with one thing that a commissioning may stumble over: a table of them, in Markdown.
-    #[arg(long, conflicts_with_all = ["seeds", "shard", "merge", "rigid"])]
+    #[arg(long, conflicts_with_all = ["seeds", "shard", "merge", "rigid", "pages"])]
     cases: bool,
 }
 
@@ -41,15 +47,32 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
         table();
         return Ok(());
     }
+    if let Some(folder) = &arguments.pages {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
     let wanted = |seed: u64| !arguments.rigid || RandomAxis::new(seed).is_rigid();
     let lines = arguments.campaign.lines(
         &arguments.results,
         "commissioning random axes",
         wanted,
-        judge,
+        |seed| judge_with_page(seed, arguments.pages.as_deref()),
     )?;
     summary(&lines);
     Ok(())
+}
+
+/// Commissions the axis of a seed, judges the result, and leaves its page in a folder.
+fn judge_with_page(seed: u64, folder: Option<&Path>) -> Line {
+    let subject = RandomAxis::new(seed).subject();
+    let judged = judged(&subject);
+    if let Some(folder) = folder {
+        let path = folder.join(format!("{seed}.html"));
+        // The result is worth more than its page.
+        if let Err(error) = page(&subject, &judged).write_html(&path) {
+            warn!("{}: {error}", path.display());
+        }
+    }
+    judged.line
 }
 
 /// Largest number of axes that are listed one by one.

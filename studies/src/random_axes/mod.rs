@@ -5,6 +5,7 @@
 
 pub mod cases;
 pub mod command;
+mod page;
 mod plant;
 mod subject;
 
@@ -103,6 +104,23 @@ struct Timed<'a> {
     subject: &'a Subject,
     test_axis: SimulatedTestAxis,
     used_s: f64,
+    tried: Vec<Tried>,
+}
+
+/// An experiment on the axis.
+struct Tried {
+    name: String,
+    /// Time from the beginning of the commissioning at which it ended, s.
+    ended_s: f64,
+    /// The reason for which it was stopped.
+    stopped: Option<String>,
+}
+
+/// An axis that was commissioned, or not.
+struct Judged {
+    line: Line,
+    found: Option<Commissioned>,
+    tried: Vec<Tried>,
 }
 
 impl TestAxis for Timed<'_> {
@@ -124,8 +142,15 @@ impl TestAxis for Timed<'_> {
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
         let outcome = self.test_axis.perform(experiment, progress);
+        let recorded = outcome.as_ref().ok().or(self.test_axis.interrupted());
+        let lasted_s = recorded.map_or(0.0, Recording::duration_s);
+        self.tried.push(Tried {
+            name: experiment.name.clone(),
+            ended_s: self.used_s + lasted_s,
+            stopped: outcome.as_ref().err().map(ToString::to_string),
+        });
         let recording = outcome?;
-        self.used_s += recording.len() as f64 * recording.sample_time_s;
+        self.used_s += lasted_s;
         if let Some(warmed) = self.subject.warmed(self.used_s) {
             self.test_axis.change(warmed);
         }
@@ -144,6 +169,11 @@ pub fn judge(seed: u64) -> Line {
 
 /// Commissions an axis and judges the result.
 pub fn judge_subject(subject: &Subject) -> Line {
+    judged(subject).line
+}
+
+/// Commissions an axis and judges the result, with everything that was tried.
+fn judged(subject: &Subject) -> Judged {
     let began = Instant::now();
     let Subject {
         seed,
@@ -158,6 +188,7 @@ pub fn judge_subject(subject: &Subject) -> Line {
         subject,
         test_axis: SimulatedTestAxis::new(0, parameters.clone(), *seed).with_travel(*travel),
         used_s: 0.0,
+        tried: Vec::new(),
     };
     let found = commission(
         &mut axis,
@@ -179,19 +210,28 @@ pub fn judge_subject(subject: &Subject) -> Line {
         axis: subject.description.clone(),
         reason: String::new(),
     };
-    match found {
-        Ok(found) => line.fill(&found, subject),
-        Err(error) if names_resonance(&error, subject) => {
-            line.outcome = Outcome::Refused;
-            line.reason = quadrant_cli::explained(&error.into());
+    let found = match found {
+        Ok(found) => {
+            line.fill(&found, subject);
+            Some(found)
         }
-        Err(error) => line.reason = quadrant_cli::explained(&error.into()),
-    }
+        Err(error) => {
+            if names_resonance(&error, subject) {
+                line.outcome = Outcome::Refused;
+            }
+            line.reason = quadrant_cli::explained(&error.into());
+            None
+        }
+    };
     if axis.test_axis.farthest_mm() > travel.half_mm() {
         line.outcome = Outcome::LeftTravel;
     }
     line.computed_s = began.elapsed().as_secs_f64();
-    line
+    Judged {
+        line,
+        found,
+        tried: axis.tried,
+    }
 }
 
 /// True if a refusal names the frequency of the axis' resonance.

@@ -3,8 +3,10 @@
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant_cli::output::command_line;
 use quadrant_sim::commission::page::commission_page;
-use quadrant_sim::pages::{columns, lines, provenance, series};
-use quadrant_sim::report::{Block, Cell, Figure, Page, Section, Series, Style, Table};
+use quadrant_sim::commission::verify::{LawResult, Verification};
+use quadrant_sim::experiment::sine_test::SineTest;
+use quadrant_sim::pages::{UM_PER_MM, columns, lines, provenance, series};
+use quadrant_sim::report::{Block, Cell, Column, Figure, Page, Section, Series, Style, Table};
 
 use super::{Judged, Subject};
 
@@ -56,6 +58,10 @@ pub(super) fn page(subject: &Subject, judged: &Judged) -> Page {
     let provenance = provenance(&command_line(), subject.seed);
     let mut sections = vec![section("truth", "Found and true", prose, blocks)];
     if let Some(found) = found {
+        if let Some(trials) = &found.verification {
+            let trials = vec![Block::Table(trials_table(trials))];
+            sections.push(section("trials", "Trials", Vec::new(), trials));
+        }
         sections.extend(commission_page(&title, found, None, provenance.clone()).sections);
     }
     let tables = vec![Block::Table(experiments)];
@@ -65,6 +71,36 @@ pub(super) fn page(subject: &Subject, judged: &Judged) -> Page {
         subtitle: "Simulated: a commissioning beside the axis that it did not know".to_owned(),
         provenance,
         sections,
+    }
+}
+
+/// The largest error of each law on each sine.
+fn trials_table(trials: &Verification) -> Table {
+    let head = |sine: &SineTest| {
+        let sine = format!(
+            "{:.1} mm at {:.1} mm/s",
+            sine.amplitude_mm, sine.velocity_mm_s
+        );
+        Column::with_unit(sine, "um")
+    };
+    let row = |law: &LawResult| {
+        let errors = (0..trials.sines.len()).map(|index| {
+            let score = law.scores.get(index);
+            score.map_or(Cell::Missing, |it| {
+                Cell::number(UM_PER_MM * it.largest_mm, 2)
+            })
+        });
+        std::iter::once(Cell::text(&law.law))
+            .chain(errors)
+            .collect()
+    };
+    Table {
+        id: "by-sine".to_owned(),
+        caption: "Largest error, by the axis' own encoder".to_owned(),
+        columns: std::iter::once(Column::new("Law"))
+            .chain(trials.sines.iter().map(head))
+            .collect(),
+        rows: trials.laws.iter().map(row).collect(),
     }
 }
 
