@@ -166,10 +166,11 @@ impl LawResult {
         }
     }
 
-    /// True if it ran on every sine that the PID ran on, is better on the mean by enough, and worse on none.
+    /// True if it ran on every sine by which a law is chosen, is better on the mean by enough, and on none that it ran on worse than the PID.
     fn is_better_than(&self, pid: &Self, drift: &Drift) -> bool {
         let (worst, mean) = self.against(pid, drift);
-        self.scores.len() == pid.scores.len() && worst <= self.most_worse() && mean <= WORTH
+        let enough = CHOOSING.min(pid.scores.len());
+        self.scores.len() >= enough && worst <= self.most_worse() && mean <= WORTH
     }
 
     /// True if on every withheld sine its largest error is below the PID's by enough, or all but what the encoder shows, or no larger
@@ -297,7 +298,8 @@ const DOMINANT: f64 = 1.0;
 
 /// Tries laws on the axis: the PID alone, the N-PID alone, the N-PID with every kind of feedforward that was identified, the best of
 /// them over other ranges of pre-sliding displacement, less of it where it is worse than the PID anywhere, and as much of the best as its
-/// errors ask for. Chooses the best of those that are not worse, on sines either that were withheld until then.
+/// errors ask for. Chooses the best of those that are not worse, on sines either that were withheld until then. Where there is none, other
+/// kinds and shares take their turn, and then what was tried, without the nonlinear gain.
 ///
 /// # Errors
 /// A PID whose settings are refused, that is stopped, or that oscillates.
@@ -433,7 +435,13 @@ pub fn verify(
             laws.push(scaled);
         }
     }
-    let chosen = bench.withheld(&mut laws, &drift)?;
+    let mut chosen = bench.withheld(&mut laws, 1, &drift)?;
+    if chosen == 0 {
+        chosen = bench.instead(&mut laws, &mut kinds, &drift)?;
+    }
+    if chosen == 0 && npid.feedback != pid.feedback {
+        chosen = bench.without_nonlinear_gain(&mut laws, &pid, &drift)?;
+    }
     // The others are shown, too, after those that ran on every sine.
     laws.extend(kinds.into_iter().chain(leaping).map(|(_, law)| law));
     Ok(Verification {
@@ -489,6 +497,8 @@ const UNFITTING: f64 = 0.15;
 const STRETCH: f64 = 2.5;
 const STRETCHES: i32 = 4;
 const BETTER: f64 = 0.95;
+/// Errors over the PID's, at worst, up to which a law with the nonlinear gain is tried without.
+const HOPEFUL: f64 = 1.25;
 /// Name of the PID's further runs.
 const AGAIN: &str = "PID, again";
 
@@ -523,7 +533,7 @@ fn one_lasts_s(sine: &SineTest) -> f64 {
 }
 
 /// Runs that all trials make at most, for progress.
-const MOST_RUNS: f64 = 65.0;
+const MOST_RUNS: f64 = 105.0;
 
 struct Bench<'a> {
     test_axis: &'a mut dyn TestAxis,
@@ -590,10 +600,97 @@ impl Bench<'_> {
         Ok((result, stopped))
     }
 
-    /// The law that is handed over, by its index: the best that is worse than the PID, the first of them, on none of the sines that
-    /// were withheld either.
-    fn withheld(&mut self, laws: &mut [LawResult], drift: &Drift) -> Result<usize, VerifyError> {
-        let better = better_than_pid(laws, drift);
+    /// The law that is handed over where the withheld sines refuse all that were better on the others: another kind, or a share of the
+    /// best one's friction. Laws that ran are added.
+    fn instead(
+        &mut self,
+        laws: &mut Vec<LawResult>,
+        kinds: &mut Vec<(FeedforwardKind, LawResult)>,
+        drift: &Drift,
+    ) -> Result<usize, VerifyError> {
+        let best = laws[1..].iter().rfind(|law| {
+            let is_fed = law.settings.feedforward.kind != FeedforwardKind::None;
+            let ran = law.scores.len() + usize::from(law.stopped.is_some());
+            is_fed && !law.is_share && ran > CHOOSING
+        });
+        let Some(best) = best else {
+            return Ok(0);
+        };
+        let (name, settings) = (best.law.clone(), best.settings.clone());
+        let (others, left): (Vec<_>, Vec<_>) =
+            std::mem::take(kinds).into_iter().partition(|(_, law)| {
+                let (worst, mean) = law.against(&laws[0], drift);
+                worst <= NO_WORSE && mean <= WORTH
+            });
+        *kinds = left;
+        for (_, mut other) in others {
+            self.run_on(&mut other, CHOOSING);
+            laws.push(other);
+            let last = laws.len() - 1;
+            let found = self.withheld(laws, last, drift)?;
+            if found != 0 {
+                return Ok(found);
+            }
+        }
+        for share in SHARES {
+            let name = format!("{name} x {share:.2}");
+            let Ok((mut found, _)) =
+                self.try_law(&name, &with_friction(&settings, share), CHOOSING)
+            else {
+                continue;
+            };
+            found.is_share = true;
+            laws.push(found);
+            let last = laws.len() - 1;
+            let found = self.withheld(laws, last, drift)?;
+            if found != 0 {
+                return Ok(found);
+            }
+        }
+        Ok(0)
+    }
+
+    /// The law that is handed over where all with the nonlinear gain were refused: that is an addition, too, and noise or play may make it
+    /// worse than the PID. What was not much worse is tried without it. Laws that ran are added.
+    fn without_nonlinear_gain(
+        &mut self,
+        laws: &mut Vec<LawResult>,
+        pid: &AxisSettings,
+        drift: &Drift,
+    ) -> Result<usize, VerifyError> {
+        let hopeful = laws.iter().filter(|law| {
+            let (worst, mean) = law.against(&laws[0], drift);
+            let is_fed = law.settings.feedforward.kind != FeedforwardKind::None;
+            is_fed && law.scores.len() >= CHOOSING && worst <= HOPEFUL && mean <= WORTH
+        });
+        let linear: Vec<_> = hopeful
+            .map(|law| {
+                let settings = AxisSettings {
+                    feedback: pid.feedback.clone(),
+                    ..law.settings.clone()
+                };
+                (law.law.replacen("N-PID", "PID", 1), settings, law.is_share)
+            })
+            .collect();
+        let from = laws.len();
+        for (name, settings, is_share) in linear {
+            if let Ok((found, _)) = self.try_law(&name, &settings, CHOOSING) {
+                laws.push(LawResult { is_share, ..found });
+            }
+        }
+        self.withheld(laws, from, drift)
+    }
+
+    /// The law that is handed over, by its index, of those from one on: the best that is worse than the PID, the first of all, on none of
+    /// the sines that were withheld either; the PID if there is none.
+    fn withheld(
+        &mut self,
+        laws: &mut [LawResult],
+        from: usize,
+        drift: &Drift,
+    ) -> Result<usize, VerifyError> {
+        let mut better = better_than_pid(laws, drift);
+        better.retain(|index| *index >= from);
         if better.is_empty() {
             return Ok(0);
         }
@@ -792,6 +889,10 @@ mod tests {
             !is_better(&[(0.5, 0.3)], false),
             "stopped on the second sine"
         );
+        // Of another law the PID has run on the withheld sines, too.
+        let pid = law(&[(1.0, 0.5); SINES.len()], &[]);
+        let next = law(&[(0.5, 0.3); CHOOSING], &[]);
+        assert!(next.is_better_than(&pid, &drift));
     }
 
     #[test]

@@ -67,6 +67,18 @@ fn axes_whose_pid_oscillates_while_friction_holds_them_get_a_softer_one_and_are_
     });
 }
 
+/// Axes that kept the PID alone before other kinds, and feedforward without the nonlinear gain, were tried after the withheld sines had
+/// refused the best: one on which Dahl's model ends in a false alarm, and one whose noise makes the N-PID worse than the PID when slow.
+#[test]
+fn axes_on_which_the_best_law_is_refused_are_handed_the_next() {
+    [18780, 18651].into_par_iter().for_each(|seed| {
+        let line = judge(seed);
+        println!("{line:?}");
+        assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
+        assert!(line.mean_ratio.unwrap() < 0.6, "{line:?}");
+    });
+}
+
 #[test]
 fn a_seed_is_the_same_axis_every_time() {
     for seed in 1..50 {
