@@ -175,7 +175,7 @@ impl Process {
     }
 
     /// The frequency at which the phase of the process alone reaches -180 degrees, Hz: without derivative action no
-    /// crossover lies above it; of the rigid axis where there are modes, and with some damping ([`LEAST_DAMPING`]): without, the phase
+    /// crossover lies above it; of the rigid axis where there are modes, and with some damping: without, the phase
     /// begins there. Nothing when the band does not hold it.
     pub fn half_turn_hz(&self) -> Option<f64> {
         match self {
