@@ -125,6 +125,11 @@ pub struct LawResult {
 }
 
 impl LawResult {
+    /// True for one with feedforward.
+    fn feeds_forward(&self) -> bool {
+        self.settings.feedforward.kind != FeedforwardKind::None
+    }
+
     /// The oscillation that has the same frequency on sines of different speed: no ripple of the axis has.
     fn rings_alike(&self) -> Option<Ringing> {
         let mut pairs = self.rings.windows(2);
@@ -417,10 +422,9 @@ pub fn verify(
     }
     // What was measured early or slowly may differ by a scale from what acts on the sines.
     let best = &laws[better_than_pid(&laws, &drift).first().copied().unwrap_or(0)];
-    let without = laws.iter().find(|law| {
-        law.settings.feedforward.kind == FeedforwardKind::None
-            && law.settings.feedback == best.settings.feedback
-    });
+    let without = laws
+        .iter()
+        .find(|law| !law.feeds_forward() && law.settings.feedback == best.settings.feedback);
     let scale = without.map_or(1.0, |without| best.best_scale(without, &drift));
     if (scale - 1.0).abs() > LEAST_CORRECTION {
         let base = best;
@@ -609,9 +613,8 @@ impl Bench<'_> {
         drift: &Drift,
     ) -> Result<usize, VerifyError> {
         let best = laws[1..].iter().rfind(|law| {
-            let is_fed = law.settings.feedforward.kind != FeedforwardKind::None;
             let ran = law.scores.len() + usize::from(law.stopped.is_some());
-            is_fed && !law.is_share && ran > CHOOSING
+            law.feeds_forward() && !law.is_share && ran > CHOOSING
         });
         let Some(best) = best else {
             return Ok(0);
@@ -625,9 +628,7 @@ impl Bench<'_> {
         *kinds = left;
         for (_, mut other) in others {
             self.run_on(&mut other, CHOOSING);
-            laws.push(other);
-            let last = laws.len() - 1;
-            let found = self.withheld(laws, last, drift)?;
+            let found = self.add_and_judge(laws, other, drift)?;
             if found != 0 {
                 return Ok(found);
             }
@@ -640,14 +641,24 @@ impl Bench<'_> {
                 continue;
             };
             found.is_share = true;
-            laws.push(found);
-            let last = laws.len() - 1;
-            let found = self.withheld(laws, last, drift)?;
+            let found = self.add_and_judge(laws, found, drift)?;
             if found != 0 {
                 return Ok(found);
             }
         }
         Ok(0)
+    }
+
+    /// Adds a law that ran; its index if it is handed over, else the PID's.
+    fn add_and_judge(
+        &mut self,
+        laws: &mut Vec<LawResult>,
+        law: LawResult,
+        drift: &Drift,
+    ) -> Result<usize, VerifyError> {
+        let from = laws.len();
+        laws.push(law);
+        self.withheld(laws, from, drift)
     }
 
     /// The law that is handed over where all with the nonlinear gain were refused: that is an addition, too, and noise or play may make it
@@ -660,8 +671,8 @@ impl Bench<'_> {
     ) -> Result<usize, VerifyError> {
         let hopeful = laws.iter().filter(|law| {
             let (worst, mean) = law.against(&laws[0], drift);
-            let is_fed = law.settings.feedforward.kind != FeedforwardKind::None;
-            is_fed && law.scores.len() >= CHOOSING && worst <= HOPEFUL && mean <= WORTH
+            let ran = law.scores.len() >= CHOOSING;
+            law.feeds_forward() && ran && worst <= HOPEFUL && mean <= WORTH
         });
         let linear: Vec<_> = hopeful
             .map(|law| {

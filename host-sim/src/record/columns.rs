@@ -208,7 +208,7 @@ struct Source<'a> {
     line: u64,
 }
 
-/// What all rows of a file have in common.
+/// Form of a file's rows.
 #[derive(Clone, Copy)]
 struct Rows<'a> {
     path: &'a Path,

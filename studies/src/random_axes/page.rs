@@ -111,7 +111,7 @@ fn parameters(subject: &Subject, judged: &Judged) -> Table {
     let friction = &truth.friction;
     let viscous =
         0.5 * (friction.positive.viscous_v_s_per_mm + friction.negative.viscous_v_s_per_mm);
-    let mode_hz = found.and_then(|found| found.plant.modes.first());
+    let mode = found.and_then(|found| found.plant.modes.first());
     let sliding = found.map(|found| &found.settings.friction.sliding);
     let number = |value: Option<f64>, decimals| {
         value.map_or(Cell::Missing, |value| Cell::number(value, decimals))
@@ -152,7 +152,7 @@ fn parameters(subject: &Subject, judged: &Judged) -> Table {
             "first mode",
             "Hz",
             subject.resonance_hz,
-            mode_hz.map(|mode| mode.frequency_hz),
+            mode.map(|mode| mode.frequency_hz),
             1,
         ),
     ];
