@@ -1,8 +1,10 @@
 //! `quadrant-studies cuts`.
 
 use std::collections::BTreeMap;
+use std::fs;
 use std::path::PathBuf;
 
+use anyhow::Context;
 use clap::Args;
 
 use super::{Line, WORSE, judge};
@@ -17,6 +19,9 @@ pub struct Arguments {
     /// Results, a line a seed: those that are there already are not run again.
     #[arg(long, default_value = "cuts.csv", value_name = "FILE")]
     results: PathBuf,
+    /// Folder for a trace of each seed: errors, scale, gate and voltages over time, as CSV.
+    #[arg(long, value_name = "FOLDER")]
+    traces: Option<PathBuf>,
 }
 
 impl Seeded for Line {
@@ -33,10 +38,15 @@ const LISTED: usize = 10;
 /// # Errors
 /// A file that cannot be read or written.
 pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let results = &arguments.results;
-    let lines = arguments
-        .campaign
-        .lines(results, "cutting", |_| true, judge)?;
+    if let Some(folder) = &arguments.traces {
+        fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    }
+    let lines = arguments.campaign.lines(
+        &arguments.results,
+        "cutting",
+        |_| true,
+        |seed| judge(seed, arguments.traces.as_deref()),
+    )?;
     summary(&lines);
     Ok(())
 }
@@ -53,33 +63,56 @@ fn summary(lines: &BTreeMap<u64, Line>) {
         .values()
         .filter(|line| !(line.worst_ratio + line.cancelling_worst_ratio).is_finite());
     say!("Ended by a fault: {}", ended.count());
-    for (name, ratio, percent) in [
+    say!(
+        "Settled, with nothing new since the last reversal but one: {:.1} % of the windows\n",
+        mean(|line| line.settled_percent)
+    );
+    type Read = fn(&Line) -> f64;
+    let laws: [(&str, [Read; 4]); 3] = [
         (
             "as commissioned",
-            (|line| line.fixed_worst_ratio) as fn(&Line) -> f64,
-            (|line| line.fixed_worse_percent) as fn(&Line) -> f64,
+            [
+                |line| line.fixed_worst_ratio,
+                |line| line.fixed_worse_percent,
+                |line| line.fixed_settled_worst_ratio,
+                |line| line.fixed_settled_worse_percent,
+            ],
         ),
         (
             "learning",
-            |line| line.worst_ratio,
-            |line| line.worse_percent,
+            [
+                |line| line.worst_ratio,
+                |line| line.worse_percent,
+                |line| line.settled_worst_ratio,
+                |line| line.settled_worse_percent,
+            ],
         ),
         (
             "cancelling",
-            |line| line.cancelling_worst_ratio,
-            |line| line.cancelling_worse_percent,
+            [
+                |line| line.cancelling_worst_ratio,
+                |line| line.cancelling_worse_percent,
+                |line| line.cancelling_settled_worst_ratio,
+                |line| line.cancelling_settled_worse_percent,
+            ],
         ),
-    ] {
-        let cases = lines.values().filter(|line| ratio(line) > WORSE).count();
-        let mut ratios: Vec<f64> = lines.values().map(ratio).collect();
-        ratios.sort_by(f64::total_cmp);
-        say!(
-            "{name:<16} worse than without feedforward in {cases} cases and {:.2} % of the windows; worst window of a case: \
-             median x {:.3}, largest x {:.3}",
-            mean(percent),
-            ratios[ratios.len() / 2],
-            ratios[ratios.len() - 1]
-        );
+    ];
+    for (name, [worst, percent, settled_worst, settled_percent]) in laws {
+        for (windows, ratio, percent) in [
+            ("all", worst, percent),
+            ("settled", settled_worst, settled_percent),
+        ] {
+            let cases = lines.values().filter(|line| ratio(line) > WORSE).count();
+            let mut ratios: Vec<f64> = lines.values().map(ratio).collect();
+            ratios.sort_by(f64::total_cmp);
+            say!(
+                "{name:<16} {windows:<8} worse than without feedforward in {cases} cases and {:.2} % of the windows; worst window of \
+                 a case: median x {:.3}, largest x {:.3}",
+                mean(percent),
+                ratios[ratios.len() / 2],
+                ratios[ratios.len() - 1]
+            );
+        }
     }
     say!(
         "\nRMS error, mean over the cases: {:.2} um without, {:.2} um as commissioned, {:.2} um learning, {:.2} um learning and \
