@@ -104,6 +104,9 @@ impl FeedforwardKind {
     }
 }
 
+/// Least gain of the pre-sliding model with which it takes over the whole of a voltage.
+const LEAST_GAIN: f64 = 0.1;
+
 /// The share of each effect that is fed forward.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
@@ -271,6 +274,10 @@ pub struct Feedforward<S: Scalar, const N: usize> {
     coulomb_gain: S::Gain,
     /// Zero where the kind has no pre-sliding model, or no viscous friction.
     gms_gain: S::Gain,
+    /// One over `gms_gain`, at most one over [`LEAST_GAIN`].
+    per_gms_gain: S::Gain,
+    /// Largest friction before sliding, V.
+    most: S,
     viscous: PerDirection<S::Gain>,
     inertia: S::Gain,
     presliding: Presliding<S, N>,
@@ -296,6 +303,8 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             presliding: Presliding::blank(),
             coulomb_gain: S::Gain::default(),
             gms_gain: S::Gain::default(),
+            per_gms_gain: S::Gain::default(),
+            most: S::ZERO,
             viscous: PerDirection::default(),
             inertia: S::Gain::default(),
         }
@@ -323,6 +332,10 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         let acts = |does: bool| if does { 1.0 } else { 0.0 };
         self.coulomb_gain = share(gains.level);
         self.gms_gain = share(acts(kind.has_presliding()) * gains.gms);
+        self.per_gms_gain = share(1.0 / gains.gms.max(LEAST_GAIN));
+        let levels = [&friction.sliding.positive, &friction.sliding.negative]
+            .map(|model| model.curve.breakaway_v.max(model.curve.coulomb_v));
+        self.most = S::quantise(levels[0].max(levels[1]), Quantity::Voltage);
         let viscous = acts(kind.has_viscous()) * gains.viscous;
         self.viscous = friction.sliding.map(|model| {
             S::gain(
@@ -338,6 +351,25 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         );
         self.presliding = Presliding::without_tables(kind, friction, period_s);
         self.presliding.fill_tables(friction, period_s);
+    }
+
+    /// Lets the pre-sliding model carry `voltage` more, V, as far as friction can be; returns by how much the output grows, V.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn take_over(&self, state: &mut FeedforwardState<S, N>, voltage: S) -> S {
+        let force = state.force();
+        let change = (force + voltage.scale(self.per_gms_gain)).within(self.most) - force;
+        match &self.presliding {
+            _ if !self.kind.has_presliding() => return S::ZERO,
+            Presliding::Gms(GmsOnSurface { elements, .. }) => {
+                elements.load(state.elements(|force| elements.spread(force)), change);
+            }
+            Presliding::Smoothed { elements, .. } => {
+                elements.load(state.elements(|force| elements.spread(force)), change);
+            }
+            Presliding::Lugre(_) | Presliding::Dahl(_) => state.bristle().load(change),
+        }
+        change.scale(self.gms_gain)
     }
 
     /// Advances by one control period.

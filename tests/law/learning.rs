@@ -41,6 +41,8 @@ pub(crate) struct Axis<S: Scalar> {
     pub(crate) rig: Rig<S>,
     plant: Plant,
     encoder: Encoder,
+    /// Force that pushes the axis, V.
+    pub(crate) pushed_v: f64,
     /// Amplitude, V, and frequency, Hz, of a load that shakes the axis.
     pub(crate) shaken: (f64, f64),
     ticks: u32,
@@ -57,6 +59,7 @@ impl<S: Scalar> Axis<S> {
             rig: Rig::with_plant(settings, plan),
             plant: Plant::new(&Truth { friction, ..MODEL }),
             encoder: Encoder::new(Death::Healthy, 7),
+            pushed_v: 0.0,
             shaken: (0.0, 0.0),
             ticks: 0,
         };
@@ -79,7 +82,7 @@ impl<S: Scalar> Axis<S> {
         let (amplitude_v, hz) = self.shaken;
         let phase = std::f64::consts::TAU * hz * f64::from(self.ticks) * PERIOD_S;
         self.ticks += 1;
-        let load_v = amplitude_v * phase.sin();
+        let load_v = self.pushed_v + amplitude_v * phase.sin();
         self.plant.step(f64::from(x.0) / 32_767.0 * 10.0 + load_v);
     }
 
@@ -95,7 +98,7 @@ impl<S: Scalar> Axis<S> {
         sum / ticks as f64
     }
 
-    fn seen(&self) -> quadrant::telemetry::AxisTelemetry<S> {
+    pub(crate) fn seen(&self) -> quadrant::telemetry::AxisTelemetry<S> {
         *self.rig.state.axes()[0].telemetry()
     }
 

@@ -70,6 +70,7 @@ mod reference_move;
 mod reference_ramp;
 mod reference_recorded;
 mod reference_stream;
+mod rest;
 mod safety;
 mod safety_expected;
 mod safety_fault_numbers;

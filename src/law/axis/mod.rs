@@ -24,11 +24,13 @@
 //! # Ok::<(), quadrant::axis::AxisError>(())
 //! ```
 
+mod rest;
 pub mod telemetry;
 
 use core::fmt;
 use core::hint::cold_path;
 
+use self::rest::RestState;
 use self::telemetry::{AxisTelemetry, LimitedBy};
 use crate::law::cancelling::{
     Cancelling, CancellingLoop, CancellingSettings, CancellingState, Cut, SpindleSpeed,
@@ -449,6 +451,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     /// Voltage that a host adds to the output in this tick, V.
     injected: S,
     feedback: FeedbackState<S>,
+    rest: RestState<S>,
     filters: FiltersState<S>,
     friction: FeedforwardState<S, N>,
     generator: GeneratorState<S>,
@@ -483,6 +486,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             preview: [Position::ZERO; PREVIEW_ROOM],
             reference_velocity: S::ZERO,
             feedback: FeedbackState::default(),
+            rest: RestState::default(),
             filters: FiltersState::default(),
             friction: FeedforwardState::default(),
             injected: S::ZERO,
@@ -814,6 +818,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
                 _ => None,
             });
         state.feedback.unload(gained);
+        state.rest.unload(gained);
     }
 
     /// Takes a step of cancelling, on what the last tick left.
@@ -880,6 +885,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             reference_velocity,
             injected,
             feedback,
+            rest,
             filters,
             friction,
             generator,
@@ -902,6 +908,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *reference_velocity = S::ZERO;
         *injected = S::ZERO;
         *feedback = FeedbackState::default();
+        *rest = RestState::default();
         *filters = FiltersState::default();
         *friction = FeedforwardState::default();
         generator.reset();
@@ -1119,6 +1126,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if state.mode() == MotionMode::OpenLoop {
             return self.drive_open(state);
         }
+        let moves = state.telemetry.velocity != S::ZERO;
+        if state.rest.changes(moves) {
+            self.set_off_or_stop(state, moves);
+        }
         let seen = &mut state.telemetry;
         let step = ReferenceStep {
             displacement: S::scale_integer(state.displacement.clipped(), self.unit_mm),
@@ -1225,6 +1236,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(never)]
     fn make_bumpless(&self, state: &mut AxisState<S, N>, input: FeedbackInput<S>, base: S) {
         self.feedback.take_over(&mut state.feedback, input.error);
+        state.rest.forget();
         if !self.learns {
             state.learning = LearningState::default();
         }
@@ -1247,6 +1259,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if state.mode() == MotionMode::OpenLoop {
             // As after enabling: the law's memory is of before, and its error is zero now.
             state.feedback = FeedbackState::default();
+            state.rest.forget();
             state.filters = FiltersState::default();
             state.friction = FeedforwardState::default();
             self.cancelling.start(&mut state.cancelling);

@@ -212,6 +212,13 @@ impl<S: Scalar> Filters<S> {
         output
     }
 
+    /// Shifts the filters by a steady voltage, V: they put out that much more, at once.
+    pub(crate) fn shift(&self, state: &mut FiltersState<S>, voltage: S) {
+        for filter in &mut state.0 {
+            filter.low = filter.low + voltage;
+        }
+    }
+
     /// Takes the filters to where they are at rest behind a steady output, V: the next step from it changes nothing.
     pub fn settle(&self, state: &mut FiltersState<S>, output: S) {
         let settled = FilterState {

@@ -23,6 +23,12 @@ pub struct FeedbackState<S: Scalar> {
 }
 
 impl<S: Scalar> FeedbackState<S> {
+    /// The integral, V.
+    #[inline(always)]
+    pub(crate) fn integral(&self) -> S {
+        S::total(self.integral)
+    }
+
     /// Takes a voltage from the integral that a feedforward now gives, V.
     pub(crate) fn unload(&mut self, voltage: S) {
         if voltage != S::ZERO {

@@ -14,6 +14,11 @@ impl<S: Scalar> Bristle<S> {
         Self { force }
     }
 
+    /// Lets them carry `change` more, V.
+    pub(crate) fn load(&mut self, change: S) {
+        self.force = self.force + change;
+    }
+
     /// The force of the bristles, `sigma0 z`, V.
     pub fn force(&self) -> S {
         self.force

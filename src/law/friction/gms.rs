@@ -179,6 +179,14 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
         }
     }
 
+    /// Lets the elements carry `change` more, V, by their weights; they stick.
+    pub(super) fn load(&mut self, change: S, weights: impl Iterator<Item = S::Gain> + Clone) {
+        self.stick(self.direction, weights.clone());
+        for (force, weight) in self.forces.iter_mut().zip(weights) {
+            *force = *force + change.scale(weight);
+        }
+    }
+
     /// Lets every element stick, as a reversal does, or as a model asks for that does not remember which ones slip.
     #[inline(always)]
     pub(super) fn stick(&mut self, direction: Direction, weights: impl Iterator<Item = S::Gain>) {
@@ -221,8 +229,13 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         state.forces_by(self.weights())
     }
 
+    /// Lets the elements carry `change` more, V, by their weights; they stick.
+    pub(crate) fn load(&self, state: &mut GmsState<S, N>, change: S) {
+        state.load(change, self.weights());
+    }
+
     #[inline(always)]
-    fn weights(&self) -> impl Iterator<Item = S::Gain> {
+    fn weights(&self) -> impl Iterator<Item = S::Gain> + Clone {
         self.elements.iter().map(|element| element.weight)
     }
 

@@ -91,8 +91,13 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
         state.forces_by(self.weights())
     }
 
+    /// Lets the elements carry `change` more, V, by their weights.
+    pub(crate) fn load(&self, state: &mut GmsState<S, N>, change: S) {
+        state.load(change, self.weights());
+    }
+
     #[inline(always)]
-    fn weights(&self) -> impl Iterator<Item = S::Gain> {
+    fn weights(&self) -> impl Iterator<Item = S::Gain> + Clone {
         self.elements.iter().map(|element| element.weight)
     }
 

@@ -57,6 +57,9 @@ pub struct LearningLoop<'a> {
     pub resolution_mm: f64,
 }
 
+/// Bounds of one over the scale: below a quarter, a scale takes over less than it could.
+const INVERSES: (f64, f64) = (1.0 / MOST_SCALE, 4.0);
+
 /// Steps of the model in a block: the scale moves once a block.
 const BLOCK_STEPS: u8 = 32;
 
@@ -126,6 +129,7 @@ pub struct Learning<S: Scalar> {
     per_unit: S::Gain,
     one: S,
     most: S,
+    inverses: (S, S),
     estimate: Estimate<S>,
 }
 
@@ -154,6 +158,8 @@ struct Estimate<S: Scalar> {
 pub struct LearningState<S: Scalar> {
     /// The scale that the friction feedforward is put out with, less 1.
     deviation: S,
+    /// One over the scale, less 1; it follows in some blocks, and stays within [`INVERSES`].
+    inverse: S,
     /// The friction that the models gave in the last tick, and of it what the gate acts on, before the gate, V.
     friction: S,
     presliding: S,
@@ -262,6 +268,7 @@ impl<S: Scalar> Learning<S> {
             per_unit: S::gain(1.0 / unit_mm, Quantity::Length, Quantity::Multiplier),
             one: number(1.0),
             most: number(MOST_SCALE),
+            inverses: (number(INVERSES.0), number(INVERSES.1)),
             estimate: Estimate {
                 step: share(step_s),
                 half: share(0.5),
@@ -303,6 +310,7 @@ impl<S: Scalar> Learning<S> {
     pub(crate) fn resume(&self, state: &mut LearningState<S>) {
         let LearningState {
             deviation: _,
+            inverse: _,
             sums: _,
             shaken: _,
             lasting: _,
@@ -325,6 +333,19 @@ impl<S: Scalar> Learning<S> {
         *steps = 0;
         *settling = 0;
         *block = Sums::default();
+    }
+
+    /// A voltage over the scale, V: what the friction has to grow by, so that the output grows by as much.
+    pub(crate) fn unscaled(&self, state: &LearningState<S>, voltage: S) -> S {
+        voltage.times(self.one + state.inverse, Quantity::Multiplier)
+    }
+
+    /// Takes note that the friction takes a voltage over from the integral, V; returns by how much the output grows, V.
+    pub(crate) fn take_over(&self, state: &mut LearningState<S>, friction: S) -> S {
+        let gate = self.one + state.gate.deviation();
+        let gated = friction.times(gate, Quantity::Multiplier);
+        ClosedLoop::unload(&mut state.closed_loop, gated.scale(self.unloaded));
+        gated.times(self.scale(state), Quantity::Multiplier)
     }
 
     /// Passes the friction of this tick through the gate, and scales it.
@@ -429,6 +450,16 @@ impl<S: Scalar> Learning<S> {
         state.lasting = 0;
     }
 
+    /// One step of Newton's towards one over the scale.
+    #[inline(always)]
+    fn follow_scale(&self, state: &mut LearningState<S>) {
+        let inverse = self.one + state.inverse;
+        let product = inverse.times(self.scale(state), Quantity::Multiplier);
+        let next = inverse + inverse.times(self.one - product, Quantity::Multiplier);
+        let (least, most) = self.inverses;
+        state.inverse = next.limit(least, most) - self.one;
+    }
+
     /// Takes a block into the sums, and moves the scale.
     #[inline(never)]
     fn end_block(&self, state: &mut LearningState<S>) {
@@ -467,6 +498,7 @@ impl<S: Scalar> Learning<S> {
             slope.scale(estimate.rate).within(estimate.most_change)
         };
         state.deviation = (scale + change).limit(S::ZERO, self.most) - self.one;
+        self.follow_scale(state);
     }
 }
 

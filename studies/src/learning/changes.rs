@@ -1,7 +1,10 @@
 //! Learning after a change: another tool or work-piece, and a rest in which friction has drifted.
 
+use std::sync::Arc;
+
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::AxisParameters;
+use quadrant_sim::plant::load::{Force, Load};
 use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
@@ -21,6 +24,8 @@ struct Change {
     before: AxisParameters,
     rest_s: f64,
     after: AxisParameters,
+    /// Force that begins with the rest and stays, V.
+    load_v: f64,
 }
 
 fn changes() -> Vec<Change> {
@@ -29,9 +34,21 @@ fn changes() -> Vec<Change> {
         before,
         rest_s,
         after,
+        load_v: 0.0,
+    };
+    let loaded = |name, load_v| Change {
+        load_v,
+        ..change(name, nominal(), 1.0, nominal())
     };
     let cold = || nominal().with_friction(1.5);
     vec![
+        change("rest of 0.1 s", nominal(), 0.1, nominal()),
+        change("rest of 1 s", nominal(), 1.0, nominal()),
+        change("rest of 10 s", nominal(), 10.0, nominal()),
+        loaded("load of +0.05 V", 0.05),
+        loaded("load of -0.05 V", -0.05),
+        loaded("load of +0.2 V", 0.2),
+        loaded("load of -0.2 V", -0.2),
         change("mass x 1.3", nominal(), 1.0, nominal().with_mass(1.3)),
         change("mass x 0.7", nominal(), 1.0, nominal().with_mass(0.7)),
         change(
@@ -61,6 +78,18 @@ fn changes() -> Vec<Change> {
     ]
 }
 
+/// A force that stays the same, V.
+fn constant(load_v: f64) -> Load {
+    let force = Force {
+        sample_time_s: 1.0,
+        force_n: vec![load_v],
+    };
+    Load::Recorded {
+        force: Arc::new(force),
+        newtons_per_volt: 1.0,
+    }
+}
+
 /// The table of changes: largest errors of the first and of the last cycle after the change.
 pub(super) fn table(
     stage: &StageSettings,
@@ -70,10 +99,11 @@ pub(super) fn table(
     let rows = changes()
         .into_par_iter()
         .map(|change| {
+            let load = constant(change.load_v);
             let phases = [
                 Phase::sine(SINE, BEFORE, change.before.clone()),
-                Phase::rest(change.rest_s, change.before.clone()),
-                Phase::sine(SINE, AFTER, change.after.clone()),
+                Phase::rest(change.rest_s, change.before.clone()).loaded(load.clone()),
+                Phase::sine(SINE, AFTER, change.after.clone()).loaded(load),
             ];
             let mut row = vec![Cell::text(change.name)];
             for friction in Friction::ALL {

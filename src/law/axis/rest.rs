@@ -1,0 +1,70 @@
+//! What the integral takes up while an axis stands.
+//!
+//! An axis that stands is held by its friction, so that its voltage is the friction's force. After a stop it creeps back into its
+//! place, by micrometres; the integral sees to it, and friction changes by as much as the integral does. The feedforward knows the
+//! reference alone, which stands. So when the reference sets off, the pre-sliding model takes over what the integral has moved by
+//! since the stop, and the integral gives it back: the output stays as it is, and the model begins with the friction of the axis.
+//!
+//! What the integral had when the reference came to a stop stays with it: an offset, gravity. A load that changes at rest
+//! cannot be told from friction by the encoder, and goes to the model, too, up to the breakaway level.
+
+use super::{Axis, AxisState};
+use crate::law::scalar::Scalar;
+
+/// The memory of the last stop.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct RestState<S> {
+    /// The reference moves.
+    moves: bool,
+    /// The integral when it came to a stop, V; none if something else than friction may have moved it since.
+    integral: Option<S>,
+}
+
+impl<S: Scalar> RestState<S> {
+    /// True if the reference sets off or stops, by whether it moves now.
+    #[inline(always)]
+    pub(super) fn changes(&self, moves: bool) -> bool {
+        self.moves != moves
+    }
+
+    /// Forgets the stop.
+    #[inline(always)]
+    pub(super) fn forget(&mut self) {
+        self.integral = None;
+    }
+
+    /// Takes note of a voltage that was taken from the integral, V.
+    #[inline(always)]
+    pub(super) fn unload(&mut self, voltage: S) {
+        if let Some(integral) = &mut self.integral {
+            *integral = *integral - voltage;
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> Axis<S, N> {
+    /// Takes note of a stop; lets the friction model take over at the next start what the integral has moved by.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {
+        state.rest.moves = moves;
+        let integral = state.feedback.integral();
+        if !moves {
+            state.rest.integral = Some(integral);
+            return;
+        }
+        let Some(before) = state.rest.integral.take() else {
+            return;
+        };
+        let mut taken = integral - before;
+        if self.learns {
+            taken = self.learning.unscaled(&state.learning, taken);
+        }
+        taken = self.feedforward.take_over(&mut state.friction, taken);
+        if self.learns {
+            taken = self.learning.take_over(&mut state.learning, taken);
+        }
+        state.feedback.unload(taken);
+        self.filters.shift(&mut state.filters, -taken);
+    }
+}
