@@ -167,6 +167,57 @@ fn the_error_without_feedforward_is_known_with_it() {
 }
 
 #[test]
+fn the_error_without_feedforward_is_known_while_a_gate_opens_and_closes() {
+    // Square of the error as learning forgets it, by a time constant of 2 s, and learning's own of the error and that without.
+    let squares = |settings: &StageSettings| {
+        let mut axis = Axis::<f32>::on(settings, 1.0, &sine_on_x(20.0, 5.0));
+        axis.command(Command::Run);
+        let mut sum = 0.0;
+        // The gate opens and closes while the axis slides: the first reversal is after six seconds.
+        for part in 0..24 {
+            axis.shaken = (if part % 2 == 1 { 0.2 } else { 0.0 }, 350.0);
+            sum = (-0.25f64 / 2.0).exp() * sum + axis.run(0.25);
+        }
+        let learning = axis.rig.state.axes()[0].learning();
+        (sum, learning.error_squares(), learning.error_squares_off())
+    };
+    let mut off = fixed();
+    off.axes[0].feedforward.kind = FeedforwardKind::None;
+    let (without, ..) = squares(&off);
+    let (with, said_with, said_without) = squares(&learning());
+    let (said, measured) = (f64::from(said_without / said_with), without / with);
+    println!("without over with: {said} is said, {measured} measured");
+    assert!((said / measured - 1.0).abs() < 0.2);
+}
+
+#[test]
+fn an_integral_that_is_still_on_its_way_is_not_taken_for_friction() {
+    // An integral as slow as the time between reversals, and a force that it has to take up first.
+    let pushed = |settings: &StageSettings| {
+        let mut settings = settings.clone();
+        settings.axes[0].feedback.pid.ki_v_per_mm_s = 0.7;
+        let mut axis = Axis::<f32>::on(&settings, 1.0, &sine_on_x(5.0, 10.0));
+        axis.pushed_v = 0.03;
+        axis.command(Command::Run);
+        let mut most: f32 = 0.0;
+        let mut squares = 0.0;
+        for _ in 0..100 {
+            squares += axis.run(0.1);
+            most = most.max((axis.scale() - 1.0).abs());
+        }
+        (squares, most)
+    };
+    let (fixed, _) = pushed(&fixed());
+    let (learning, off_by) = pushed(&learning());
+    println!("{fixed} with a fixed scale, {learning} mm^2 learning; off by {off_by}");
+    assert!(off_by < 0.2, "the scale was off by {off_by}");
+    assert!(
+        learning < 1.3 * fixed,
+        "{learning} mm^2, {fixed} mm^2 fixed"
+    );
+}
+
+#[test]
 fn the_error_without_feedforward_is_that_of_the_loop_as_stiff_as_the_nonlinear_gain_makes_it() {
     let mut axis = Axis::<f32>::on_sine(&learning(), 3.0);
     let mut stiffer = learning();

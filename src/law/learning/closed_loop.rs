@@ -102,10 +102,16 @@ impl<S: Scalar> ClosedLoop<S> {
         }
     }
 
-    /// Takes a voltage from the integral that a feedforward now gives, V: the position does not change by it.
+    /// The integral of the PID, V.
     #[inline(always)]
-    pub(super) fn unload(state: &mut ClosedLoopState<S>, voltage: S) {
-        state.integral = (S::total(state.integral) - voltage).into_sum();
+    pub(super) fn integral(state: &ClosedLoopState<S>) -> S {
+        S::total(state.integral)
+    }
+
+    /// Lets the integral hold against `voltage` more from now on, V: the position does not change by it.
+    #[inline(always)]
+    pub(super) fn hold_against(state: &mut ClosedLoopState<S>, voltage: S) {
+        state.integral = (S::total(state.integral) + voltage).into_sum();
     }
 
     /// One step with `voltage` added to the output of the PID, whose gains are `stiffening` times their values; returns the

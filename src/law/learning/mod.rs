@@ -344,7 +344,7 @@ impl<S: Scalar> Learning<S> {
     pub(crate) fn take_over(&self, state: &mut LearningState<S>, friction: S) -> S {
         let gate = self.one + state.gate.deviation();
         let gated = friction.times(gate, Quantity::Multiplier);
-        ClosedLoop::unload(&mut state.closed_loop, gated.scale(self.unloaded));
+        ClosedLoop::hold_against(&mut state.closed_loop, gated.scale(self.unloaded));
         gated.times(self.scale(state), Quantity::Multiplier)
     }
 
@@ -379,7 +379,7 @@ impl<S: Scalar> Learning<S> {
             .presliding
             .times(opened, Quantity::Multiplier)
             .scale(self.unloaded);
-        ClosedLoop::unload(&mut state.closed_loop, ungated);
+        ClosedLoop::hold_against(&mut state.closed_loop, ungated);
         let mut without = error;
         let scale = self.scale(state);
         let gained = ungated.times(scale, Quantity::Multiplier);
@@ -421,8 +421,9 @@ impl<S: Scalar> Learning<S> {
         let before = state.deviation;
         self.end_block(state);
         let change = state.deviation - before;
-        let gained_by_scale = state.friction.times(change, Quantity::Multiplier);
-        gained + gained_by_scale.scale(self.unloaded)
+        // What a unit of the scale would have taken from the integral by now.
+        let integral = ClosedLoop::integral(&state.closed_loop);
+        gained + integral.times(change, Quantity::Multiplier)
     }
 
     /// Takes up what was learnt with the gate as it is now: closed, the scale makes up for what the gate takes away. When it
