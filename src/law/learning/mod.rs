@@ -14,6 +14,9 @@
 //! **Cut.** Under a vibration the scale also makes up for what the gate takes away, so that there are two of them: what is
 //! learnt while the gate is closed holds while it is closed.
 //!
+//! **Change.** What the last seconds say is held against all that is remembered. Where their scales differ by more than
+//! [`DIFFERS`], the axis has changed, and the rest is forgotten: one reversal then counts for all.
+//!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
 //! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
 
@@ -69,6 +72,11 @@ const UNIT: f64 = 4.0;
 /// Largest `sum(psi^2)` times time, in units: what was learnt before is halved beyond it.
 const MOST_INFORMATION: f64 = 0.02;
 
+/// Difference of the scale by the last seconds from the present one beyond which the axis has changed; and the information that they
+/// need to say so, as a share of all that is remembered.
+const DIFFERS: f64 = 0.1;
+const TELLING: f64 = 0.25;
+
 /// Rate of the scale down the slope, 1/s, per unit of information.
 const RATE: f64 = 300.0;
 
@@ -81,7 +89,7 @@ const MOST_PER_S: f64 = 0.5;
 /// Change of the scale by the guard, 1/s.
 const FADE_PER_S: f64 = 1.0;
 
-/// Window of the guard: time constant of its mean squares, s.
+/// The last seconds, for the guard and for what shows a change: time constant, s.
 const GUARD_S: f64 = 2.0;
 
 /// Excess of the error over that without feedforward that the guard allows: a share of its mean square, and counts.
@@ -149,6 +157,8 @@ struct Estimate<S: Scalar> {
     fade: S,
     guard_share: S::Gain,
     guard_least: S,
+    differs: S::Gain,
+    telling: S::Gain,
     /// The gate less 1 below which the axis is shaken.
     shaken: S,
 }
@@ -178,23 +188,30 @@ pub struct LearningState<S: Scalar> {
     /// Sums of the block, and the forgetting ones.
     block: Sums<S>,
     sums: Sums<S>,
+    /// What the last seconds say.
+    lately: Fit<S>,
 }
 
 /// What was learnt in one state of the gate: the scale less 1, and the sums that it was learnt from.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Learnt<S> {
     deviation: S,
+    fit: Fit<S>,
+}
+
+/// The sums whose quotient is the scale of least error, in units.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Fit<S> {
+    /// `psi^2`.
     information: S,
+    /// `e0 psi`.
     correlation: S,
 }
 
 /// Sums of products, in units.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Sums<S> {
-    /// `psi^2`.
-    information: S,
-    /// `e0 psi`.
-    correlation: S,
+    fit: Fit<S>,
     /// `e^2`.
     with: S,
     /// `e0^2`.
@@ -280,6 +297,8 @@ impl<S: Scalar> Learning<S> {
                 most_change: number(MOST_PER_S * block_s),
                 fade: number(FADE_PER_S * block_s),
                 guard_share: share(GUARD_SHARE),
+                differs: share(DIFFERS),
+                telling: share(TELLING),
                 guard_least: number(GUARD_S * count * count),
                 shaken: number(SHAKEN - 1.0),
             },
@@ -324,6 +343,7 @@ impl<S: Scalar> Learning<S> {
             steps,
             settling,
             block,
+            lately,
         } = state;
         *friction = S::ZERO;
         *presliding = S::ZERO;
@@ -333,6 +353,7 @@ impl<S: Scalar> Learning<S> {
         *steps = 0;
         *settling = 0;
         *block = Sums::default();
+        *lately = Fit::default();
     }
 
     /// A voltage over the scale, V: what the friction has to grow by, so that the output grows by as much.
@@ -410,8 +431,9 @@ impl<S: Scalar> Learning<S> {
         let (psi, with, without) = (unit(missing), unit(error), unit(without));
         let product = |one: S, other: S| one.times(other, Quantity::Multiplier);
         let block = &mut state.block;
-        block.information = block.information + product(psi, psi);
-        block.correlation = block.correlation + product(without, psi);
+        let fit = &mut block.fit;
+        fit.information = fit.information + product(psi, psi);
+        fit.correlation = fit.correlation + product(without, psi);
         block.with = block.with + product(with, with);
         block.without = block.without + product(without, without);
         state.steps += 1;
@@ -437,15 +459,14 @@ impl<S: Scalar> Learning<S> {
         }
         let now = Learnt {
             deviation: state.deviation,
-            information: state.sums.information,
-            correlation: state.sums.correlation,
+            fit: state.sums.fit,
         };
+        state.lately = Fit::default();
         let before = core::mem::replace(&mut state.other, now);
         if !shaken || state.lasting < QUIET_BLOCKS {
             let falls = !shaken && now.deviation < before.deviation;
             state.deviation = if falls { now } else { before }.deviation;
-            state.sums.information = before.information;
-            state.sums.correlation = before.correlation;
+            state.sums.fit = before.fit;
         }
         state.shaken = shaken;
         state.lasting = 0;
@@ -482,24 +503,41 @@ impl<S: Scalar> Learning<S> {
         } else {
             estimate.keep
         };
-        sums.information = add(sums.information, keep, block.information);
-        sums.correlation = add(sums.correlation, keep, block.correlation);
-        if sums.information > estimate.most_information {
-            sums.information = sums.information.scale(estimate.half);
-            sums.correlation = sums.correlation.scale(estimate.half);
+        let add_fit = |fit: Fit<S>, keep: S| Fit {
+            information: add(fit.information, keep, block.fit.information),
+            correlation: add(fit.correlation, keep, block.fit.correlation),
+        };
+        let lately = add_fit(state.lately, estimate.guard_keep);
+        state.lately = lately;
+        let fit = &mut sums.fit;
+        *fit = add_fit(*fit, keep);
+        let telling = lately.information > fit.information.scale(estimate.telling);
+        let differs = lately.slope(scale).magnitude() > lately.information.scale(estimate.differs);
+        if telling & differs {
+            *fit = lately;
+        }
+        if fit.information > estimate.most_information {
+            fit.information = fit.information.scale(estimate.half);
+            fit.correlation = fit.correlation.scale(estimate.half);
         }
         let change = if worse {
             state.status = LearningStatus::Fading;
             -estimate.fade
         } else {
             state.status = LearningStatus::Learning;
-            let slope = sums.correlation
-                - sums.information.times(scale, Quantity::Multiplier)
-                - state.deviation.scale(estimate.pull);
+            let slope = fit.slope(scale) - state.deviation.scale(estimate.pull);
             slope.scale(estimate.rate).within(estimate.most_change)
         };
         state.deviation = (scale + change).limit(S::ZERO, self.most) - self.one;
         self.follow_scale(state);
+    }
+}
+
+impl<S: Scalar> Fit<S> {
+    /// The slope of the sum of squares towards a larger scale; zero at the scale of least error.
+    #[inline(always)]
+    fn slope(self, scale: S) -> S {
+        self.correlation - self.information.times(scale, Quantity::Multiplier)
     }
 }
 
