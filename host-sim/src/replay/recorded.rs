@@ -82,9 +82,9 @@ const MARGINS: (f64, f64) = (9.9, 54.2);
 const INTEGRAL_RATIO_PER_S: f64 = 0.66;
 
 /// Axis under test: law and plant.
-struct Axis {
-    settings: AxisSettings,
-    truth: AxisParameters,
+pub struct Axis {
+    pub settings: AxisSettings,
+    pub truth: AxisParameters,
 }
 
 impl RecordedAxis {
@@ -116,7 +116,11 @@ impl RecordedAxis {
     }
 }
 
-fn emps_axis() -> Result<Axis, ShapingError> {
+/// Makes the EMPS axis of its published model, with a PID designed on it.
+///
+/// # Errors
+/// No PID has the margins.
+pub fn emps_axis() -> Result<Axis, ShapingError> {
     let per_newton = 1.0 / emps::FORCE_N_PER_V;
     let gain = emps::FORCE_N_PER_V / emps::MASS_KG * 1e3;
     let friction = PerDirection::both(StaticFriction {

@@ -1,12 +1,14 @@
 //! `quadrant-studies learning`.
 
+use std::path::PathBuf;
+
 use clap::{Args, ValueEnum};
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::Output;
 use quadrant_cli::say;
 use quadrant_sim::report::{Block, Section};
 
-use super::{changes, cuts, figures, parts, starts};
+use super::{changes, cuts, figures, parts, recorded, starts};
 
 /// Options of `quadrant-studies learning`.
 #[derive(Clone, Debug, Args)]
@@ -16,6 +18,10 @@ pub struct Arguments {
     /// Run one question alone.
     #[arg(long, value_enum)]
     only: Option<Question>,
+    /// Instead of all that: a recording of EMPS, whose friction then acts on a simulated axis: a CSV file with t_s, position_mm
+    /// (or position_m) and voltage_v.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "path"])]
+    record: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
 }
@@ -43,8 +49,16 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments {
         settings,
         only,
+        record,
         output,
     } = arguments;
+    if let Some(path) = record {
+        say!(
+            "Recorded friction on a simulated axis; seed {}\n",
+            output.seed
+        );
+        return output.table(&recorded::table(path, output.seed)?);
+    }
     let stage = settings.read()?.stage;
     let axis = &stage.axes[0];
     let seed = output.seed;

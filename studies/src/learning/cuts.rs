@@ -2,7 +2,6 @@
 
 use quadrant::cancelling::CancellingSettings;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::reference::MotionSettings;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
@@ -99,10 +98,7 @@ impl Case {
         };
         Self {
             name: format!("at rest, {LOAD_V} V at {frequency_hz} Hz"),
-            phase: Phase {
-                motion: MotionSettings::Hold,
-                ..Phase::rest(LOADED_S, nominal()).loaded(load)
-            },
+            phase: Phase::rest(LOADED_S, nominal()).loaded(load),
             scored_s: SCORED_S,
             spindle_hz: IDLE_HZ,
         }

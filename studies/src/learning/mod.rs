@@ -6,6 +6,7 @@ pub mod command;
 mod cuts;
 mod figures;
 mod parts;
+mod recorded;
 mod remedies;
 mod run;
 mod starts;

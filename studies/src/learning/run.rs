@@ -7,7 +7,7 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::learning::LearningSettings;
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
 use quadrant::safety::SafetyState;
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant::telemetry::AxisTelemetry;
@@ -47,11 +47,19 @@ impl Friction {
     }
 }
 
+/// The motion of a phase.
+#[derive(Clone, Debug)]
+pub(super) enum PhaseMotion {
+    Planned(MotionSettings),
+    /// Along recorded positions.
+    Recorded(RecordedTable<f32>),
+}
+
 /// A part of a run.
 #[derive(Clone, Debug)]
 pub(super) struct Phase {
     /// Its motion; a hold lasts for `rest_s`.
-    pub(super) motion: MotionSettings,
+    pub(super) motion: PhaseMotion,
     pub(super) rest_s: f64,
     /// The axis as it then is, and what pushes it, from the beginning of the phase on.
     pub(super) truth: AxisParameters,
@@ -76,7 +84,7 @@ impl Phase {
     pub(super) fn sine(sine: (f64, f64), cycles: f64, truth: AxisParameters) -> Self {
         let harmonic = HarmonicSettings::with_velocity(sine.0, sine.1, cycles, LEAD_S);
         Self {
-            motion: MotionSettings::Harmonic(harmonic),
+            motion: PhaseMotion::Planned(MotionSettings::Harmonic(harmonic)),
             rest_s: 0.0,
             truth,
             load: Load::None,
@@ -86,11 +94,18 @@ impl Phase {
 
     pub(super) fn rest(seconds: f64, truth: AxisParameters) -> Self {
         Self {
-            motion: MotionSettings::Hold,
+            motion: PhaseMotion::Planned(MotionSettings::Hold),
             rest_s: seconds,
             truth,
             load: Load::None,
             spindle_rpm: None,
+        }
+    }
+
+    pub(super) fn recorded(table: RecordedTable<f32>, truth: AxisParameters) -> Self {
+        Self {
+            motion: PhaseMotion::Recorded(table),
+            ..Self::rest(0.0, truth)
         }
     }
 
@@ -179,9 +194,14 @@ pub(super) fn run(
     for phase in phases {
         plant.change(phase.truth.clone());
         let mut trace = Trace::default();
-        let moves = phase.motion != MotionSettings::Hold;
-        let motions = [phase.motion, MotionSettings::Hold, MotionSettings::Hold];
-        let motion = PlanSettings { motions }.build(&stage)?[AxisName::X].clone();
+        let motion = match &phase.motion {
+            PhaseMotion::Planned(motion) => {
+                let motions = [*motion, MotionSettings::Hold, MotionSettings::Hold];
+                PlanSettings { motions }.build(&stage)?[AxisName::X].clone()
+            }
+            PhaseMotion::Recorded(table) => Motion::Recorded(table.clone()),
+        };
+        let moves = motion != Motion::Hold;
         machine.set_motion(AxisName::X, motion);
         let starting = (START_S * rate_hz) as usize;
         let resting = (phase.rest_s * rate_hz) as usize;

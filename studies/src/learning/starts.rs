@@ -98,7 +98,7 @@ fn even_elements(level_v: f64, range_mm: f64) -> GmsElements {
 
 /// The settings of an axis with friction from a catalogue: one level for both senses, no Stribeck effect, no viscous friction,
 /// and a pre-sliding range that nobody has measured.
-fn catalogue(axis: &AxisSettings, level_v: f64, range_mm: f64) -> AxisSettings {
+pub(super) fn catalogue(axis: &AxisSettings, level_v: f64, range_mm: f64) -> AxisSettings {
     let mut axis = axis.clone();
     let sliding = &mut axis.friction.sliding;
     for model in [&mut sliding.positive, &mut sliding.negative] {
