@@ -1,8 +1,12 @@
 //! The channel between the emulated board and the host that simulates its stage: a memory shared by both.
 //!
-//! One exchange per control tick. The host writes an [`InputRecord`] and then its number to
-//! [`INPUT_SEQUENCE`]; the target answers with an [`OutputRecord`] and the same number in [`OUTPUT_SEQUENCE`]. In the
-//! recorded modes the inputs of all ticks lie in the memory beforehand and the outputs are collected there.
+//! In lockstep, inputs and outputs of a tick lie in two rings of [`LOCKSTEP_TICKS`] records, at [`input_offset`] and
+//! [`output_offset`]. The host writes the [`InputRecord`]s of one or several ticks and then the last one's number to
+//! [`INPUT_SEQUENCE`]; the target runs these ticks, each with an interrupt of its own, and answers each with an
+//! [`OutputRecord`] and its number in [`OUTPUT_SEQUENCE`]. A host that asks one tick at a time sees every answer before it
+//! says what follows; one that asks several must know their inputs, as a simulation of the firmware does.
+//!
+//! In the recorded modes the inputs of all ticks lie in the memory beforehand and the outputs are collected there.
 //! All words are little-endian; offsets are bytes from the start of the memory.
 
 use serde::{Deserialize, Serialize};
@@ -20,18 +24,16 @@ pub const BASE: usize = 0x2100_0000;
 /// Size of the memory.
 pub const MEMORY_BYTES: usize = 16 << 20;
 
-/// Number of the last answered exchange, a word.
+/// Number of the last answered tick, a word; the first tick's is 1.
 pub const OUTPUT_SEQUENCE: usize = 0x00;
-/// The answer: an [`OutputRecord`].
+/// The outputs in force in lockstep, an [`OutputRecord`]: those of the last tick, or off, if the firmware has failed since.
 pub const OUTPUT: usize = 0x10;
-/// Number of the last asked exchange, a word; [`END_OF_RUN`] ends the run.
+/// Number of the last asked tick, a word; [`END_OF_RUN`] ends the run.
 pub const INPUT_SEQUENCE: usize = 0x80;
-/// The question: an [`InputRecord`].
-pub const INPUT: usize = 0x90;
 /// The [`BootBlock`].
 pub const BOOT: usize = 0x100;
 /// Number of the firmware's starts since the memory was made, a word. A firmware that has reset the processor
-/// begins with exchange number 1 again, and with empty rings.
+/// begins with tick number 1 again, and with empty rings.
 pub const STARTS: usize = 0x110;
 /// Number of resets that a failed firmware may still perform, a word; at zero it ends the emulator.
 pub const RESETS_LEFT: usize = 0x114;
@@ -67,23 +69,46 @@ pub const LINK_OUT: usize = 0x8800;
 pub const FLASH_BYTES: usize = 0x8000;
 /// The flash for settings, every byte inverted.
 pub const FLASH: usize = 0x9000;
-/// The recorded inputs, an [`InputRecord`] a tick.
+/// The recorded inputs, an [`InputRecord`] a tick; in lockstep a ring of them.
 pub const RECORDED_INPUTS: usize = 0x1_1000;
-/// The collected outputs, an [`OutputRecord`] a tick.
+/// The collected outputs, an [`OutputRecord`] a tick; in lockstep a ring of them.
 pub const RECORDED_OUTPUTS: usize = 0xCD_1000;
 /// The sequence number that ends a run.
 pub const END_OF_RUN: u32 = u32::MAX;
 /// Most ticks that a recorded run can hold.
 pub const RECORDED_TICKS: usize = (MEMORY_BYTES - RECORDED_OUTPUTS) / OutputRecord::BYTES;
 
+/// Most ticks in lockstep that are asked and not answered: 0.8 s at 10 kHz. A power of two.
+pub const LOCKSTEP_TICKS: u32 = 1 << 13;
+
+const _: () =
+    assert!(LOCKSTEP_TICKS.is_power_of_two() && LOCKSTEP_TICKS as usize <= RECORDED_TICKS);
 const _: () = assert!(LINK_OUT + LINK_BYTES <= FLASH && FLASH + FLASH_BYTES <= RECORDED_INPUTS);
 const _: () = assert!(RECORDED_INPUTS + RECORDED_TICKS * InputRecord::BYTES <= RECORDED_OUTPUTS);
+
+/// Offset of the inputs of a tick in lockstep; the first tick's number is 1.
+#[inline(always)]
+pub const fn input_offset(tick: u32) -> usize {
+    RECORDED_INPUTS + InputRecord::BYTES * place(tick)
+}
+
+/// Offset of the outputs of a tick in lockstep; the first tick's number is 1.
+#[inline(always)]
+pub const fn output_offset(tick: u32) -> usize {
+    RECORDED_OUTPUTS + OutputRecord::BYTES * place(tick)
+}
+
+/// The place of a tick in the rings.
+#[inline(always)]
+const fn place(tick: u32) -> usize {
+    (tick.wrapping_sub(1) % LOCKSTEP_TICKS) as usize
+}
 
 /// The source of the control interrupt.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, FromRepr)]
 #[repr(u32)]
 pub enum Mode {
-    /// Each exchange with the host.
+    /// Each tick that the host asks.
     Lockstep = 0,
     /// The hardware timer, on recorded inputs.
     Paced = 1,

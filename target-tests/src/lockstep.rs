@@ -1,14 +1,16 @@
 //! `cargo xtask emulate`: the image in QEMU against the simulated stage, word by word beside the reference model in this process.
 
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::lockstep::{
     InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
+use quadrant::stage::Outputs;
 use quadrant_sim::machine::emulator::{Clock, Emulator, Lockstep, Memory};
 
+use crate::ahead;
 use crate::reference_model::{self, ReferenceModel, Tally};
 use xtask::image::{self, Board, Image, Scalar, Target};
 use xtask::toolchain::Toolchain;
@@ -24,8 +26,8 @@ const PROGRESS_TICKS: u32 = 10_000;
 pub(crate) struct Run {
     /// Comparison of the words.
     pub(crate) tally: Tally,
-    /// Duration of the ticks.
-    elapsed: Duration,
+    /// Ticks per second.
+    rate: f64,
 }
 
 /// Runs the image for some seconds of its time and fails on any difference.
@@ -51,7 +53,7 @@ pub(crate) fn run(
     )?;
     println!("{}", image.footprint()?);
     let model = ReferenceModel::of(scalar, job)?;
-    let Run { tally, elapsed, .. } = if paced {
+    let Run { tally, rate } = if paced {
         recorded(&image, model, ticks)?
     } else {
         lockstep(&image, model, ticks)?
@@ -59,7 +61,6 @@ pub(crate) fn run(
     if let Some((tick, model, firmware)) = &tally.first {
         println!("first difference at tick {tick}: {model:?} here, {firmware:?} in the firmware");
     }
-    let rate = f64::from(ticks) / elapsed.as_secs_f64();
     println!(
         "{} words compared, {} differ, {} of them not zero, {rate:.0} ticks/s, {:.1} times real time",
         tally.words,
@@ -76,36 +77,43 @@ pub(crate) fn run(
     Ok(())
 }
 
-/// Exchanges with the firmware tick by tick. The time starts with the first answer: compiling tables is not a tick.
+/// Runs the image beside the reference model, which runs ahead. The time starts with the first answers: compiling tables is
+/// not a tick.
 pub(crate) fn lockstep(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run> {
     let memory = Memory::create()?;
     memory.prepare(Mode::Lockstep, 0, &reference_model::encode(model.job())?)?;
     let mut firmware = Lockstep::start(reference_model::program(image)?, memory, show)?;
     let bar = progress(ticks);
-    let mut started = None;
-    for tick in 1..=ticks {
-        let input = model.input();
-        firmware.ask(&input)?;
-        // The reference model computes while the firmware does.
-        model.compute(&input);
-        let answer = firmware
-            .answer()?
-            .with_context(|| format!("the firmware ended before it answered tick {tick}"))?;
-        started.get_or_insert_with(Instant::now);
-        model.compare(answer);
-        model.step(&answer);
-        if tick % PROGRESS_TICKS == 0 {
-            bar.inc(1);
+    let mut first: Option<(Instant, u32)> = None;
+    let tally = ahead::run(&mut model, &mut firmware, ticks, |firmware, tick| {
+        first.get_or_insert_with(|| (Instant::now(), tick));
+        let seconds = (tick / PROGRESS_TICKS).into();
+        if bar.position() != seconds {
+            bar.set_position(seconds);
             firmware.new_lines()?;
         }
-    }
-    let elapsed = started.map_or(Duration::ZERO, |started| started.elapsed());
+        Ok(())
+    })?;
     bar.finish_and_clear();
+    let rate = first.map_or(0.0, |(since, tick)| {
+        f64::from(ticks - tick) / since.elapsed().as_secs_f64()
+    });
     firmware.finish()?;
-    Ok(Run {
-        tally: *model.tally(),
-        elapsed,
-    })
+    Ok(Run { tally, rate })
+}
+
+impl ahead::Firmware for Lockstep {
+    fn room(&self) -> usize {
+        Lockstep::room(self)
+    }
+
+    fn ask(&mut self, inputs: &[InputRecord]) -> Result<()> {
+        Ok(self.ask_all(inputs)?)
+    }
+
+    fn answers(&mut self) -> Result<Vec<Outputs>> {
+        Ok(Lockstep::answers(self)?)
+    }
 }
 
 /// Prints a line of the firmware's log.
@@ -135,7 +143,7 @@ fn recorded(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run>
         show,
     )?
     .wait()?;
-    let elapsed = started.elapsed();
+    let rate = f64::from(ticks) / started.elapsed().as_secs_f64();
     check_paced(&log, ticks)?;
     let mut bytes = vec![0; inputs.len() * OutputRecord::BYTES];
     memory.read(RECORDED_OUTPUTS, &mut bytes)?;
@@ -144,7 +152,7 @@ fn recorded(image: &Image, mut model: ReferenceModel, ticks: u32) -> Result<Run>
     for ((tick, expected), record) in (0..).zip(expected).zip(records) {
         tally.add(tick, expected, OutputRecord::decode(record).outputs);
     }
-    Ok(Run { tally, elapsed })
+    Ok(Run { tally, rate })
 }
 
 /// Prepares a run of recorded inputs.

@@ -2,6 +2,7 @@
 //! `cargo xtask` has the same verbs.
 #![forbid(unsafe_code)]
 
+mod ahead;
 mod attribution;
 mod board_smoke;
 mod combinations;

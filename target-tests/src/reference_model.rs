@@ -97,8 +97,6 @@ pub(crate) struct ReferenceModel {
     plant: SimulatedStage,
     operator: Operator,
     tick: u32,
-    expected: Outputs,
-    tally: Tally,
 }
 
 impl ReferenceModel {
@@ -115,8 +113,6 @@ impl ReferenceModel {
             plant: SimulatedStage::new(&StageParameters::real(), job.stage.rate_hz, SEED),
             operator: Operator::runs_the_plan(),
             tick: 0,
-            expected: Outputs::default(),
-            tally: Tally::default(),
             job,
         })
     }
@@ -147,33 +143,22 @@ impl ReferenceModel {
     }
 
     /// Returns the inputs of the next tick, for firmware and reference model.
-    pub(crate) fn input(&mut self) -> InputRecord {
+    fn input(&mut self) -> InputRecord {
         self.plant.read_inputs(self.operator.request(self.tick))
     }
 
     /// The reference model's own answer.
-    pub(crate) fn compute(&mut self, input: &InputRecord) -> Outputs {
-        self.expected = self.law.tick(input);
+    fn compute(&mut self, input: &InputRecord) -> Outputs {
         self.tick += 1;
-        self.expected
+        self.law.tick(input)
     }
 
     /// Moves the stage by one control period.
-    pub(crate) fn step(&mut self, outputs: &Outputs) {
+    fn step(&mut self, outputs: &Outputs) {
         self.plant.step(outputs);
     }
 
-    /// Compares an answer of the firmware with the reference model's last.
-    pub(crate) fn compare(&mut self, firmware: Outputs) {
-        self.tally.add(self.tick, self.expected, firmware);
-    }
-
-    /// Returns the comparison so far.
-    pub(crate) fn tally(&self) -> &Tally {
-        &self.tally
-    }
-
-    /// The reference model alone in closed loop, for `ticks` ticks: what it read and what it answered.
+    /// The reference model alone in closed loop, for the next `ticks` ticks: what it read and what it answered.
     pub(crate) fn run_alone(&mut self, ticks: u32) -> (Vec<InputRecord>, Vec<Outputs>) {
         (0..ticks)
             .map(|_| {

@@ -8,6 +8,7 @@ mod fault_injection;
 mod flash;
 mod guard;
 mod mailbox;
+mod nap;
 mod serial;
 mod timer;
 mod watchdog;
@@ -18,6 +19,7 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
+use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::command::Command;
 use quadrant::drivers::tick_interval::TickInterval;
 use quadrant::encoder::EncoderReading;
@@ -26,6 +28,7 @@ use quadrant::safety;
 use quadrant::stage::Outputs;
 
 pub(crate) use self::flash::SettingsFlash;
+use self::nap::Nap;
 pub(crate) use self::serial::Serial;
 pub(crate) use self::watchdog::Watchdog;
 use super::{Finished, Outcome};
@@ -38,7 +41,7 @@ use quadrant::lockstep::{
 static TICKS: AtomicU32 = AtomicU32::new(0);
 
 /// Offset of this tick's inputs. Written by [`Tick::begin`] alone.
-static INPUTS: AtomicU32 = AtomicU32::new(lockstep::INPUT as u32);
+static INPUTS: AtomicU32 = AtomicU32::new(RECORDED_INPUTS as u32);
 
 /// Cycles from the start of the control timer to the last tick of a paced run.
 static PACED_CYCLES: AtomicU32 = AtomicU32::new(0);
@@ -111,8 +114,8 @@ impl Board {
             idle: Idle {
                 mode: boot.mode,
                 last: boot.ticks,
-                sequence: 0,
                 started: false,
+                nap: Nap::new(core.SYST),
             },
             serial: Serial::new(boot.mode),
             watchdog: Watchdog::new(boot.mode),
@@ -236,8 +239,9 @@ impl hal::Amplifiers for Amplifiers {
                 let tick = TICKS.load(Ordering::Relaxed);
                 mailbox::write(lockstep::OUTPUT, low);
                 mailbox::write(lockstep::OUTPUT + 4, high);
-                mailbox::write(lockstep::OUTPUT + 8, tick);
-                // One tick per exchange, so the tick is the number of the inputs that are answered.
+                let at = lockstep::output_offset(tick);
+                mailbox::write(at, low);
+                mailbox::write(at + 4, high);
                 mailbox::write_sequence(lockstep::OUTPUT_SEQUENCE, tick);
             }
             Mode::Paced | Mode::Unpaced => {
@@ -283,9 +287,13 @@ impl Tick {
     pub(crate) fn begin(&mut self) -> bool {
         let ticks = TICKS.load(Ordering::Relaxed).wrapping_add(1);
         TICKS.store(ticks, Ordering::Relaxed);
-        if self.mode != Mode::Lockstep {
-            let at = RECORDED_INPUTS + InputRecord::BYTES * record();
-            INPUTS.store(at as u32, Ordering::Relaxed);
+        let at = match self.mode {
+            Mode::Lockstep => lockstep::input_offset(ticks),
+            Mode::Paced | Mode::Unpaced => RECORDED_INPUTS + InputRecord::BYTES * record(),
+        };
+        INPUTS.store(at as u32, Ordering::Relaxed);
+        if self.mode == Mode::Lockstep {
+            pend_next(ticks);
         }
         if self.mode == Mode::Paced {
             timer::CONTROL.acknowledge();
@@ -336,25 +344,28 @@ impl Tick {
 pub(crate) struct Idle {
     mode: Mode,
     last: u32,
-    sequence: u32,
     started: bool,
+    nap: Nap,
 }
 
 impl Idle {
     /// One turn of the idle loop; something is returned when the run is over.
     ///
-    /// It never sleeps: with WFI the emulator's time would no longer follow the instructions executed.
+    /// It sleeps in lockstep only: with WFI a paced emulator's time would no longer follow the instructions executed.
     pub(crate) fn turn(&mut self) -> Option<Finished> {
         let over = match self.mode {
             Mode::Lockstep => {
-                let sequence = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
-                if sequence != self.sequence && sequence != END_OF_RUN {
-                    self.sequence = sequence;
-                    fault_injection::act_on(sequence);
+                let ticks = TICKS.load(Ordering::Relaxed);
+                let asked = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
+                if asked == ticks {
+                    self.nap.turn();
+                } else if asked != END_OF_RUN {
+                    self.nap.end();
+                    fault_injection::act_on(ticks.wrapping_add(1));
                     serial::exchange();
                     pend_tick();
                 }
-                sequence == END_OF_RUN
+                asked == END_OF_RUN
             }
             Mode::Paced => {
                 // Not before: ticks that come due while the application is still being set up would be lost.
@@ -379,6 +390,17 @@ impl Idle {
             ticks: TICKS.load(Ordering::Relaxed),
             microseconds: PACED_CYCLES.load(Ordering::Relaxed) / (timer::CLOCK_HZ / 1_000_000),
         })
+    }
+}
+
+/// In tick `ticks` of lockstep: if the host has asked the next one, too, pends its control interrupt, which then follows
+/// without a way through the idle loop: a third of the emulator's time. Not where other tasks run between the two, which are
+/// to be done before the next tick begins.
+#[inline(always)]
+fn pend_next(ticks: u32) {
+    let asked = mailbox::read_sequence(lockstep::INPUT_SEQUENCE);
+    if asked != ticks && asked != END_OF_RUN && !ticks.is_multiple_of(PERIOD_TICKS) {
+        NVIC::pend(device::Interrupt::CONTROL_TICK);
     }
 }
 

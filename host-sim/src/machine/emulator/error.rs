@@ -57,6 +57,14 @@ pub enum EmulatorError {
         /// Size of the flash. in bytes.
         expected: usize,
     },
+    /// More ticks are asked than the shared memory has room for.
+    #[error("{asked} ticks asked at once, but there is room for {room}; take answers first")]
+    NoRoom {
+        /// Ticks asked.
+        asked: usize,
+        /// Ticks that there is room for.
+        room: usize,
+    },
     /// The firmware ended before its first tick.
     #[error(
         "the firmware ended before its first tick; give the image of the emulated board, and of this release"
@@ -64,8 +72,8 @@ pub enum EmulatorError {
     EndedAtStart,
     /// The firmware does not answer.
     #[error(
-        "the firmware has not answered tick {tick} within {waited:?}; a computer with one free core at least is needed, else \
-         this is a defect of the firmware"
+        "the firmware has not answered tick {tick} within {waited:?}; on a computer that is not \
+         overloaded this is a defect of the firmware"
     )]
     Silent {
         /// The tick, counted from the firmware's start.
