@@ -1,11 +1,13 @@
 //! From bytes to columns of finite numbers.
 //!
-//! A file is read in blocks, and each block is parsed in as many parts as there are threads; rows end where lines do. Where a quotation
-//! mark stands, a line break may be part of a cell: from there on the rows are read one after the other.
+//! A file is read in blocks, and the lines of a block are parsed in parts, in parallel, while the next block is read; rows end where
+//! lines do, and cells at commas. Where a quotation mark stands, a line break or a comma may be part of a cell: from there on the
+//! rows are read one after the other, as CSV with all its rules.
 
 use super::error::RecordError;
 use super::limits::MIN_ROWS;
 use csv::{ByteRecord, ReaderBuilder};
+use memchr::{memchr, memchr_iter, memchr2, memrchr2};
 use rayon::prelude::*;
 use std::fs::File;
 use std::io::{Cursor, Read};
@@ -277,9 +279,8 @@ impl<'a> Source<'a> {
         while goes_on {
             let parsed = self.read - self.text.len() as u64;
             share(parsed);
-            goes_on = self.read_block()?;
             let room = most_rows - rows;
-            let parts = if self.text.contains(&b'"') {
+            let parts = if memchr(b'"', &self.text).is_some() {
                 goes_on = false;
                 let text = std::mem::take(&mut self.text);
                 let text = Cursor::new(text).chain(&mut self.file);
@@ -289,15 +290,22 @@ impl<'a> Source<'a> {
                         .parse(text, self.line, empty.clone(), room, &mut share),
                 ]
             } else {
-                let end = if goes_on {
-                    let last = self.text.iter().rposition(ends_line);
-                    last.map_or(0, |last| last + 1)
-                } else {
-                    self.text.len()
-                };
-                let parts = self.parse_lines(&self.text[..end], &empty, room);
-                self.line += line_breaks(&self.text[..end]);
-                self.text.drain(..end);
+                // The last line may go on in the next block, or be the file's last.
+                let end = memrchr2(b'\n', b'\r', &self.text).map_or(0, |last| last + 1);
+                let mut lines = std::mem::take(&mut self.text);
+                self.text.extend_from_slice(&lines[end..]);
+                lines.truncate(end);
+                let (rows, line) = (self.rows, self.line);
+                let (mut parts, more) = rayon::join(
+                    || rows.parse_lines(&lines, line, &empty, room),
+                    || self.read_block(),
+                );
+                self.line += line_breaks(&lines);
+                if !more? {
+                    goes_on = false;
+                    let last = std::mem::take(&mut self.text);
+                    parts.push(rows.parse_part(&last, self.line, empty.clone(), room));
+                }
                 parts
             };
             for part in parts {
@@ -324,43 +332,67 @@ impl<'a> Source<'a> {
         }
         Ok(())
     }
+}
 
-    /// The parts of whole lines, each parsed on a thread of its own.
-    fn parse_lines(&self, lines: &[u8], empty: &[Place], room: usize) -> Vec<Part> {
-        let share = lines.len().div_ceil(rayon::current_num_threads()).max(1);
+/// Lines that end in a text.
+fn line_breaks(text: &[u8]) -> u64 {
+    memchr_iter(b'\n', text).count() as u64
+}
+
+/// Rows between two reports of progress.
+const PROGRESS_ROWS: usize = 1 << 16;
+
+/// Bytes of a part of a block, some 3000 rows.
+const PART_BYTES: usize = 1 << 18;
+
+impl Rows<'_> {
+    /// Rows of whole lines without a quotation mark, of which the first is a line of the file, in parts.
+    fn parse_lines(&self, lines: &[u8], line: u64, empty: &[Place], room: usize) -> Vec<Part> {
         let mut parts = Vec::new();
-        let (mut rest, mut line) = (lines, self.line);
+        let (mut rest, mut line) = (lines, line);
         while !rest.is_empty() {
-            let end = rest.iter().skip(share - 1).position(ends_line);
-            let (part, after) = rest.split_at(end.map_or(rest.len(), |end| share + end));
+            let least = PART_BYTES.min(rest.len());
+            let end = memchr2(b'\n', b'\r', &rest[least - 1..]);
+            let (part, after) = rest.split_at(end.map_or(rest.len(), |end| least + end));
             parts.push((part, line));
             line += line_breaks(part);
             rest = after;
         }
         parts
             .into_par_iter()
-            .map(|(part, line)| {
-                self.rows
-                    .parse(part, line, empty.to_vec(), room, &mut |_| {})
-            })
+            .map(|(part, line)| self.parse_part(part, line, empty.to_vec(), room))
             .collect()
     }
-}
 
-/// True for a byte with which a line ends, or nearly.
-fn ends_line(byte: &u8) -> bool {
-    matches!(byte, b'\n' | b'\r')
-}
+    /// Rows of lines without a quotation mark, into columns that are empty; one beyond `room` ends them. Empty lines are no rows.
+    fn parse_part(&self, lines: &[u8], line: u64, columns: Vec<Place>, room: usize) -> Part {
+        let mut part = Part {
+            columns,
+            rows: 0,
+            refused: None,
+        };
+        let mut cells = Vec::with_capacity(self.cells);
+        let (mut rest, mut line) = (lines, line);
+        while !rest.is_empty() && part.refused.is_none() && part.rows <= room {
+            let end = memchr2(b'\n', b'\r', rest).unwrap_or(rest.len());
+            let row = &rest[..end];
+            if !row.is_empty() {
+                part.rows += 1;
+                cells.clear();
+                let mut begin = 0;
+                for comma in memchr_iter(b',', row) {
+                    cells.push(&row[begin..comma]);
+                    begin = comma + 1;
+                }
+                cells.push(&row[begin..]);
+                part.refused = self.take(&cells, line, &mut part.columns).err();
+            }
+            line += u64::from(rest.get(end) == Some(&b'\n'));
+            rest = rest.get(end + 1..).unwrap_or_default();
+        }
+        part
+    }
 
-/// Lines that end in a text.
-fn line_breaks(text: &[u8]) -> u64 {
-    text.iter().filter(|byte| **byte == b'\n').count() as u64
-}
-
-/// Rows between two reports of progress.
-const PROGRESS_ROWS: usize = 1 << 16;
-
-impl Rows<'_> {
     /// Rows of a text that begins in a line of the file, into columns that are empty; one beyond `room` ends it. `progress` is told how
     /// many bytes were parsed.
     fn parse(
@@ -396,13 +428,15 @@ impl Rows<'_> {
                 progress(place.1);
             }
             part.rows += 1;
-            part.refused = self.take(&row, line + place.0 - 1, &mut part.columns).err();
+            let cells: Vec<&[u8]> = row.iter().collect();
+            let line = line + place.0 - 1;
+            part.refused = self.take(&cells, line, &mut part.columns).err();
         }
         part
     }
 
     /// Takes a row, which stands in a line of the file, into the columns.
-    fn take(&self, row: &ByteRecord, line: u64, columns: &mut [Place]) -> Result<(), RecordError> {
+    fn take(&self, row: &[&[u8]], line: u64, columns: &mut [Place]) -> Result<(), RecordError> {
         if row.len() != self.cells {
             let (found, expected) = (row.len(), self.cells);
             let message = format!(
@@ -414,7 +448,7 @@ impl Rows<'_> {
             });
         }
         for (column, index) in columns {
-            let value = number(self.path, column.name, line, &row[*index])?;
+            let value = number(self.path, column.name, line, row[*index])?;
             column.push(value, line);
         }
         Ok(())

@@ -55,12 +55,22 @@ pub fn estimate(
     lines: &[usize],
     estimator: Estimator,
 ) -> Estimate {
+    let [estimate] = estimates(blocks, lines, [estimator]);
+    estimate
+}
+
+/// As [`estimate`], several from the same spectra.
+pub(super) fn estimates<const N: usize>(
+    blocks: &[(&Recording, Range<usize>)],
+    lines: &[usize],
+    estimators: [Estimator; N],
+) -> [Estimate; N] {
     let Some((first, range)) = blocks.first() else {
-        return Estimate {
+        return estimators.map(|_| Estimate {
             response: FrequencyResponse::default(),
             blocks: 0,
             resolution_hz: f64::NAN,
-        };
+        });
     };
     let length = range.len();
     let transform = Transform::new(length);
@@ -77,20 +87,22 @@ pub fn estimate(
         })
         .collect();
     let resolution_hz = 1.0 / (length as f64 * first.sample_time_s);
-    let points = lines
-        .iter()
-        .enumerate()
-        .map(|(index, &line)| {
-            let hold = hold(PI * line as f64 / length as f64);
-            let frequency_hz = line as f64 * resolution_hz;
-            point(&spectra, index, frequency_hz, hold, estimator)
-        })
-        .collect();
-    Estimate {
-        response: FrequencyResponse { points },
-        blocks: blocks.len(),
-        resolution_hz,
-    }
+    estimators.map(|estimator| {
+        let points = lines
+            .par_iter()
+            .enumerate()
+            .map(|(index, &line)| {
+                let hold = hold(PI * line as f64 / length as f64);
+                let frequency_hz = line as f64 * resolution_hz;
+                point(&spectra, index, frequency_hz, hold, estimator)
+            })
+            .collect();
+        Estimate {
+            response: FrequencyResponse { points },
+            blocks: blocks.len(),
+            resolution_hz,
+        }
+    })
 }
 
 /// The response of a zero-order hold at half the angle between samples, over that at zero frequency.

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 
-use super::estimate::{Estimate, Estimator, estimate};
+use super::estimate::{Estimate, Estimator, estimates};
 use crate::identify::excitation::{Excitation, Waveform};
 use crate::identify::setting::SettingError;
 use crate::machine::{
@@ -265,10 +265,9 @@ pub fn measure(
     } else {
         Estimator::Instrument
     };
-    let found = estimate(&views, &lines, unbiased);
-    let plain = estimate(&views, &lines, Estimator::H1);
+    let [estimate, plain] = estimates(&views, &lines, [unbiased, Estimator::H1]);
     Ok(FrfMeasurement {
-        estimate: found,
+        estimate,
         plain,
         closed_loop: !settings.open_loop,
         recordings,

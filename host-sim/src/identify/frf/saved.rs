@@ -9,7 +9,8 @@ use num_complex::Complex64;
 use rayon::prelude::*;
 use rustfft::FftPlanner;
 
-use super::{Estimator, FrfMeasurement, estimate};
+use super::estimate::estimates;
+use super::{Estimator, FrfMeasurement};
 use crate::identify::setting::SettingError;
 use crate::record::Recording;
 
@@ -113,10 +114,9 @@ pub fn response_of(
     } else {
         Estimator::H1
     };
-    let found = estimate(&blocks, &lines, suited);
-    let plain = estimate(&blocks, &lines, Estimator::H1);
+    let [estimate, plain] = estimates(&blocks, &lines, [suited, Estimator::H1]);
     Ok(FrfMeasurement {
-        estimate: found,
+        estimate,
         plain,
         closed_loop,
         recordings,

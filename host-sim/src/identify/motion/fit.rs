@@ -296,10 +296,17 @@ fn withheld(
 ) -> Result<Option<Withheld>, MotionFitError> {
     let (mut missed, mut total) = (0.0, 0.0);
     let mut solutions = Vec::new();
-    for part in 0..PARTS {
-        let (judged, fitted): (Vec<usize>, Vec<usize>) =
-            (0..parts.len()).partition(|&row| parts[row] == part);
-        let found = match Solution::find(regression, structure, &fitted) {
+    // Summed up in their order, whatever the threads.
+    let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = (0..PARTS)
+        .into_par_iter()
+        .map(|part| {
+            let (judged, fitted): (Vec<usize>, Vec<usize>) =
+                (0..parts.len()).partition(|&row| parts[row] == part);
+            (judged, Solution::find(regression, structure, &fitted))
+        })
+        .collect();
+    for (judged, found) in found {
+        let found = match found {
             Err(MotionFitError::Dependent { .. }) => return Ok(None),
             found => found?,
         };

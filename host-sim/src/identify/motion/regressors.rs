@@ -1,6 +1,9 @@
 //! The columns that voltage is explained by.
 
-use nalgebra::{DMatrix, DVector};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use nalgebra::{DMatrix, DVector, Dyn, QR, SVD};
 
 use super::model::{Span, Structure};
 use super::signals::{MotionFitSettings, Signals};
@@ -57,14 +60,19 @@ impl Term {
     }
 }
 
+/// Stribeck velocities whose columns are kept.
+const LATEST: usize = 16;
+
 /// The regression of one record: its columns but for those that depend on the Stribeck velocity.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub(super) struct Regression<'a> {
     signals: &'a Signals,
     settings: &'a MotionFitSettings,
     pub(super) terms: Vec<Term>,
     /// Decimated columns; that of `Drop` is filled in by the velocity.
-    columns: DMatrix<f64>,
+    columns: Arc<DMatrix<f64>>,
+    /// The columns of the Stribeck velocities asked for last: a search asks for each several times.
+    latest: Mutex<VecDeque<(f64, Arc<DMatrix<f64>>)>>,
     /// Hysteresis without weights, at the full rate: what the drop acts on.
     hysteresis: Vec<f64>,
     /// The voltage, smoothed, at the full rate.
@@ -151,7 +159,8 @@ impl<'a> Regression<'a> {
             signals,
             settings,
             terms,
-            columns: DMatrix::from_columns(&columns),
+            columns: Arc::new(DMatrix::from_columns(&columns)),
+            latest: Mutex::default(),
             hysteresis,
             voltage_v: signals.smoothed(&signals.voltage_v, settings),
             velocity_mm_s: signals.decimated(velocity, settings),
@@ -174,18 +183,28 @@ impl<'a> Regression<'a> {
     }
 
     /// The columns at a Stribeck velocity.
-    pub(super) fn columns_at(&self, stribeck_velocity_mm_s: f64) -> DMatrix<f64> {
-        let mut columns = self.columns.clone();
-        if let Some(index) = self.terms.iter().position(|term| *term == Term::Drop) {
-            let drop: Vec<f64> = self
-                .hysteresis
-                .iter()
-                .zip(&self.signals.velocity_mm_s)
-                .map(|(h, v)| h * (-v.abs() / stribeck_velocity_mm_s).exp())
-                .collect();
-            let drop = self.signals.decimated(&drop, self.settings);
-            columns.set_column(index, &DVector::from_vec(drop));
+    pub(super) fn columns_at(&self, stribeck_velocity_mm_s: f64) -> Arc<DMatrix<f64>> {
+        let Some(index) = self.terms.iter().position(|term| *term == Term::Drop) else {
+            return self.columns.clone();
+        };
+        let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |(velocity, _): &&(f64, _)| *velocity == stribeck_velocity_mm_s;
+        if let Some((_, columns)) = latest().iter().find(same) {
+            return columns.clone();
         }
+        let drop: Vec<f64> = self
+            .hysteresis
+            .iter()
+            .zip(&self.signals.velocity_mm_s)
+            .map(|(h, v)| h * (-v.abs() / stribeck_velocity_mm_s).exp())
+            .collect();
+        let drop = self.signals.decimated(&drop, self.settings);
+        let mut columns = (*self.columns).clone();
+        columns.set_column(index, &DVector::from_vec(drop));
+        let columns = Arc::new(columns);
+        let mut latest = latest();
+        latest.truncate(LATEST - 1);
+        latest.push_front((stribeck_velocity_mm_s, columns.clone()));
         columns
     }
 
@@ -219,16 +238,27 @@ fn maxwell_slip(position_mm: &[f64], knot_mm: f64) -> Vec<f64> {
 }
 
 /// Least squares over some rows, with no negative level: a term that wants one is left out.
-pub(super) fn solve(
-    terms: &[Term],
-    columns: &DMatrix<f64>,
-    voltage_v: &DVector<f64>,
-    rows: &[usize],
-) -> Option<DVector<f64>> {
-    let mut kept: Vec<usize> = (0..terms.len()).collect();
-    let targets = voltage_v.select_rows(rows);
-    loop {
-        let chosen = columns.select_columns(&kept).select_rows(rows);
+pub(super) struct Solver<'a> {
+    terms: &'a [Term],
+    rows: &'a [usize],
+    /// The decompositions used last: a search over the dead time changes the voltage alone.
+    latest: Mutex<VecDeque<Arc<Decomposed>>>,
+}
+
+/// Some columns and some rows of a regression, decomposed.
+struct Decomposed {
+    columns: Arc<DMatrix<f64>>,
+    kept: Vec<usize>,
+    /// Norms by which the columns were divided.
+    sizes: Vec<f64>,
+    orthogonal: QR<f64, Dyn, Dyn>,
+    triangle: SVD<f64, Dyn, Dyn>,
+}
+
+impl Decomposed {
+    /// Nothing, if a column is zero.
+    fn of(columns: &Arc<DMatrix<f64>>, kept: &[usize], rows: &[usize]) -> Option<Self> {
+        let chosen = columns.select_columns(kept).select_rows(rows);
         // Columns of one size, so that the cut-off of the singular values means dependence and not units.
         let sizes: Vec<f64> = chosen.column_iter().map(|column| column.norm()).collect();
         if sizes.contains(&0.0) {
@@ -240,34 +270,83 @@ pub(super) fn solve(
         }
         // The triangle of a QR decomposition has the columns' singular values, and is small.
         let orthogonal = scaled.qr();
-        let mut rotated = targets.clone();
-        orthogonal.q_tr_mul(&mut rotated);
-        let rotated = rotated.rows(0, kept.len()).into_owned();
-        let decomposition = orthogonal.r().svd(true, true);
-        let smallest = decomposition.singular_values.min();
-        if smallest < DEPENDENT * decomposition.singular_values.max() {
-            return None;
+        Some(Self {
+            columns: columns.clone(),
+            kept: kept.to_vec(),
+            sizes,
+            triangle: orthogonal.r().svd(true, true),
+            orthogonal,
+        })
+    }
+}
+
+impl<'a> Solver<'a> {
+    /// For some rows of a regression's columns.
+    pub(super) fn new(terms: &'a [Term], rows: &'a [usize]) -> Self {
+        Self {
+            terms,
+            rows,
+            latest: Mutex::default(),
         }
-        let solution = decomposition.solve(&rotated, 0.0).ok()?;
-        let worst = kept
-            .iter()
-            .enumerate()
-            .filter(|&(place, &term)| terms[term].is_level() && solution[place] < 0.0)
-            .min_by(|a, b| solution[a.0].total_cmp(&solution[b.0]));
-        match worst {
-            Some((place, _)) => {
-                kept.remove(place);
+    }
+
+    /// The decomposition of some columns; nothing, if one is zero.
+    fn decomposed(&self, columns: &Arc<DMatrix<f64>>, kept: &[usize]) -> Option<Arc<Decomposed>> {
+        let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        let same =
+            |found: &&Arc<Decomposed>| Arc::ptr_eq(&found.columns, columns) && found.kept == kept;
+        if let Some(found) = latest().iter().find(same) {
+            return Some(found.clone());
+        }
+        let found = Arc::new(Decomposed::of(columns, kept, self.rows)?);
+        let mut latest = latest();
+        latest.truncate(DECOMPOSITIONS - 1);
+        latest.push_front(found.clone());
+        Some(found)
+    }
+
+    /// The coefficients that explain a voltage best; nothing, if some columns cannot be told apart.
+    pub(super) fn solve(
+        &self,
+        columns: &Arc<DMatrix<f64>>,
+        voltage_v: &DVector<f64>,
+    ) -> Option<DVector<f64>> {
+        let mut kept: Vec<usize> = (0..self.terms.len()).collect();
+        let targets = voltage_v.select_rows(self.rows);
+        loop {
+            let decomposed = self.decomposed(columns, &kept)?;
+            let mut rotated = targets.clone();
+            decomposed.orthogonal.q_tr_mul(&mut rotated);
+            let rotated = rotated.rows(0, kept.len()).into_owned();
+            let triangle = &decomposed.triangle;
+            let smallest = triangle.singular_values.min();
+            if smallest < DEPENDENT * triangle.singular_values.max() {
+                return None;
             }
-            None => {
-                let mut coefficients = DVector::zeros(terms.len());
-                for (place, &term) in kept.iter().enumerate() {
-                    coefficients[term] = solution[place] / sizes[place];
+            let solution = triangle.solve(&rotated, 0.0).ok()?;
+            let worst = kept
+                .iter()
+                .enumerate()
+                .filter(|&(place, &term)| self.terms[term].is_level() && solution[place] < 0.0)
+                .min_by(|a, b| solution[a.0].total_cmp(&solution[b.0]));
+            match worst {
+                Some((place, _)) => {
+                    kept.remove(place);
                 }
-                return Some(coefficients);
+                None => {
+                    let mut coefficients = DVector::zeros(self.terms.len());
+                    for (place, &term) in kept.iter().enumerate() {
+                        coefficients[term] = solution[place] / decomposed.sizes[place];
+                    }
+                    return Some(coefficients);
+                }
             }
         }
     }
 }
+
+/// Decompositions that are kept: those of two Stribeck velocities, each with up to seven elements left out.
+const DECOMPOSITIONS: usize = 16;
 
 /// Smallest over largest singular value of the scaled columns below which some cannot be told apart.
 const DEPENDENT: f64 = 1e-9;

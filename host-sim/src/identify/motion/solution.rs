@@ -5,7 +5,7 @@ use quadrant::friction::PerDirection;
 
 use super::error::MotionFitError;
 use super::model::{Change, Estimate, MotionModel, Structure, sliding};
-use super::regressors::{Part, Regression, Term, Way, solve};
+use super::regressors::{Part, Regression, Solver, Term, Way};
 use super::signals::MotionFitSettings;
 use crate::identify::fit::{Loss, Parameter, fit_nearest};
 
@@ -61,11 +61,12 @@ impl Solution {
             let velocity = values.last().copied().filter(|_| structure.stribeck);
             (dead_time_s, velocity.unwrap_or(start * fastest))
         };
+        let solver = Solver::new(&regression.terms, rows);
         let solved = |values: &[f64]| {
             let (dead_time_s, stribeck_velocity_mm_s) = split(values);
             let columns = regression.columns_at(stribeck_velocity_mm_s);
             let voltage = regression.voltage_at(dead_time_s);
-            solve(&regression.terms, &columns, &voltage, rows).map(|coefficients| Self {
+            solver.solve(&columns, &voltage).map(|coefficients| Self {
                 coefficients,
                 dead_time_s,
                 stribeck_velocity_mm_s,
@@ -92,7 +93,7 @@ impl Solution {
     pub(super) fn residual(&self, regression: &Regression<'_>, rows: &[usize]) -> DVector<f64> {
         let columns = regression.columns_at(self.stribeck_velocity_mm_s);
         let voltage = regression.voltage_at(self.dead_time_s);
-        (voltage - columns * &self.coefficients).select_rows(rows)
+        (voltage - &*columns * &self.coefficients).select_rows(rows)
     }
 
     /// The model, in its own terms; `estimates` are its parameters with their standard errors.

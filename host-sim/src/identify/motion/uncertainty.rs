@@ -59,7 +59,7 @@ pub(super) fn estimates(
         let shift = SHIFT * solution.stribeck_velocity_mm_s;
         let above = regression.columns_at(solution.stribeck_velocity_mm_s + shift);
         let below = regression.columns_at(solution.stribeck_velocity_mm_s - shift);
-        jacobian.push((above - below) * &solution.coefficients / (2.0 * shift));
+        jacobian.push((&*above - &*below) * &solution.coefficients / (2.0 * shift));
         let velocity = solution.stribeck_velocity_mm_s;
         estimates.push(searched(STRIBECK_VELOCITY, "mm/s", velocity, (1e-3, "m/s")));
     }

@@ -44,9 +44,13 @@ fn sections(sample_time_s: f64, cutoff_hz: f64, order: usize) -> Option<Vec<Coef
 /// One pass, started as if the first sample had been there for ever.
 fn pass(sections: &[Coefficients<f64>], signal: &mut [f64]) {
     let start = signal.first().copied().unwrap_or(0.0);
-    for section in sections {
-        let mut filter = DirectForm2Transposed::new(*section);
-        for value in signal.iter_mut() {
+    // Section by section a sample would wait for the one before it: so the processor works on several sections at a time.
+    let mut filters: Vec<_> = sections
+        .iter()
+        .map(|section| DirectForm2Transposed::new(*section))
+        .collect();
+    for value in signal {
+        for filter in &mut filters {
             *value = filter.run(*value - start) + start;
         }
     }
