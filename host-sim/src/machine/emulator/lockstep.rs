@@ -10,7 +10,7 @@ use quadrant::stage::Outputs;
 
 use super::error::EmulatorError;
 use super::memory::Memory;
-use super::patience::Patience;
+use super::backoff::Backoff;
 use super::process::{Clock, Emulator, Listener};
 use super::program::Program;
 
@@ -135,8 +135,8 @@ impl Lockstep {
     /// # Errors
     /// A firmware that failed or is silent.
     pub fn answer(&mut self) -> Result<Option<Outputs>, EmulatorError> {
-        let mut patience = Patience::default();
-        let answered = self.wait(|| patience.pause())?;
+        let mut backoff = Backoff::default();
+        let answered = self.wait(|| backoff.pause())?;
         if answered == 0 {
             return Ok(None);
         }

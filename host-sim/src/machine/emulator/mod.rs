@@ -5,13 +5,13 @@ mod error;
 mod lockstep;
 mod log;
 mod memory;
-mod patience;
+mod backoff;
 mod process;
 mod program;
 
 pub use self::error::EmulatorError;
 pub use self::lockstep::Lockstep;
 pub use self::memory::Memory;
-pub use self::patience::Patience;
+pub use self::backoff::Backoff;
 pub use self::process::{Clock, Emulator, Listener, command_line};
 pub use self::program::Program;

@@ -11,11 +11,11 @@ const SLEEP: Duration = Duration::from_micros(50);
 
 /// The pauses of a wait: none at first, then longer and longer ones, as the firmware may need this very core.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Patience {
+pub struct Backoff {
     looks: u32,
 }
 
-impl Patience {
+impl Backoff {
     /// Pauses before the next look.
     pub fn pause(&mut self) {
         self.looks = self.looks.saturating_add(1);
