@@ -88,11 +88,6 @@ impl FeedforwardKind {
         }
     }
 
-    /// True if the static model's `s(v) sgn(v)` acts.
-    const fn has_static_level(self) -> bool {
-        matches!(self, Self::Static)
-    }
-
     /// True if a pre-sliding model acts.
     const fn has_presliding(self) -> bool {
         !matches!(self, Self::None | Self::Static)
@@ -149,7 +144,7 @@ impl<S: Scalar> FeedforwardTerms<S> {
     /// The sum of all terms, V.
     #[inline(always)]
     pub fn total(&self) -> S {
-        S::ZERO + self.level + self.viscous + self.gms + self.inertia
+        self.level + self.viscous + self.gms + self.inertia
     }
 
     /// The friction, V.
@@ -178,8 +173,12 @@ impl<S: Scalar> FeedforwardTerms<S> {
 /// The pre-sliding model of a kind, with what only that model needs.
 #[derive(Clone, Debug, PartialEq)]
 enum Presliding<S: Scalar, const N: usize> {
-    /// None, static, GMS, combined: the elements move with each of them.
+    /// None, combined: the elements on the Stribeck curve.
     Gms(GmsOnSurface<S, N>),
+    /// Static: they carry their load for when a change makes them act.
+    Static(GmsOnSurface<S, N>),
+    /// GMS: the elements at the breakaway level.
+    Breakaway(GmsOnSurface<S, N>),
     Smoothed {
         elements: SmoothedGms<S, N>,
         surface: SlidingTable<S>,
@@ -270,7 +269,6 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
 pub struct Feedforward<S: Scalar, const N: usize> {
-    kind: FeedforwardKind,
     coulomb_gain: S::Gain,
     /// Zero where the kind has no pre-sliding model, or no viscous friction.
     gms_gain: S::Gain,
@@ -299,7 +297,6 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// None at all, to be [built over](Self::build_over).
     pub(crate) fn blank() -> Self {
         Self {
-            kind: FeedforwardKind::None,
             presliding: Presliding::blank(),
             coulomb_gain: S::Gain::default(),
             gms_gain: S::Gain::default(),
@@ -312,7 +309,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
 
     /// Feeds nothing forward. The tables stay: to clear them would take as long as to fill them.
     pub(crate) fn switch_off(&mut self) {
-        self.kind = FeedforwardKind::None;
+        self.coulomb_gain = S::Gain::default();
         self.gms_gain = S::Gain::default();
         self.viscous = PerDirection::default();
         self.inertia = S::Gain::default();
@@ -328,7 +325,6 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         period_s: f64,
     ) {
         let share = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
-        self.kind = kind;
         let acts = |does: bool| if does { 1.0 } else { 0.0 };
         self.coulomb_gain = share(gains.level);
         self.gms_gain = share(acts(kind.has_presliding()) * gains.gms);
@@ -383,43 +379,61 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
             inertia: reference.acceleration.scale(self.inertia),
             ..FeedforwardTerms::default()
         };
-        let direction = Direction::of(reference.velocity);
-        terms.viscous = reference.velocity.scale(*self.viscous.of(direction));
-        let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
-        let force = match &self.presliding {
-            Presliding::Gms(GmsOnSurface {
-                elements,
-                breakaway,
-                surface,
-            }) => {
-                let sliding = match self.kind {
-                    FeedforwardKind::Gms => *breakaway.of(direction),
-                    _ => surface.at(speed, direction),
-                };
-                if self.kind.has_static_level() && reference.velocity != S::ZERO {
-                    let level = sliding.level.scale(self.coulomb_gain);
-                    terms.level = match direction {
-                        Direction::Positive => level,
-                        Direction::Negative => -level,
-                    };
-                }
-                // The elements move with any of these kinds: they carry their load when a change makes them act.
-                let memory = state.elements(|force| elements.spread(force));
-                elements.step(memory, displacement, sliding)
+        let (velocity, speed) = (reference.velocity, reference.velocity.magnitude());
+        let direction = Direction::of(velocity);
+        terms.viscous = velocity.scale(*self.viscous.of(direction));
+        let (model, sliding) = match &self.presliding {
+            Presliding::Gms(model) => (model, model.surface.at(speed, direction)),
+            Presliding::Static(model) => {
+                let sliding = model.surface.at(speed, direction);
+                terms.level = self.static_level(sliding.level, velocity);
+                (model, sliding)
             }
-            Presliding::Smoothed { elements, surface } => {
-                let memory = state.elements(|force| elements.spread(force));
-                elements.step(memory, displacement, surface.at(speed, direction))
+            Presliding::Breakaway(model) => (model, *model.breakaway.of(direction)),
+            other => {
+                terms.gms = other.step_other(state, reference).scale(self.gms_gain);
+                return terms;
             }
-            Presliding::Lugre(model) => model.step(state.bristle(), displacement, speed),
-            Presliding::Dahl(model) => model.step(state.bristle(), displacement),
         };
+        let elements = &model.elements;
+        let memory = state.elements(|force| elements.spread(force));
+        let force = elements.step(memory, reference.displacement, sliding);
         terms.gms = force.scale(self.gms_gain);
         terms
+    }
+
+    /// The static model's level in the sense of the velocity, V; none at rest.
+    #[inline(never)]
+    fn static_level(&self, level: S, velocity: S) -> S {
+        let level = level.scale(self.coulomb_gain);
+        if velocity < S::ZERO {
+            -level
+        } else if velocity != S::ZERO {
+            level
+        } else {
+            S::ZERO
+        }
     }
 }
 
 impl<S: Scalar, const N: usize> Presliding<S, N> {
+    /// The force of a model but the GMS elements', V: apart, so that those have the registers to themselves.
+    #[inline(never)]
+    fn step_other(&self, state: &mut FeedforwardState<S, N>, reference: ReferenceStep<S>) -> S {
+        let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
+        match self {
+            Self::Smoothed { elements, surface } => {
+                let direction = Direction::of(reference.velocity);
+                let memory = state.elements(|force| elements.spread(force));
+                elements.step(memory, displacement, surface.at(speed, direction))
+            }
+            Self::Lugre(model) => model.step(state.bristle(), displacement, speed),
+            Self::Dahl(model) => model.step(state.bristle(), displacement),
+            // Not here: the feedforward takes them.
+            Self::Gms(_) | Self::Static(_) | Self::Breakaway(_) => S::ZERO,
+        }
+    }
+
     fn blank() -> Self {
         Self::Gms(GmsOnSurface {
             elements: Gms::build(&[]),
@@ -432,7 +446,10 @@ impl<S: Scalar, const N: usize> Presliding<S, N> {
     fn fill_tables(&mut self, friction: &FrictionSettings, period_s: f64) {
         let curves = friction.sliding.map(|model| model.curve);
         match self {
-            Self::Gms(GmsOnSurface { surface, .. }) | Self::Smoothed { surface, .. } => {
+            Self::Gms(GmsOnSurface { surface, .. })
+            | Self::Static(GmsOnSurface { surface, .. })
+            | Self::Breakaway(GmsOnSurface { surface, .. })
+            | Self::Smoothed { surface, .. } => {
                 surface.fill(&curves, friction.gms.attraction_v_s, period_s);
             }
             Self::Lugre(model) => {
@@ -463,13 +480,24 @@ impl<S: Scalar, const N: usize> Presliding<S, N> {
                 ),
                 surface: SlidingTable::blank(),
             },
-            _ => Self::Gms(GmsOnSurface {
-                elements: Gms::build(&gms.elements),
-                surface: SlidingTable::blank(),
-                breakaway: sliding.map(|model| {
-                    Sliding::constant(model.curve.breakaway_v, gms.attraction_v_s, period_s)
-                }),
-            }),
+            (FeedforwardKind::Static, ..) => Self::Static(GmsOnSurface::build(friction, period_s)),
+            (FeedforwardKind::Gms, ..) => Self::Breakaway(GmsOnSurface::build(friction, period_s)),
+            _ => Self::Gms(GmsOnSurface::build(friction, period_s)),
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> GmsOnSurface<S, N> {
+    /// The elements without the tables of their surface.
+    #[inline(always)]
+    fn build(friction: &FrictionSettings, period_s: f64) -> Self {
+        let attraction_v_s = friction.gms.attraction_v_s;
+        Self {
+            elements: Gms::build(&friction.gms.elements),
+            surface: SlidingTable::blank(),
+            breakaway: friction
+                .sliding
+                .map(|model| Sliding::constant(model.curve.breakaway_v, attraction_v_s, period_s)),
         }
     }
 }
