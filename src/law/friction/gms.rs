@@ -109,9 +109,22 @@ pub struct GmsState<S: Scalar, const N: usize> {
     sum: S,
     /// Share that is left of the distances in `forces` while all slip, a [`Quantity::Fraction`].
     left: S,
-    /// A bit for each element.
+    /// A bit for each element that slips, and [`BACKWARD`] after a motion towards smaller positions: one comparison tells that
+    /// all go on slipping.
     slipping: u32,
-    direction: Direction,
+}
+
+/// Bit above those of the elements.
+const BACKWARD: u32 = 1 << 31;
+
+impl Direction {
+    /// Its bit in [`GmsState::slipping`].
+    const fn bit(self) -> u32 {
+        match self {
+            Self::Positive => 0,
+            Self::Negative => BACKWARD,
+        }
+    }
 }
 
 impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
@@ -121,8 +134,7 @@ impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
             forces: [S::ZERO; N],
             sum: S::ZERO,
             left: S::ZERO,
-            slipping: 0,
-            direction: Direction::Positive,
+            slipping: Direction::Positive.bit(),
         }
     }
 }
@@ -146,13 +158,13 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
     /// True if every element slips.
     #[inline(always)]
     fn all_slip(&self) -> bool {
-        self.slipping == Self::ALL
+        self.slipping & Self::ALL == Self::ALL
     }
 
     /// The forces of the elements, V.
     pub(super) fn forces_by(&self, weights: impl Iterator<Item = S::Gain>) -> [S; N] {
         let mut stuck = self.clone();
-        stuck.stick(self.direction, weights);
+        stuck.stick(Direction::Positive, weights);
         stuck.forces
     }
 
@@ -190,13 +202,12 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
     /// Lets every element stick, as a reversal does, or as a model asks for that does not remember which ones slip.
     #[inline(always)]
     pub(super) fn stick(&mut self, direction: Direction, weights: impl Iterator<Item = S::Gain>) {
-        self.direction = direction;
         if self.all_slip() {
             for (force, weight) in self.forces.iter_mut().zip(weights) {
                 *force = self.sum.scale(weight) + force.times(self.left, Quantity::Fraction);
             }
         }
-        self.slipping = 0;
+        self.slipping = direction.bit();
     }
 }
 
@@ -262,12 +273,13 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         direction: Direction,
         along: impl Fn(S) -> S,
     ) -> S {
-        if state.direction != direction {
-            state.stick(direction, self.weights());
-        } else if state.all_slip() {
+        if state.slipping == GmsState::<S, N>::ALL | direction.bit() {
             state.sum = sliding.slip(state.sum, sliding.level, &along);
             state.left = state.left.times(sliding.decay, Quantity::Fraction);
             return state.sum;
+        }
+        if state.slipping & BACKWARD != direction.bit() {
+            state.stick(direction, self.weights());
         }
         let mut slipping = state.slipping;
         let mut total = S::ZERO;
