@@ -717,8 +717,14 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// True if the measured speed is within its limits.
     #[inline(always)]
     fn is_slow(&self, state: &AxisState<S, N>) -> bool {
-        self.overspeed.allows(&state.overspeed)
-            && (state.homed || state.speed().unsigned_abs() <= self.reduced_speed)
+        if !self.overspeed.allows(&state.overspeed) {
+            return false;
+        }
+        if state.homed {
+            return true;
+        }
+        cold_path();
+        state.speed().unsigned_abs() <= self.reduced_speed
     }
 
     /// Examines a reading that has an index pulse, or that a monitor takes for a fault.
@@ -986,6 +992,19 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if !state.homed {
             return Ok(());
         }
+        if self
+            .travel
+            .is_clear(state.look_ahead, state.encoder.position())
+        {
+            state.travel.enter();
+            return Ok(());
+        }
+        self.check_travel(state)
+    }
+
+    /// Checks an axis near an end of its travel or beyond.
+    #[inline(never)]
+    fn check_travel(&self, state: &mut AxisState<S, N>) -> Result<(), FaultCode> {
         self.travel.step(
             &mut state.travel,
             self.generator.stop_ramp(),

@@ -81,27 +81,15 @@ impl Travel {
         }
     }
 
-    /// Takes the reference, its displacement in this tick, and the measured position. A fault that is found calls for a
-    /// stop along `ramp`.
+    /// True if the axis is inside its travel and could stop before the ends: [`step`](Self::step) then finds nothing.
     #[inline(always)]
-    pub fn step<S: Scalar>(
-        &self,
-        state: &mut TravelState,
-        ramp: &Ramp<S>,
-        reference: Position,
-        displacement: Position,
-        measured: Position,
-    ) -> Result<(), FaultCode> {
-        if self.clear.holds(reference) && self.allowed.holds(measured) {
-            state.inside = true;
-            return Ok(());
-        }
-        self.at_the_edge(state, ramp, reference, displacement, measured)
+    pub(crate) fn is_clear(&self, reference: Position, measured: Position) -> bool {
+        self.clear.holds(reference) && self.allowed.holds(measured)
     }
 
-    /// The same near an end of the travel or beyond.
-    #[inline(never)]
-    fn at_the_edge<S: Scalar>(
+    /// Takes the reference, its displacement in this tick, and the measured position. A fault that is found calls for a
+    /// stop along `ramp`.
+    pub fn step<S: Scalar>(
         &self,
         state: &mut TravelState,
         ramp: &Ramp<S>,
@@ -127,6 +115,14 @@ impl Travel {
         } else {
             Ok(())
         }
+    }
+}
+
+impl TravelState {
+    /// Takes note that the axis is inside its travel.
+    #[inline(always)]
+    pub(crate) fn enter(&mut self) {
+        self.inside = true;
     }
 }
 
