@@ -78,8 +78,8 @@ pub struct Harmonic<S: Scalar> {
     lead_step: u64,
     /// Ticks at full speed; more than can elapse when there is no end.
     cruise_ticks: u32,
-    /// Tick after the lead-out, if it ever ends.
-    end_tick: Option<u32>,
+    /// Tick after the lead-out, or [`NEVER`].
+    end_tick: u32,
     velocity: S::Gain,
     centripetal: S::Gain,
     tangential: S::Gain,
@@ -96,6 +96,9 @@ enum Lead {
     /// After the lead-out: at rest.
     Ended,
 }
+
+/// End of a motion without one.
+const NEVER: u32 = u32::MAX;
 
 /// One, as a Q31 phase speed or lead progress.
 const ONE: u32 = 1 << 31;
@@ -156,8 +159,10 @@ impl<S: Scalar> Harmonic<S> {
             phase_per_tick,
             lead_ticks,
             lead_step: (1 << 62) / u64::from(lead_ticks),
-            cruise_ticks: cruise_ticks.unwrap_or(u32::MAX),
-            end_tick: cruise_ticks.map(|cruise| cruise.saturating_add(2 * lead_ticks)),
+            cruise_ticks: cruise_ticks.unwrap_or(NEVER),
+            end_tick: cruise_ticks.map_or(NEVER, |cruise| {
+                cruise.saturating_add(2 * lead_ticks).min(NEVER - 1)
+            }),
             velocity: gain(settings.amplitude_mm * angular, Quantity::Velocity),
             centripetal: gain(
                 -settings.amplitude_mm * angular * angular,
@@ -261,11 +266,11 @@ impl<S: Scalar> Harmonic<S> {
 
     /// True if the motion has an end.
     pub(super) const fn ends(&self) -> bool {
-        self.end_tick.is_some()
+        self.end_tick != NEVER
     }
 
     #[inline(always)]
     pub(super) fn finished(&self, state: &MotionState) -> bool {
-        self.end_tick.is_some_and(|end| state.elapsed >= end)
+        state.elapsed >= self.end_tick && self.ends()
     }
 }
