@@ -116,7 +116,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let axes = self.axes.each_ref().map(|axis| &**axis);
         let stage = StageRef {
             axes: axes.into(),
-            operation: self.operation,
+            operation: &self.operation,
         };
         let outputs = stage.tick(&self.plan, &mut self.state, inputs);
         if self.host.is_needed() {
@@ -131,7 +131,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let axes = self.axes.each_ref().map(|axis| &**axis);
         StageRef {
             axes: axes.into(),
-            operation: self.operation,
+            operation: &self.operation,
         }
     }
 

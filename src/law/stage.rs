@@ -98,7 +98,7 @@ pub struct StageRef<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     /// The axes x, y and z.
     pub axes: PerAxis<&'a Axis<S, N>>,
     /// Rules of operation.
-    pub operation: Operation,
+    pub operation: &'a Operation,
 }
 
 /// The memory of the stage.
@@ -335,7 +335,7 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
     pub fn as_ref(&self) -> StageRef<'_, S, N> {
         StageRef {
             axes: self.axes.by_ref(),
-            operation: self.operation,
+            operation: &self.operation,
         }
     }
 

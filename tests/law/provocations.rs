@@ -133,5 +133,5 @@ pub(crate) fn provoke(settings: &StageSettings, axis: usize) -> Option<(Vec<Trac
         .iter()
         .chain(&HOMING)
         .map(|each| run(settings, axis, false, *each));
-    Some((moving.chain(standing).collect(), stage.as_ref().operation))
+    Some((moving.chain(standing).collect(), *stage.as_ref().operation))
 }

@@ -18,7 +18,7 @@ fn an_axis_built_alone_is_the_stages() {
         let alone = settings.build_axis::<f32, 4>(axis);
         assert_eq!(alone, *stage.axis(axis));
     }
-    assert_eq!(stage.as_ref().operation, settings.operation());
+    assert_eq!(*stage.as_ref().operation, settings.operation());
 }
 
 #[test]
