@@ -3,7 +3,6 @@
 use quadrant_link::message::{AxisName, AxisSignal, Channel, MachineState, StageSignal};
 
 use crate::app::glitch_monitor::GlitchReadings;
-use crate::law::axis::AxisState;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::stage::StageState;
 
@@ -82,26 +81,26 @@ pub(crate) fn read_raw<S: Scalar, const N: usize>(
 ) -> u32 {
     match channel {
         Channel::Stage(signal) => read_stage(signal, seen),
-        Channel::Axis(name, signal) => match seen.stage.axes().get(name as usize) {
-            Some(axis) => read_axis(signal, axis, || {
-                let [x, y, z] = seen.glitches.heights_um;
-                match name {
-                    AxisName::X => x,
-                    AxisName::Y => y,
-                    AxisName::Z => z,
-                }
-            }),
-            None => 0,
-        },
+        // An arm for each axis, so that a signal's place is known in each.
+        Channel::Axis(AxisName::X, signal) => read_axis(signal, seen, AxisName::X),
+        Channel::Axis(AxisName::Y, signal) => read_axis(signal, seen, AxisName::Y),
+        Channel::Axis(AxisName::Z, signal) => read_axis(signal, seen, AxisName::Z),
     }
 }
 
 #[inline(always)]
 fn read_axis<S: Scalar, const N: usize>(
     signal: AxisSignal,
-    axis: &AxisState<S, N>,
-    glitch_um: impl FnOnce() -> f32,
+    seen: &Observation<'_, S, N>,
+    name: AxisName,
 ) -> u32 {
+    let [x, y, z] = &**seen.stage.axes();
+    let axis = match name {
+        AxisName::X => x,
+        AxisName::Y => y,
+        AxisName::Z => z,
+    };
+    let glitches = seen.glitches;
     let seen = axis.telemetry();
     match signal {
         AxisSignal::Reference => (seen.reference.0 >> 8) as u32,
@@ -121,7 +120,15 @@ fn read_axis<S: Scalar, const N: usize>(
         AxisSignal::LimitedBy => seen.limited_by as u32,
         AxisSignal::Injection => axis.injected().to_word(),
         AxisSignal::CodeSum => seen.code_sum.wrapping_sub(seen.code.0.into()) as u32,
-        AxisSignal::Glitch => glitch_um().to_bits(),
+        AxisSignal::Glitch => {
+            let [x, y, z] = glitches.heights_um;
+            let height = match name {
+                AxisName::X => x,
+                AxisName::Y => y,
+                AxisName::Z => z,
+            };
+            height.to_bits()
+        }
         AxisSignal::FrictionScale => axis.learning().scale().to_bits(),
         AxisSignal::Learning => axis.learning().status() as u32,
         AxisSignal::VibrationGate => axis.learning().gate().to_bits(),
