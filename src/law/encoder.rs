@@ -146,7 +146,9 @@ impl Encoder {
     /// True if the axis can have moved that far in a tick.
     #[inline(always)]
     pub(crate) const fn is_plausible(&self, counts: i32) -> bool {
-        counts.unsigned_abs() <= self.largest_step as u32
+        // Between both ends, by one comparison.
+        let largest = self.largest_step as u32;
+        (counts as u32).wrapping_add(largest) <= largest.wrapping_mul(2)
     }
 
     /// The accumulated count at which the counter showed `raw`, within half its range of the last reading.

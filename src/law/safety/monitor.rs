@@ -43,21 +43,27 @@ pub(crate) fn speed_limit(counts_per_tick: f64) -> u32 {
     rounding::round(limit) as u32
 }
 
+/// Above every filtered speed, and half of what is compared.
+const LARGEST_LIMIT: u32 = i32::MAX as u32;
+
 impl Overspeed {
     /// A limit that no speed exceeds.
-    pub const UNLIMITED: Self = Self { limit: u32::MAX };
+    pub const UNLIMITED: Self = Self {
+        limit: LARGEST_LIMIT,
+    };
 
     /// A limit in counts per tick, at most 2^16; half a count is added for the quantisation. Settings time only.
     pub fn new(counts_per_tick: f64) -> Self {
         Self {
-            limit: speed_limit(counts_per_tick),
+            limit: speed_limit(counts_per_tick).min(LARGEST_LIMIT),
         }
     }
 
     /// True if the filtered speed is within the limit.
     #[inline(always)]
     pub(crate) fn allows(&self, state: &OverspeedState) -> bool {
-        state.filtered.unsigned_abs() <= self.limit
+        // Between both ends, by one comparison.
+        (state.filtered as u32).wrapping_add(self.limit) <= self.limit.wrapping_mul(2)
     }
 }
 

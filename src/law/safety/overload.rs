@@ -49,9 +49,13 @@ impl Overload {
     #[inline(always)]
     pub fn step(&self, state: &mut OverloadState, word: i16) -> bool {
         let force = i64::from(i32::from(word) - self.offset);
-        let sum = (state.0 + force * force).saturating_sub(self.continuous);
-        // Not `clamp`, which panics if its bounds are the wrong way round.
-        state.0 = sum.min(self.budget).max(0);
+        // Neither is negative: their difference does not overflow.
+        let sum = (state.0 + force * force).wrapping_sub(self.continuous);
+        if sum < 0 {
+            state.0 = 0;
+            return true;
+        }
+        state.0 = sum.min(self.budget);
         sum <= self.budget
     }
 }
