@@ -595,12 +595,14 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.index.is_seen()
     }
 
-    /// Takes the next position of the look-ahead reference.
+    /// Takes the next sample of the look-ahead reference.
     #[inline(always)]
-    fn move_reference(&mut self, position: Position) {
+    fn move_reference(&mut self, ahead: &ReferenceSample<S>) {
         self.displacement_before = self.displacement;
-        self.displacement = position - self.look_ahead;
-        self.look_ahead = position;
+        self.displacement = ahead.position - self.look_ahead;
+        self.look_ahead = ahead.position;
+        self.telemetry.velocity = ahead.velocity;
+        self.acceleration = ahead.acceleration;
     }
 
     #[inline(always)]
@@ -689,7 +691,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     }
 
     /// Takes the encoder's reading and checks it. `due`: it is compared with the plant in this tick.
-    #[inline(never)]
+    #[inline(always)]
     pub(crate) fn read_encoder(
         &self,
         state: &mut AxisState<S, N>,
@@ -1030,9 +1032,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let Some(ahead) = planned else {
             return self.update_other_reference(state, motion, switches, tick);
         };
-        state.move_reference(ahead.position);
+        state.move_reference(&ahead);
         let found = self.check_limits(state, switches);
-        self.form_error(state, &ahead, tick)?;
+        self.form_error(state, tick)?;
         found
     }
 
@@ -1060,7 +1062,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if let GeneratorEvent::Origin(offset) = event {
             Self::shift(state, offset);
         }
-        state.move_reference(ahead.position);
+        state.move_reference(&ahead);
         let switches = switches.without(self.generator.expected(&state.generator));
         let mut found = if state.mode() == MotionMode::Stopping {
             Ok(())
@@ -1070,21 +1072,16 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         if let GeneratorEvent::Fault(code) = event {
             found = Err(code);
         }
-        self.form_error(state, &ahead, tick)?;
+        self.form_error(state, tick)?;
         found
     }
 
     /// Forms the error, and checks it.
     #[inline(always)]
-    fn form_error(
-        &self,
-        state: &mut AxisState<S, N>,
-        ahead: &ReferenceSample<S>,
-        tick: u32,
-    ) -> Result<(), FaultCode> {
+    fn form_error(&self, state: &mut AxisState<S, N>, tick: u32) -> Result<(), FaultCode> {
         // The feedback's reference is what the feedforward's was `preview_ticks` ago.
         let slot = tick as usize % PREVIEW_ROOM;
-        state.preview[slot] = ahead.position;
+        state.preview[slot] = state.look_ahead;
         let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
         let reference = state.preview[delayed];
         if self.feedback.needs_velocity() {
@@ -1097,11 +1094,8 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let error = S::scale_wide((reference - measured).0, self.unit_mm);
         state.telemetry.reference = reference;
         state.telemetry.error = error;
-        state.telemetry.velocity = ahead.velocity;
-        state.acceleration = ahead.acceleration;
-        let follows = self
-            .following
-            .step(&mut state.following, error, ahead.velocity.magnitude());
+        let speed = state.telemetry.velocity.magnitude();
+        let follows = self.following.step(&mut state.following, error, speed);
         // An axis that does not follow cannot be stopped under control, so this goes before what could.
         if follows {
             Ok(())
