@@ -353,11 +353,15 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     #[cold]
     #[inline(never)]
     pub(crate) fn take_over(&self, state: &mut FeedforwardState<S, N>, voltage: S) -> S {
+        if self.gms_gain == S::Gain::default() {
+            return S::ZERO;
+        }
         let force = state.force();
         let change = (force + voltage.scale(self.per_gms_gain)).within(self.most) - force;
         match &self.presliding {
-            _ if !self.kind.has_presliding() => return S::ZERO,
-            Presliding::Gms(GmsOnSurface { elements, .. }) => {
+            Presliding::Gms(GmsOnSurface { elements, .. })
+            | Presliding::Static(GmsOnSurface { elements, .. })
+            | Presliding::Breakaway(GmsOnSurface { elements, .. }) => {
                 elements.load(state.elements(|force| elements.spread(force)), change);
             }
             Presliding::Smoothed { elements, .. } => {

@@ -193,7 +193,9 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
 
     /// Lets the elements carry `change` more, V, by their weights; they stick.
     pub(super) fn load(&mut self, change: S, weights: impl Iterator<Item = S::Gain> + Clone) {
-        self.stick(self.direction, weights.clone());
+        let backward = self.slipping & BACKWARD;
+        self.stick(Direction::Positive, weights.clone());
+        self.slipping = backward;
         for (force, weight) in self.forces.iter_mut().zip(weights) {
             *force = *force + change.scale(weight);
         }

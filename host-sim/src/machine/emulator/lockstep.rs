@@ -8,9 +8,9 @@ use quadrant::lockstep::{
 };
 use quadrant::stage::Outputs;
 
+use super::backoff::Backoff;
 use super::error::EmulatorError;
 use super::memory::Memory;
-use super::backoff::Backoff;
 use super::process::{Clock, Emulator, Listener};
 use super::program::Program;
 

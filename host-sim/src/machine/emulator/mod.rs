@@ -1,17 +1,17 @@
 //! QEMU with the firmware in it, and the memory through which a host plays its stage
 //! ([`quadrant::lockstep`] is its map).
 
+mod backoff;
 mod error;
 mod lockstep;
 mod log;
 mod memory;
-mod backoff;
 mod process;
 mod program;
 
+pub use self::backoff::Backoff;
 pub use self::error::EmulatorError;
 pub use self::lockstep::Lockstep;
 pub use self::memory::Memory;
-pub use self::backoff::Backoff;
 pub use self::process::{Clock, Emulator, Listener, command_line};
 pub use self::program::Program;
