@@ -1179,6 +1179,28 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         self.put_out(state, output)
     }
 
+    /// Takes note of a stop; lets the friction model take over at the next start what the integral has moved by.
+    #[cold]
+    #[inline(never)]
+    fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {
+        let integral = state.feedback.integral();
+        if !moves {
+            return state.rest.stop(integral);
+        }
+        let Some(mut taken) = state.rest.set_off(integral) else {
+            return;
+        };
+        if self.learns {
+            taken = self.learning.unscaled(&state.learning, taken);
+        }
+        taken = self.feedforward.take_over(&mut state.friction, taken);
+        if self.learns {
+            taken = self.learning.take_over(&mut state.learning, taken);
+        }
+        state.feedback.unload(taken);
+        self.filters.shift(&mut state.filters, -taken);
+    }
+
     /// Scales the friction's feedforward as was learnt; returns the whole feedforward, V.
     #[inline(never)]
     fn scale_friction(&self, state: &mut AxisState<S, N>, changed: bool) -> S {

@@ -8,7 +8,6 @@
 //! What the integral had when the reference came to a stop stays with it: an offset, gravity. A load that changes at rest
 //! cannot be told from friction by the encoder, and goes to the model, too, up to the breakaway level.
 
-use super::{Axis, AxisState};
 use crate::law::scalar::Scalar;
 
 /// The memory of the last stop.
@@ -27,6 +26,18 @@ impl<S: Scalar> RestState<S> {
         self.moves != moves
     }
 
+    /// Takes note of a stop, with the integral at it, V.
+    pub(super) fn stop(&mut self, integral: S) {
+        self.moves = false;
+        self.integral = Some(integral);
+    }
+
+    /// Takes note of a start; returns by how much the integral has moved since the stop, V: friction has with it.
+    pub(super) fn set_off(&mut self, integral: S) -> Option<S> {
+        self.moves = true;
+        self.integral.take().map(|before| integral - before)
+    }
+
     /// Forgets the stop.
     #[inline(always)]
     pub(super) fn forget(&mut self) {
@@ -39,32 +50,5 @@ impl<S: Scalar> RestState<S> {
         if let Some(integral) = &mut self.integral {
             *integral = *integral - voltage;
         }
-    }
-}
-
-impl<S: Scalar, const N: usize> Axis<S, N> {
-    /// Takes note of a stop; lets the friction model take over at the next start what the integral has moved by.
-    #[cold]
-    #[inline(never)]
-    pub(super) fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {
-        state.rest.moves = moves;
-        let integral = state.feedback.integral();
-        if !moves {
-            state.rest.integral = Some(integral);
-            return;
-        }
-        let Some(before) = state.rest.integral.take() else {
-            return;
-        };
-        let mut taken = integral - before;
-        if self.learns {
-            taken = self.learning.unscaled(&state.learning, taken);
-        }
-        taken = self.feedforward.take_over(&mut state.friction, taken);
-        if self.learns {
-            taken = self.learning.take_over(&mut state.learning, taken);
-        }
-        state.feedback.unload(taken);
-        self.filters.shift(&mut state.filters, -taken);
     }
 }
