@@ -15,7 +15,7 @@
 //! learnt while the gate is closed holds while it is closed.
 //!
 //! **Change.** What the last seconds say is held against all that is remembered. Where their scales differ by more than
-//! [`DIFFERS`], the axis has changed, and the rest is forgotten: one reversal then counts for all.
+//! [`DIFFERS`] while nothing vibrates, the axis has changed, and the rest is forgotten: one reversal then counts for all.
 //!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
 //! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
@@ -513,7 +513,7 @@ impl<S: Scalar> Learning<S> {
         *fit = add_fit(*fit, keep);
         let telling = lately.information > fit.information.scale(estimate.telling);
         let differs = lately.slope(scale).magnitude() > lately.information.scale(estimate.differs);
-        if telling & differs {
+        if telling & differs & !state.shaken {
             *fit = lately;
         }
         if fit.information > estimate.most_information {
