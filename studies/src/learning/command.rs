@@ -20,7 +20,7 @@ pub struct Arguments {
     only: Option<Question>,
     /// Instead of all that: a recording of EMPS, whose friction then acts on a simulated axis: a CSV file with t_s, position_mm
     /// (or position_m) and voltage_v.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "path"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["only", "settings"])]
     record: Option<PathBuf>,
     #[command(flatten)]
     output: Output,
