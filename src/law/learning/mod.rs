@@ -15,7 +15,7 @@
 //! learnt while the gate is closed holds while it is closed.
 //!
 //! **Change.** What the last seconds say is held against all that is remembered. Where their scales differ by more than
-//! [`DIFFERS`] while nothing vibrates, the axis has changed, and the rest is forgotten: one reversal then counts for all.
+//! a tenth while nothing vibrates, the axis has changed, and the rest is forgotten: one reversal then counts for all.
 //!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
 //! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
