@@ -188,7 +188,7 @@ pub struct LearningState<S: Scalar> {
     /// Sums of the block, and the forgetting ones.
     block: Sums<S>,
     sums: Sums<S>,
-    /// What the last seconds say.
+    /// The sums of the last seconds alone.
     lately: Fit<S>,
 }
 

@@ -175,7 +175,8 @@ impl Lockstep {
 
     /// Waits until ticks have been answered; their number is zero, if the firmware has ended itself instead.
     fn wait(&mut self, mut pause: impl FnMut()) -> Result<u32, EmulatorError> {
-        let mut since = None;
+        let since = Instant::now();
+        let mut looked = since;
         loop {
             let count = self.news()?;
             if count > 0 {
@@ -183,12 +184,10 @@ impl Lockstep {
             }
             pause();
             // Seldom: it asks the operating system.
-            let since: &mut (Instant, Instant) =
-                since.get_or_insert_with(|| (Instant::now(), Instant::now()));
-            if since.1.elapsed() < PAUSE {
+            if looked.elapsed() < PAUSE {
                 continue;
             }
-            since.1 = Instant::now();
+            looked = Instant::now();
             if let Some(status) = self.emulator.ended()? {
                 // It may have answered first.
                 let count = self.news()?;
@@ -197,7 +196,7 @@ impl Lockstep {
                     false => Err(self.emulator.failure()?),
                 };
             }
-            if since.0.elapsed() >= TIMEOUT {
+            if since.elapsed() >= TIMEOUT {
                 return Err(EmulatorError::Silent {
                     tick: self.answered.wrapping_add(1),
                     waited: TIMEOUT,
