@@ -9,7 +9,7 @@ use quadrant::control::plant_model::PlantModel;
 use quadrant::friction::PerDirection;
 use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::reference::{Motion, RecordedTable};
+use quadrant::reference::{Motion, MotionScale, RecordedTable};
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant::units::Position;
 use rayon::prelude::*;
@@ -237,6 +237,35 @@ impl From<quadrant::settings::SettingsError> for ReplayError {
     }
 }
 
+/// Makes the motion along recorded positions, mm. Its table lives in flash for ever in a firmware; here it lives as long as the
+/// process.
+///
+/// # Errors
+/// A sample time that is not a whole number of control periods.
+pub fn recorded_motion(
+    positions_mm: &[f64],
+    sample_time_s: f64,
+    scale: MotionScale,
+) -> Result<RecordedTable<f32>, ReplayError> {
+    let ticks = sample_time_s * scale.rate_hz;
+    let ticks_per_sample = ticks.round();
+    if ticks_per_sample < 1.0 || (ticks - ticks_per_sample).abs() > 1e-3 * ticks_per_sample {
+        return Err(ReplayError::SampleTime {
+            sample_time_s,
+            period_s: 1.0 / scale.rate_hz,
+        });
+    }
+    let positions: Vec<Position> = positions_mm
+        .iter()
+        .map(|&mm| Position::from_mm(mm, scale.resolution_mm))
+        .collect();
+    Ok(RecordedTable::new(
+        positions.leak(),
+        ticks_per_sample as u32,
+        scale,
+    ))
+}
+
 /// Number of runs in [`replay`].
 pub const RUNS: u64 = 8;
 
@@ -254,22 +283,13 @@ pub fn replay(
 ) -> Result<Vec<RecordedOutcome>, ReplayError> {
     let axis = axis.build(setup)?;
     let rate_hz = StageSettings::simulated().rate_hz;
-    let ticks = record.sample_time_s * rate_hz;
-    let ticks_per_sample = ticks.round();
-    if ticks_per_sample < 1.0 || (ticks - ticks_per_sample).abs() > 1e-3 * ticks_per_sample {
-        return Err(ReplayError::SampleTime {
-            sample_time_s: record.sample_time_s,
-            period_s: 1.0 / rate_hz,
-        });
-    }
-    let resolution_mm = axis.settings.encoder.resolution_mm;
-    let positions: Vec<Position> = record
-        .reference_mm
-        .iter()
-        .map(|&mm| Position::from_mm(mm, resolution_mm))
-        .collect();
-    // The firmware's table lives in flash for ever; here it lives as long as the process.
-    let positions: &'static [Position] = positions.leak();
+    let scale = MotionScale {
+        resolution_mm: axis.settings.encoder.resolution_mm,
+        rate_hz,
+    };
+    let table = recorded_motion(&record.reference_mm, record.sample_time_s, scale)?;
+    let duration_s = record.reference_mm.len() as f64 * record.sample_time_s;
+    let most_ticks = (duration_s * rate_hz).round() as usize + 10_000;
     let machine_itself = record.position_mm.as_ref().map(|position| {
         let error_mm: Vec<f64> = record
             .reference_mm
@@ -289,13 +309,7 @@ pub fn replay(
     let ours: Result<Vec<_>, ReplayError> = Configuration::all()
         .into_par_iter()
         .map(|configuration| {
-            let outcome = run_record(
-                configuration,
-                &axis,
-                positions,
-                ticks_per_sample as u32,
-                seed,
-            );
+            let outcome = run_record(configuration, &axis, &table, most_ticks, seed);
             advance();
             outcome
         })
@@ -306,8 +320,8 @@ pub fn replay(
 fn run_record(
     configuration: Configuration,
     axis: &Axis,
-    positions: &'static [Position],
-    ticks_per_sample: u32,
+    table: &RecordedTable<f32>,
+    most_ticks: usize,
     seed: u64,
 ) -> Result<RecordedOutcome, ReplayError> {
     let mut settings = StageSettings::simulated();
@@ -315,17 +329,15 @@ fn run_record(
     configuration.apply(&mut settings);
     let mut truth = StageParameters::ideal();
     truth.axes[0] = axis.truth.clone();
-    let table = RecordedTable::new(positions, ticks_per_sample, settings.motion_scale(0));
     let mut machine = LawMachine::<f32, ELEMENTS>::with_plan(
         settings.build()?,
-        [Motion::Recorded(table), Motion::Hold, Motion::Hold],
+        [Motion::Recorded(table.clone()), Motion::Hold, Motion::Hold],
     );
     let mut plant = SimulatedStage::new(&truth, settings.rate_hz, seed);
     let resolution_mm = settings
         .axes
         .each_ref()
         .map(|axis| axis.encoder.resolution_mm);
-    let most_ticks = positions.len() * ticks_per_sample as usize + 10_000;
     let [trace, ..] = run(&mut machine, &mut plant, resolution_mm, most_ticks)?;
     let period_s = 1.0 / settings.rate_hz;
     let error_mm = settled(trace.error_mm, period_s);

@@ -10,14 +10,13 @@ use std::sync::Arc;
 use anyhow::Context;
 use quadrant::reference::{MotionScale, RecordedTable};
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant::units::Position;
 use quadrant_sim::identify::motion::{
     MotionFitSettings, MotionModel, Signals, fit_motion, recommended,
 };
 use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::plant::load::{Force, Load};
 use quadrant_sim::record::Recording;
-use quadrant_sim::replay::recorded::{Axis, emps_axis};
+use quadrant_sim::replay::recorded::{Axis, emps_axis, recorded_motion};
 use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
@@ -40,18 +39,11 @@ impl Experiment {
     fn new(recording: &Recording, axis: &Axis, rate_hz: f64) -> anyhow::Result<Self> {
         let signals = Signals::new(recording, &MotionFitSettings::default());
         let sample_time_s = signals.sample_time_s;
-        let ticks = (sample_time_s * rate_hz).round();
-        anyhow::ensure!(
-            ticks >= 1.0 && (sample_time_s * rate_hz - ticks).abs() < 1e-3,
-            "the record's sample time, {sample_time_s} s, is not a whole number of control periods of {} s",
-            1.0 / rate_hz
-        );
-        let resolution_mm = axis.settings.encoder.resolution_mm;
-        let positions: Vec<Position> = signals
-            .position_mm
-            .iter()
-            .map(|mm| Position::from_mm(*mm, resolution_mm))
-            .collect();
+        let scale = MotionScale {
+            resolution_mm: axis.settings.encoder.resolution_mm,
+            rate_hz,
+        };
+        let table = recorded_motion(&signals.position_mm, sample_time_s, scale)?;
         let friction = signals.voltage_v.iter().zip(&signals.acceleration_mm_s2);
         let force = Force {
             sample_time_s,
@@ -61,13 +53,8 @@ impl Experiment {
         };
         let mut truth = axis.truth.clone().with_friction(0.0);
         truth.imperfections.offset_v = 0.0;
-        let scale = MotionScale {
-            resolution_mm,
-            rate_hz,
-        };
         Ok(Self {
-            // The firmware's table lives in flash for ever; here it lives as long as the process.
-            table: RecordedTable::new(positions.leak(), ticks as u32, scale),
+            table,
             load: Load::Recorded {
                 force: Arc::new(force),
                 newtons_per_volt: 1.0,
