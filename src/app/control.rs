@@ -14,12 +14,11 @@ use crate::law::safety::{FaultCode, Operation, Station, Switches};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
 
-/// Everything that the control interrupt owns.
+/// Everything that the control interrupt owns. What is small comes first.
+#[repr(C)]
 pub struct Control<'q, 'a, S: Scalar> {
     axes: PerAxis<&'a mut Axis<S>>,
     operation: Operation,
-    plan: Plan<S>,
-    state: StageState<S, FIRMWARE_ELEMENTS>,
     sampler: Sampler,
     sampling: SamplerState,
     capture: Option<Capture<'a>>,
@@ -37,6 +36,8 @@ pub struct Control<'q, 'a, S: Scalar> {
     plan_taken: bool,
     host: HostNeed,
     ends: ControlEnds<'q, 'a, S>,
+    plan: Plan<S>,
+    state: StageState<S, FIRMWARE_ELEMENTS>,
 }
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {

@@ -101,10 +101,10 @@ pub struct StageRef<'a, S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     pub operation: &'a Operation,
 }
 
-/// The memory of the stage.
+/// The memory of the stage. What is small comes first.
 #[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
 pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
-    axes: PerAxis<AxisState<S, N>>,
     safety: SafetyState,
     tick: u32,
     interlock: Option<EnableInterlock>,
@@ -119,6 +119,7 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     locked: bool,
     /// The stored settings are damaged or were refused.
     settings_invalid: bool,
+    axes: PerAxis<AxisState<S, N>>,
 }
 
 /// The fault that each axis found in a tick, if any.

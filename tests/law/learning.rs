@@ -55,9 +55,13 @@ impl<S: Scalar> Axis<S> {
     }
 
     fn on(settings: &StageSettings, friction: f64, plan: &PlanSettings) -> Self {
+        Self::on_plant(settings, &Truth { friction, ..MODEL }, plan)
+    }
+
+    fn on_plant(settings: &StageSettings, truth: &Truth, plan: &PlanSettings) -> Self {
         let mut axis = Self {
             rig: Rig::with_plant(settings, plan),
-            plant: Plant::new(&Truth { friction, ..MODEL }),
+            plant: Plant::new(truth),
             encoder: Encoder::new(Death::Healthy, 7),
             pushed_v: 0.0,
             shaken: (0.0, 0.0),
@@ -164,6 +168,41 @@ fn the_error_without_feedforward_is_known_with_it() {
         (said / measured - 1.0).abs() < 0.25,
         "{said} is said, {measured} measured"
     );
+}
+
+#[test]
+fn the_error_without_feedforward_is_known_of_a_loop_that_answers_quickly() {
+    let quick = |mut settings: StageSettings| {
+        let [x, ..] = &mut settings.axes;
+        x.plant.as_mut().expect("by default").delay_s *= 0.2;
+        x.feedback.pid.kd_v_s_per_mm *= 8.0;
+        x.feedback.pid.kp_v_per_mm *= 40.0;
+        x.feedback.pid.ki_v_per_mm_s *= 200.0;
+        settings
+    };
+    let truth = Truth {
+        delay: 0.2,
+        friction: 1.5,
+        ..MODEL
+    };
+    let run = |settings: StageSettings| {
+        let mut axis = Axis::<f32>::on_plant(&settings, &truth, &sine_on_x(2.0, 5.0));
+        axis.command(Command::Run);
+        axis.run(5.0);
+        let square = axis.run(8.0);
+        let learning = axis.rig.state.axes()[0].learning();
+        (
+            square,
+            learning.error_squares() / learning.error_squares_off(),
+        )
+    };
+    let (with, said) = run(quick(learning()));
+    let mut off = quick(fixed());
+    off.axes[0].feedforward.kind = FeedforwardKind::None;
+    let (without, _) = run(off);
+    let (said, measured) = (f64::from(said).sqrt(), (with / without).sqrt());
+    println!("{said} is said, {measured} measured");
+    assert!((said / measured - 1.0).abs() < 0.25);
 }
 
 #[test]

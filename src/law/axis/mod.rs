@@ -804,6 +804,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(never)]
     fn learn(&self, state: &mut AxisState<S, N>) {
         let seen = &state.telemetry;
+        if !self.learning.look(&mut state.learning, seen.error) {
+            return;
+        }
         let status = if !matches!(
             state.mode(),
             MotionMode::Plan | MotionMode::Stream | MotionMode::Hold

@@ -2,15 +2,12 @@
 //! to the position that it brings about.
 //!
 //! `v' = A u(t - Td) - B v - C y`, `u = w - PID(y)`: the exact step of the damped mass for a held input, the trapezoidal rule
-//! for the position. The PID's derivative acts on the model's velocity, which needs no differences. Steps are
-//! [`INTERVAL_TICKS`] control periods long; what a longer hold delays more, the dead time is shorter by.
+//! for the position. The PID's derivative acts on the model's velocity, which needs no differences. A step takes several control
+//! periods; what a longer hold delays more, the dead time is shorter by.
 
 use crate::law::control::pid::PidGains;
 use crate::law::control::plant_model::PlantModel;
 use crate::law::scalar::{Quantity, Scalar};
-
-/// Control periods in a step of the model.
-pub(crate) const INTERVAL_TICKS: u32 = 4;
 
 /// Inputs that are remembered; a power of two.
 const ROOM: usize = 8;
@@ -54,9 +51,8 @@ pub(super) struct ClosedLoopState<S: Scalar> {
 }
 
 impl<S: Scalar> ClosedLoop<S> {
-    /// Makes the loop of a plant and its PID, for a control period. Settings time only.
-    pub(super) fn build(plant: &PlantModel, gains: &PidGains, period_s: f64) -> Self {
-        let step_s = period_s * f64::from(INTERVAL_TICKS);
+    /// Makes the loop of a plant and its PID, for a control period and a step of the model. Settings time only.
+    pub(super) fn build(plant: &PlantModel, gains: &PidGains, period_s: f64, step_s: f64) -> Self {
         let damping = plant.damping_per_s * step_s;
         // The velocity that a volt brings in a step.
         let push_s = if damping > 1e-9 {

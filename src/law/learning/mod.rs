@@ -27,11 +27,12 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
 pub use self::closed_loop::MAX_DELAY_TICKS;
-use self::closed_loop::{ClosedLoop, ClosedLoopState, INTERVAL_TICKS};
+use self::closed_loop::{ClosedLoop, ClosedLoopState};
 use self::vibration::{Gate, GateState};
 use crate::law::control::pid::PidGains;
 use crate::law::control::plant_model::PlantModel;
 use crate::law::feedforward::FeedforwardTerms;
+use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
 /// Largest scale.
@@ -63,8 +64,16 @@ pub struct LearningLoop<'a> {
 /// Bounds of one over the scale: below a quarter, a scale takes over less than it could.
 const INVERSES: (f64, f64) = (1.0 / MOST_SCALE, 4.0);
 
-/// Steps of the model in a block: the scale moves once a block.
-const BLOCK_STEPS: u8 = 32;
+/// Control periods from one look at the axis to the next.
+const LOOK_TICKS: u32 = 4;
+
+/// Longest step of the model, s, and over the time in which the loop answers; and most looks in a step.
+const STEP_S: f64 = 1.2e-3;
+const STEP_SHARE: f64 = 1.0;
+const MOST_LOOKS: f64 = 4.0;
+
+/// Length of a block, s, as nearly as whole steps allow: the scale moves once a block.
+const BLOCK_S: f64 = 12.8e-3;
 
 /// Unit of errors, as a multiple of breakaway over Kp: half of what a reversal without feedforward leaves.
 const UNIT: f64 = 4.0;
@@ -103,6 +112,17 @@ const QUIET_BLOCKS: u8 = 40;
 /// Time for which nothing is learnt after the model and the axis may have parted, s.
 const SETTLING_S: f64 = 1.0;
 
+impl LearningLoop<'_> {
+    /// Longest step that a model of the loop may take, s: rounding must not take a look away.
+    fn step_s(&self) -> f64 {
+        let gain = self.plant.gain_mm_per_v_s2;
+        let crossover_per_s = (gain * self.pid.kd_v_s_per_mm)
+            .max(libm::sqrt(gain * self.pid.kp_v_per_mm))
+            .max(1e-9);
+        1.001 * f64::min(STEP_S, STEP_SHARE / crossover_per_s)
+    }
+}
+
 /// The reason for which the scale is not learnt in a tick, or that it is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[repr(u8)]
@@ -127,7 +147,10 @@ pub enum LearningStatus {
 /// Learning ready for the tick.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Learning<S: Scalar> {
-    on: bool,
+    /// Looks in a step; none without learning.
+    looks: u8,
+    /// Steps in a block.
+    block_steps: u8,
     settling_steps: u16,
     closed_loop: ClosedLoop<S>,
     gate: Gate<S>,
@@ -178,7 +201,8 @@ pub struct LearningState<S: Scalar> {
     status: LearningStatus,
     /// The output was at its limit since the last step.
     saturated: bool,
-    /// Steps in the block, and steps until learning begins again.
+    /// Looks in the step, steps in the block, and steps until learning begins again.
+    looks: u8,
     steps: u8,
     settling: u16,
     /// True if the gate is closed; blocks for which it has been closed or open; and what was learnt while it was the other.
@@ -261,18 +285,27 @@ pub struct LearningInput<S> {
 impl<S: Scalar> Learning<S> {
     /// Learning on an axis, for a control period. Settings time only.
     pub fn build(settings: &LearningSettings, axis: &LearningLoop, period_s: f64) -> Self {
-        let step_s = period_s * f64::from(INTERVAL_TICKS);
-        let block_s = step_s * f64::from(BLOCK_STEPS);
+        let look_s = period_s * f64::from(LOOK_TICKS);
+        let looks = rounding::floor(axis.step_s() / look_s).clamp(1.0, MOST_LOOKS);
+        let step_s = look_s * looks;
+        let block_steps = rounding::round(BLOCK_S / step_s).clamp(1.0, f64::from(u8::MAX));
+        let block_s = step_s * block_steps;
         let unit_mm = UNIT * axis.breakaway_v / axis.pid.kp_v_per_mm.max(1e-9);
         let count = GUARD_COUNTS * axis.resolution_mm / unit_mm;
         let number = |value| S::quantise(value, Quantity::Multiplier);
         let share = |value| S::gain(value, Quantity::Multiplier, Quantity::Multiplier);
         let fraction = |value| S::quantise(value, Quantity::Fraction);
         Self {
-            on: true,
+            looks: looks as u8,
+            block_steps: block_steps as u8,
             settling_steps: (SETTLING_S / step_s).min(f64::from(u16::MAX)) as u16,
-            closed_loop: ClosedLoop::build(axis.plant, axis.pid, period_s),
-            gate: Gate::build(settings.vibration_mm_s, axis.resolution_mm, period_s),
+            closed_loop: ClosedLoop::build(axis.plant, axis.pid, period_s, step_s),
+            gate: Gate::build(
+                settings.vibration_mm_s,
+                axis.resolution_mm,
+                step_s,
+                looks as u8,
+            ),
             unloaded: S::gain(
                 if axis.pid.ki_v_per_mm_s > 0.0 {
                     1.0
@@ -313,7 +346,7 @@ impl<S: Scalar> Learning<S> {
     /// True if there is learning.
     #[inline(always)]
     pub const fn is_on(&self) -> bool {
-        self.on
+        self.looks > 0
     }
 
     /// A memory that begins at the commissioned value. Nothing is learnt from what the axis did before.
@@ -340,6 +373,7 @@ impl<S: Scalar> Learning<S> {
             closed_loop,
             gate,
             saturated,
+            looks,
             steps,
             settling,
             block,
@@ -350,6 +384,7 @@ impl<S: Scalar> Learning<S> {
         *closed_loop = ClosedLoopState::default();
         *gate = GateState::default();
         *saturated = false;
+        *looks = 0;
         *steps = 0;
         *settling = 0;
         *block = Sums::default();
@@ -384,7 +419,19 @@ impl<S: Scalar> Learning<S> {
         self.one + state.deviation
     }
 
-    /// One step, [`INTERVAL_TICKS`] control periods long; returns the voltage by which the feedforward grew with a change of
+    /// Looks at the tracking error, mm; returns true if a step is due.
+    #[inline(always)]
+    pub(crate) fn look(&self, state: &mut LearningState<S>, error: S) -> bool {
+        state.gate.hear(error);
+        state.looks += 1;
+        let due = state.looks >= self.looks;
+        if due {
+            state.looks = 0;
+        }
+        due
+    }
+
+    /// One step; returns the voltage by which the feedforward grew with a change of
     /// the scale, which the integral is to lose: what it has taken up of the friction is the feedforward's now. `gain` is the nonlinear gain of
     /// the feedback at an error, if it has one.
     #[inline(always)]
@@ -395,7 +442,7 @@ impl<S: Scalar> Learning<S> {
         gain: impl FnOnce(S) -> Option<S>,
     ) -> S {
         let error = input.error;
-        let opened = self.gate.step(&mut state.gate, error);
+        let opened = self.gate.step(&mut state.gate);
         let ungated = state
             .presliding
             .times(opened, Quantity::Multiplier)
@@ -437,7 +484,7 @@ impl<S: Scalar> Learning<S> {
         block.with = block.with + product(with, with);
         block.without = block.without + product(without, without);
         state.steps += 1;
-        if state.steps < BLOCK_STEPS {
+        if state.steps < self.block_steps {
             return gained;
         }
         let before = state.deviation;

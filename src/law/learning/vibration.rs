@@ -3,9 +3,9 @@
 //! A cut that shakes the axis takes friction's hysteresis away: the mean of friction over a period of the vibration is no step
 //! at a reversal, but rises with the velocity. The velocity of the tracking error between two corner frequencies is squared
 //! and averaged; of its amplitude `a`, beyond what the encoder's own noise shows, the gate is `g = 1 / (1 + (a / a1)^2)`. There
-//! is no division: `g` goes to the solution of `g (1 + (a / a1)^2) = 1` by a share of the difference in each step.
+//! is no division: `g` goes to the solution of `g (1 + (a / a1)^2) = 1` by a share of the difference in each step. A step sees the mean
+//! of several errors: of the encoder's noise, which they do not share, less is then folded into the band.
 
-use super::closed_loop::INTERVAL_TICKS;
 use crate::law::scalar::{Quantity, Scalar};
 
 /// Corner frequencies of the band, Hz: above the loop's own motions, and below most of the encoder's noise.
@@ -46,7 +46,9 @@ pub(super) struct Gate<S: Scalar> {
 /// The memory of the gate.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct GateState<S: Scalar> {
-    error: S,
+    /// Sums of the errors of a step: of this one so far, and of the last.
+    heard: S,
+    heard_before: S,
     low: S,
     slow: S,
     power: S,
@@ -55,22 +57,23 @@ pub(super) struct GateState<S: Scalar> {
 }
 
 impl<S: Scalar> Gate<S> {
-    /// Makes a gate that is one half at an amplitude of `half_mm_s`, for an encoder with counts of `resolution_mm` and a
-    /// control period. Settings time only.
-    pub(super) fn build(half_mm_s: f64, resolution_mm: f64, period_s: f64) -> Self {
-        let step_s = period_s * f64::from(INTERVAL_TICKS);
+    /// Makes a gate that is one half at an amplitude of `half_mm_s`, for an encoder with counts of `resolution_mm` and steps of
+    /// `errors` errors. Settings time only.
+    pub(super) fn build(half_mm_s: f64, resolution_mm: f64, step_s: f64, errors: u8) -> Self {
+        let errors = f64::from(errors);
         let pole = |hz: f64| libm::exp(-core::f64::consts::TAU * hz * step_s);
         let (slow, low) = (pole(BAND_HZ.0), pole(BAND_HZ.1));
         let mean = libm::exp(-step_s / MEAN_S);
         // Noise of the counts through the difference and the low-pass, as the square of an amplitude.
         let noise_mm_s = NOISE_COUNTS * resolution_mm / step_s / half_mm_s;
-        let noise = 4.0 * (1.0 - low) * (1.0 - low) / (1.0 + low) * noise_mm_s * noise_mm_s;
+        let noise =
+            4.0 * (1.0 - low) * (1.0 - low) / (1.0 + low) * noise_mm_s * noise_mm_s / errors;
         let number = |value| S::quantise(value, Quantity::Multiplier);
         let share = |value| S::gain(value, Quantity::Multiplier, Quantity::Multiplier);
         let fraction = |value| S::quantise(value, Quantity::Fraction);
         Self {
             velocity: S::gain(
-                (1.0 - low) / (step_s * half_mm_s),
+                (1.0 - low) / (errors * step_s * half_mm_s),
                 Quantity::Length,
                 Quantity::Multiplier,
             ),
@@ -84,12 +87,13 @@ impl<S: Scalar> Gate<S> {
         }
     }
 
-    /// One step, with the tracking error in mm; returns by how much the gate has changed.
+    /// One step with the errors that were heard since the last; returns by how much the gate has changed.
     #[inline(always)]
-    pub(super) fn step(&self, state: &mut GateState<S>, error: S) -> S {
+    pub(super) fn step(&self, state: &mut GateState<S>) -> S {
         let (most_velocity, most_power) = self.most;
-        let moved = error - state.error;
-        state.error = error;
+        let heard = core::mem::replace(&mut state.heard, S::ZERO);
+        let moved = heard - state.heard_before;
+        state.heard_before = heard;
         let low = state.low.times(self.low, Quantity::Fraction) + moved.scale(self.velocity);
         state.low = low.within(most_velocity);
         let band = state.low - state.slow;
@@ -105,6 +109,12 @@ impl<S: Scalar> Gate<S> {
 }
 
 impl<S: Scalar> GateState<S> {
+    /// Takes a tracking error of the next step, mm.
+    #[inline(always)]
+    pub(super) fn hear(&mut self, error: S) {
+        self.heard = self.heard + error;
+    }
+
     /// The gate less 1, within -1 to 0, a [`Quantity::Multiplier`].
     #[inline(always)]
     pub(super) fn deviation(&self) -> S {

@@ -8,7 +8,7 @@ use quadrant_cli::output::Output;
 use quadrant_cli::say;
 use quadrant_sim::report::{Block, Section};
 
-use super::{changes, cuts, figures, parts, recorded, starts};
+use super::{changes, cuts, figures, known, parts, recorded, starts};
 
 /// Options of `quadrant-studies learning`.
 #[derive(Clone, Debug, Args)]
@@ -31,6 +31,8 @@ pub struct Arguments {
 enum Question {
     /// Other gains, another history, friction from a catalogue.
     Starts,
+    /// Friction that the feedforward knows.
+    Known,
     /// Short moves, and a part with reversals of all sizes.
     Parts,
     /// Another tool, an hour of rest.
@@ -66,6 +68,9 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let mut tables = Vec::new();
     if asked(Question::Starts) {
         tables.extend(starts::tables(&stage, axis, seed)?);
+    }
+    if asked(Question::Known) {
+        tables.push(known::table(&stage, axis, seed)?);
     }
     if asked(Question::Parts) {
         tables.push(parts::table(&stage, seed)?);

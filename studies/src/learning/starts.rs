@@ -54,7 +54,7 @@ pub(super) fn nominal() -> AxisParameters {
 }
 
 /// The gains of the whole friction feedforward, times a factor.
-fn with_gains(axis: &AxisSettings, factor: f64) -> AxisSettings {
+pub(super) fn with_gains(axis: &AxisSettings, factor: f64) -> AxisSettings {
     let mut axis = axis.clone();
     let gains = &mut axis.feedforward.gains;
     for gain in [&mut gains.gms, &mut gains.level, &mut gains.viscous] {
