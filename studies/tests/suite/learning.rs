@@ -22,6 +22,26 @@ fn the_figures_are_written_and_the_scale_settles_at_the_friction() {
     fail(folder.path(), &["learning", "--only", "magic"]);
 }
 
+#[test]
+fn learning_leaves_as_little_as_a_feedforward_that_knows_the_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(
+        folder.path(),
+        &[
+            "learning", "--only", "known", "--format", "csv", "--out", "a",
+        ],
+    );
+    let table = std::fs::read_to_string(folder.path().join("a/known.csv")).unwrap();
+    for row in table.lines().skip(1) {
+        let cells = row.split(',').skip(1);
+        // Largest and RMS of: without, scaled by hand, the axis' own friction, learning; um.
+        let errors: Vec<f64> = cells.map(|cell| cell.parse().unwrap()).collect();
+        let [without, scaled, own, learning] = [errors[1], errors[3], errors[5], errors[7]];
+        assert!(learning < 0.1 * without, "{table}");
+        assert!(learning < 1.25 * f64::max(scaled, own), "{table}");
+    }
+}
+
 /// A recording of an axis like EMPS: 25 s of two cosines, from rest, with friction that nothing of ours made.
 fn record() -> String {
     let sines = [(45.0, 0.2), (12.0, 0.62)].map(|(mm, hz)| (mm, std::f64::consts::TAU * hz));
