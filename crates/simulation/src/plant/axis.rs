@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::friction::Direction;
+use quadrant::friction::{Direction, PerDirection};
 use quadrant::units::DacCode;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
@@ -14,15 +14,51 @@ use super::{AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, Preslid
 /// Steps of the integration in a control period.
 pub const SUBSTEPS: usize = 4;
 
-/// Forces that an axis takes for the whole of a control period, V at the amplifier's input.
+/// A control period of an axis: what stays the same in it, and the motion, which the steps of the integration keep in registers.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct PeriodForces {
-    /// Output of the amplifier, before the plant's delay.
-    driven_v: f64,
-    /// Load, ripple, cogging and gravity.
+pub(super) struct Period {
+    /// Output of the amplifier after the plant's delay, V, in each step.
+    driven_v: [f64; SUBSTEPS],
+    /// Load, ripple, cogging and gravity, V at the amplifier's input.
     external_v: f64,
     /// Friction where the axis is over its mean.
     friction_factor: f64,
+    moving: Moving,
+}
+
+/// Motion of an axis.
+#[derive(Clone, Copy, Debug, Default)]
+struct Moving {
+    /// Of the table, and of the motor where it moves with it.
+    position_mm: f64,
+    velocity_mm_s: f64,
+    /// The motor, where a gap lies between it and the table.
+    motor: Body,
+    /// Friction without its viscous part, V.
+    presliding_v: f64,
+    /// Viscous friction of the last step, V s/mm.
+    viscous_v_s_per_mm: f64,
+}
+
+/// Damping of an axis in one sense of motion.
+#[derive(Clone, Copy, Debug)]
+struct Damping {
+    viscous_v_s_per_mm: f64,
+    /// Share of the velocity that half a step takes away from motor and table together.
+    drag: f64,
+}
+
+impl Damping {
+    fn of(truth: &AxisParameters, step_s: f64) -> PerDirection<Self> {
+        truth.friction.map(|friction| {
+            let viscous = friction.viscous_v_s_per_mm;
+            let rate_per_s = truth.damping_per_s + truth.gain_mm_per_v_s2 * viscous;
+            Self {
+                viscous_v_s_per_mm: viscous,
+                drag: 0.5 * step_s * rate_per_s,
+            }
+        })
+    }
 }
 
 /// One simulated axis in motion.
@@ -34,14 +70,9 @@ pub struct SimulatedAxis {
     /// The plant's delay, of one amplifier voltage a substep.
     delay: Delay,
     presliding: Presliding,
-    /// Friction without its viscous part, V.
-    presliding_v: f64,
-    friction_v: f64,
+    damping: PerDirection<Damping>,
+    moving: Moving,
     load_v: f64,
-    position_mm: f64,
-    velocity_mm_s: f64,
-    /// The motor, where a gap lies between it and the table.
-    motor: Body,
     noise: Xoshiro256PlusPlus,
 }
 
@@ -55,12 +86,9 @@ impl SimulatedAxis {
             volts_per_code: truth.full_scale_v / DacCode::FULL_SCALE,
             delay: Delay::of(delay),
             presliding: Presliding::new(&truth, step_s),
-            presliding_v: 0.0,
-            friction_v: 0.0,
+            damping: Damping::of(&truth, step_s),
+            moving: Moving::default(),
             load_v: 0.0,
-            position_mm: 0.0,
-            velocity_mm_s: 0.0,
-            motor: Body::default(),
             noise: Xoshiro256PlusPlus::seed_from_u64(seed),
             truth,
         }
@@ -73,30 +101,32 @@ impl SimulatedAxis {
         self.delay.resize(delay);
         self.volts_per_code = truth.full_scale_v / DacCode::FULL_SCALE;
         self.presliding.change(&truth, self.step_s);
+        self.damping = Damping::of(&truth, self.step_s);
         self.truth = truth;
     }
 
     /// The true position, mm.
     pub fn position_mm(&self) -> f64 {
-        self.position_mm
+        self.moving.position_mm
     }
 
     /// The true velocity, mm/s.
     pub fn velocity_mm_s(&self) -> f64 {
-        self.velocity_mm_s
+        self.moving.velocity_mm_s
     }
 
     /// The motor's position as far as it has one of its own, mm.
     pub fn motor_position_mm(&self) -> f64 {
         match self.truth.drive {
-            Drive::RackAndPinion(_) => self.motor.position_mm,
-            Drive::BallScrew | Drive::Direct(_) => self.position_mm,
+            Drive::RackAndPinion(_) => self.moving.motor.position_mm,
+            Drive::BallScrew | Drive::Direct(_) => self.moving.position_mm,
         }
     }
 
     /// The friction at this moment, V at the amplifier input.
     pub fn friction_v(&self) -> f64 {
-        self.friction_v
+        let moving = &self.moving;
+        moving.presliding_v + moving.viscous_v_s_per_mm * moving.velocity_mm_s
     }
 
     /// Sets an external load (a cutting force, say), in V at the amplifier input; positive loads push towards larger
@@ -116,24 +146,26 @@ impl SimulatedAxis {
         };
         let seen_mm = match self.truth.drive {
             Drive::RackAndPinion(gap) if gap.encoder == EncoderSide::Motor => {
-                self.motor.position_mm
+                self.moving.motor.position_mm
             }
-            _ => self.position_mm,
+            _ => self.moving.position_mm,
         };
         let error_mm = self.truth.imperfections.interpolation_error_mm(seen_mm);
-        ((seen_mm + error_mm + noise) / self.truth.resolution_mm).floor() as i64 as u32
+        floor((seen_mm + error_mm + noise) / self.truth.resolution_mm) as u32
     }
 
     /// One control period with the converter at `code` (or the amplifier disabled).
     pub fn step(&mut self, code: DacCode, enabled: bool) {
-        let forces = self.period_forces(code, enabled);
-        for _ in 0..SUBSTEPS {
-            self.substep(forces);
+        let mut period = self.begin(code, enabled);
+        for step in 0..SUBSTEPS {
+            self.substep(&mut period, step);
         }
+        self.end(&period);
     }
 
-    /// The forces of a control period with the converter at `code` (or the amplifier disabled).
-    pub(super) fn period_forces(&self, code: DacCode, enabled: bool) -> PeriodForces {
+    /// Begins a control period with the converter at `code` (or the amplifier disabled).
+    #[inline(always)]
+    pub(super) fn begin(&mut self, code: DacCode, enabled: bool) -> Period {
         let Self { truth, .. } = self;
         let imperfections = &truth.imperfections;
         let limit = truth.full_scale_v;
@@ -143,75 +175,85 @@ impl SimulatedAxis {
         } else {
             0.0
         };
+        let position_mm = self.moving.position_mm;
         // In a control period the screw turns by a thousandth, and the axis moves by a thousandth of what friction varies over: both are
         // taken once.
         let ripple = if imperfections.ripple_v > 0.0 {
-            imperfections.ripple_v * (TAU * self.position_mm / imperfections.lead_mm).sin()
+            imperfections.ripple_v * (TAU * position_mm / imperfections.lead_mm).sin()
         } else {
             0.0
         };
-        let external = self.load_v - ripple + truth.drive.force_v(self.position_mm);
+        let external = self.load_v - ripple + truth.drive.force_v(position_mm);
         // Without gravity the sum is the one above, to the bit.
         let external = if imperfections.gravity_v == 0.0 {
             external
         } else {
             external + imperfections.gravity_v
         };
-        PeriodForces {
-            driven_v: driven,
+        Period {
+            driven_v: self.delay.pass(driven),
             external_v: external,
-            friction_factor: imperfections.friction_factor(self.position_mm),
+            friction_factor: imperfections.friction_factor(position_mm),
+            moving: self.moving,
         }
     }
 
     /// One step of the integration.
     #[inline(always)]
-    pub(super) fn substep(&mut self, forces: PeriodForces) {
-        let driven_v = self.delay.pass(forces.driven_v);
-        let external_v = forces.external_v;
-        let along = |velocity: f64| {
-            if velocity < 0.0 {
-                Direction::Negative
-            } else {
-                Direction::Positive
+    pub(super) fn substep(&mut self, period: &mut Period, step: usize) {
+        let driven_v = period.driven_v[step];
+        let external_v = period.external_v;
+        let moving = &mut period.moving;
+        let damping = self.damping.of(Direction::of(moving.velocity_mm_s));
+        let displacement = match self.truth.drive {
+            Drive::RackAndPinion(gap) => {
+                self.move_geared(moving, &gap, driven_v, external_v, damping)
+            }
+            Drive::BallScrew | Drive::Direct(_) => {
+                self.move_rigid(moving, driven_v + external_v, damping)
             }
         };
-        let truth = &self.truth;
-        let viscous = truth
-            .friction
-            .of(along(self.velocity_mm_s))
-            .viscous_v_s_per_mm;
-        let displacement = match truth.drive {
-            Drive::RackAndPinion(gap) => self.move_geared(&gap, driven_v, external_v, viscous),
-            Drive::BallScrew | Drive::Direct(_) => self.move_rigid(driven_v + external_v, viscous),
-        };
-        let factor = forces.friction_factor;
-        let after = self.velocity_mm_s;
-        self.presliding_v = factor * self.presliding.step(displacement, after.abs(), self.step_s);
-        self.friction_v = self.presliding_v + viscous * after;
+        let speed = moving.velocity_mm_s.abs();
+        moving.presliding_v =
+            period.friction_factor * self.presliding.step(displacement, speed, self.step_s);
+        moving.viscous_v_s_per_mm = damping.viscous_v_s_per_mm;
+    }
+
+    /// Ends a control period.
+    #[inline(always)]
+    pub(super) fn end(&mut self, period: &Period) {
+        self.moving = period.moving;
     }
 
     /// Moves motor and table as one; the displacement, mm.
-    fn move_rigid(&mut self, force_v: f64, viscous: f64) -> f64 {
+    #[inline(always)]
+    fn move_rigid(&self, moving: &mut Moving, force_v: f64, damping: &Damping) -> f64 {
         let truth = &self.truth;
-        let gain = truth.gain_mm_per_v_s2;
         // The trapezoidal rule on the linear part: a held force moves the mass as it would in continuous time.
-        let drag = 0.5 * self.step_s * (truth.damping_per_s + gain * viscous);
-        let push = gain * (force_v - self.presliding_v) - truth.stiffness_per_s2 * self.position_mm;
-        let before = self.velocity_mm_s;
+        let drag = damping.drag;
+        let push = truth.gain_mm_per_v_s2 * (force_v - moving.presliding_v)
+            - truth.stiffness_per_s2 * moving.position_mm;
+        let before = moving.velocity_mm_s;
         let after = (before * (1.0 - drag) + push * self.step_s) / (1.0 + drag);
         let displacement = 0.5 * (before + after) * self.step_s;
-        self.velocity_mm_s = after;
-        self.position_mm += displacement;
+        moving.velocity_mm_s = after;
+        moving.position_mm += displacement;
         displacement
     }
 
     /// Moves motor and table with the gap between them; the table's displacement, mm.
-    fn move_geared(&mut self, gap: &Backlash, driven_v: f64, external_v: f64, viscous: f64) -> f64 {
+    fn move_geared(
+        &self,
+        moving: &mut Moving,
+        gap: &Backlash,
+        driven_v: f64,
+        external_v: f64,
+        damping: &Damping,
+    ) -> f64 {
         let truth = &self.truth;
         let table = Body {
-            position_mm: self.position_mm,
-            velocity_mm_s: self.velocity_mm_s,
+            position_mm: moving.position_mm,
+            velocity_mm_s: moving.velocity_mm_s,
         };
         let motor_gain = truth.gain_mm_per_v_s2 / gap.motor_share;
         let table_gain = truth.gain_mm_per_v_s2 / (1.0 - gap.motor_share);
@@ -223,16 +265,24 @@ impl SimulatedAxis {
             },
             Forcing {
                 gain_mm_per_v_s2: table_gain,
-                acceleration_mm_s2: table_gain * (external_v - self.presliding_v)
-                    - truth.stiffness_per_s2 / (1.0 - gap.motor_share) * self.position_mm,
-                damping_per_s: truth.damping_per_s + table_gain * viscous,
+                acceleration_mm_s2: table_gain * (external_v - moving.presliding_v)
+                    - truth.stiffness_per_s2 / (1.0 - gap.motor_share) * moving.position_mm,
+                damping_per_s: truth.damping_per_s + table_gain * damping.viscous_v_s_per_mm,
             },
         ];
-        let [motor, table] = gap.step([self.motor, table], &forcings, self.step_s);
-        let displacement = table.position_mm - self.position_mm;
-        self.motor = motor;
-        self.position_mm = table.position_mm;
-        self.velocity_mm_s = table.velocity_mm_s;
+        let [motor, table] = gap.step([moving.motor, table], &forcings, self.step_s);
+        let displacement = table.position_mm - moving.position_mm;
+        moving.motor = motor;
+        moving.position_mm = table.position_mm;
+        moving.velocity_mm_s = table.velocity_mm_s;
         displacement
     }
+}
+
+/// The largest integer that is not above a number, as [`f64::floor`] and a conversion give it: that calls a function where the
+/// processor need not have an instruction for it.
+#[inline(always)]
+fn floor(value: f64) -> i64 {
+    let towards_zero = value as i64;
+    towards_zero.saturating_sub(i64::from(towards_zero as f64 > value))
 }

@@ -17,16 +17,19 @@ impl Delay {
         }
     }
 
-    /// Puts a value in and takes out the one that arrives: `value` itself without a delay.
+    /// Puts a value in for `N` steps, and takes out what arrives in each of them: `value` itself without a delay.
     #[inline(always)]
-    pub(super) fn pass(&mut self, value: f64) -> f64 {
-        let Some(slot) = self.values.get_mut(self.next) else {
-            return value;
-        };
-        let arriving = std::mem::replace(slot, value);
-        self.next += 1;
-        if self.next == self.values.len() {
-            self.next = 0;
+    pub(super) fn pass<const N: usize>(&mut self, value: f64) -> [f64; N] {
+        let mut arriving = [value; N];
+        for arriving in &mut arriving {
+            let Some(slot) = self.values.get_mut(self.next) else {
+                break;
+            };
+            std::mem::swap(slot, arriving);
+            self.next += 1;
+            if self.next == self.values.len() {
+                self.next = 0;
+            }
         }
         arriving
     }

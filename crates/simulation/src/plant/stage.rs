@@ -8,7 +8,6 @@ use quadrant::safety::Switches;
 use quadrant::stage::Outputs;
 use quadrant::units::DacCode;
 
-use super::axis::PeriodForces;
 use super::{MarkParameters, Marks, SUBSTEPS, SimulatedAxis, StageParameters};
 
 /// The simulated stage in motion.
@@ -85,15 +84,22 @@ impl SimulatedStage {
                 *code = DacCode(shaper.step(state, *code) << 4);
             }
         }
-        let forces: [PeriodForces; 3] = std::array::from_fn(|index| {
-            self.axes[index].period_forces(codes[index], outputs.enabled)
-        });
+        let [x, y, z] = &mut self.axes;
+        let mut periods = [
+            x.begin(codes[0], outputs.enabled),
+            y.begin(codes[1], outputs.enabled),
+            z.begin(codes[2], outputs.enabled),
+        ];
         // A step of an axis waits for its own results, a division and a sum of many terms: the processor fills that time with
         // the other axes.
-        for _ in 0..SUBSTEPS {
-            for (axis, forces) in self.axes.iter_mut().zip(forces) {
-                axis.substep(forces);
-            }
+        let [of_x, of_y, of_z] = &mut periods;
+        for step in 0..SUBSTEPS {
+            x.substep(of_x, step);
+            y.substep(of_y, step);
+            z.substep(of_z, step);
         }
+        x.end(of_x);
+        y.end(of_y);
+        z.end(of_z);
     }
 }
