@@ -235,6 +235,7 @@ impl InputRecord {
     pub const SELDOM: u32 = !0 << Self::INDEX_SEEN;
 
     /// Fresh and valid raw counts and a request: a stage without switches and index pulses.
+    #[inline]
     pub fn of_counts(counts: [u32; 3], request: Option<Command>) -> Self {
         Self {
             readings: counts.map(EncoderReading::of),

@@ -95,7 +95,9 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
 
     fn feed_stream(&mut self) {
         for (name, queue) in AxisName::ALL.into_iter().zip(&mut self.segments) {
-            if self.state.axes()[name as usize].wants_segment()
+            // Few runs have a stream.
+            if !queue.is_empty()
+                && self.state.axes()[name as usize].wants_segment()
                 && let Some(segment) = queue.pop_front()
             {
                 self.state.offer_segment(name, &segment);
@@ -118,7 +120,9 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
                 ..input.inputs()
             },
         );
-        self.requests.extend(input.request);
+        if let Some(request) = input.request {
+            self.requests.push_back(request);
+        }
         if self.state.tick().is_multiple_of(PERIOD_TICKS) {
             self.supervise();
         }

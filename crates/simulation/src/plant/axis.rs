@@ -44,8 +44,9 @@ struct Moving {
 #[derive(Clone, Copy, Debug)]
 struct Damping {
     viscous_v_s_per_mm: f64,
-    /// Share of the velocity that half a step takes away from motor and table together.
-    drag: f64,
+    /// One less and one plus what half a step takes away of the velocity of motor and table together.
+    keeps: f64,
+    slows: f64,
 }
 
 impl Damping {
@@ -53,9 +54,11 @@ impl Damping {
         truth.friction.map(|friction| {
             let viscous = friction.viscous_v_s_per_mm;
             let rate_per_s = truth.damping_per_s + truth.gain_mm_per_v_s2 * viscous;
+            let drag = 0.5 * step_s * rate_per_s;
             Self {
                 viscous_v_s_per_mm: viscous,
-                drag: 0.5 * step_s * rate_per_s,
+                keeps: 1.0 - drag,
+                slows: 1.0 + drag,
             }
         })
     }
@@ -230,11 +233,10 @@ impl SimulatedAxis {
     fn move_rigid(&self, moving: &mut Moving, force_v: f64, damping: &Damping) -> f64 {
         let truth = &self.truth;
         // The trapezoidal rule on the linear part: a held force moves the mass as it would in continuous time.
-        let drag = damping.drag;
         let push = truth.gain_mm_per_v_s2 * (force_v - moving.presliding_v)
             - truth.stiffness_per_s2 * moving.position_mm;
         let before = moving.velocity_mm_s;
-        let after = (before * (1.0 - drag) + push * self.step_s) / (1.0 + drag);
+        let after = (before * damping.keeps + push * self.step_s) / damping.slows;
         let displacement = 0.5 * (before + after) * self.step_s;
         moving.velocity_mm_s = after;
         moving.position_mm += displacement;

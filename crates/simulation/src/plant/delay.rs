@@ -21,15 +21,19 @@ impl Delay {
     #[inline(always)]
     pub(super) fn pass<const N: usize>(&mut self, value: f64) -> [f64; N] {
         let mut arriving = [value; N];
-        for arriving in &mut arriving {
-            let Some(slot) = self.values.get_mut(self.next) else {
-                break;
-            };
-            std::mem::swap(slot, arriving);
-            self.next += 1;
-            if self.next == self.values.len() {
-                self.next = 0;
+        let length = self.values.len();
+        let ahead = self.values.get_mut(self.next..);
+        if let Some(slots) = ahead.and_then(|slots| slots.first_chunk_mut()) {
+            std::mem::swap(slots, &mut arriving);
+            self.next += N;
+        } else if length > 0 {
+            for arriving in &mut arriving {
+                std::mem::swap(&mut self.values[self.next % length], arriving);
+                self.next = self.next % length + 1;
             }
+        }
+        if self.next == length {
+            self.next = 0;
         }
         arriving
     }
