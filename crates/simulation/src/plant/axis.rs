@@ -1,6 +1,7 @@
 //! One simulated axis.
 
 use std::f64::consts::TAU;
+use std::hint::cold_path;
 
 use quadrant::friction::{Direction, PerDirection};
 use quadrant::units::DacCode;
@@ -217,8 +218,12 @@ impl SimulatedAxis {
             }
         };
         let speed = moving.velocity_mm_s.abs();
-        moving.presliding_v =
-            period.friction_factor * self.presliding.step(displacement, speed, self.step_s);
+        let mut presliding_v = self.presliding.step(displacement, speed, self.step_s);
+        if period.friction_factor != 1.0 {
+            cold_path();
+            presliding_v *= period.friction_factor;
+        }
+        moving.presliding_v = presliding_v;
         moving.viscous_v_s_per_mm = damping.viscous_v_s_per_mm;
     }
 
@@ -233,11 +238,15 @@ impl SimulatedAxis {
     fn move_rigid(&self, moving: &mut Moving, force_v: f64, damping: &Damping) -> f64 {
         let truth = &self.truth;
         // The trapezoidal rule on the linear part: a held force moves the mass as it would in continuous time.
-        let push = truth.gain_mm_per_v_s2 * (force_v - moving.presliding_v)
-            - truth.stiffness_per_s2 * moving.position_mm;
+        let mut push = truth.gain_mm_per_v_s2 * (force_v - moving.presliding_v);
+        // A stage has no spring to ground, and every step waits for this sum.
+        if truth.stiffness_per_s2 != 0.0 {
+            cold_path();
+            push -= truth.stiffness_per_s2 * moving.position_mm;
+        }
         let before = moving.velocity_mm_s;
         let after = (before * damping.keeps + push * self.step_s) / damping.slows;
-        let displacement = 0.5 * (before + after) * self.step_s;
+        let displacement = (before + after) * (0.5 * self.step_s);
         moving.velocity_mm_s = after;
         moving.position_mm += displacement;
         displacement
