@@ -1,17 +1,18 @@
 //! Cost of one control tick on the host: the law alone, and law and simulated stage together; three axes, N-PID with
-//! combined feedforward of four elements. `cargo bench -p quadrant-sim`; the time per iteration is ns per tick, and 100 us
+//! combined feedforward of four elements; and x alone, as campaigns run it. `cargo bench -p quadrant-sim`; the time per iteration is ns per tick, and 100 us
 //! over it the ratio to real time at 10 kHz.
 
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::command::Command;
+use quadrant::friction::gms::{FIRMWARE_ELEMENTS, MAX_ELEMENTS};
 use quadrant::lockstep::InputRecord;
 use quadrant::safety::SafetyState;
 use quadrant::scalar::{Fixed, Scalar};
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::{LawMachine, Operator};
-use quadrant_sim::plant::{SimulatedStage, StageParameters};
+use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 
 /// A machine on its stage, moving.
 struct Rig<S: Scalar> {
@@ -69,6 +70,36 @@ fn law<S: Scalar>(criterion: &mut Criterion, name: &str) {
     group.finish();
 }
 
+/// x alone, as campaigns run it, moving.
+struct OneAxis {
+    machine: LawMachine<f32, MAX_ELEMENTS>,
+    plant: SimulatedAxis,
+}
+
+impl OneAxis {
+    fn moving() -> Self {
+        let job = circle_and_sine(0.5);
+        let machine = LawMachine::new(&job).expect("the default settings are valid");
+        let truth = StageParameters::real().axes[0].clone();
+        let mut axis = Self {
+            machine: machine.with_x_alone(),
+            plant: SimulatedAxis::new(truth, job.stage.rate_hz, 1),
+        };
+        let mut operator = Operator::runs_the_plan();
+        for tick in 0..20_000 {
+            axis.step(operator.request(tick));
+        }
+        assert!(axis.machine.state().is_running());
+        axis
+    }
+
+    fn step(&mut self, request: Option<Command>) {
+        let input = InputRecord::of_counts([self.plant.read_counter(), 0, 0], request);
+        let outputs = self.machine.tick(&input);
+        self.plant.step(outputs.codes[0], outputs.enabled);
+    }
+}
+
 fn benches(criterion: &mut Criterion) {
     law::<f32>(criterion, "100 ticks, f32");
     law::<f64>(criterion, "100 ticks, f64");
@@ -78,6 +109,10 @@ fn benches(criterion: &mut Criterion) {
     let mut rig = Rig::<f32>::moving();
     group.bench_function("tick of law and stage, f32", |bencher| {
         bencher.iter(|| rig.step())
+    });
+    let mut axis = OneAxis::moving();
+    group.bench_function("tick of law and stage, one axis, f32", |bencher| {
+        bencher.iter(|| axis.step(None))
     });
     group.finish();
 }

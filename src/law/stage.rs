@@ -355,6 +355,12 @@ impl<S: Scalar, const N: usize> Stage<S, N> {
     pub fn tick(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
         self.as_ref().tick(plan, state, inputs)
     }
+
+    /// One control period of x alone; see [`StageRef::tick_x`].
+    #[inline(always)]
+    pub fn tick_x(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
+        self.as_ref().tick_x(plan, state, inputs)
+    }
 }
 
 impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
@@ -364,17 +370,36 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     /// [`Reaction`] says. No path panics, allocates, or loops without a bound; every operation saturates.
     #[inline(always)]
     pub fn tick(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
+        self.tick_axes::<true>(plan, state, inputs)
+    }
+
+    /// One control period of x alone, for a host that simulates no other axis: y and z are neither read nor driven, so
+    /// they must hold, and nothing but [`Command::StartMove`] of x may start a motion.
+    #[inline(always)]
+    pub fn tick_x(&self, plan: &Plan<S>, state: &mut StageState<S, N>, inputs: &Inputs) -> Outputs {
+        self.tick_axes::<false>(plan, state, inputs)
+    }
+
+    /// One control period of all axes, or of x alone.
+    #[inline(always)]
+    fn tick_axes<const ALL: bool>(
+        &self,
+        plan: &Plan<S>,
+        state: &mut StageState<S, N>,
+        inputs: &Inputs,
+    ) -> Outputs {
         let tick = state.tick;
         state.tick = tick.wrapping_add(1);
         let driven = state.safety.drives();
         let [x, y, z] = self.axes.into_array();
         let [of_x, of_y, of_z] = &mut *state.axes;
         let [at_x, at_y, at_z] = &*inputs.readings;
-        let findings = Findings::new([
-            x.read_encoder(of_x, at_x, is_due(tick, 0)),
-            y.read_encoder(of_y, at_y, is_due(tick, 1)),
-            z.read_encoder(of_z, at_z, is_due(tick, 2)),
-        ]);
+        let mut findings = Findings::splat(Ok(()));
+        findings[AxisName::X] = x.read_encoder(of_x, at_x, is_due(tick, 0));
+        if ALL {
+            findings[AxisName::Y] = y.read_encoder(of_y, at_y, is_due(tick, 1));
+            findings[AxisName::Z] = z.read_encoder(of_z, at_z, is_due(tick, 2));
+        }
         state.interlock = None;
         if !(inputs.switches.are_good() & is_empty(&findings)) {
             self.report_bad_inputs(state, inputs.switches, findings, tick);
@@ -399,7 +424,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             self.inject(state, tick);
         }
         if state.safety.drives() {
-            self.update_references(plan, state, inputs.switches, tick);
+            self.update_references::<ALL>(plan, state, inputs.switches, tick);
         }
         if !state.safety.drives() {
             state.injection.end();
@@ -413,12 +438,14 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         }
         let [of_x, of_y, of_z] = &mut *state.axes;
         let [new_x, new_y, new_z] = inputs.settings_changed.into_array();
+        let mut codes = PerAxis::splat(DacCode::ZERO);
+        codes[AxisName::X] = x.drive(of_x, new_x);
+        if ALL {
+            codes[AxisName::Y] = y.drive(of_y, new_y);
+            codes[AxisName::Z] = z.drive(of_z, new_z);
+        }
         Outputs {
-            codes: PerAxis::new([
-                x.drive(of_x, new_x),
-                y.drive(of_y, new_y),
-                z.drive(of_z, new_z),
-            ]),
+            codes,
             enabled: true,
             brake_released: state.brake.has_current(),
         }
@@ -434,9 +461,9 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             .map(|(_, name)| name)
     }
 
-    /// Advances the references of driven axes.
+    /// Advances the references of driven axes, all of them or x alone.
     #[inline(always)]
-    fn update_references(
+    fn update_references<const ALL: bool>(
         &self,
         plan: &Plan<S>,
         state: &mut StageState<S, N>,
@@ -447,11 +474,12 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         let [of_x, of_y, of_z] = &mut *state.axes;
         let [to_x, to_y, to_z] = &**plan;
         let at = |axis| switches.axis(axis);
-        let findings = Findings::new([
-            x.update_reference(of_x, to_x, at(AxisName::X), tick),
-            y.update_reference(of_y, to_y, at(AxisName::Y), tick),
-            z.update_reference(of_z, to_z, at(AxisName::Z), tick),
-        ]);
+        let mut findings = Findings::splat(Ok(()));
+        findings[AxisName::X] = x.update_reference(of_x, to_x, at(AxisName::X), tick);
+        if ALL {
+            findings[AxisName::Y] = y.update_reference(of_y, to_y, at(AxisName::Y), tick);
+            findings[AxisName::Z] = z.update_reference(of_z, to_z, at(AxisName::Z), tick);
+        }
         if !is_empty(&findings) {
             self.trip_findings(state, findings, tick);
         }

@@ -23,6 +23,8 @@ pub struct LawMachine<S: Scalar, const N: usize> {
     /// Segments of a stream on their way to the axes.
     segments: [VecDeque<Segment>; 3],
     command: Option<Command>,
+    /// True if y and z are left out.
+    x_alone: bool,
     /// Axes whose settings were exchanged since the last tick.
     settings_changed: PerAxis<bool>,
     events: Vec<(u32, Event)>,
@@ -50,9 +52,18 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
             requests: VecDeque::new(),
             segments: Default::default(),
             command: None,
+            x_alone: false,
             settings_changed: PerAxis::splat(false),
             events: Vec::new(),
         }
+    }
+
+    /// The same machine, whose axes y and z hold at zero and are left out: what x does is the same, in less time.
+    /// [`Command::Run`] moves x.
+    #[must_use]
+    pub fn with_x_alone(mut self) -> Self {
+        self.x_alone = true;
+        self
     }
 
     /// The control law's memory.
@@ -108,20 +119,21 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     /// Runs one control period.
     pub fn tick(&mut self, input: &InputRecord) -> Outputs {
         self.feed_stream();
-        let outputs = self.stage.tick(
-            &self.plan,
-            &mut self.state,
-            &Inputs {
-                command: self.command.take(),
-                settings_changed: std::mem::replace(
-                    &mut self.settings_changed,
-                    PerAxis::splat(false),
-                ),
-                ..input.inputs()
-            },
-        );
+        let inputs = Inputs {
+            command: self.command.take(),
+            settings_changed: std::mem::replace(&mut self.settings_changed, PerAxis::splat(false)),
+            ..input.inputs()
+        };
+        let outputs = if self.x_alone {
+            self.stage.tick_x(&self.plan, &mut self.state, &inputs)
+        } else {
+            self.stage.tick(&self.plan, &mut self.state, &inputs)
+        };
         if let Some(request) = input.request {
-            self.requests.push_back(request);
+            self.requests.push_back(match request {
+                Command::Run if self.x_alone => Command::StartMove(AxisName::X),
+                other => other,
+            });
         }
         if self.state.tick().is_multiple_of(PERIOD_TICKS) {
             self.supervise();

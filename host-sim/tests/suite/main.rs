@@ -21,6 +21,7 @@ mod identify_static_friction;
 mod identify_virgin_curve;
 mod machine_motion;
 mod npid_lasting_error;
+mod one_axis;
 mod part_program;
 mod plant;
 mod plant_disturbances;

@@ -240,7 +240,9 @@ impl Case {
                 MotionSettings::Hold,
             ],
         };
-        let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job { stage, plan }).ok()?;
+        let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job { stage, plan })
+            .ok()?
+            .with_x_alone();
         let load = Load::Milling {
             cut: self.cut,
             component: self.component,

@@ -183,7 +183,8 @@ pub(super) fn run(
     let mut machine = LawMachine::<f32, ELEMENTS>::new(&Job {
         stage: stage.clone(),
         plan,
-    })?;
+    })?
+    .with_x_alone();
     let Some(first) = phases.first() else {
         return Ok(Vec::new());
     };

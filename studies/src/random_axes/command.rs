@@ -107,6 +107,12 @@ fn summary(lines: &BTreeMap<u64, Line>) {
     let mut minutes: Vec<f64> = lines.values().map(|line| line.axis_min).collect();
     minutes.sort_by(f64::total_cmp);
     say!("Axis time, median: {:.1} min", minutes[minutes.len() / 2]);
+    let axis_s: f64 = lines.values().map(|line| 60.0 * line.axis_min).sum();
+    let computed_s: f64 = lines.values().map(|line| line.computed_s).sum();
+    say!(
+        "Axis time over the time of a core: {:.0}",
+        axis_s / computed_s
+    );
     let mut reasons: BTreeMap<String, Vec<u64>> = BTreeMap::new();
     for line in lines.values().filter(|line| !line.reason.is_empty()) {
         let reason = line.reason.split(':').next().unwrap_or_default();

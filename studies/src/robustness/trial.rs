@@ -157,7 +157,7 @@ impl Stopped {
 
 impl Trial<'_> {
     pub(super) fn run(&self) -> Result<Ended, Stopped> {
-        // The idle axes are like it, so that none waits for another.
+        // The others are left out, and like it, so that it waits for none.
         let [axis, ..] = &self.stage.axes;
         let cycles = match axis.feedforward.learning {
             Some(_) => LEARNING_CYCLES + CYCLES,
@@ -176,7 +176,8 @@ impl Trial<'_> {
                 ],
             },
         })
-        .map_err(Stopped::Settings)?;
+        .map_err(Stopped::Settings)?
+        .with_x_alone();
         let rate_hz = self.stage.rate_hz;
         let resolution_mm = self.stage.axes[0].encoder.resolution_mm;
         let mut plant = SimulatedAxis::new(self.truth.clone(), rate_hz, self.seed);

@@ -218,7 +218,7 @@ impl SimulatedTestAxis {
         };
         let build = || {
             let plan = plan.build(&self.stage)?;
-            Ok(LawMachine::with_plan(self.stage.build()?, plan))
+            Ok(LawMachine::with_plan(self.stage.build()?, plan).with_x_alone())
         };
         let machine = build().map_err(|source| ExperimentError::Motion {
             experiment: experiment.name.clone(),
