@@ -166,10 +166,8 @@ fn validation(
     settings: &MotionFitSettings,
 ) -> anyhow::Result<Table> {
     let other = recorded::read(path)?;
-    let errors = candidates
-        .iter()
-        .map(|candidate| Ok((candidate, validate(candidate, &other, settings)?)))
-        .collect::<anyhow::Result<Vec<_>>>()?;
+    let errors = validate(candidates, &other, settings)?;
+    let errors: Vec<_> = candidates.iter().zip(errors).collect();
     Ok(validation_table(&errors, &path.display().to_string()))
 }
 

@@ -253,7 +253,7 @@ fn another_record_judges_models_that_it_did_not_fit() {
     let on = |truth: &AxisParameters, seed: u64| {
         let mut test_axis = SimulatedTestAxis::new(0, truth.clone(), seed);
         let record = shuttle(&mut test_axis, 1, &mut |_| {}).unwrap();
-        validate(best, &record, &settings).unwrap()
+        validate(std::slice::from_ref(best), &record, &settings).unwrap()[0]
     };
     let same = on(truth, 2);
     assert!(same < 1.2 * best.model.relative_error, "{same}");

@@ -8,6 +8,7 @@ use std::fmt;
 
 use levenberg_marquardt::{LeastSquaresProblem, LevenbergMarquardt, TerminationReason};
 use nalgebra::{DMatrix, DVector, Dyn, Owned};
+use rayon::prelude::*;
 
 /// A parameter to be fitted.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -116,7 +117,7 @@ const ON_BOUND: f64 = 1e-6;
 pub fn fit(
     parameters: &[Parameter],
     loss: Loss,
-    residuals: impl Fn(&[f64]) -> Vec<f64>,
+    residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
 ) -> Result<Fit, FitError> {
     fit_with_step(parameters, loss, STEP, residuals)
 }
@@ -130,7 +131,7 @@ pub fn fit_with_step(
     parameters: &[Parameter],
     loss: Loss,
     step: f64,
-    residuals: impl Fn(&[f64]) -> Vec<f64>,
+    residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
 ) -> Result<Fit, FitError> {
     search(parameters, loss, (step, step > STEP), residuals)
 }
@@ -142,7 +143,7 @@ pub fn fit_with_step(
 pub fn fit_nearest(
     parameters: &[Parameter],
     loss: Loss,
-    residuals: impl Fn(&[f64]) -> Vec<f64>,
+    residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
 ) -> Result<Fit, FitError> {
     search(parameters, loss, (STEP, true), residuals)
 }
@@ -152,7 +153,7 @@ fn search(
     parameters: &[Parameter],
     loss: Loss,
     (step, nearest): (f64, bool),
-    residuals: impl Fn(&[f64]) -> Vec<f64>,
+    residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
 ) -> Result<Fit, FitError> {
     for parameter in parameters {
         let (low, high) = parameter.bounds;
@@ -223,7 +224,7 @@ struct Problem<'a, F> {
     weights: Vec<f64>,
 }
 
-impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
+impl<'a, F: Fn(&[f64]) -> Vec<f64> + Sync> Problem<'a, F> {
     fn value(parameter: &Parameter, angle: f64) -> f64 {
         let (low, high) = parameter.bounds;
         low + (high - low) * 0.5 * (1.0 + angle.sin())
@@ -278,20 +279,22 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
         &self,
         at: &[f64],
         steps: &[f64],
-        place: impl Fn(&[f64]) -> Vec<f64>,
+        place: impl Fn(&[f64]) -> Vec<f64> + Sync,
     ) -> DMatrix<f64> {
-        let columns: Vec<DVector<f64>> = steps
-            .iter()
-            .enumerate()
-            .map(|(index, &step)| {
-                let moved = |by: f64| {
-                    let mut there = at.to_vec();
-                    there[index] += by;
-                    self.weighted(&place(&there))
-                };
-                (moved(step) - moved(-step)) / (2.0 * step)
-            })
-            .collect();
+        let column = |(index, &step): (usize, &f64)| {
+            let moved = |by: f64| {
+                let mut there = at.to_vec();
+                there[index] += by;
+                self.weighted(&place(&there))
+            };
+            (moved(step) - moved(-step)) / (2.0 * step)
+        };
+        // Rough residuals are simulations, each of which takes longer than handing it to another thread.
+        let columns: Vec<DVector<f64>> = if self.step > STEP {
+            steps.par_iter().enumerate().map(column).collect()
+        } else {
+            steps.iter().enumerate().map(column).collect()
+        };
         DMatrix::from_columns(&columns)
     }
 
@@ -345,7 +348,7 @@ impl<'a, F: Fn(&[f64]) -> Vec<f64>> Problem<'a, F> {
     }
 }
 
-impl<F: Fn(&[f64]) -> Vec<f64>> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, F> {
+impl<F: Fn(&[f64]) -> Vec<f64> + Sync> LeastSquaresProblem<f64, Dyn, Dyn> for Problem<'_, F> {
     type ResidualStorage = Owned<f64, Dyn>;
     type JacobianStorage = Owned<f64, Dyn, Dyn>;
     type ParameterStorage = Owned<f64, Dyn>;

@@ -321,25 +321,28 @@ fn withheld(
     }))
 }
 
-/// Relative error of a model on another record, taken after its own, on which nothing is fitted.
+/// Relative error of each model on another record, taken after its own, on which nothing is fitted.
 ///
 /// # Errors
 /// As [`fit_motion`].
 pub fn validate(
-    candidate: &Candidate,
+    candidates: &[Candidate],
     other: &Recording,
     settings: &MotionFitSettings,
-) -> Result<f64, MotionFitError> {
+) -> Result<Vec<f64>, MotionFitError> {
     check(other, settings)?;
     let signals = Signals::new(other, settings);
-    let Candidate {
-        model, solution, ..
-    } = candidate;
-    let span = model.span.afterwards();
-    let regression = Regression::new(&signals, settings, model.structure, span);
-    let all: Vec<usize> = (0..regression.rows()).collect();
-    let voltage = regression.voltage_at(solution.dead_time_s);
-    Ok(solution.residual(&regression, &all).norm() / voltage.norm())
+    let error = |candidate: &Candidate| {
+        let Candidate {
+            model, solution, ..
+        } = candidate;
+        let span = model.span.afterwards();
+        let regression = Regression::new(&signals, settings, model.structure, span);
+        let all: Vec<usize> = (0..regression.rows()).collect();
+        let voltage = regression.voltage_at(solution.dead_time_s);
+        solution.residual(&regression, &all).norm() / voltage.norm()
+    };
+    Ok(candidates.par_iter().map(error).collect())
 }
 
 /// Ranges of the coefficients in a refinement, over their values; of those that may be of either sign, over the Coulomb level.

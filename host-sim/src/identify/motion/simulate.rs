@@ -86,7 +86,12 @@ impl<'a> Moving<'a> {
             &model.friction.positive
         };
         // The elements' levels are those of fast motion.
-        let drop = way.curve.level_v(velocity) - way.curve.coulomb_v;
+        let curve = &way.curve;
+        let drop = if curve.breakaway_v == curve.coulomb_v {
+            0.0
+        } else {
+            curve.level_v(velocity) - curve.coulomb_v
+        };
         let time = model.span.time_share(time_s);
         let place = model.span.travel_share(self.position_mm);
         let level = drop + time * model.drift.level_v + place * model.along_travel.level_v;

@@ -7,7 +7,7 @@ use quadrant::friction::stribeck::StaticFriction;
 use super::branches::{Smooth, VirginCurve, range};
 use super::error::VirginCurveError;
 use super::plateau::{check_plateau, plateau};
-use super::predict::{Prediction, predict};
+use super::predict::{Prediction, Trajectory};
 use super::shape::{Shape, parameters};
 use crate::identify::fit::{Fit, Loss, Parameter, fit_nearest, fit_with_step};
 use crate::record::Recording;
@@ -173,8 +173,9 @@ fn refine(
         let shape = Shape::from_variables(values, count, held);
         parameters(&shape, level_v, values[attraction].exp())
     };
+    let trajectory = Trajectory::new(smooth, sliding);
     let found = fit_with_step(&variables, Loss::Squares, ROUGH_STEP, |values| {
-        let predicted = predict(smooth, sliding, &model(values));
+        let predicted = trajectory.predict(&model(values), scored.end);
         scored
             .clone()
             .step_by(THINNING)
@@ -187,7 +188,7 @@ fn refine(
     if !attraction_determined {
         gms.attraction_v_s = ASSUMED_ATTRACTION_V_S;
     }
-    let predicted_v = predict(smooth, sliding, &gms);
+    let predicted_v = trajectory.predict(&gms, smooth.position_mm.len());
     let squares: f64 = scored
         .clone()
         .map(|index| (predicted_v[index] - smooth.voltage_v[index]).powi(2))

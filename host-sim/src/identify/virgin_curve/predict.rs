@@ -1,7 +1,10 @@
 //! The hysteresis that a model predicts: the library's own GMS model, moved along the measured position.
 
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, PoisonError};
+
 use quadrant::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
-use quadrant::friction::stribeck::{SlidingTable, StaticFriction};
+use quadrant::friction::stribeck::{Sliding, SlidingTable, StaticFriction, StribeckCurve};
 use quadrant::friction::{Direction, PerDirection};
 
 use super::branches::Smooth;
@@ -19,38 +22,83 @@ pub struct Prediction {
     pub relative_error: f64,
 }
 
-/// The voltage that the model predicts along the smooth position.
-pub(super) fn predict(
-    smooth: &Smooth,
-    sliding: &PerDirection<StaticFriction>,
-    gms: &GmsParameters,
-) -> Vec<f64> {
-    let surface = SlidingTable::<f64>::build(
-        &sliding.map(|model| model.curve),
-        gms.attraction_v_s,
-        smooth.sample_time_s,
-    );
-    let model = Gms::<f64, MAX_ELEMENTS>::build(&gms.elements);
-    let mut state = GmsState::default();
-    let mut last_mm = smooth.position_mm.first().copied().unwrap_or_default();
-    smooth
-        .position_mm
-        .iter()
-        .map(|&position_mm| {
-            let displacement = position_mm - last_mm;
+/// The smooth position as steps that a model takes, on a static friction.
+pub(super) struct Trajectory {
+    steps: Vec<Step>,
+    curves: PerDirection<StribeckCurve>,
+    sample_time_s: f64,
+    /// The surfaces of the attraction rates asked for last: most models of a search have the same, and other elements.
+    latest: Mutex<VecDeque<(f64, Arc<[Sliding<f64>]>)>>,
+}
+
+/// A step of the position.
+struct Step {
+    displacement_mm: f64,
+    speed_mm_s: f64,
+    direction: Direction,
+    viscous_v: f64,
+}
+
+/// Attraction rates whose surfaces are kept: that of a difference quotient's middle, and those of its ends.
+const LATEST: usize = 3;
+
+impl Trajectory {
+    pub(super) fn new(smooth: &Smooth, sliding: &PerDirection<StaticFriction>) -> Self {
+        let mut last_mm = smooth.position_mm.first().copied().unwrap_or_default();
+        let step = |&position_mm: &f64| {
+            let displacement_mm = position_mm - last_mm;
             last_mm = position_mm;
-            let velocity = displacement / smooth.sample_time_s;
-            let direction = if displacement < 0.0 {
+            let velocity = displacement_mm / smooth.sample_time_s;
+            let direction = if displacement_mm < 0.0 {
                 Direction::Negative
             } else {
                 Direction::Positive
             };
-            let force = model.step(
-                &mut state,
-                displacement,
-                surface.at(velocity.abs(), direction),
-            );
-            force + sliding.of(direction).viscous_v_s_per_mm * velocity
-        })
-        .collect()
+            Step {
+                displacement_mm,
+                speed_mm_s: velocity.abs(),
+                direction,
+                viscous_v: sliding.of(direction).viscous_v_s_per_mm * velocity,
+            }
+        };
+        Self {
+            steps: smooth.position_mm.iter().map(step).collect(),
+            curves: sliding.map(|model| model.curve),
+            sample_time_s: smooth.sample_time_s,
+            latest: Mutex::default(),
+        }
+    }
+
+    /// The surface at each step.
+    fn surfaces(&self, attraction_v_s: f64) -> Arc<[Sliding<f64>]> {
+        let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
+        let same = |(rate, _): &&(f64, _)| *rate == attraction_v_s;
+        if let Some((_, found)) = latest().iter().find(same) {
+            return found.clone();
+        }
+        let table = SlidingTable::build(&self.curves, attraction_v_s, self.sample_time_s);
+        let steps = self.steps.iter();
+        let found: Arc<[Sliding<f64>]> = steps
+            .map(|step| table.at(step.speed_mm_s, step.direction))
+            .collect();
+        let mut latest = latest();
+        latest.truncate(LATEST - 1);
+        latest.push_front((attraction_v_s, found.clone()));
+        found
+    }
+
+    /// The voltage that the model predicts at the first `count` positions.
+    pub(super) fn predict(&self, gms: &GmsParameters, count: usize) -> Vec<f64> {
+        let surfaces = self.surfaces(gms.attraction_v_s);
+        let model = Gms::<f64, MAX_ELEMENTS>::build(&gms.elements);
+        let mut state = GmsState::default();
+        self.steps
+            .iter()
+            .zip(&*surfaces)
+            .take(count)
+            .map(|(step, surface)| {
+                model.step(&mut state, step.displacement_mm, *surface) + step.viscous_v
+            })
+            .collect()
+    }
 }

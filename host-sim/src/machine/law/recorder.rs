@@ -12,6 +12,8 @@ pub(super) struct Recorder {
     recording: Recording,
     decimation: usize,
     ticks: usize,
+    /// Control periods of the sample under way.
+    within: usize,
     voltage_v: f64,
     injection_v: f64,
     latest: VecDeque<Period>,
@@ -37,6 +39,7 @@ impl Recorder {
             },
             decimation,
             ticks: 0,
+            within: 0,
             voltage_v: 0.0,
             injection_v: 0.0,
             latest: VecDeque::with_capacity(LATEST),
@@ -54,7 +57,7 @@ impl Recorder {
             decimation,
             ..
         } = self;
-        if self.ticks.is_multiple_of(*decimation) {
+        if self.within == 0 {
             recording.reference_mm.push(period.reference_mm);
             recording.position_mm.push(period.position_mm);
         }
@@ -65,7 +68,9 @@ impl Recorder {
         self.voltage_v += period.voltage_v;
         self.injection_v += period.injection_v;
         self.ticks += 1;
-        if self.ticks.is_multiple_of(*decimation) {
+        self.within += 1;
+        if self.within == *decimation {
+            self.within = 0;
             let count = *decimation as f64;
             recording.voltage_v.push(self.voltage_v / count);
             recording.injection_v.push(self.injection_v / count);
