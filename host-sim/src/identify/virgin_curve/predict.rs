@@ -28,8 +28,11 @@ pub(super) struct Trajectory {
     curves: PerDirection<StribeckCurve>,
     sample_time_s: f64,
     /// The surfaces of the attraction rates asked for last: most models of a search have the same, and other elements.
-    latest: Mutex<VecDeque<(f64, Arc<[Sliding<f64>]>)>>,
+    latest: Mutex<VecDeque<(f64, Surfaces)>>,
 }
+
+/// The surface at each step of a trajectory.
+type Surfaces = Arc<[Sliding<f64>]>;
 
 /// A step of the position.
 struct Step {
@@ -70,7 +73,7 @@ impl Trajectory {
     }
 
     /// The surface at each step.
-    fn surfaces(&self, attraction_v_s: f64) -> Arc<[Sliding<f64>]> {
+    fn surfaces(&self, attraction_v_s: f64) -> Surfaces {
         let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
         let same = |(rate, _): &&(f64, _)| *rate == attraction_v_s;
         if let Some((_, found)) = latest().iter().find(same) {
@@ -78,7 +81,7 @@ impl Trajectory {
         }
         let table = SlidingTable::build(&self.curves, attraction_v_s, self.sample_time_s);
         let steps = self.steps.iter();
-        let found: Arc<[Sliding<f64>]> = steps
+        let found: Surfaces = steps
             .map(|step| table.at(step.speed_mm_s, step.direction))
             .collect();
         let mut latest = latest();
