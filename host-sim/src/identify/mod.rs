@@ -26,6 +26,7 @@ pub mod characteristic;
 pub mod excitation;
 pub mod fit;
 pub mod frf;
+mod latest;
 pub mod measured_table;
 pub mod mode;
 pub mod motion;

@@ -1,12 +1,12 @@
 //! The columns that voltage is explained by.
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector, Dyn, QR, SVD};
 
 use super::model::{Span, Structure};
 use super::signals::{MotionFitSettings, Signals};
+use crate::identify::latest::Latest;
 
 /// The parts of a model that are linear, each the coefficient of a column.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,7 +72,7 @@ pub(super) struct Regression<'a> {
     /// Decimated columns; that of `Drop` is filled in by the velocity.
     columns: Arc<DMatrix<f64>>,
     /// The columns of the Stribeck velocities asked for last: a search asks for each several times.
-    latest: Mutex<VecDeque<(f64, Arc<DMatrix<f64>>)>>,
+    latest: Latest<(f64, Arc<DMatrix<f64>>)>,
     /// Hysteresis without weights, at the full rate: what the drop acts on.
     hysteresis: Vec<f64>,
     /// The voltage, smoothed, at the full rate.
@@ -160,7 +160,7 @@ impl<'a> Regression<'a> {
             settings,
             terms,
             columns: Arc::new(DMatrix::from_columns(&columns)),
-            latest: Mutex::default(),
+            latest: Latest::new(LATEST),
             hysteresis,
             voltage_v: signals.smoothed(&signals.voltage_v, settings),
             velocity_mm_s: signals.decimated(velocity, settings),
@@ -187,10 +187,9 @@ impl<'a> Regression<'a> {
         let Some(index) = self.terms.iter().position(|term| *term == Term::Drop) else {
             return self.columns.clone();
         };
-        let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |(velocity, _): &&(f64, _)| *velocity == stribeck_velocity_mm_s;
-        if let Some((_, columns)) = latest().iter().find(same) {
-            return columns.clone();
+        let same = |(velocity, _): &(f64, _)| *velocity == stribeck_velocity_mm_s;
+        if let Some((_, columns)) = self.latest.find(same) {
+            return columns;
         }
         let drop: Vec<f64> = self
             .hysteresis
@@ -202,9 +201,7 @@ impl<'a> Regression<'a> {
         let mut columns = (*self.columns).clone();
         columns.set_column(index, &DVector::from_vec(drop));
         let columns = Arc::new(columns);
-        let mut latest = latest();
-        latest.truncate(LATEST - 1);
-        latest.push_front((stribeck_velocity_mm_s, columns.clone()));
+        self.latest.keep((stribeck_velocity_mm_s, columns.clone()));
         columns
     }
 
@@ -242,7 +239,7 @@ pub(super) struct Solver<'a> {
     terms: &'a [Term],
     rows: &'a [usize],
     /// The decompositions used last: a search over the dead time changes the voltage alone.
-    latest: Mutex<VecDeque<Arc<Decomposed>>>,
+    latest: Latest<Arc<Decomposed>>,
 }
 
 /// Some columns and some rows of a regression, decomposed.
@@ -286,23 +283,20 @@ impl<'a> Solver<'a> {
         Self {
             terms,
             rows,
-            latest: Mutex::default(),
+            latest: Latest::new(DECOMPOSITIONS),
         }
     }
 
     /// The decomposition of some columns; nothing, if one is zero.
     fn decomposed(&self, columns: &Arc<DMatrix<f64>>, kept: &[usize]) -> Option<Arc<Decomposed>> {
-        let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
         let same =
-            |found: &&Arc<Decomposed>| Arc::ptr_eq(&found.columns, columns) && found.kept == kept;
-        if let Some(found) = latest().iter().find(same) {
-            return Some(found.clone());
+            |found: &Arc<Decomposed>| Arc::ptr_eq(&found.columns, columns) && found.kept == kept;
+        if let Some(found) = self.latest.find(same) {
+            return Some(found);
         }
-        let found = Arc::new(Decomposed::of(columns, kept, self.rows)?);
-        let mut latest = latest();
-        latest.truncate(DECOMPOSITIONS - 1);
-        latest.push_front(found.clone());
-        Some(found)
+        let made = Arc::new(Decomposed::of(columns, kept, self.rows)?);
+        self.latest.keep(made.clone());
+        Some(made)
     }
 
     /// The coefficients that explain a voltage best; nothing, if some columns cannot be told apart.

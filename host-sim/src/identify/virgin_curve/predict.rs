@@ -1,13 +1,13 @@
 //! The hysteresis that a model predicts: the library's own GMS model, moved along the measured position.
 
-use std::collections::VecDeque;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
 use quadrant::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
 use quadrant::friction::stribeck::{Sliding, SlidingTable, StaticFriction, StribeckCurve};
 use quadrant::friction::{Direction, PerDirection};
 
 use super::branches::Smooth;
+use crate::identify::latest::Latest;
 
 /// Measured and predicted hysteresis.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -28,7 +28,7 @@ pub(super) struct Trajectory {
     curves: PerDirection<StribeckCurve>,
     sample_time_s: f64,
     /// The surfaces of the attraction rates asked for last: most models of a search have the same, and other elements.
-    latest: Mutex<VecDeque<(f64, Surfaces)>>,
+    latest: Latest<(f64, Surfaces)>,
 }
 
 /// The surface at each step of a trajectory.
@@ -68,26 +68,23 @@ impl Trajectory {
             steps: smooth.position_mm.iter().map(step).collect(),
             curves: sliding.map(|model| model.curve),
             sample_time_s: smooth.sample_time_s,
-            latest: Mutex::default(),
+            latest: Latest::new(LATEST),
         }
     }
 
     /// The surface at each step.
     fn surfaces(&self, attraction_v_s: f64) -> Surfaces {
-        let latest = || self.latest.lock().unwrap_or_else(PoisonError::into_inner);
-        let same = |(rate, _): &&(f64, _)| *rate == attraction_v_s;
-        if let Some((_, found)) = latest().iter().find(same) {
-            return found.clone();
+        let same = |(rate, _): &(f64, _)| *rate == attraction_v_s;
+        if let Some((_, found)) = self.latest.find(same) {
+            return found;
         }
         let table = SlidingTable::build(&self.curves, attraction_v_s, self.sample_time_s);
         let steps = self.steps.iter();
-        let found: Surfaces = steps
+        let made: Surfaces = steps
             .map(|step| table.at(step.speed_mm_s, step.direction))
             .collect();
-        let mut latest = latest();
-        latest.truncate(LATEST - 1);
-        latest.push_front((attraction_v_s, found.clone()));
-        found
+        self.latest.keep((attraction_v_s, made.clone()));
+        made
     }
 
     /// The voltage that the model predicts at the first `count` positions.
