@@ -1,6 +1,6 @@
 //! Cost of one control tick on the host: the law alone, and law and simulated stage together; three axes, N-PID with
-//! combined feedforward of four elements; and x alone, as campaigns run it. `cargo bench -p quadrant-sim`; the time per iteration is ns per tick, and 100 us
-//! over it the ratio to real time at 10 kHz.
+//! combined feedforward of four elements; and x alone, as campaigns run it. `cargo bench -p quadrant-sim`; the time per iteration
+//! is ns per tick, and 100 us over it the ratio to real time at 10 kHz.
 
 use std::hint::black_box;
 

@@ -5,13 +5,10 @@ use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 
 use super::run::{Friction, Nothing, Phase, SINE, cycle_s, run};
-use super::starts::{nominal, with_gains};
+use super::starts::{MINUTE_CYCLES, nominal, with_gains};
 
 /// Friction over what it was when the axis was commissioned.
 const FACTORS: [f64; 4] = [0.5, 1.0, 1.5, 2.0];
-
-/// Cycles of the sine: the last of them is scored.
-const CYCLES: f64 = 3.25;
 
 /// The settings of an axis with the simulated axis' own friction model, `factor` times what it was.
 fn told(axis: &AxisSettings, factor: f64) -> AxisSettings {
@@ -39,7 +36,8 @@ pub(super) fn table(
             ];
             let mut row = vec![Cell::text(format!("x {factor}"))];
             for settings in competitors {
-                let phases = [Phase::sine(SINE, CYCLES, nominal().with_friction(factor))];
+                let truth = nominal().with_friction(factor);
+                let phases = [Phase::sine(SINE, MINUTE_CYCLES, truth)];
                 let traces = run(stage, &settings, &phases, &mut Nothing, seed)?;
                 let scored_s = cycle_s(SINE);
                 row.extend([

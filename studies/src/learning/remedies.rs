@@ -210,11 +210,7 @@ impl Addition for FedFriction {
         self.last = now;
         let velocity = f64::from(seen.velocity);
         let moved = velocity * self.period_s + displacement;
-        let sense = if moved < 0.0 {
-            Direction::Negative
-        } else {
-            Direction::Positive
-        };
+        let sense = Direction::of(moved);
         let surface = self.surface.at((moved / self.period_s).abs(), sense);
         let force = self.gain * self.model.step(&mut self.state, moved, surface);
         self.sum += force - self.average.pop_front().unwrap_or(0.0);

@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::run::{Friction, Nothing, Phase, SINE, cycle_s, run};
 
 /// Cycles of the sine: three and a half make a minute, the last of them is scored.
-const MINUTE_CYCLES: f64 = 3.25;
+pub(super) const MINUTE_CYCLES: f64 = 3.25;
 
 /// A start: its name, the settings, and what comes before the minute.
 struct Start {

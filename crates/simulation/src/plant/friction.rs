@@ -78,11 +78,7 @@ impl Presliding {
     /// `step_s`.
     #[inline]
     pub fn step(&mut self, displacement: f64, speed: f64, step_s: f64) -> f64 {
-        let direction = if displacement < 0.0 {
-            Direction::Negative
-        } else {
-            Direction::Positive
-        };
+        let direction = Direction::of(displacement);
         match &mut self.0 {
             Model::Gms(model, surface, state) => {
                 model.step(state, displacement, surface.at(speed, direction))

@@ -52,11 +52,7 @@ impl Trajectory {
             let displacement_mm = position_mm - last_mm;
             last_mm = position_mm;
             let velocity = displacement_mm / smooth.sample_time_s;
-            let direction = if displacement_mm < 0.0 {
-                Direction::Negative
-            } else {
-                Direction::Positive
-            };
+            let direction = Direction::of(displacement_mm);
             Step {
                 displacement_mm,
                 speed_mm_s: velocity.abs(),
