@@ -213,6 +213,60 @@ fn what_cancelled_a_cut_is_unlearnt_as_soon_as_it_ends() {
     }
 }
 
+/// Runs the axis on an encoder that shows the reference, a vibration, mm, and an answer to the voltage at 200 Hz, mm/V, a number of ticks late:
+/// the model expects 0.05 mm/V and 25 ticks. Returns the largest deviation of the last 50 ms, mm.
+fn answered<S: Scalar>(
+    axis: &mut Axis<S>,
+    seconds: f64,
+    shaken_mm: f64,
+    (late, mm_per_v): (usize, f64),
+) -> f64 {
+    const TURN: usize = 50;
+    let resolution_mm = fixed().axes[0].encoder.resolution_mm;
+    let ticks = (seconds / PERIOD_S) as usize;
+    let mut voltages = [0.0; TURN];
+    let mut largest_mm: f64 = 0.0;
+    for tick in 0..ticks {
+        voltages[tick % TURN] = voltage(axis);
+        let turns = tick as f64 / TURN as f64;
+        let deviation_mm = mm_per_v * voltages[(tick + TURN - late) % TURN]
+            + shaken_mm * (std::f64::consts::TAU * turns).sin();
+        let position_mm = axis.seen().reference.to_mm(resolution_mm) + deviation_mm;
+        axis.rig.inputs.readings[0].count = (position_mm / resolution_mm).round() as i32 as u32;
+        axis.rig.tick();
+        if tick + 500 >= ticks {
+            largest_mm = largest_mm.max(deviation_mm.abs());
+        }
+    }
+    assert!(axis.rig.state.is_running());
+    largest_mm
+}
+
+#[test]
+fn a_voltage_that_the_axis_answers_a_quarter_of_a_turn_aside_of_its_model_is_unlearnt() {
+    fn left_after_a_second<S: Scalar>() -> f64 {
+        let mut axis = shaken::<S>(&cancelling(rpm(200.0)), (0.2, 200.0));
+        axis.run(2.0);
+        let before = amplitude(&mut axis);
+        assert!(before > 0.1, "{before} V");
+        answered(&mut axis, 1.0, 0.0, (20, 0.2)) / 0.2 / before
+    }
+    // At the rate of learning, which turns the vector instead, a tenth and more would be left.
+    for left in [left_after_a_second::<f32>(), left_after_a_second::<Fixed>()] {
+        assert!(left < 0.03, "{left} of the voltage is left");
+    }
+}
+
+#[test]
+fn an_axis_that_answered_aside_for_long_cancels_again_in_two_seconds() {
+    let mut axis = shaken::<f32>(&cancelling(rpm(200.0)), (0.0, 200.0));
+    axis.run(0.5);
+    let aside_mm = answered(&mut axis, 40.0, 0.004, (36, 0.2));
+    assert!(aside_mm > 0.004, "{aside_mm} mm");
+    let well_mm = answered(&mut axis, 2.0, 0.004, (25, 0.05));
+    assert!(well_mm < 0.002, "{well_mm} mm of 0.004 mm are left");
+}
+
 #[test]
 fn a_reversal_that_errs_unlearns_little() {
     for hz in [30.0, 60.0, 100.0] {

@@ -17,7 +17,9 @@
 //! sine, cosine and response come from polynomials and tables, without a division.
 //!
 //! **Guard.** `p`, the sum of Re (G z), is the error that the vectors take away. Where the error goes against it, so that the mean of
-//! `-p (e + a p)` is above a floor, the vectors are too large: they are unlearnt much faster than they are learnt.
+//! `-p (e + a p)` is above a floor, the vectors are too large: they are unlearnt much faster than they are learnt. `q`, the sum of Im (G z), is
+//! that error a quarter of a turn later. Where the mean of `q e` stays large beside that of `p^2`, the axis answers aside of G, and the vectors turn
+//! in place of falling: they are unlearnt as well.
 //!
 //! **Slip.** The vector of the teeth turns against its own frequency where the spindle is not as fast as it is told. The speed
 //! follows that rotation, within 1.2 % of what was told.
@@ -33,6 +35,7 @@ use serde::{Deserialize, Serialize};
 pub use self::response::{CancellingLoop, LEAST_MARGIN_DEG, STEP_TICKS};
 use self::response::{NODES, node_turns};
 use crate::law::reference::sine::{SINE_BITS, SinePolynomial};
+use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
 /// Multiples of the spindle's frequency that are cancelled at most.
@@ -52,6 +55,14 @@ const GUARD_TURNS: f64 = 1.0;
 const UNLEARN_S: f64 = 0.04;
 const EXCESS: f64 = 0.06;
 const FLOOR_MM: f64 = 1e-3;
+
+/// The axis answers aside where the error that lies a quarter of a turn aside of what the vectors take away is so many times as large as that, and
+/// more than 60 degrees aside in all, by the cotangent: the margin allows less. The time after which the vectors are unlearnt, s, and how many
+/// steps less a step counts that is not so: a speed that is told a per cent wrong, or a ramp, looks the same for a time.
+const ASIDE_TIMES: f64 = 3.0;
+const ASIDE_COTANGENT: f64 = 0.577;
+const ASIDE_S: f64 = 0.3;
+const NOT_ASIDE: u16 = 4;
 
 /// Lengths are multiplied by so much, 1/mm, for the guard, and are a quarter of a millimetre at most.
 const PER_UNIT: f64 = 4.0;
@@ -164,6 +175,10 @@ struct Guard<S: Scalar> {
     share_of_turn: S::Gain,
     floor: S,
     unlearn: S,
+    aside_times: S::Gain,
+    aside_cotangent: S::Gain,
+    /// Steps that are counted at most while the axis answers aside: beyond half of them the vectors are unlearnt.
+    aside_steps: u16,
 }
 
 /// The constants of the slip's follower.
@@ -218,6 +233,13 @@ pub struct CancellingState<S: Scalar> {
     /// Means of the harm that the vectors do, the second one of the first, squares of the guard's unit.
     harm_now: S,
     harm: S,
+    /// The same two means of the error times the one that the vectors take away a quarter of a turn later; and the mean of the square of what they
+    /// take away.
+    aside_now: S,
+    aside: S,
+    size: S,
+    /// Steps in which the axis has answered aside, less [`NOT_ASIDE`] for each in which it has not.
+    aside_steps: u16,
     /// Growth across the vector of the teeth since the last look; its mean, and that of the vector's square.
     across: S,
     rotation: S,
@@ -288,6 +310,10 @@ impl<S: Scalar> Cancelling<S> {
             ),
             floor: number(floor * floor),
             unlearn: fraction(libm::exp(-step_s / UNLEARN_S)),
+            aside_times: S::gain(ASIDE_TIMES, Quantity::Multiplier, Quantity::Multiplier),
+            aside_cotangent: S::gain(ASIDE_COTANGENT, Quantity::Multiplier, Quantity::Multiplier),
+            // `as` saturates.
+            aside_steps: rounding::round(2.0 * ASIDE_S / step_s) as u16,
         };
         let look_s = step_s * f64::from(LOOK_STEPS);
         let per_volt = 1.0 / settings.limit_v.max(LEAST_V);
@@ -401,24 +427,39 @@ impl<S: Scalar> Cancelling<S> {
         }
     }
 
-    /// Weighs the error against what the vectors take away, and unlearns vectors that are too large.
+    /// Weighs the error against what the vectors take away, and unlearns vectors that are too large, or that the axis answers aside.
     #[inline(always)]
     fn weigh(&self, state: &mut CancellingState<S>, error: S) {
         let guard = &self.guard;
         let product = |one: S, other: S| one.times(other, Quantity::Multiplier);
         let mut taken = S::ZERO;
+        let mut later = S::ZERO;
         for harmonic in &state.harmonics {
             let ([x, y], [by_x, by_y]) = (harmonic.vector, harmonic.response);
             taken = taken + product(x, by_x) - product(y, by_y);
+            later = later + product(x, by_y) + product(y, by_x);
         }
         let taken = taken.within(guard.one);
+        let later = later.within(guard.one);
         let error = error.scale(guard.per_unit).within(guard.one);
         let allowed = error + taken.times(guard.excess, Quantity::Fraction);
         // Two means, one behind the other: of a reversal's error little is left that the vibration makes ripple.
         let mean = |mean: S, new: S| mean + (new - mean).times(state.share, Quantity::Fraction);
         state.harm_now = mean(state.harm_now, -product(taken, allowed));
         state.harm = mean(state.harm, state.harm_now);
-        if state.harm > guard.floor {
+        state.aside_now = mean(state.aside_now, product(later, error));
+        state.aside = mean(state.aside, state.aside_now);
+        state.size = mean(state.size, product(taken, taken));
+        let aside = state.aside.magnitude();
+        let is_aside = (aside > guard.floor)
+            & (aside > state.size.scale(guard.aside_times))
+            & (aside.scale(guard.aside_cotangent) + state.harm > S::ZERO);
+        state.aside_steps = if is_aside {
+            state.aside_steps.saturating_add(1).min(guard.aside_steps)
+        } else {
+            state.aside_steps.saturating_sub(NOT_ASIDE)
+        };
+        if state.harm > guard.floor || state.aside_steps > guard.aside_steps / 2 {
             for harmonic in &mut state.harmonics {
                 let unlearnt = |part: S| part.times(guard.unlearn, Quantity::Fraction);
                 harmonic.vector = harmonic.vector.map(unlearnt);
