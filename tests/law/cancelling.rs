@@ -245,11 +245,12 @@ fn answered<S: Scalar>(
 #[test]
 fn a_voltage_that_the_axis_answers_a_quarter_of_a_turn_aside_of_its_model_is_unlearnt() {
     fn left_after_a_second<S: Scalar>() -> f64 {
+        let (late, mm_per_v) = (20, 0.2);
         let mut axis = shaken::<S>(&cancelling(rpm(200.0)), (0.2, 200.0));
         axis.run(2.0);
         let before = amplitude(&mut axis);
         assert!(before > 0.1, "{before} V");
-        answered(&mut axis, 1.0, 0.0, (20, 0.2)) / 0.2 / before
+        answered(&mut axis, 1.0, 0.0, (late, mm_per_v)) / mm_per_v / before
     }
     // At the rate of learning, which turns the vector instead, a tenth and more would be left.
     for left in [left_after_a_second::<f32>(), left_after_a_second::<Fixed>()] {

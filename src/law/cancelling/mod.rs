@@ -57,10 +57,14 @@ const EXCESS: f64 = 0.06;
 const FLOOR_MM: f64 = 1e-3;
 
 /// The axis answers aside where the error that lies a quarter of a turn aside of what the vectors take away is so many times as large as that, and
-/// more than 60 degrees aside in all, by the cotangent: the margin allows less. The time after which the vectors are unlearnt, s, and how many
+/// more than 60 degrees aside in all, by the cotangent: [`LEAST_MARGIN_DEG`] allows less. The time after which the vectors are unlearnt, s, and how many
 /// steps less a step counts that is not so: a speed that is told a per cent wrong, or a ramp, looks the same for a time.
 const ASIDE_TIMES: f64 = 3.0;
 const ASIDE_COTANGENT: f64 = 0.577;
+const _: () = assert!(
+    LEAST_MARGIN_DEG == 30.0,
+    "60 degrees are a right angle less this margin"
+);
 const ASIDE_S: f64 = 0.3;
 const NOT_ASIDE: u16 = 4;
 
