@@ -31,6 +31,7 @@ use crate::law::friction::smoothed_gms::SmoothedGms;
 use crate::law::friction::stribeck::{Sliding, SlidingTable};
 use crate::law::friction::{Direction, FrictionSettings, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
+use crate::law::words::words;
 
 /// The friction models that act together.
 #[derive(
@@ -187,6 +188,15 @@ enum Presliding<S: Scalar, const N: usize> {
     Dahl(Dahl<S>),
 }
 
+words!([S: Scalar, const N: usize] enum Presliding<S, N> {
+    0 Gms { 0 model: GmsOnSurface<S, N> },
+    1 Static { 0 model: GmsOnSurface<S, N> },
+    2 Breakaway { 0 model: GmsOnSurface<S, N> },
+    3 Smoothed { elements elements: SmoothedGms<S, N>, surface surface: SlidingTable<S> },
+    4 Lugre { 0 model: Lugre<S> },
+    5 Dahl { 0 model: Dahl<S> },
+});
+
 /// The elements and what they slide on, the tables last.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
@@ -195,6 +205,12 @@ struct GmsOnSurface<S: Scalar, const N: usize> {
     breakaway: PerDirection<Sliding<S>>,
     surface: SlidingTable<S>,
 }
+
+words!([S: Scalar, const N: usize] struct GmsOnSurface<S, N> {
+    elements: Gms<S, N>,
+    breakaway: PerDirection<Sliding<S>>,
+    surface: SlidingTable<S>,
+});
 
 /// The friction state of the feedforward; slack by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -280,6 +296,16 @@ pub struct Feedforward<S: Scalar, const N: usize> {
     inertia: S::Gain,
     presliding: Presliding<S, N>,
 }
+
+words!([S: Scalar, const N: usize] struct Feedforward<S, N> {
+    coulomb_gain: S::Gain,
+    gms_gain: S::Gain,
+    per_gms_gain: S::Gain,
+    most: S,
+    viscous: PerDirection<S::Gain>,
+    inertia: S::Gain,
+    presliding: Presliding<S, N>,
+});
 
 impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// Makes the feedforward from validated parameters. Settings time only.

@@ -37,7 +37,8 @@
 //! - Memory, which a tick changes: [`control::terms::FeedbackState`], [`axis::AxisState`].
 //!
 //! Everything for the tick is generic over the number type ([`scalar::Scalar`]): `f32`, fixed point, or `f64` on a host.
-//! Curves are tabulated ([`table`]); what there is one of for each axis is a [`axes::PerAxis`]; [`decimal`] writes numbers into messages.
+//! Curves are tabulated ([`table`]); what there is one of for each axis is a [`axes::PerAxis`]; [`decimal`] writes numbers into messages,
+//! and [`words`] turns what was built into words for another machine.
 
 pub mod admission;
 pub mod axes;
@@ -60,5 +61,6 @@ pub mod scalar;
 pub mod stage;
 pub mod table;
 pub mod units;
+pub mod words;
 
 pub use axis::telemetry;

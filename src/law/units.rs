@@ -7,6 +7,7 @@ use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use crate::law::rounding;
+use crate::law::words::words;
 
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +21,10 @@ pub const POSITION_UNITS_PER_COUNT: f64 = 65536.0;
 /// and differences of what a machine can reach do not wrap, and the encoder's own sum saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position(pub i64);
+
+words!([] struct Position {
+    0: i64,
+});
 
 impl Position {
     /// The origin of the axis.

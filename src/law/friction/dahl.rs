@@ -17,6 +17,7 @@ use super::bristle::Bristle;
 use super::direction::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
+use crate::law::words::words;
 
 /// Dahl's model as a person writes it. Its level is the Coulomb level of the static model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -66,6 +67,12 @@ struct Side<S: Scalar> {
     travel: S::Gain,
 }
 
+words!([S: Scalar] struct Side<S> {
+    level: S,
+    per_level: S::Gain,
+    travel: S::Gain,
+});
+
 /// Dahl's model ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dahl<S: Scalar> {
@@ -73,6 +80,12 @@ pub struct Dahl<S: Scalar> {
     rate: OctaveTable<S, 1>,
     covered: OctaveTable<S, 1>,
 }
+
+words!([S: Scalar] struct Dahl<S> {
+    sides: PerDirection<Side<S>>,
+    rate: OctaveTable<S, 1>,
+    covered: OctaveTable<S, 1>,
+});
 
 impl<S: Scalar> Dahl<S> {
     /// Makes the model from its parameters and its level in V, positive, for each sense of motion. Settings time only.

@@ -21,6 +21,7 @@ use serde::{Deserialize, Serialize};
 use super::direction::Direction;
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
+use crate::law::words::words;
 
 /// Elements in a settings file at most.
 pub const MAX_ELEMENTS: usize = 10;
@@ -77,6 +78,11 @@ struct ElementConfig<S: Scalar> {
     weight: S::Gain,
 }
 
+words!([S: Scalar] struct ElementConfig<S> {
+    stiffness: S::Gain,
+    weight: S::Gain,
+});
+
 /// The GMS model ready for the tick.
 ///
 /// ```
@@ -99,6 +105,11 @@ pub struct Gms<S: Scalar, const N: usize> {
     elements: [ElementConfig<S>; N],
     one: S,
 }
+
+words!([S: Scalar, const N: usize] struct Gms<S, N> {
+    elements: [ElementConfig<S>; N],
+    one: S,
+});
 
 /// The memory of the GMS model.
 #[derive(Clone, Debug, PartialEq)]

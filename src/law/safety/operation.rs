@@ -3,6 +3,8 @@
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
+use crate::law::words::words;
+
 use super::brake::Brake;
 use super::fault::{FaultCode, Reaction};
 
@@ -41,6 +43,12 @@ pub enum EnabledBy {
     Operator,
 }
 
+words!([] enum EnabledBy {
+    0 Any {},
+    1 Host {},
+    2 Operator {},
+});
+
 impl EnabledBy {
     /// True if a command to enable is heeded from there.
     pub const fn allows(self, station: Station) -> bool {
@@ -76,6 +84,11 @@ pub enum HostNeeded {
     EndlessMotion,
 }
 
+words!([] enum HostNeeded {
+    0 EveryMotion {},
+    1 EndlessMotion {},
+});
+
 /// Rules of operation of the stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operation {
@@ -92,6 +105,15 @@ pub struct Operation {
     /// The holding brake.
     pub brake: Brake,
 }
+
+words!([] struct Operation {
+    enabled_by: EnabledBy,
+    host_needed: HostNeeded,
+    emergency_stop: Reaction,
+    link_lost: Reaction,
+    underrun: Reaction,
+    brake: Brake,
+});
 
 impl Operation {
     /// The reaction to a fault under these rules.
