@@ -12,13 +12,15 @@ use quadrant::app::supervisor::Event;
 use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
 use quadrant::axes::AxisName;
 use quadrant::command::Command;
-use quadrant::hal::{ResetCause, SettingsFlash};
+use quadrant::hal::ResetCause;
 use quadrant::motion::MotionMode;
 use quadrant::safety::Fault;
 use quadrant::scalar::{Quantity, Scalar};
+#[cfg(not(feature = "lean"))]
 use quadrant::settings::StageSettings;
 
 use crate::board;
+use crate::boot::Source;
 
 /// Lines of a kind in a second at 10 kHz: more are counted, not printed.
 const LINES: u16 = 5;
@@ -57,6 +59,7 @@ pub(crate) fn started(cause: ResetCause) {
 }
 
 /// Logs the origin of the settings in force.
+#[cfg(not(feature = "lean"))]
 pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance: &str) {
     let mut paths = 0_usize;
     // An error of the tree would end the visit early, and show as a number that is too small.
@@ -70,6 +73,7 @@ pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance:
 }
 
 /// Warns if the settings in force are the default ones, and says what to do.
+#[cfg(not(feature = "lean"))]
 pub(crate) fn not_commissioned(settings: &StageSettings) {
     if !settings.is_commissioned() {
         defmt::warn!(
@@ -312,9 +316,9 @@ impl EventLogger {
     }
 
     /// Logs the changes since the last call. Once a poll of the server.
-    pub(crate) fn log<S: Scalar, F: SettingsFlash>(
+    pub(crate) fn log<S: Scalar>(
         &mut self,
-        server: &Server<'_, '_, S, F>,
+        server: &Server<'static, 'static, S, Source>,
         seen: &Snapshot<S>,
         timing: TimingStatistics,
     ) {
@@ -328,6 +332,7 @@ impl EventLogger {
                 continue;
             }
             match change {
+                #[cfg(not(feature = "lean"))]
                 // The sum of what there is to say of settings needs the server.
                 StateChange::Stored => defmt::info!(
                     "settings stored: {=usize} paths, from {=str}",

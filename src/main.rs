@@ -62,10 +62,10 @@ mod app {
     use quadrant::safety::AxisSwitches;
 
     use crate::board::{
-        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
-        Switches, Tick, Watchdog,
+        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, Switches, Tick,
+        Watchdog,
     };
-    use crate::boot::{self, StaticStorage};
+    use crate::boot::{self, Source, StaticStorage};
     use crate::log::{self, EventLogger, LogEntry, Printer};
 
     /// The number type of the control law.
@@ -108,7 +108,7 @@ mod app {
     #[local]
     struct Local {
         control: &'static mut Control<'static, 'static, Number>,
-        server: &'static mut Server<'static, 'static, Number, SettingsFlash>,
+        server: &'static mut Server<'static, 'static, Number, Source>,
         amplifiers: Amplifiers,
         encoders: Encoders,
         switches: Switches,
@@ -137,7 +137,7 @@ mod app {
     }
 
     #[init(local = [
-        storage: StaticStorage<Number, SettingsFlash> = StaticStorage::new(),
+        storage: StaticStorage<Number> = StaticStorage::new(),
         requests: Queue<Command, 4> = Queue::new(),
         commands: Queue<Command, 4> = Queue::new(),
         snapshots: Queue<&'static mut Snapshot<Number>, 4> = Queue::new(),
@@ -157,7 +157,14 @@ mod app {
             server,
             rate_hz,
             resolution_mm,
-        } = boot::machine(cx.local.storage, board.flash, crashed, cycle_hz, NUMBER);
+        } = boot::machine(
+            cx.local.storage,
+            #[cfg(not(feature = "lean"))]
+            board.flash,
+            crashed,
+            cycle_hz,
+            NUMBER,
+        );
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
@@ -305,9 +312,11 @@ mod app {
                 let _ = cx.local.events_in.enqueue((snapshot.tick, event));
                 print(cx.local.lines_in, LogEntry::Event(event));
             }
+            #[cfg(not(feature = "lean"))]
             for glitch in &supervised.glitches {
                 print(cx.local.lines_in, LogEntry::Glitch(*glitch));
             }
+            #[cfg(not(feature = "lean"))]
             if !supervised.glitches.is_empty() {
                 // Control empties this queue at its next snapshot.
                 let _ = cx

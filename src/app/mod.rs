@@ -46,7 +46,10 @@ pub use host_need::LINK_TIMEOUT_TICKS;
 pub use intake::{Intake, Received};
 pub use liveness::Liveness;
 pub use queues::{ControlEnds, IntakeEnds, Queues, ServerEnds};
-pub use server::{Poll, Server, ServerParts, ServerStatistics};
+pub use server::{
+    AxisSource, HostAxes, OwnSettings, OwnSettingsParts, Poll, Server, ServerParts,
+    ServerStatistics, fingerprint,
+};
 pub use snapshot::{AxisSnapshot, Snapshot, TimingStatistics};
 pub use supervision::{Supervised, Supervision};
 

@@ -7,6 +7,7 @@ use heapless_queues::spsc::{Consumer, Producer, Queue};
 use super::Axis;
 use crate::app::capture::Capture;
 use crate::app::telemetry::{Sample, Sampler};
+use crate::law::admission::Lock;
 use crate::law::axes::AxisName;
 use crate::law::cancelling::SpindleSpeed;
 use crate::law::command::Command;
@@ -28,9 +29,11 @@ pub(super) enum Order {
     /// Take the speed of the spindle over.
     Spindle(SpindleSpeed),
     /// Keep the outputs off.
-    Lock,
-    /// No longer keep the outputs off.
+    Lock(Lock),
+    /// No longer keep the outputs off for this reason.
     Unlock {
+        /// The reason.
+        reason: Lock,
         /// Valid settings were stored meanwhile.
         stored: bool,
     },
@@ -46,6 +49,8 @@ pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) needs_disabled: bool,
     /// Another axis of the same settings follows: the outputs stay off until then.
     pub(super) more: bool,
+    /// It is the first that drives this axis since the start.
+    pub(super) first: bool,
 }
 
 /// An item that waits for the control law: of a stream or of an injection, never of both.

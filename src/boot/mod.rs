@@ -1,235 +1,38 @@
-//! The start: settings, static storage, and the crash record of the last run.
+//! The start: static storage, where the axes come from, and the crash record of the last run.
+
+#[cfg(feature = "lean")]
+mod host_axes;
+#[cfg(not(feature = "lean"))]
+mod own_settings;
 
 use core::mem::MaybeUninit;
 
-use quadrant::app::capture::CAPTURE_WORDS;
 use quadrant::app::crash_record::CrashCause;
-use quadrant::app::start_record::StartRecord;
-use quadrant::app::{Axis, Control, ControlEnds, Intake, Queues, Server, ServerParts};
-use quadrant::axes::AxisName;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::hal::{ResetCause, SettingsFlash};
-use quadrant::link::message::{NumberType, Provenance};
-use quadrant::lockstep::Job;
+use quadrant::app::{Axis, AxisSource, Control, ControlEnds, Intake, Server, ServerParts};
+use quadrant::hal::ResetCause;
 use quadrant::safety::{FaultCode, Operation};
 use quadrant::scalar::Scalar;
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
-use quadrant::store::{BUFFER_BYTES, Finding, Store};
 
 use crate::{board, log};
 
-/// Static storage for all large objects: the stack has no room for them.
-pub(crate) struct StaticStorage<S: Scalar + 'static, F: 'static> {
-    settings: MaybeUninit<StageSettings>,
-    draft: MaybeUninit<StageSettings>,
-    axes: [MaybeUninit<Axis<S>>; 4],
-    queues: Queues<'static, S>,
-    buffer: [u8; BUFFER_BYTES],
-    capture: [u32; CAPTURE_WORDS],
-    control: MaybeUninit<Control<'static, 'static, S>>,
-    intake: MaybeUninit<Intake<'static>>,
-    server: MaybeUninit<Server<'static, 'static, S, F>>,
-}
-
-impl<S: Scalar, F> StaticStorage<S, F> {
-    /// Returns the storage before the start.
-    pub(crate) const fn new() -> Self {
-        Self {
-            settings: MaybeUninit::uninit(),
-            draft: MaybeUninit::uninit(),
-            axes: [const { MaybeUninit::uninit() }; 4],
-            queues: Queues::new(),
-            buffer: [0; BUFFER_BYTES],
-            capture: [0; CAPTURE_WORDS],
-            control: MaybeUninit::uninit(),
-            intake: MaybeUninit::uninit(),
-            server: MaybeUninit::uninit(),
-        }
-    }
-}
+#[cfg(feature = "lean")]
+pub(crate) use host_axes::{Source, StaticStorage, forget_starts, machine};
+#[cfg(not(feature = "lean"))]
+pub(crate) use own_settings::{Source, StaticStorage, forget_starts, machine};
 
 /// The two halves of the machine, ready for the first tick.
-pub(crate) struct Machine<S: Scalar + 'static, F: 'static> {
+pub(crate) struct Machine<S: Scalar + 'static, O: 'static> {
     /// The fast half, of the control interrupt.
     pub(crate) control: &'static mut Control<'static, 'static, S>,
     /// The link's bytes on their way, of the supervising task.
     pub(crate) intake: &'static mut Intake<'static>,
     /// The slow half, of the lowest task.
-    pub(crate) server: &'static mut Server<'static, 'static, S, F>,
+    pub(crate) server: &'static mut Server<'static, 'static, S, O>,
     /// Control rate, Hz.
     pub(crate) rate_hz: u32,
     /// Lengths of the encoders' counts, mm.
     pub(crate) resolution_mm: [f64; 3],
-}
-
-/// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
-/// timer that measures ticks.
-pub(crate) fn machine<S: Scalar, F: SettingsFlash>(
-    storage: &'static mut StaticStorage<S, F>,
-    flash: F,
-    crashed: Option<FaultCode>,
-    cycle_hz: u32,
-    number: NumberType,
-) -> Machine<S, F> {
-    let settings = defaults(&mut storage.settings);
-    let draft = defaults(&mut storage.draft);
-    let Loaded {
-        plan,
-        provenance,
-        store,
-        invalid,
-        keep_draft,
-    } = load(
-        flash,
-        settings,
-        draft,
-        &mut storage.buffer,
-        count_start(crashed.is_some()),
-    );
-    // The back buffer's content does not matter: it is built over before it is used.
-    let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
-    let mut axes = [x, y, z];
-    // Tables are filled and bounds are searched before the first tick is due.
-    for (name, axis) in AxisName::ALL.into_iter().zip(&mut axes) {
-        settings.build_axis_into(name, axis);
-    }
-    let rate_hz = settings.rate_hz as u32;
-    let resolution_mm = settings
-        .axes
-        .each_ref()
-        .map(|axis| axis.encoder.resolution_mm);
-    let operation = settings.operation();
-    let (control_ends, intake_ends, ends) = storage.queues.split();
-    let control = place_control(&mut storage.control, axes, operation, plan, control_ends);
-    let invalid = invalid.then_some(FaultCode::SettingsInvalid);
-    for code in [crashed, invalid].into_iter().flatten() {
-        control.start_faulted(code);
-    }
-    let parts = ServerParts {
-        ends,
-        back_buffer,
-        settings,
-        draft,
-        keep_draft,
-        provenance,
-        store,
-        buffer: &mut storage.buffer,
-        capture: &mut storage.capture,
-        board: board::NAME,
-        cycle_hz,
-        rates_hz: board::RATES_HZ,
-        number,
-    };
-    Machine {
-        control,
-        intake: storage.intake.write(Intake::new(intake_ends)),
-        server: place_server(&mut storage.server, parts),
-        rate_hz,
-        resolution_mm,
-    }
-}
-
-/// Results of loading the settings.
-struct Loaded<S: Scalar, F> {
-    /// The motions of the axes.
-    plan: Plan<S>,
-    /// The origin of the settings.
-    provenance: Provenance,
-    /// The store that holds them.
-    store: Store<F>,
-    /// True if stored settings were refused or are damaged.
-    invalid: bool,
-    /// True if the draft holds settings that are stored and not in force.
-    keep_draft: bool,
-}
-
-/// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults, on
-/// which the outputs are not enabled. They have been checked then. An older set than one that is damaged, one that the board
-/// is not up to, and one that is to be set aside go into `draft`.
-///
-/// # Panics
-/// When a job cannot be decoded or is refused: then there is nothing that could safely be run.
-// Each step of the start has a frame of its own, gone when the next one begins.
-#[inline(never)]
-fn load<S: Scalar, F: SettingsFlash>(
-    flash: F,
-    settings: &mut StageSettings,
-    draft: &mut StageSettings,
-    buffer: &mut [u8; BUFFER_BYTES],
-    set_aside: bool,
-) -> Loaded<S, F> {
-    let mut store = Store::new(flash, 0);
-    let mut report = |finding: Finding<'_>| match finding {
-        Finding::Unknown(path) => defmt::warn!("{=str} is stored, but unknown here", path),
-        Finding::Missing(path) => defmt::warn!("{=str} is not stored, and has its default", path),
-    };
-    let found = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut report);
-    let mut provenance = Provenance::new();
-    let (mut invalid, mut keep_draft) = (false, false);
-    let plan = match found {
-        Ok(Some(stored)) if stored.is_newest && !set_aside && is_possible(settings.rate_hz) => {
-            log::settings_loaded(settings, stored.sequence, &stored.provenance);
-            provenance = stored.provenance;
-            take(board::job(), None)
-        }
-        not_stored => {
-            match not_stored {
-                Err(error) => {
-                    defmt::error!("stored settings refused: {}", defmt::Display2Format(&error));
-                    invalid = true;
-                }
-                Ok(Some(stored)) => {
-                    let why = if !stored.is_newest {
-                        "those stored after them are damaged"
-                    } else if set_aside {
-                        "three starts with them did not last"
-                    } else {
-                        "the board is not up to their rate_hz"
-                    };
-                    defmt::error!(
-                        "settings number {=u32} are in the draft, and not in force: {=str}",
-                        stored.sequence,
-                        why
-                    );
-                    provenance = stored.provenance;
-                    draft.copy_from(settings);
-                    settings.set_default();
-                    (invalid, keep_draft) = (true, true);
-                }
-                Ok(None) => defmt::info!("no settings are stored"),
-            }
-            let plan = take(board::job(), Some(settings));
-            built(settings.validate(FIRMWARE_ELEMENTS));
-            log::not_commissioned(settings);
-            plan
-        }
-    };
-    let plan = built(plan.build(settings));
-    Loaded {
-        plan,
-        provenance,
-        store,
-        invalid,
-        keep_draft,
-    }
-}
-
-/// Counts this start; returns true if as many as allowed have not lasted.
-fn count_start(crashed: bool) -> bool {
-    let record = board::start_record::read().begin(crashed);
-    board::start_record::write(record);
-    record.is_safe_start()
-}
-
-/// Takes note that this start has lasted, or that the next is asked for.
-pub(crate) fn forget_starts() {
-    board::start_record::write(StartRecord::default());
-}
-
-/// True if the board is up to a control rate.
-fn is_possible(rate_hz: f64) -> bool {
-    (board::RATES_HZ.0..=board::RATES_HZ.1).contains(&rate_hz)
 }
 
 /// Logs the crash record of the last run; returns its fault, or that of a watchdog reset.
@@ -252,33 +55,6 @@ pub(crate) fn report_crash(cause: ResetCause) -> Option<FaultCode> {
     (cause == ResetCause::Watchdog).then_some(FaultCode::WatchdogReset)
 }
 
-/// Decodes the job that the board was given: its motions, and its settings into `settings`. Without a job, there is no
-/// motion, and the settings stay as they are.
-#[inline(never)]
-fn take(bytes: Option<&[u8]>, settings: Option<&mut StageSettings>) -> PlanSettings {
-    let Some(bytes) = bytes else {
-        return PlanSettings::default();
-    };
-    match postcard::from_bytes::<Job>(bytes) {
-        Ok(job) => {
-            if let Some(settings) = settings {
-                settings.copy_from(&job.stage);
-            }
-            job.plan
-        }
-        Err(_) => panic!(
-            "the job of {} bytes cannot be decoded: host and firmware differ in version",
-            bytes.len()
-        ),
-    }
-}
-
-/// Makes the default settings in their place.
-#[inline(never)]
-fn defaults(place: &mut MaybeUninit<StageSettings>) -> &mut StageSettings {
-    place.write(StageSettings::default())
-}
-
 /// Makes room for an axis.
 #[inline(never)]
 fn blank_axis<S: Scalar>(place: &mut MaybeUninit<Axis<S>>) -> &mut Axis<S> {
@@ -299,20 +75,9 @@ fn place_control<S: Scalar>(
 
 /// Makes the slow half in its place.
 #[inline(never)]
-fn place_server<S: Scalar, F: SettingsFlash>(
-    place: &'static mut MaybeUninit<Server<'static, 'static, S, F>>,
-    parts: ServerParts<'static, 'static, S, F>,
-) -> &'static mut Server<'static, 'static, S, F> {
+fn place_server<S: Scalar, O: AxisSource<'static, S>>(
+    place: &'static mut MaybeUninit<Server<'static, 'static, S, O>>,
+    parts: ServerParts<'static, 'static, S, O>,
+) -> &'static mut Server<'static, 'static, S, O> {
     place.write(Server::new(parts))
-}
-
-/// Unwraps a build.
-///
-/// # Panics
-/// When settings were refused.
-fn built<T>(result: Result<T, SettingsError>) -> T {
-    match result {
-        Ok(built) => built,
-        Err(error) => panic!("settings refused: {error}"),
-    }
 }

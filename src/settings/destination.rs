@@ -3,11 +3,12 @@
 use core::fmt;
 
 use super::axis::AxisSettings;
+use super::bounds::StageBounds;
 use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
 use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
-use crate::law::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
+use crate::law::reference::{PointToPointSettings, StreamLimits, Velocity};
 use crate::law::units::Position;
 
 /// Reason why an axis is not moved.
@@ -85,15 +86,9 @@ impl StageSettings {
             AxisName::Z => z,
         }
     }
+}
 
-    /// The scale of an axis' motions.
-    pub fn scale_of(&self, axis: AxisName) -> MotionScale {
-        MotionScale {
-            resolution_mm: self.axis(axis).encoder.resolution_mm,
-            rate_hz: self.rate_hz,
-        }
-    }
-
+impl StageBounds {
     /// The move of a homed axis from rest at `from` to `target_mm` at `velocity_mm_s`, within the axis' acceleration and
     /// jerk. Hand it to the axis as its plan's motion and start it with
     /// [`Command::StartMove`](crate::law::command::Command::StartMove).
@@ -109,8 +104,7 @@ impl StageSettings {
         velocity_mm_s: f64,
     ) -> Result<PointToPointSettings, MoveError> {
         let refuse = |flaw| Err(MoveError { axis, flaw });
-        let settings = self.axis(axis);
-        let limits = &settings.limits;
+        let limits = &self.axes[axis];
         if !homed {
             return refuse(MoveFlaw::NotHomed);
         }
@@ -133,7 +127,7 @@ impl StageSettings {
                 limit_mm_s: limits.max_velocity_mm_s,
             });
         }
-        let resolution_mm = settings.encoder.resolution_mm;
+        let resolution_mm = limits.encoder.resolution_mm;
         // From whole units to whole units, so that the move ends on the target's.
         let distance = Position::from_mm(target_mm, resolution_mm) - from;
         Ok(PointToPointSettings {
@@ -149,7 +143,7 @@ impl StageSettings {
     /// # Errors
     /// A speed above the axis' largest, or no number.
     pub fn jog_at(&self, axis: AxisName, velocity_mm_s: f64) -> Result<Velocity, MoveError> {
-        let limit_mm_s = self.axis(axis).limits.max_velocity_mm_s;
+        let limit_mm_s = self.axes[axis].max_velocity_mm_s;
         if !(velocity_mm_s >= -limit_mm_s && velocity_mm_s <= limit_mm_s) {
             return Err(MoveError {
                 axis,
@@ -168,13 +162,13 @@ impl StageSettings {
     /// # Errors
     /// The settings do not say how.
     pub fn can_home(&self, axis: AxisName) -> Result<(), MoveError> {
-        match self.axis(axis).homing {
-            Some(_) => Ok(()),
-            None => Err(MoveError {
-                axis,
-                flaw: MoveFlaw::NoHoming,
-            }),
+        if self.axes[axis].can_home {
+            return Ok(());
         }
+        Err(MoveError {
+            axis,
+            flaw: MoveFlaw::NoHoming,
+        })
     }
 
     /// Limits of streamed set points; the travel holds for axes that are homed.
@@ -183,7 +177,7 @@ impl StageSettings {
         let [of_x, of_y, of_z] = homed;
         [(x, of_x), (y, of_y), (z, of_z)].map(|(axis, homed)| {
             let scale = self.scale_of(axis);
-            let limits = &self.axis(axis).limits;
+            let limits = &self.axes[axis];
             let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
             StreamLimits {
                 scale,

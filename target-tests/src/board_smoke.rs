@@ -92,13 +92,7 @@ fn start(image: &Image) -> Result<(Machine, Debugger)> {
 
 /// Builds the image, lets it start and tick, fills its stack, and checks what it logs.
 pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
-    let image = image::build(
-        toolchain,
-        Target {
-            board: Board::NucleoF446re,
-            scalar: Scalar::F32,
-        },
-    )?;
+    let image = image::build(toolchain, Target::new(Board::NucleoF446re, Scalar::F32))?;
     let (_machine, mut debugger) = start(&image)?;
     pass_clock_setup(&mut debugger)?;
     let mut log = Log::of(&image)?;

@@ -89,13 +89,7 @@ fn job(axes: [Combination; 3]) -> Job {
 
 /// Runs every combination in lockstep, one on each axis and three at a time, and fails on any difference.
 pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
-    let image = image::build(
-        toolchain,
-        Target {
-            board: Board::Mps2,
-            scalar,
-        },
-    )?;
+    let image = image::build(toolchain, Target::new(Board::Mps2, scalar))?;
     let combinations = all();
     let (mut words, mut moving) = (0, 0);
     for three in combinations.chunks(3) {

@@ -35,10 +35,7 @@ const BRIDGES: [(&str, u32); 2] = [
 
 /// The reference board's image.
 pub(crate) fn image(toolchain: Toolchain) -> Result<Image> {
-    let target = Target {
-        board: Board::NucleoF446re,
-        scalar: Scalar::F32,
-    };
+    let target = Target::new(Board::NucleoF446re, Scalar::F32);
     image::build(toolchain, target)
 }
 

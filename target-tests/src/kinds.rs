@@ -17,10 +17,7 @@ use xtask::toolchain::Toolchain;
 
 /// The image that is emulated.
 pub(crate) fn emulated(toolchain: Toolchain, scalar: Scalar) -> Result<Image> {
-    let target = Target {
-        board: Board::Mps2,
-        scalar,
-    };
+    let target = Target::new(Board::Mps2, scalar);
     image::build(toolchain, target)
 }
 

@@ -44,13 +44,7 @@ pub(crate) fn run(
         "{seconds} s is not a time to run"
     );
     let ticks = ticks as u32;
-    let image = image::build(
-        toolchain,
-        Target {
-            board: Board::Mps2,
-            scalar,
-        },
-    )?;
+    let image = image::build(toolchain, Target::new(Board::Mps2, scalar))?;
     println!("{}", image.footprint()?);
     let model = ReferenceModel::of(scalar, job)?;
     let Run { tally, rate } = if paced {

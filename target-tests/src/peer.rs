@@ -67,10 +67,7 @@ pub(crate) fn run(toolchain: Toolchain) -> Result<()> {
 
 /// Builds the program.
 fn build(toolchain: Toolchain) -> Result<Image> {
-    let target = Target {
-        board: Board::Mps2,
-        scalar: Scalar::F32,
-    };
+    let target = Target::new(Board::Mps2, Scalar::F32);
     let mut cargo = toolchain.cargo("build");
     cargo.args(["--package", PEER, "--profile", "firmware", "--target"]);
     command::run_quietly(cargo.arg(target.triple())).context("cannot build the law in C")?;

@@ -112,7 +112,7 @@ const LOADS: [(&str, Load, usize); 6] = [
 /// Counts under every load, prints the table, and fails if a load lengthens a tick, or if the jitter has grown.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, overwrite: bool) -> Result<()> {
     let board = Board::Mps2;
-    let image = image::build(toolchain, Target { board, scalar })?;
+    let image = image::build(toolchain, Target::new(board, scalar))?;
     println!(
         "{}: instructions of {TICKS} control ticks, each against the same tick of the motion without the load",
         image.target

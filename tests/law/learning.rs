@@ -331,7 +331,10 @@ fn nothing_is_learnt_at_rest_or_from_a_jog() {
     let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
     axis.run(1.0);
     assert_eq!(axis.status(), LearningStatus::AtRest);
-    let jog = learning().jog_at(AxisName::X, 5.0).expect("slow enough");
+    let jog = learning()
+        .bounds()
+        .jog_at(AxisName::X, 5.0)
+        .expect("slow enough");
     axis.command(Command::Jog(AxisName::X, jog));
     axis.run(1.0);
     assert_eq!(axis.status(), LearningStatus::OtherMotion);

@@ -4,6 +4,7 @@ mod admission_exhaustive;
 mod anti_windup;
 mod axis_alone;
 mod axis_limits;
+mod axis_words;
 mod board_wiring;
 mod brake;
 mod bumpless;

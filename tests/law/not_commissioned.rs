@@ -1,5 +1,6 @@
 //! A board with nothing in its flash has no law: its outputs stay off, and a person learns what to do.
 
+use quadrant::admission::Lock;
 use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
 use quadrant::admission::refusal;
@@ -28,7 +29,7 @@ const READY: StageView = StageView {
     commissioned: false,
     brake_moves: false,
     enabled_by: EnabledBy::Any,
-    locked: false,
+    lock: Lock::Open,
     settings_invalid: false,
 };
 

@@ -10,7 +10,7 @@ use crate::settings::check_message;
 fn plan_refusal(motion: MotionSettings) -> SettingsError {
     let mut plan = PlanSettings::default();
     plan.motions[1] = motion;
-    plan.validate(&StageSettings::simulated())
+    plan.validate(&StageSettings::simulated().bounds())
         .expect_err("refused")
 }
 
@@ -117,7 +117,7 @@ fn a_travel_beyond_the_references_format_is_refused() {
     let mut plan = PlanSettings::default();
     let sine = HarmonicSettings::with_velocity(3000.0, 10.0, 1.0, 10.0);
     plan.motions[0] = MotionSettings::Harmonic(sine);
-    let error = plan.validate(&stage).expect_err("refused");
+    let error = plan.validate(&stage.bounds()).expect_err("refused");
     check_message(&error, AxisName::X, "motion.amplitude_mm");
     plan.motions[0] = MotionSettings::PointToPoint(PointToPointSettings {
         distance_mm: -3000.0,
@@ -125,6 +125,6 @@ fn a_travel_beyond_the_references_format_is_refused() {
         max_acceleration_mm_s2: 10.0,
         max_jerk_mm_s3: 10.0,
     });
-    let error = plan.validate(&stage).expect_err("refused");
+    let error = plan.validate(&stage.bounds()).expect_err("refused");
     check_message(&error, AxisName::X, "motion.distance_mm");
 }

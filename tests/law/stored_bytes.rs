@@ -20,7 +20,7 @@ use crate::settings_leaves::is_whole;
 use crate::settings_tree::{get, paths};
 use quadrant_fault_bench::flash::SECTOR;
 
-const ELEMENTS: usize = 8;
+pub(crate) const ELEMENTS: usize = 8;
 
 fn encoded(settings: &StageSettings, provenance: &str) -> Vec<u8> {
     let mut room = [0; BUFFER_BYTES];
@@ -108,7 +108,7 @@ fn with_record(path: &str, change: impl FnOnce(&mut Record)) -> Vec<u8> {
 }
 
 /// Settings unlike the default ones in everything that chance picks, valid or not.
-fn varied(seed: u64) -> StageSettings {
+pub(crate) fn varied(seed: u64) -> StageSettings {
     let mut noise = Noise::new(seed);
     let mut settings = StageSettings::simulated();
     for path in paths(&settings, "") {

@@ -1,5 +1,6 @@
 //! The commands that the supervising task lets through, and the events that it tells.
 
+use quadrant::admission::Lock;
 use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
 use quadrant::app::supervisor::{Decision, Event, Supervisor};
@@ -30,7 +31,7 @@ const DISABLED: StageView = StageView {
     commissioned: true,
     brake_moves: false,
     enabled_by: EnabledBy::Any,
-    locked: false,
+    lock: Lock::Open,
     settings_invalid: false,
 };
 const ENABLED: StageView = StageView {

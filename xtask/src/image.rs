@@ -42,28 +42,35 @@ pub struct Target {
     pub board: Board,
     /// The number type.
     pub scalar: Scalar,
+    /// True for the firmware that holds no settings.
+    pub lean: bool,
 }
 
 impl Target {
-    /// All there are.
-    pub const ALL: [Self; 4] = [
-        Self {
-            board: Board::Mps2,
-            scalar: Scalar::F32,
-        },
-        Self {
-            board: Board::Mps2,
-            scalar: Scalar::Fixed,
-        },
-        Self {
-            board: Board::NucleoF446re,
-            scalar: Scalar::F32,
-        },
-        Self {
-            board: Board::NucleoF446re,
-            scalar: Scalar::Fixed,
-        },
+    /// All there are: the firmware with settings of its own on each board and in each number type, and the lean one in `f32`.
+    pub const ALL: [Self; 6] = [
+        Self::new(Board::Mps2, Scalar::F32),
+        Self::new(Board::Mps2, Scalar::Fixed),
+        Self::new(Board::NucleoF446re, Scalar::F32),
+        Self::new(Board::NucleoF446re, Scalar::Fixed),
+        Self::new(Board::Mps2, Scalar::F32).lean(),
+        Self::new(Board::NucleoF446re, Scalar::F32).lean(),
     ];
+
+    /// The firmware with settings of its own.
+    pub const fn new(board: Board, scalar: Scalar) -> Self {
+        Self {
+            board,
+            scalar,
+            lean: false,
+        }
+    }
+
+    /// The same without: a host loads its axes.
+    #[must_use]
+    pub const fn lean(self) -> Self {
+        Self { lean: true, ..self }
+    }
 
     /// The Rust target. The emulated machine for fixed point is a Cortex-M3, which has no floating-point unit.
     pub fn triple(self) -> &'static str {
@@ -88,10 +95,17 @@ impl Target {
             Board::Mps2 => "board-mps2",
             Board::NucleoF446re => "board-nucleo-f446re",
         };
-        match self.scalar {
-            Scalar::F32 => board.to_owned(),
-            Scalar::Fixed => format!("{board},scalar-fixed"),
-        }
+        let number = match self.scalar {
+            Scalar::F32 => "",
+            Scalar::Fixed => ",scalar-fixed",
+        };
+        let lean = if self.lean { ",lean" } else { "" };
+        format!("{board}{number}{lean}")
+    }
+
+    /// Cargo's profile.
+    const fn profile(self) -> &'static str {
+        if self.lean { "lean" } else { "firmware" }
     }
 
     /// Cargo's arguments to select the firmware of this target.
@@ -102,7 +116,7 @@ impl Target {
             "--bin".into(),
             "quadrant-firmware".into(),
             "--profile".into(),
-            "firmware".into(),
+            self.profile().into(),
             "--target".into(),
             self.triple().into(),
             "--features".into(),
@@ -117,7 +131,8 @@ impl fmt::Display for Target {
             .board
             .to_possible_value()
             .expect("no variant is hidden");
-        write!(f, "{} {}", board.get_name(), self.scalar_name())
+        let lean = if self.lean { " lean" } else { "" };
+        write!(f, "{} {}{lean}", board.get_name(), self.scalar_name())
     }
 }
 
@@ -138,10 +153,7 @@ pub struct Image {
 /// # Errors
 /// It does not build.
 pub fn link_fallback(toolchain: Toolchain) -> Result<()> {
-    let target = Target {
-        board: Board::NucleoF446re,
-        scalar: Scalar::F32,
-    };
+    let target = Target::new(Board::NucleoF446re, Scalar::F32);
     let mut cargo = toolchain.cargo("build");
     cargo
         .args(target.arguments())
@@ -182,7 +194,8 @@ fn link(toolchain: Toolchain, target: Target, path: &Path) -> Result<()> {
     let built = command::root()
         .join("target/firmware")
         .join(target.triple())
-        .join("firmware/quadrant-firmware");
+        .join(target.profile())
+        .join("quadrant-firmware");
     // Two boards share a triple: keep each image under a name of its own.
     let folder = path.parent().context("the image has a folder")?;
     std::fs::create_dir_all(folder)

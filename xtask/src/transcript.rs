@@ -8,10 +8,7 @@ use xtask::toolchain::Toolchain;
 
 /// Builds the image and runs the tests that play the session on it (`cli/tests/suite/transcript.rs`).
 pub(crate) fn run(toolchain: Toolchain, overwrite_expected: bool) -> Result<()> {
-    let target = Target {
-        board: Board::Mps2,
-        scalar: Scalar::F32,
-    };
+    let target = Target::new(Board::Mps2, Scalar::F32);
     let image = image::build(toolchain, target)?;
     let mut test = command::command("cargo");
     // Of the whole workspace, so that nothing is built with other features than the other tests.

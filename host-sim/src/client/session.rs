@@ -10,6 +10,7 @@ use quadrant::link::message::{
     Status,
 };
 use quadrant::link::message::{MachineState, TelemetryBlock};
+use quadrant::settings::StageSettings;
 
 use super::error::ClientError;
 use super::interrupt::Interrupt;
@@ -46,6 +47,8 @@ pub struct Client {
     stopping: bool,
     notices: VecDeque<Notice>,
     dropped_notices: u64,
+    /// The settings whose axes this session has loaded into a board that holds none.
+    loaded: Option<Box<StageSettings>>,
 }
 
 impl Client {
@@ -66,6 +69,7 @@ impl Client {
             stopping: false,
             notices: VecDeque::new(),
             dropped_notices: 0,
+            loaded: None,
         };
         // Ends whatever the other end takes for a frame's beginning.
         client.send(&[DELIMITER])?;
@@ -82,6 +86,15 @@ impl Client {
     /// Never: a session is open.
     pub fn identity(&self) -> &Identity {
         self.identity.as_ref().expect("a session is open")
+    }
+
+    /// The settings whose axes this session has loaded into a board that holds none, and that has not restarted since.
+    pub(super) fn loaded(&self) -> Option<&StageSettings> {
+        self.loaded.as_deref()
+    }
+
+    pub(super) fn remember_loaded(&mut self, stage: &StageSettings) {
+        self.loaded = Some(Box::new(stage.clone()));
     }
 
     /// Time by the connection's clock: the machine's time, if it is a simulated one.
@@ -355,6 +368,7 @@ impl Client {
         match self.ask(&Body::Hello)? {
             Ok(Reply::Identity(identity)) => {
                 self.identity = Some(identity);
+                self.loaded = None;
                 Ok(())
             }
             Ok(other) => Err(self.unexpected("hello", &other)),
@@ -508,5 +522,6 @@ const fn reply_name(reply: &Reply) -> &'static str {
         Reply::Inject(_) => "the state of an injection",
         Reply::Inputs(_) => "the digital inputs",
         Reply::Learning(_) => "what was learnt",
+        Reply::Load(_) => "what is loaded",
     }
 }

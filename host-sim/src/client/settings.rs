@@ -228,11 +228,14 @@ pub enum ExchangeError {
     Reverted(ClientError),
 }
 
-/// Reads all settings of the machine's draft.
+/// Reads all settings of the machine's draft; of a board that holds none, those whose axes this session has loaded.
 ///
 /// # Errors
 /// A connection that is broken, or a machine of a later release.
 pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
+    if let Some(loaded) = client.loaded() {
+        return Ok(loaded.clone());
+    }
     let mut settings = StageSettings::simulated();
     // In the machine's order a part comes before its leaves.
     for path in list(client, "")? {

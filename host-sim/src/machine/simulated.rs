@@ -4,20 +4,25 @@
 
 use std::collections::VecDeque;
 
-use quadrant::app::Poll;
+use quadrant::app::{HostAxes, Poll};
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
+use quadrant::lockstep::InputRecord;
 use quadrant::safety::Switches;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Outputs;
 
-use super::application::{Running, Start};
+use super::application::{BoardIdentity, Running, Start};
 use super::memory_flash::MemoryFlash;
 use super::timing::{OFF_TICKS, PORT_BYTES};
 use crate::plant::{SimulatedStage, StageParameters};
 
-/// Name of the board in the greeting.
-const BOARD: &str = "simulated";
+/// What it says of itself.
+const IDENTITY: BoardIdentity = BoardIdentity {
+    board: "simulated",
+    cycle_hz: 0,
+    number: NumberType::F32,
+};
 /// The host's end of the port, and its wire.
 #[derive(Debug, Default)]
 struct Wire {
@@ -50,15 +55,37 @@ fn start<'a>(defaults: &'a StageSettings, plan: &'a PlanSettings) -> Start<'a> {
         defaults,
         plan,
         fault: None,
-        board: BOARD,
-        cycle_hz: 0,
-        number: NumberType::F32,
+        identity: IDENTITY,
+    }
+}
+
+/// The lean application at its start.
+fn unloaded(rate_hz: f64) -> Application {
+    Application::Lean(Running::start_unloaded(IDENTITY, rate_hz as u32, None))
+}
+
+/// The application of either firmware.
+// There is one of it in a machine.
+#[allow(clippy::large_enum_variant)]
+enum Application {
+    /// With settings of its own.
+    Own(Running<f32>),
+    /// The lean one, which is loaded by a host.
+    Lean(Running<f32, HostAxes>),
+}
+
+impl Application {
+    fn tick(&mut self, inputs: &InputRecord, wire: &mut Wire) -> (Outputs, Poll) {
+        match self {
+            Self::Own(running) => running.tick(inputs, wire),
+            Self::Lean(running) => running.tick(inputs, wire),
+        }
     }
 }
 
 /// The firmware's application on the simulated stage.
 pub struct SimulatedMachine {
-    running: Running<f32>,
+    running: Application,
     plant: SimulatedStage,
     defaults: StageSettings,
     wire: Wire,
@@ -90,19 +117,38 @@ impl SimulatedMachine {
         seed: u64,
         flash: MemoryFlash,
     ) -> Result<Self, SettingsError> {
-        Ok(Self {
-            running: Running::start(start(settings, &PlanSettings::default()), flash)?,
+        let running = Running::start(start(settings, &PlanSettings::default()), flash)?;
+        Ok(Self::of(Application::Own(running), settings, truth, seed))
+    }
+
+    /// Starts a machine with the lean firmware, which holds no settings: a host loads its axes.
+    pub fn lean(truth: &StageParameters, seed: u64) -> Self {
+        let settings = StageSettings::simulated();
+        Self::of(unloaded(settings.rate_hz), &settings, truth, seed)
+    }
+
+    fn of(
+        running: Application,
+        settings: &StageSettings,
+        truth: &StageParameters,
+        seed: u64,
+    ) -> Self {
+        Self {
+            running,
             plant: SimulatedStage::new(truth, settings.rate_hz, seed),
             defaults: settings.clone(),
             wire: Wire::default(),
             outputs: Outputs::default(),
             pressed: Switches::NONE,
-        })
+        }
     }
 
     /// Control ticks since the last start.
     pub fn tick(&self) -> u32 {
-        self.running.state().tick()
+        match &self.running {
+            Application::Own(running) => running.state().tick(),
+            Application::Lean(running) => running.state().tick(),
+        }
     }
 
     /// The outputs of the last tick.
@@ -120,9 +166,12 @@ impl SimulatedMachine {
         self.pressed = switches;
     }
 
-    /// Returns the flash for settings.
-    pub fn flash(&self) -> &MemoryFlash {
-        self.running.flash()
+    /// Returns the flash for settings, if there is one.
+    pub fn flash(&self) -> Option<&MemoryFlash> {
+        match &self.running {
+            Application::Own(running) => Some(running.flash()),
+            Application::Lean(_) => None,
+        }
     }
 
     /// Sends bytes to the machine.
@@ -156,10 +205,13 @@ impl SimulatedMachine {
 
     /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
     pub fn restart(&mut self) {
-        let flash = self.flash().clone();
+        let Some(flash) = self.flash().cloned() else {
+            self.running = unloaded(self.defaults.rate_hz);
+            return;
+        };
         let plan = PlanSettings::default();
         match Running::start(start(&self.defaults, &plan), flash) {
-            Ok(running) => self.running = running,
+            Ok(running) => self.running = Application::Own(running),
             // The defaults were accepted when the machine was made.
             Err(_) => unreachable!("the same settings were accepted before"),
         }

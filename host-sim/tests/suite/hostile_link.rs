@@ -18,7 +18,7 @@ use quadrant::link::server::LinkServer;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 use quadrant_sim::experiment::run_configuration::identified_settings;
-use quadrant_sim::machine::application::{Running, Start};
+use quadrant_sim::machine::application::{BoardIdentity, Running, Start};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 
@@ -97,9 +97,11 @@ fn start(settings: &StageSettings) -> Running<f32> {
         defaults: settings,
         plan: &PlanSettings::default(),
         fault: None,
-        board: "hostile",
-        cycle_hz: 0,
-        number: NumberType::F32,
+        identity: BoardIdentity {
+            board: "hostile",
+            cycle_hz: 0,
+            number: NumberType::F32,
+        },
     };
     Running::start(start, MemoryFlash::default()).expect("valid settings")
 }

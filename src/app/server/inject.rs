@@ -1,10 +1,9 @@
 //! A voltage that a host adds to an axis' output.
 
 use super::opened::OpenInjection;
-use super::{Server, invalid, refused};
+use super::{AxisSource, Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::app::supervisor::PERIOD_TICKS;
-use crate::hal::SettingsFlash;
 use crate::law::command::Command;
 use crate::law::injection::{BLOCK_VALUES, VoltageBlock};
 use crate::law::scalar::Scalar;
@@ -16,7 +15,7 @@ const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;
 /// Ticks after which a command that was sent shows in the snapshot.
 const ARRIVAL_TICKS: u32 = 3 * PERIOD_TICKS;
 
-impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     pub(super) fn serve_inject(&mut self, request: InjectRequest) -> Result<Reply, LinkError> {
         match request {
             InjectRequest::Open {
@@ -76,8 +75,8 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             )));
         }
         let (injection, most) = self
-            .draft
-            .in_force()
+            .source
+            .bounds()
             .injection(request)
             .map_err(|error| invalid(format_args!("{error}")))?;
         // There is room: nothing waits.

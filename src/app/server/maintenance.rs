@@ -1,13 +1,13 @@
 //! Requests that control decides on: what is done while it keeps the outputs off, and the exchange of the plan.
 
 use super::deferred::{Deferred, Work};
-use super::{Server, refused};
+use super::{AxisSource, Server, refused};
 use crate::app::queues::Order;
-use crate::hal::SettingsFlash;
+use crate::law::admission::Lock;
 use crate::law::scalar::Scalar;
 use quadrant_link::message::{LinkError, Message, Reply, Response};
 
-impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     /// Asks control for what the work needs, and puts the answer off. The reply returned is not sent.
     pub(super) fn defer(&mut self, work: Work) -> Result<Reply, LinkError> {
         match work {
@@ -15,9 +15,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 if self.seen.view.safety.drives() {
                     return Err(outputs_on());
                 }
-                self.order(Order::Lock)?;
+                self.order(Order::Lock(Lock::Maintenance))?;
                 self.locked = true;
             }
+            // Control keeps the lock until all axes are there.
+            Work::Load(_) => self.order(Order::Lock(Lock::Loading))?,
             Work::Plan => self.order(Order::Plan)?,
             Work::Enable => {}
         }
@@ -43,8 +45,9 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 "a motion is under way; stop it before the plan is exchanged"
             ))),
             Work::Enable => self.check_not_stopped().and_then(|()| self.enable()),
-            _ if !self.seen.view.locked => Err(outputs_on()),
-            Work::Store(provenance) => self.save(provenance),
+            _ if self.seen.view.lock == Lock::Open => Err(outputs_on()),
+            Work::Load(header) => O::begin_load(self, header),
+            Work::Store(provenance) => O::store(self, provenance),
             Work::Restart => {
                 self.reboot = true;
                 Ok(Reply::Done)
@@ -57,17 +60,16 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     /// Lets control enable the outputs again, once nothing needs them off.
     pub(super) fn release(&mut self) {
-        let stored = self.accepted;
-        if self.locked
-            && self.deferred.is_none()
-            && !self.reboot
-            && self.order(Order::Unlock { stored }).is_ok()
-        {
+        let unlock = Order::Unlock {
+            reason: Lock::Maintenance,
+            stored: self.accepted,
+        };
+        if self.locked && self.deferred.is_none() && !self.reboot && self.order(unlock).is_ok() {
             (self.locked, self.accepted) = (false, false);
         }
     }
 }
 
-fn outputs_on() -> LinkError {
+pub(super) fn outputs_on() -> LinkError {
     refused(format_args!("the outputs are on; disable them first"))
 }

@@ -1,10 +1,9 @@
 //! Requests that switch outputs and start motions.
 
 use super::deferred::Work;
-use super::{Server, busy, index, invalid, refused};
+use super::{AxisSource, Server, busy, index, invalid, refused};
 use crate::app::queues::Order;
 use crate::app::supervisor;
-use crate::hal::SettingsFlash;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::cancelling::{MOST_RPM, SpindleSpeed};
 use crate::law::command::Command;
@@ -15,7 +14,7 @@ use crate::law::scalar::Scalar;
 use crate::settings::PlanSettings;
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
 
-impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     /// Requests that are commands of the control law.
     #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
@@ -36,7 +35,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             Body::Home(axes) => {
                 for axis in axes.iter().map(AxisName::from) {
                     self.check(Command::Home(axis))?;
-                    let known = self.draft.in_force().can_home(axis);
+                    let known = self.source.bounds().can_home(axis);
                     known.map_err(|error| refused(format_args!("{error}")))?;
                 }
                 for axis in axes.iter().map(AxisName::from) {
@@ -49,8 +48,8 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             } => {
                 let axis = axis.into();
                 let velocity = self
-                    .draft
-                    .in_force()
+                    .source
+                    .bounds()
                     .jog_at(axis, velocity_mm_s)
                     .map_err(|error| invalid(format_args!("{error}")))?;
                 self.command(Command::Jog(axis, velocity))?;
@@ -116,8 +115,8 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             self.seen.view.homed[index(axis)],
         );
         let motion = self
-            .draft
-            .in_force()
+            .source
+            .bounds()
             .move_to(axis, ahead, homed, target_mm, velocity_mm_s)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let mut motions = [MotionSettings::Hold; 3];
@@ -136,7 +135,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 Decimal(MOST_RPM)
             )));
         }
-        let period_s = 1.0 / self.draft.in_force().rate_hz;
+        let period_s = 1.0 / self.source.bounds().rate_hz;
         self.order(Order::Spindle(SpindleSpeed::from_rpm(rpm, period_s)))?;
         Ok(Reply::Done)
     }
@@ -150,7 +149,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             )));
         }
         let plan = PlanSettings::from(plan);
-        plan.validate(self.draft.in_force())
+        plan.validate(&self.source.bounds())
             .map_err(|error| invalid(format_args!("{error}")))?;
         self.hand_over(&plan)?;
         self.defer(Work::Plan)
@@ -159,9 +158,9 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Lays motions where control takes them from when it is ordered to.
     #[inline(never)]
     fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
-        let settings = self.draft.in_force();
+        let bounds = self.source.bounds();
         let plan = PerAxis::from_fn(|axis| {
-            Motion::build(&plan.motions[index(axis)], settings.scale_of(axis))
+            Motion::build(&plan.motions[index(axis)], bounds.scale_of(axis))
         });
         self.ends.plans.enqueue(plan).map_err(|_| {
             busy(format_args!(

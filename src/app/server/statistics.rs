@@ -1,9 +1,7 @@
 //! Statistics of the server, for the board's own log.
 
-use super::Server;
-use crate::hal::SettingsFlash;
+use super::{AxisSource, Server};
 use crate::law::scalar::Scalar;
-use quadrant_link::message::Provenance;
 
 /// Statistics of a server: counts that only grow, and wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -26,7 +24,7 @@ pub struct ServerStatistics {
     pub captures: u16,
 }
 
-impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     /// Returns the statistics.
     pub fn statistics(&self) -> ServerStatistics {
         let frames = self.link.counters();
@@ -43,18 +41,5 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             stored: self.stored,
             captures: self.recorder.number(),
         }
-    }
-
-    /// The origin of the settings in force, or of the stored ones.
-    pub const fn provenance(&self) -> &Provenance {
-        &self.provenance
-    }
-
-    /// Counts the paths of the draft. Visits them all: for rare occasions.
-    pub fn paths(&self) -> usize {
-        let mut paths = 0;
-        // An error of the tree would end the visit early, and show as a number that is too small.
-        let _ = self.draft.settings().list("", &mut |_| paths += 1);
-        paths
     }
 }

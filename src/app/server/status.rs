@@ -1,7 +1,6 @@
 //! Identity and status of the machine.
 
-use super::Server;
-use crate::hal::SettingsFlash;
+use super::{AxisSource, Server};
 use crate::law::admission;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
@@ -15,13 +14,13 @@ use quadrant_link::message::{
     Status, text,
 };
 
-impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     pub(super) fn identity(&self) -> Identity {
         Identity {
             protocol: PROTOCOL_VERSION,
             firmware: text(format_args!("{}", env!("CARGO_PKG_VERSION"))),
             board: text(format_args!("{}", self.board)),
-            rate_hz: self.draft.in_force().rate_hz,
+            rate_hz: self.source.rate_hz(),
             cycle_hz: self.cycle_hz,
             number: self.number,
             tick: self.seen.tick,
@@ -30,12 +29,13 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     pub(super) fn status(&self) -> Status {
         let view = &self.seen.view;
+        let bounds = self.source.bounds();
         let axes = core::array::from_fn(|index| {
-            let (axis, settings) = (&self.seen.axes[index], &self.draft.in_force().axes[index]);
+            let (axis, bounds) = (&self.seen.axes[index], &bounds.axes[index]);
             let measured = Position(axis.measured.0 << POSITION_FRACTION_BITS);
             AxisStatus {
                 mode: view.modes[index].into(),
-                position_mm: measured.to_mm(settings.encoder.resolution_mm),
+                position_mm: measured.to_mm(bounds.encoder.resolution_mm),
                 error_mm: axis.error.to_f32(Quantity::Length),
                 output_v: axis.output.to_f32(Quantity::Voltage),
                 limited_by: axis.limited_by.into(),

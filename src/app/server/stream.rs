@@ -1,9 +1,9 @@
 //! Set points that a host streams.
 
 use super::opened::OpenStream;
-use super::{Server, invalid, refused};
+use super::{AxisSource, Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
-use crate::hal::SettingsFlash;
+use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::reference::{
     AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
@@ -16,7 +16,7 @@ use quadrant_link::message::{self, LinkError, Reply, StreamRequest, StreamStatus
 /// Segments that must wait before the axes start: the host is that far ahead.
 const START_SEGMENTS: usize = STREAM_ITEM_ROOM / 2;
 
-impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
+impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     #[inline(never)]
     pub(super) fn serve_stream(&mut self, request: StreamRequest) -> Result<Reply, LinkError> {
         match request {
@@ -60,7 +60,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 "period_ticks = {period_ticks} is outside {LEAST_PERIOD_TICKS} to {MOST_SEGMENT_TICKS}"
             )));
         }
-        let limits = self.draft.in_force().stream_limits(view.homed.into_array());
+        let limits = self.source.bounds().stream_limits(view.homed.into_array());
         let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
         self.stream = Some(OpenStream {
             planner: StreamPlanner::new(limits, period_ticks, start),
@@ -86,8 +86,8 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         point: &message::SetPoint,
         last: bool,
     ) -> Result<bool, LinkError> {
-        let scales: [MotionScale; 3] =
-            core::array::from_fn(|axis| self.draft.in_force().motion_scale(axis));
+        let bounds = self.source.bounds();
+        let scales: [MotionScale; 3] = AxisName::ALL.map(|axis| bounds.scale_of(axis));
         let room = self.ends.stream_items.ready();
         let stream = self.opened()?;
         if number < stream.next {

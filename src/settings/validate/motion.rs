@@ -3,10 +3,10 @@
 use super::Place;
 use crate::law::axes::AxisName;
 use crate::law::reference::MotionSettings;
-use crate::settings::axis::AxisSettings;
+use crate::settings::bounds::{AxisBounds, StageBounds};
 use crate::settings::error::SettingsError;
 use crate::settings::leaves::limits::LONGEST_TRAVEL_MM;
-use crate::settings::stage::{PlanSettings, StageSettings};
+use crate::settings::stage::PlanSettings;
 
 /// The longest travel of a motion, in counts: what the references' products hold.
 const MOST_TRAVEL_COUNTS: f64 = 1_073_741_824.0;
@@ -19,10 +19,10 @@ impl PlanSettings {
     ///
     /// # Errors
     /// The first field that is refused.
-    pub fn validate(&self, stage: &StageSettings) -> Result<(), SettingsError> {
+    pub fn validate(&self, stage: &StageBounds) -> Result<(), SettingsError> {
         for ((name, axis), motion) in AxisName::ALL
             .into_iter()
-            .zip(&stage.axes)
+            .zip(&*stage.axes)
             .zip(&self.motions)
         {
             validate_motion(Place { axis: Some(name) }, motion, axis, stage.rate_hz)?;
@@ -34,10 +34,9 @@ impl PlanSettings {
 fn validate_motion(
     at: Place,
     motion: &MotionSettings,
-    axis: &AxisSettings,
+    axis: &AxisBounds,
     rate_hz: f64,
 ) -> Result<(), SettingsError> {
-    let limits = &axis.limits;
     let longest = (MOST_TRAVEL_COUNTS * axis.encoder.resolution_mm).min(LONGEST_TRAVEL_MM);
     match motion {
         MotionSettings::Hold => return Ok(()),
@@ -75,12 +74,12 @@ fn validate_motion(
         "motion (peak velocity, mm/s)",
         velocity,
         0.0,
-        limits.max_velocity_mm_s,
+        axis.max_velocity_mm_s,
     )?;
     at.within(
         "motion (peak acceleration, mm/s^2)",
         acceleration,
         0.0,
-        limits.max_acceleration_mm_s2,
+        axis.max_acceleration_mm_s2,
     )
 }

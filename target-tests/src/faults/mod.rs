@@ -41,7 +41,7 @@ pub(crate) fn run(
     overwrite: bool,
 ) -> Result<()> {
     let board = Board::Mps2;
-    let image = image::build(toolchain, Target { board, scalar })?;
+    let image = image::build(toolchain, Target::new(board, scalar))?;
     let codes: Vec<FaultCode> = match only {
         Some(name) => FaultCode::ALL
             .into_iter()

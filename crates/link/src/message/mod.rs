@@ -11,6 +11,7 @@ mod capture;
 mod channel;
 mod error;
 mod inject;
+mod load;
 mod machine;
 mod motion;
 mod notice;
@@ -23,6 +24,7 @@ pub use capture::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigge
 pub use channel::{AxisSignal, Channel, StageSignal, UnknownChannel, WordKind};
 pub use error::LinkError;
 pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
+pub use load::{Checksum, LoadHeader, LoadPart, LoadRequest, LoadStatus};
 pub use machine::{
     AxisLearning, AxisMode, AxisStatus, FaultReport, INPUTS, Identity, Inputs, Learning,
     LearningState, LimitedBy, MachineState, NumberType, Status,
@@ -116,6 +118,8 @@ pub enum Body {
         /// The speed, rpm, 0 to 1 000 000; zero if it stands.
         rpm: f64,
     },
+    /// A request to load axes that the host has built. [`Reply::Load`].
+    Load(LoadRequest),
 }
 
 impl Body {
@@ -246,4 +250,6 @@ pub enum Reply {
     Inputs(Inputs),
     /// The result of learning.
     Learning(Learning),
+    /// What a board takes, and what is loaded.
+    Load(LoadStatus),
 }

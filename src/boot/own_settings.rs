@@ -1,0 +1,264 @@
+//! The start of a board that holds settings of its own: those in flash, or those of a job that a host has left.
+
+use core::mem::MaybeUninit;
+
+use quadrant::app::capture::CAPTURE_WORDS;
+use quadrant::app::start_record::StartRecord;
+use quadrant::app::{
+    Axis, Control, Intake, OwnSettings, OwnSettingsParts, Queues, Server, ServerParts,
+};
+use quadrant::axes::AxisName;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant::link::message::{NumberType, Provenance};
+use quadrant::lockstep::Job;
+use quadrant::safety::FaultCode;
+use quadrant::scalar::Scalar;
+use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant::stage::Plan;
+use quadrant::store::{BUFFER_BYTES, Finding, Store};
+
+use super::{Machine, blank_axis, place_control, place_server};
+use crate::board::{self, SettingsFlash};
+use crate::log;
+
+/// The source of the server's axes.
+pub(crate) type Source = OwnSettings<'static, SettingsFlash>;
+
+/// Static storage for all large objects: the stack has no room for them.
+pub(crate) struct StaticStorage<S: Scalar + 'static> {
+    settings: MaybeUninit<StageSettings>,
+    draft: MaybeUninit<StageSettings>,
+    axes: [MaybeUninit<Axis<S>>; 4],
+    queues: Queues<'static, S>,
+    buffer: [u8; BUFFER_BYTES],
+    capture: [u32; CAPTURE_WORDS],
+    control: MaybeUninit<Control<'static, 'static, S>>,
+    intake: MaybeUninit<Intake<'static>>,
+    server: MaybeUninit<Server<'static, 'static, S, Source>>,
+}
+
+impl<S: Scalar> StaticStorage<S> {
+    /// Returns the storage before the start.
+    pub(crate) const fn new() -> Self {
+        Self {
+            settings: MaybeUninit::uninit(),
+            draft: MaybeUninit::uninit(),
+            axes: [const { MaybeUninit::uninit() }; 4],
+            queues: Queues::new(),
+            buffer: [0; BUFFER_BYTES],
+            capture: [0; CAPTURE_WORDS],
+            control: MaybeUninit::uninit(),
+            intake: MaybeUninit::uninit(),
+            server: MaybeUninit::uninit(),
+        }
+    }
+}
+
+/// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
+/// timer that measures ticks.
+pub(crate) fn machine<S: Scalar>(
+    storage: &'static mut StaticStorage<S>,
+    flash: SettingsFlash,
+    crashed: Option<FaultCode>,
+    cycle_hz: u32,
+    number: NumberType,
+) -> Machine<S, Source> {
+    let settings = defaults(&mut storage.settings);
+    let draft = defaults(&mut storage.draft);
+    let Loaded {
+        plan,
+        provenance,
+        store,
+        invalid,
+        keep_draft,
+    } = load(
+        flash,
+        settings,
+        draft,
+        &mut storage.buffer,
+        count_start(crashed.is_some()),
+    );
+    // The back buffer's content does not matter: it is built over before it is used.
+    let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
+    let mut axes = [x, y, z];
+    // Tables are filled and bounds are searched before the first tick is due.
+    for (name, axis) in AxisName::ALL.into_iter().zip(&mut axes) {
+        settings.build_axis_into(name, axis);
+    }
+    let rate_hz = settings.rate_hz as u32;
+    let resolution_mm = settings
+        .axes
+        .each_ref()
+        .map(|axis| axis.encoder.resolution_mm);
+    let operation = settings.operation();
+    let (control_ends, intake_ends, ends) = storage.queues.split();
+    let control = place_control(&mut storage.control, axes, operation, plan, control_ends);
+    let invalid = invalid.then_some(FaultCode::SettingsInvalid);
+    for code in [crashed, invalid].into_iter().flatten() {
+        control.start_faulted(code);
+    }
+    let parts = ServerParts {
+        ends,
+        back_buffer,
+        source: OwnSettings::new(OwnSettingsParts {
+            settings,
+            draft,
+            keep_draft,
+            provenance,
+            store,
+            buffer: &mut storage.buffer,
+            rates_hz: board::RATES_HZ,
+        }),
+        capture: &mut storage.capture,
+        board: board::NAME,
+        cycle_hz,
+        number,
+    };
+    Machine {
+        control,
+        intake: storage.intake.write(Intake::new(intake_ends)),
+        server: place_server(&mut storage.server, parts),
+        rate_hz,
+        resolution_mm,
+    }
+}
+
+/// Results of loading the settings.
+struct Loaded<S: Scalar> {
+    /// The motions of the axes.
+    plan: Plan<S>,
+    /// The origin of the settings.
+    provenance: Provenance,
+    /// The store that holds them.
+    store: Store<SettingsFlash>,
+    /// True if stored settings were refused or are damaged.
+    invalid: bool,
+    /// True if the draft holds settings that are stored and not in force.
+    keep_draft: bool,
+}
+
+/// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults, on
+/// which the outputs are not enabled. They have been checked then. An older set than one that is damaged, one that the board
+/// is not up to, and one that is to be set aside go into `draft`.
+///
+/// # Panics
+/// When a job cannot be decoded or is refused: then there is nothing that could safely be run.
+// Each step of the start has a frame of its own, gone when the next one begins.
+#[inline(never)]
+fn load<S: Scalar>(
+    flash: SettingsFlash,
+    settings: &mut StageSettings,
+    draft: &mut StageSettings,
+    buffer: &mut [u8; BUFFER_BYTES],
+    set_aside: bool,
+) -> Loaded<S> {
+    let mut store = Store::new(flash, 0);
+    let mut report = |finding: Finding<'_>| match finding {
+        Finding::Unknown(path) => defmt::warn!("{=str} is stored, but unknown here", path),
+        Finding::Missing(path) => defmt::warn!("{=str} is not stored, and has its default", path),
+    };
+    let found = store.load(settings, FIRMWARE_ELEMENTS, buffer, &mut report);
+    let mut provenance = Provenance::new();
+    let (mut invalid, mut keep_draft) = (false, false);
+    let plan = match found {
+        Ok(Some(stored)) if stored.is_newest && !set_aside && is_possible(settings.rate_hz) => {
+            log::settings_loaded(settings, stored.sequence, &stored.provenance);
+            provenance = stored.provenance;
+            take(board::job(), None)
+        }
+        not_stored => {
+            match not_stored {
+                Err(error) => {
+                    defmt::error!("stored settings refused: {}", defmt::Display2Format(&error));
+                    invalid = true;
+                }
+                Ok(Some(stored)) => {
+                    let why = if !stored.is_newest {
+                        "those stored after them are damaged"
+                    } else if set_aside {
+                        "three starts with them did not last"
+                    } else {
+                        "the board is not up to their rate_hz"
+                    };
+                    defmt::error!(
+                        "settings number {=u32} are in the draft, and not in force: {=str}",
+                        stored.sequence,
+                        why
+                    );
+                    provenance = stored.provenance;
+                    draft.copy_from(settings);
+                    settings.set_default();
+                    (invalid, keep_draft) = (true, true);
+                }
+                Ok(None) => defmt::info!("no settings are stored"),
+            }
+            let plan = take(board::job(), Some(settings));
+            built(settings.validate(FIRMWARE_ELEMENTS));
+            log::not_commissioned(settings);
+            plan
+        }
+    };
+    let plan = built(plan.build(settings));
+    Loaded {
+        plan,
+        provenance,
+        store,
+        invalid,
+        keep_draft,
+    }
+}
+
+/// Counts this start; returns true if as many as allowed have not lasted.
+fn count_start(crashed: bool) -> bool {
+    let record = board::start_record::read().begin(crashed);
+    board::start_record::write(record);
+    record.is_safe_start()
+}
+
+/// Takes note that this start has lasted, or that the next is asked for.
+pub(crate) fn forget_starts() {
+    board::start_record::write(StartRecord::default());
+}
+
+/// True if the board is up to a control rate.
+fn is_possible(rate_hz: f64) -> bool {
+    (board::RATES_HZ.0..=board::RATES_HZ.1).contains(&rate_hz)
+}
+
+/// Decodes the job that the board was given: its motions, and its settings into `settings`. Without a job, there is no
+/// motion, and the settings stay as they are.
+#[inline(never)]
+fn take(bytes: Option<&[u8]>, settings: Option<&mut StageSettings>) -> PlanSettings {
+    let Some(bytes) = bytes else {
+        return PlanSettings::default();
+    };
+    match postcard::from_bytes::<Job>(bytes) {
+        Ok(job) => {
+            if let Some(settings) = settings {
+                settings.copy_from(&job.stage);
+            }
+            job.plan
+        }
+        Err(_) => panic!(
+            "the job of {} bytes cannot be decoded: host and firmware differ in version",
+            bytes.len()
+        ),
+    }
+}
+
+/// Makes the default settings in their place.
+#[inline(never)]
+fn defaults(place: &mut MaybeUninit<StageSettings>) -> &mut StageSettings {
+    place.write(StageSettings::default())
+}
+
+/// Unwraps a build.
+///
+/// # Panics
+/// When settings were refused.
+fn built<T>(result: Result<T, SettingsError>) -> T {
+    match result {
+        Ok(built) => built,
+        Err(error) => panic!("settings refused: {error}"),
+    }
+}
