@@ -6,6 +6,7 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use quadrant::app::friction_monitor::FrictionChange;
+#[cfg(not(feature = "lean"))]
 use quadrant::app::glitch_monitor::GlitchEvent;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
@@ -35,6 +36,7 @@ pub(crate) enum LogEntry<S> {
     /// An event of the supervisor.
     Event(Event),
     /// A glitch or a circle has ended.
+    #[cfg(not(feature = "lean"))]
     Glitch(GlitchEvent),
     /// A command went to the control law.
     Command(Command),
@@ -100,6 +102,7 @@ enum Topic {
     Link,
     Settings,
     Losses,
+    #[cfg_attr(feature = "lean", allow(dead_code))]
     Glitches,
     Friction,
 }
@@ -175,6 +178,7 @@ impl Printer {
                     print_event(event);
                 }
             }
+            #[cfg(not(feature = "lean"))]
             LogEntry::Glitch(event) => {
                 if self.limiter.admits(Topic::Glitches, tick) {
                     print_glitch(event);
@@ -232,11 +236,13 @@ fn print_event(event: Event) {
 }
 
 /// Micrometres and degrees to one digit.
+#[cfg(not(feature = "lean"))]
 fn tenths(value: f32) -> f32 {
     let rounding = if value < 0.0 { -0.5 } else { 0.5 };
     (10.0 * value + rounding) as i32 as f32 / 10.0
 }
 
+#[cfg(not(feature = "lean"))]
 fn print_glitch(event: GlitchEvent) {
     match event {
         GlitchEvent::Reversal {
@@ -274,6 +280,19 @@ fn print_friction(change: FrictionChange) {
     }
 }
 
+#[cfg(feature = "lean")]
+fn print_fault(fault: Fault, reaction: &str) {
+    defmt::error!(
+        "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}",
+        fault.code.number(),
+        fault.axis.map_or("the stage", AxisName::as_str),
+        fault.tick,
+        reaction,
+        fault.code.name()
+    );
+}
+
+#[cfg(not(feature = "lean"))]
 fn print_fault(fault: Fault, reaction: &str) {
     defmt::error!(
         "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}; {=str}",

@@ -18,6 +18,8 @@
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
 #[allow(unsafe_code)]
+// The lean firmware uses neither the flash for settings, nor a job, nor the count of starts.
+#[cfg_attr(feature = "lean", allow(dead_code))]
 mod board;
 #[cfg(all(
     target_os = "none",

@@ -80,7 +80,7 @@ const ONE: usize = 2;
 const ORDERS: usize = 8;
 /// Bytes of the link that wait for the server: two of the longest frames, as in the reference board's own ring.
 const BYTES: usize = 1024;
-const STREAM_ITEMS: usize = 16;
+const STREAM_ITEMS: usize = if cfg!(feature = "lean") { 8 } else { 16 };
 /// Samples of each tick of 3 ms at 10 kHz.
 const SAMPLES: usize = 32;
 

@@ -154,7 +154,7 @@ impl Refusal {
                 FaultCode::EncoderInvalid => {
                     "both lines of the encoder change at once; check its cable and supply"
                 }
-                other => other.cause(),
+                _ => "an input is bad; `inputs` shows which",
             },
         }
     }

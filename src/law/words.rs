@@ -31,12 +31,12 @@ use core::fmt;
 use heapless::Vec;
 
 /// A value that is made of words.
-pub trait Words {
+pub trait Words: Sized {
     /// Hash of the type's name, and of the names and types of its fields: it differs where the words would mean something else.
     const LAYOUT: u32;
 
-    /// A value that is to be taken over from words.
-    fn blank() -> Self;
+    /// A value that is to be taken over from words: zeros wherever there can be, so that making one takes no room on the stack.
+    const BLANK: Self;
 
     /// Passes over the words in order.
     ///
@@ -221,6 +221,16 @@ pub(crate) const fn with_layout(hash: u32, layout: u32) -> u32 {
     hash
 }
 
+/// The number of variants, whose numbers must be 0, 1, 2 and so on.
+pub(crate) const fn in_order(numbers: &[u32]) -> u32 {
+    let mut index = 0;
+    while index < numbers.len() {
+        assert!(numbers[index] == index as u32, "variants out of order");
+        index += 1;
+    }
+    index as u32
+}
+
 /// Says of a type which words it is made of: in brackets its generic parameters, then its fields in the order of their words.
 ///
 /// A field that is not named, or of another type, does not compile. A variant has its number first; what it holds is named twice,
@@ -238,9 +248,7 @@ macro_rules! words {
                 hash
             };
 
-            fn blank() -> Self {
-                Self { $($field: <$of as $crate::law::words::Words>::blank()),* }
-            }
+            const BLANK: Self = Self { $($field: <$of as $crate::law::words::Words>::BLANK),* };
 
             fn pass(
                 &mut self,
@@ -269,20 +277,26 @@ macro_rules! words {
                 hash
             };
 
-            fn blank() -> Self {
-                Self::of_number(0)
-            }
+            const BLANK: Self = $crate::law::words::first!($(
+                Self::$variant { $($field: <$of as $crate::law::words::Words>::BLANK),* }
+            ),*);
 
             fn pass(
                 &mut self,
                 window: &mut $crate::law::words::Window<'_>,
             ) -> Result<(), $crate::law::words::WordsError> {
-                const VARIANTS: u32 = [$($number),*].len() as u32;
+                const VARIANTS: u32 = $crate::law::words::in_order(&[$($number),*]);
                 let mut number: u32 = match self {
                     $( Self::$variant { .. } => $number ),*
                 };
                 if window.variant(&mut number, VARIANTS)? {
-                    *self = Self::of_number(number);
+                    $(
+                        if number == $number {
+                            *self = Self::$variant {
+                                $($field: <$of as $crate::law::words::Words>::BLANK),*
+                            };
+                        }
+                    )*
                 }
                 match self {
                     $(
@@ -292,22 +306,6 @@ macro_rules! words {
                     )*
                 }
                 Ok(())
-            }
-        }
-
-        impl<$($parameters)*> $type {
-            /// The variant of a number, blank; the first for a number that is none.
-            fn of_number(number: u32) -> Self {
-                $(
-                    if number == $number {
-                        return Self::$variant {
-                            $($field: <$of as $crate::law::words::Words>::blank()),*
-                        };
-                    }
-                )*
-                $crate::law::words::first!($(
-                    Self::$variant { $($field: <$of as $crate::law::words::Words>::blank()),* }
-                ),*)
             }
         }
     };
@@ -328,9 +326,7 @@ macro_rules! number {
         impl Words for $type {
             const LAYOUT: u32 = with_name(NO_LAYOUT, stringify!($type));
 
-            fn blank() -> Self {
-                Self::default()
-            }
+            const BLANK: Self = 0 as $type;
 
             #[inline(never)]
             fn pass(&mut self, $window: &mut Window<'_>) -> Result<(), WordsError> {
@@ -375,12 +371,18 @@ number!(usize, |own, window| {
     Ok(())
 });
 
-number!(bool, |own, window| {
-    let mut word = u32::from(*own);
-    window.variant(&mut word, 2)?;
-    *own = word != 0;
-    Ok(())
-});
+impl Words for bool {
+    const LAYOUT: u32 = with_name(NO_LAYOUT, "bool");
+
+    const BLANK: Self = false;
+
+    fn pass(&mut self, window: &mut Window<'_>) -> Result<(), WordsError> {
+        let mut word = u32::from(*self);
+        window.variant(&mut word, 2)?;
+        *self = word != 0;
+        Ok(())
+    }
+}
 
 number!(u64, |own, window| {
     window.double(own);
@@ -426,9 +428,7 @@ number!(f64, |own, window| {
 impl<T: Words, const N: usize> Words for [T; N] {
     const LAYOUT: u32 = with_layout(with_layout(NO_LAYOUT, N as u32), T::LAYOUT);
 
-    fn blank() -> Self {
-        core::array::from_fn(|_| T::blank())
-    }
+    const BLANK: Self = [const { T::BLANK }; N];
 
     fn pass(&mut self, window: &mut Window<'_>) -> Result<(), WordsError> {
         for each in self {
@@ -441,9 +441,7 @@ impl<T: Words, const N: usize> Words for [T; N] {
 impl<A: Words, B: Words> Words for (A, B) {
     const LAYOUT: u32 = with_layout(with_layout(with_name(NO_LAYOUT, "2"), A::LAYOUT), B::LAYOUT);
 
-    fn blank() -> Self {
-        (A::blank(), B::blank())
-    }
+    const BLANK: Self = (A::BLANK, B::BLANK);
 
     fn pass(&mut self, window: &mut Window<'_>) -> Result<(), WordsError> {
         self.0.pass(window)?;
@@ -457,9 +455,7 @@ impl<A: Words, B: Words, C: Words> Words for (A, B, C) {
         C::LAYOUT,
     );
 
-    fn blank() -> Self {
-        (A::blank(), B::blank(), C::blank())
-    }
+    const BLANK: Self = (A::BLANK, B::BLANK, C::BLANK);
 
     fn pass(&mut self, window: &mut Window<'_>) -> Result<(), WordsError> {
         self.0.pass(window)?;
@@ -471,14 +467,12 @@ impl<A: Words, B: Words, C: Words> Words for (A, B, C) {
 impl<T: Words> Words for Option<T> {
     const LAYOUT: u32 = with_layout(with_name(NO_LAYOUT, "Option"), T::LAYOUT);
 
-    fn blank() -> Self {
-        None
-    }
+    const BLANK: Self = None;
 
     fn pass(&mut self, window: &mut Window<'_>) -> Result<(), WordsError> {
         let mut number = u32::from(self.is_some());
         if window.variant(&mut number, 2)? {
-            *self = (number == 1).then(T::blank);
+            *self = (number == 1).then_some(T::BLANK);
         }
         match self {
             Some(value) => value.pass(window),
@@ -493,9 +487,7 @@ impl<T: Words, const N: usize> Words for Vec<T, N> {
         T::LAYOUT,
     );
 
-    fn blank() -> Self {
-        Self::new()
-    }
+    const BLANK: Self = Self::new();
 
     fn pass(&mut self, window: &mut Window<'_>) -> Result<(), WordsError> {
         let mut length = self.len() as u32;
@@ -503,7 +495,7 @@ impl<T: Words, const N: usize> Words for Vec<T, N> {
         self.truncate(length as usize);
         while self.len() < length as usize {
             // There is room: the length is within the capacity.
-            let _ = self.push(T::blank());
+            let _ = self.push(T::BLANK);
         }
         for each in self {
             each.pass(window)?;

@@ -9,9 +9,9 @@ use quadrant::link::message::{
 use quadrant::settings::StageSettings;
 use quadrant_sim::client::load::{BuiltPart, build};
 
-use crate::hosted::homed_configuration;
 use crate::faults::approach::{LONGEST, SPEED_MM_S, homed};
 use crate::faults::fixture::{A_WHILE, Fixture};
+use crate::hosted::homed_configuration;
 use xtask::image::{self, Board, Scalar, Target};
 use xtask::toolchain::Toolchain;
 

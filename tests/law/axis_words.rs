@@ -62,7 +62,7 @@ proptest! {
         every_axis_comes_back::<Fixed>(&settings);
         every_axis_comes_back::<f64>(&settings);
         let mut machine = settings.machine();
-        let mut taken = Machine::blank();
+        let mut taken = Machine::BLANK;
         prop_assert!(take(&words_of(&mut machine), &mut taken).is_ok());
         prop_assert_eq!(taken, machine);
     }

@@ -9,7 +9,8 @@ use quadrant::link::message::{
     Body, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice, Reply, Request,
     Status,
 };
-use quadrant::link::message::{MachineState, TelemetryBlock};
+use quadrant::link::message::{MachineState, TelemetryBlock, text};
+use quadrant::safety::FaultCode;
 use quadrant::settings::StageSettings;
 
 use super::error::ClientError;
@@ -215,7 +216,7 @@ impl Client {
     /// As [`request`](Self::request).
     pub fn fault(&mut self) -> Result<Option<FaultReport>, ClientError> {
         match self.request(Body::Fault)? {
-            Reply::Fault(fault) => Ok(fault),
+            Reply::Fault(fault) => Ok(fault.map(explained)),
             other => Err(self.unexpected("fault", &other)),
         }
     }
@@ -502,6 +503,17 @@ impl Client {
             theirs,
         }
     }
+}
+
+/// The report with cause and remedy, which a firmware without room for texts leaves to this program.
+fn explained(mut report: FaultReport) -> FaultReport {
+    if report.cause.is_empty()
+        && let Some(code) = FaultCode::from_number(report.code)
+    {
+        report.cause = text(format_args!("{}", code.cause()));
+        report.remedy = text(format_args!("{}", code.remedy()));
+    }
+    report
 }
 
 /// Returns the name of a reply.

@@ -63,8 +63,8 @@ impl HostAxes {
     pub fn new(rate_hz: u32) -> Self {
         Self {
             rate_hz,
-            machine: Machine::blank(),
-            next: Machine::blank(),
+            machine: Machine::BLANK,
+            next: Machine::BLANK,
             part: None,
             set: None,
             machine_is_whole: false,

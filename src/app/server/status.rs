@@ -103,13 +103,19 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             SafetyState::Faulted(fault) | SafetyState::Stopping(fault) => fault,
             _ => return None,
         };
+        // The lean firmware has no room for the texts: whoever asks knows them by the number.
+        let (cause, remedy) = if cfg!(feature = "lean") {
+            ("", "")
+        } else {
+            (fault.code.cause(), fault.code.remedy())
+        };
         Some(FaultReport {
             code: fault.code.number(),
             axis: fault.axis.map(Into::into),
             tick: fault.tick,
             name: text(format_args!("{}", fault.code.name())),
-            cause: text(format_args!("{}", fault.code.cause())),
-            remedy: text(format_args!("{}", fault.code.remedy())),
+            cause: text(format_args!("{cause}")),
+            remedy: text(format_args!("{remedy}")),
             captured: self.recorder.holds_trace_of(fault.tick),
         })
     }
