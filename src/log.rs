@@ -21,7 +21,7 @@ use quadrant::scalar::{Quantity, Scalar};
 use quadrant::settings::StageSettings;
 
 use crate::board;
-use crate::boot::Source;
+use crate::source::Source;
 
 /// Lines of a kind in a second at 10 kHz: more are counted, not printed.
 const LINES: u16 = 5;

@@ -31,6 +31,11 @@ mod boot;
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
 mod log;
+#[cfg(all(
+    target_os = "none",
+    any(feature = "board-mps2", feature = "board-nucleo-f446re")
+))]
+mod source;
 
 #[cfg(all(
     target_os = "none",
@@ -67,8 +72,9 @@ mod app {
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, Switches, Tick,
         Watchdog,
     };
-    use crate::boot::{self, Source, StaticStorage};
+    use crate::boot::{self, StaticStorage};
     use crate::log::{self, EventLogger, LogEntry, Printer};
+    use crate::source::Source;
 
     /// The number type of the control law.
     #[cfg(not(feature = "scalar-fixed"))]

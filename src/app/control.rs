@@ -311,7 +311,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         } = swap;
         self.exchanging = needs_disabled && more;
         if first {
-            self.state.forget(name);
+            self.state.forget_encoder(name);
         }
         // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);

@@ -12,6 +12,7 @@ use quadrant::scalar::Scalar;
 
 use super::{Machine, blank_axis, place_control, place_server};
 use crate::board;
+use crate::source::Source;
 
 /// Control rate, Hz: axes that are built for another are refused.
 const RATE_HZ: u32 = 10_000;
@@ -19,9 +20,6 @@ const _: () = {
     let (lowest, highest) = board::RATES_HZ;
     assert!(RATE_HZ as f64 >= lowest && RATE_HZ as f64 <= highest);
 };
-
-/// The source of the server's axes.
-pub(crate) type Source = HostAxes;
 
 /// Static storage for all large objects: the stack has no room for them.
 pub(crate) struct StaticStorage<S: Scalar + 'static> {

@@ -17,9 +17,9 @@ use quadrant::stage::Plan;
 use crate::{board, log};
 
 #[cfg(feature = "lean")]
-pub(crate) use host_axes::{Source, StaticStorage, forget_starts, machine};
+pub(crate) use host_axes::{StaticStorage, forget_starts, machine};
 #[cfg(not(feature = "lean"))]
-pub(crate) use own_settings::{Source, StaticStorage, forget_starts, machine};
+pub(crate) use own_settings::{StaticStorage, forget_starts, machine};
 
 /// The two halves of the machine, ready for the first tick.
 pub(crate) struct Machine<S: Scalar + 'static, O: 'static> {

@@ -20,9 +20,7 @@ use quadrant::store::{BUFFER_BYTES, Finding, Store};
 use super::{Machine, blank_axis, place_control, place_server};
 use crate::board::{self, SettingsFlash};
 use crate::log;
-
-/// The source of the server's axes.
-pub(crate) type Source = OwnSettings<'static, SettingsFlash>;
+use crate::source::Source;
 
 /// Static storage for all large objects: the stack has no room for them.
 pub(crate) struct StaticStorage<S: Scalar + 'static> {

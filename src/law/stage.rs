@@ -181,9 +181,9 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         }
     }
 
-    /// Forgets what was measured of an axis, which begins as at the start: what measured it was not its encoder yet.
-    pub fn forget(&mut self, axis: AxisName) {
-        self.axes[axis] = AxisState::default();
+    /// Forgets what was measured of an axis that has never been enabled: what measured it was not set for its encoder.
+    pub fn forget_encoder(&mut self, axis: AxisName) {
+        self.axes[axis].forget_encoder();
     }
 
     /// Takes note that valid settings were stored, or the stored ones erased: a reset clears

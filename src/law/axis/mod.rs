@@ -667,6 +667,12 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.following.high_mark()
     }
 
+    /// Forgets what the encoder has shown: the next reading is the first. For what enabling does not begin anew.
+    pub(crate) fn forget_encoder(&mut self) {
+        self.encoder = EncoderState::default();
+        self.index = IndexState::default();
+    }
+
     /// Declares the present count that of the machine, or not: homing does, and a board whose encoders are absolute.
     pub(crate) fn set_homed(&mut self, homed: bool) {
         if self.homed != homed {
