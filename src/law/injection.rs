@@ -60,7 +60,7 @@ pub(crate) struct InjectedValue {
 }
 
 /// An injection ready for the tick. Made by
-/// [`StageSettings::injection`](crate::settings::StageSettings::injection).
+/// [`StageBounds::injection`](crate::settings::StageBounds::injection).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Injection<S: Scalar> {
     axis: AxisName,

@@ -6,7 +6,7 @@
 //!
 //! What is taken is checked word by word: a variant must be known, a number finite, a length within its capacity. That the words
 //! are of the same layout tells [`Words::LAYOUT`], a hash of all names and types, and that none was damaged a CRC; both are for
-//! whoever carries them ([`transfer`](crate::app::transfer)).
+//! whoever carries them.
 //!
 //! ```
 //! use quadrant::axis::Axis;

@@ -135,9 +135,7 @@ fn load_axes(
     stage: &StageSettings,
     board: &LoadStatus,
 ) -> anyhow::Result<Answer> {
-    let loaded = with_bar("axes", |told| {
-        load::load(client, stage, board, |share| told(share))
-    });
+    let loaded = with_bar("axes", |told| load::load(client, stage, board, told));
     let loaded = loaded.with_context(|| format!("{} was not loaded", file.display()))?;
     let text = format!(
         "acting now on x, y, z: {} words built here, at most {} an axis; set {:08x}\nthe board holds no settings: load again after \

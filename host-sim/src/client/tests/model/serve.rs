@@ -61,6 +61,8 @@ impl Model {
                     captured: false,
                 })));
             }
+            // It holds settings of its own.
+            Body::Load(_) => return Err(LinkError::Unsupported(text(format_args!("load")))),
             // Nothing of the model turns.
             Body::Spindle { .. } => {}
             Body::ResetFault => self.fault = None,
