@@ -24,10 +24,10 @@ impl ForceRecord {
     /// A file that cannot be read, with gaps or uneven time, or with a force beyond 100 kN; names line or column, the value,
     /// and what is allowed.
     pub fn read_csv(path: &Path) -> Result<Self, RecordError> {
-        let (time, forces) = columns::read_forces(path)?;
-        let sample_time_s = time::check(path, &time)?;
+        let columns = columns::read_forces(path)?;
+        let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
         let mut axes = [None, None, None];
-        for (axis, column) in axes.iter_mut().zip(forces) {
+        for (axis, column) in axes.iter_mut().zip(columns.forces) {
             if let Some(column) = column {
                 check(path, &column)?;
                 *axis = Some(Force {

@@ -19,6 +19,7 @@ mod columns;
 mod error;
 mod force;
 mod limits;
+mod lines;
 mod motion;
 mod plausible;
 mod recording;

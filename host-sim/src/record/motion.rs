@@ -28,7 +28,7 @@ impl Record {
     /// Reads and checks a record for an axis with `limits`.
     pub fn read(path: &Path, limits: &AxisLimits) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Motion, &mut |_| {})?;
-        let sample_time_s = time::check(path, &columns.time)?;
+        let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
         plausible::check(path, &columns, sample_time_s, limits)?;
         let reference_mm = columns
             .reference

@@ -98,7 +98,7 @@ impl Recording {
     /// As [`read_csv`](Self::read_csv).
     pub fn read_csv_with(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Experiment, progress)?;
-        let sample_time_s = time::check(path, &columns.time)?;
+        let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
         check(path, &columns)?;
         plausible::check_experiment(path, &columns)?;
         check_travel(path, &columns)?;
@@ -190,7 +190,7 @@ fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
             UnusableSignal::Saturated {
                 percent: 100.0 * share,
                 limit_v: LIMIT_V,
-                line: voltage.line(first),
+                line: columns.lines.line(first),
             },
         ),
         _ => Ok(()),
