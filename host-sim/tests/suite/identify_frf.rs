@@ -3,13 +3,16 @@
 use std::f64::consts::TAU;
 
 use quadrant::control::plant_model::PlantModel;
+use quadrant::settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::bootstrap_settings;
 use quadrant_sim::identify::excitation::Waveform;
 use quadrant_sim::identify::frf::{
     FrfError, FrfMeasurement, FrfSettings, SavedError, SavedSettings, measure, response_of,
 };
 use quadrant_sim::identify::response::FrequencyResponse;
-use quadrant_sim::machine::{SimulatedTestAxis, TestAxis};
+use quadrant_sim::machine::{
+    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis,
+};
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::Recording;
 
@@ -297,4 +300,79 @@ fn recordings_without_excitation_or_too_short_are_refused() {
         matches!(error, SavedError::TooShort { blocks: 0, .. }),
         "{error}"
     );
+}
+
+#[test]
+fn the_number_of_threads_changes_no_bit_of_a_saved_response() {
+    let mut settings = FrfSettings {
+        open_loop: true,
+        bias_velocity_mm_s: 0.0,
+        periods: 60,
+        ..gentle()
+    };
+    settings.excitation.waveform = Waveform::Random;
+    settings.excitation.rms_v = 0.3;
+    let found = measured(&mut slow_rig(&x_truth(), 1), &settings);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("long.csv");
+    found.recordings[0].write_csv(&path).unwrap();
+    let with = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let read = Recording::read_csv(&path).unwrap();
+            let measured = response_of(vec![read], &SAVED).unwrap();
+            (measured.recordings, measured.estimate, measured.plain)
+        })
+    };
+    let alone = with(1);
+    for threads in [2, 3, 8] {
+        assert_eq!(with(threads), alone, "{threads} threads");
+    }
+}
+
+/// An axis that records every tenth control period.
+struct Coarse(SimulatedTestAxis);
+
+impl TestAxis for Coarse {
+    fn info(&self) -> AxisInfo {
+        self.0.info()
+    }
+
+    fn settings(&self) -> &AxisSettings {
+        self.0.settings()
+    }
+
+    fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+        self.0.apply(settings)
+    }
+
+    fn perform(
+        &mut self,
+        experiment: &Experiment,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<Recording, ExperimentError> {
+        let mut every_tenth = experiment.clone();
+        every_tenth.decimation = 10;
+        self.0.perform(&every_tenth, progress)
+    }
+}
+
+#[test]
+fn a_band_beyond_half_the_recorded_rate_is_refused() {
+    let mut test_axis = Coarse(slow_rig(&x_truth(), 1));
+    let mut settings = FrfSettings {
+        open_loop: true,
+        bias_velocity_mm_s: 0.0,
+        periods: 4,
+        ..gentle()
+    };
+    settings.excitation.rms_v = 0.3;
+    settings.excitation.band_hz = (4.0, 499.0);
+    assert!(measure(&mut test_axis, &settings, &mut |_| {}).is_ok());
+    settings.excitation.band_hz = (4.0, 500.0);
+    let error = measure(&mut test_axis, &settings, &mut |_| {}).unwrap_err();
+    assert!(error.to_string().contains("half the rate"), "{error}");
 }

@@ -204,7 +204,6 @@ pub fn measure(
 ) -> Result<FrfMeasurement, FrfError> {
     let axis = test_axis.info();
     settings.check(axis.rate_hz)?;
-    let period = settings.excitation.period(axis.rate_hz);
     let moves = settings.bias_velocity_mm_s != 0.0;
     let mut recordings: Vec<Recording> = Vec::new();
     let mut blocks: Vec<(usize, Range<usize>)> = Vec::new();
@@ -233,7 +232,7 @@ pub fn measure(
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((done + share * expected as f64) / settings.periods as f64);
         })?;
-        let period = in_samples(period, &recording, axis.rate_hz)?;
+        let period = in_samples(&settings.excitation, &recording, axis.rate_hz)?;
         let steady = steady_range(&recording, settings);
         check_sliding(&recording, &steady, settings, axis.resolution_mm)?;
         // Blocks begin where a period does, so that the excitation is the same in each; they overlap by half.
@@ -274,14 +273,28 @@ pub fn measure(
     })
 }
 
-/// A period of control periods in samples of a recording, which may be coarser.
-fn in_samples(period: usize, recording: &Recording, rate_hz: f64) -> Result<usize, SettingError> {
+/// The period of the excitation in samples of a recording, which may be coarser than control periods; all lines lie within the spectrum of
+/// two periods.
+fn in_samples(
+    excitation: &Excitation,
+    recording: &Recording,
+    rate_hz: f64,
+) -> Result<usize, SettingError> {
+    let period = excitation.period(rate_hz);
     let every = (recording.sample_time_s * rate_hz).round() as usize;
     if every == 0 || !period.is_multiple_of(every) {
         return Err(SettingError {
             field: "period",
             value: period as f64 / rate_hz,
             expected: "it must be a whole number of the samples that the test_axis records",
+        });
+    }
+    let (_, high) = excitation.band_hz;
+    if high * recording.sample_time_s >= 0.5 {
+        return Err(SettingError {
+            field: "band",
+            value: high,
+            expected: "the highest frequency must lie below half the rate at which the axis was recorded",
         });
     }
     Ok(period / every)

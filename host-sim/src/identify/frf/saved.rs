@@ -7,9 +7,8 @@ use std::ops::Range;
 
 use num_complex::Complex64;
 use rayon::prelude::*;
-use rustfft::FftPlanner;
 
-use super::estimate::estimates;
+use super::estimate::{Transform, estimates};
 use super::{Estimator, FrfMeasurement};
 use crate::identify::setting::SettingError;
 use crate::record::Recording;
@@ -230,20 +229,26 @@ fn excited_lines(
     sample_time_s: f64,
     (low_hz, high_hz): (f64, f64),
 ) -> Vec<usize> {
-    let fft = FftPlanner::new().plan_fft_forward(length);
+    let transform = Transform::new(length);
     let mut power = vec![0.0; length / 2];
-    let spectrum = |(recording, range): &(&Recording, Range<usize>)| {
-        let volts = recording.injection_v[range.clone()].iter();
-        let mut spectrum: Vec<Complex64> = volts.map(|volts| Complex64::from(*volts)).collect();
-        fft.process(&mut spectrum);
-        spectrum
-    };
     // A few at a time, as an hour's recording has thousands of blocks; summed up in their order, whatever the threads.
     for some in blocks.chunks(AT_ONCE) {
-        let spectra: Vec<Vec<Complex64>> = some.par_iter().map(spectrum).collect();
-        for spectrum in spectra {
-            for (power, value) in power.iter_mut().zip(&spectrum) {
-                *power += value.norm_sqr();
+        let powers: Vec<Vec<f64>> = some
+            .par_iter()
+            .map_init(
+                || transform.workspace(),
+                |workspace, (recording, range)| {
+                    workspace
+                        .block
+                        .copy_from_slice(&recording.injection_v[range.clone()]);
+                    transform.run(workspace);
+                    workspace.spectrum.iter().map(Complex64::norm_sqr).collect()
+                },
+            )
+            .collect();
+        for block in powers {
+            for (power, value) in power.iter_mut().zip(&block) {
+                *power += value;
             }
         }
     }
