@@ -4,7 +4,7 @@
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::command::Command;
 use quadrant::link::message::{
-    AxisSet, BLOCK_WORDS, Body, LinkError, LoadRequest, LoadStatus, Reply, SettingsRequest, Words,
+    AxisSet, Body, LinkError, LoadRequest, LoadStatus, Reply, SettingsRequest,
 };
 use quadrant::settings::StageSettings;
 use quadrant_sim::client::load::{BuiltPart, build};
@@ -141,12 +141,8 @@ fn load(fixture: &mut Fixture, parts: &[BuiltPart]) -> Result<()> {
 }
 
 fn send(fixture: &mut Fixture, part: &BuiltPart) -> Result<()> {
-    fixture.done(Body::Load(LoadRequest::Begin(part.header)))?;
-    for (number, chunk) in part.words.chunks(BLOCK_WORDS).enumerate() {
-        let mut words = Words::new();
-        ensure!(words.extend(chunk.iter().copied()), "a chunk is a block");
-        let offset = (number * BLOCK_WORDS) as u16;
-        fixture.done(Body::Load(LoadRequest::Words { offset, words }))?;
+    for request in part.requests() {
+        fixture.done(Body::Load(request))?;
     }
     Ok(())
 }

@@ -61,6 +61,23 @@ pub struct BuiltPart {
     pub words: Vec<u32>,
 }
 
+impl BuiltPart {
+    /// The requests that load it, in order: the head, then the words in blocks.
+    pub fn requests(&self) -> impl Iterator<Item = LoadRequest> + '_ {
+        let blocks = self.words.chunks(BLOCK_WORDS).enumerate();
+        let words = blocks.map(|(number, chunk)| {
+            let mut words = message::Words::new();
+            let fits = words.extend(chunk.iter().copied());
+            debug_assert!(fits, "a chunk is a block");
+            LoadRequest::Words {
+                offset: (number * BLOCK_WORDS) as u16,
+                words,
+            }
+        });
+        std::iter::once(LoadRequest::Begin(self.header)).chain(words)
+    }
+}
+
 /// The result of loading.
 #[derive(Clone, Debug, PartialEq, Eq, serde::Serialize)]
 pub struct LoadedAxes {
@@ -179,26 +196,12 @@ pub fn load(
     let parts = build(stage, board)?;
     let words: usize = parts.iter().map(|part| part.words.len()).sum();
     let mut sent = 0;
-    for BuiltPart {
-        header,
-        words: of_part,
-    } in &parts
-    {
-        ask(client, LoadRequest::Begin(*header))?;
-        for (number, chunk) in of_part.chunks(BLOCK_WORDS).enumerate() {
-            let mut block = message::Words::new();
-            let fits = block.extend(chunk.iter().copied());
-            debug_assert!(fits, "a chunk is a block");
-            ask(
-                client,
-                LoadRequest::Words {
-                    offset: (number * BLOCK_WORDS) as u16,
-                    words: block,
-                },
-            )?;
-            sent += chunk.len();
-            told(sent as f64 / words as f64);
+    for part in &parts {
+        for request in part.requests() {
+            let received = ask(client, request)?.received;
+            told((sent + usize::from(received)) as f64 / words as f64);
         }
+        sent += part.words.len();
     }
     let set = parts.first().map_or(0, |part| part.header.set);
     let due = client.now() + TAKEN;

@@ -8,8 +8,8 @@ use quadrant::command::Command;
 use quadrant::hal::Serial;
 use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
-    AxisSet, BLOCK_WORDS, Body, LinkError, LoadHeader, LoadPart, LoadRequest, LoadStatus, Message,
-    NumberType, Reply, Request, Response, SettingsRequest, Words,
+    AxisSet, Body, LinkError, LoadHeader, LoadPart, LoadRequest, LoadStatus, Message, NumberType,
+    Reply, Request, Response, SettingsRequest, Words,
 };
 use quadrant::lockstep::InputRecord;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
@@ -56,13 +56,9 @@ fn block(words: &[u32]) -> Words {
 }
 
 fn send(client: &mut Client, part: &BuiltPart) -> Result<LoadStatus, String> {
-    let mut last = ask(client, LoadRequest::Begin(part.header))?;
-    for (number, chunk) in part.words.chunks(BLOCK_WORDS).enumerate() {
-        let offset = (number * BLOCK_WORDS) as u16;
-        let words = block(chunk);
-        last = ask(client, LoadRequest::Words { offset, words })?;
-    }
-    Ok(last)
+    let mut answers = part.requests().map(|request| ask(client, request));
+    let first = answers.next().expect("a head")?;
+    answers.try_fold(first, |_, answer| answer)
 }
 
 /// The part with the CRC that belongs to it.
@@ -467,12 +463,8 @@ impl Lean {
 
     fn load(&mut self, stage: &StageSettings) {
         for part in parts_here(stage) {
-            self.line.send(Body::Load(LoadRequest::Begin(part.header)));
-            for (number, chunk) in part.words.chunks(BLOCK_WORDS).enumerate() {
-                self.line.send(Body::Load(LoadRequest::Words {
-                    offset: (number * BLOCK_WORDS) as u16,
-                    words: block(chunk),
-                }));
+            for request in part.requests() {
+                self.line.send(Body::Load(request));
                 // No faster than a host that waits for its answers.
                 for _ in 0..60 {
                     self.tick(None);
