@@ -214,8 +214,16 @@ struct Source<'a> {
 /// Whole lines without a quotation mark.
 struct Block {
     text: Vec<u8>,
-    /// Range of each part, and the line that it begins in.
-    parts: Vec<(Range<usize>, u64)>,
+    parts: Vec<PartPlace>,
+}
+
+/// Place of a part in its block, and in the file.
+struct PartPlace {
+    range: Range<usize>,
+    /// Line that it begins in.
+    line: u64,
+    /// Line breaks in it.
+    line_breaks: u64,
 }
 
 impl<'a> Source<'a> {
@@ -288,9 +296,14 @@ impl<'a> Source<'a> {
             let least = (begin + self.sizes.part).min(end);
             let part =
                 begin..memchr2(b'\n', b'\r', &text[least - 1..]).map_or(end, |at| least + at);
-            parts.push((part.clone(), self.line));
-            self.line += line_breaks(&text[part.clone()]);
             begin = part.end;
+            let line_breaks = memchr_iter(b'\n', &text[part.clone()]).count() as u64;
+            parts.push(PartPlace {
+                range: part,
+                line: self.line,
+                line_breaks,
+            });
+            self.line += line_breaks;
         }
         Block { text, parts }
     }
@@ -316,7 +329,7 @@ impl<'a> Source<'a> {
         while let Some(Block { text, parts }) = block {
             share(self.read - (text.len() + self.text.len()) as u64);
             let room = filled.room();
-            let part = |(part, line): (Range<usize>, u64)| rows.parse(&text[part], line, room);
+            let part = |place| rows.parse(&text, place, room);
             let (found, next) = rayon::join(
                 || parts.into_par_iter().map(part).collect(),
                 || {
@@ -355,11 +368,6 @@ impl<'a> Source<'a> {
         }
         Ok(lines)
     }
-}
-
-/// Line breaks in a text.
-fn line_breaks(text: &[u8]) -> u64 {
-    memchr_iter(b'\n', text).count() as u64
 }
 
 /// Columns as far as they are read.
@@ -496,12 +504,11 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// Parses whole lines without a quotation mark, of which the first is a line of the file; one row beyond `room` ends them. Empty lines
-    /// are no rows.
-    fn parse(&self, text: &[u8], line: u64, room: usize) -> Part {
-        let mut part = self.part(line_breaks(text) as usize + 1);
+    /// Parses a part of a block; one row beyond `room` ends it. Empty lines are no rows.
+    fn parse(&self, block: &[u8], place: PartPlace, room: usize) -> Part {
+        let mut part = self.part(place.line_breaks as usize + 1);
         let mut row = vec![0.0; self.columns.len()];
-        let (mut rest, mut line) = (text, line);
+        let (mut rest, mut line) = (&block[place.range], place.line);
         while !rest.is_empty() && part.lines.rows() <= room {
             let mut end = 0;
             if !matches!(rest[0], b'\n' | b'\r') {
