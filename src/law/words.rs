@@ -4,7 +4,7 @@
 //! gives its words or takes new ones ([`Window`]), so that what one side writes is what the other reads. A window shows a part of
 //! the words: a board takes an axis in pieces, in place, and no buffer holds the whole of it.
 //!
-//! What is taken is checked word by word: a variant must be known, a number finite, a length within its capacity. That the words
+//! Each word that is taken is checked: a variant must be known, a number finite, a length within its capacity. That the words
 //! are of the same layout tells [`Words::LAYOUT`], a hash of all names and types, and that none was damaged a CRC; both are for
 //! whoever carries them.
 //!
@@ -50,11 +50,11 @@ pub trait Words: Sized {
 pub struct WordsError {
     /// Its place among the words of the value, from zero.
     pub place: usize,
-    /// What is wrong with it.
+    /// The flaw of it.
     pub flaw: WordFlaw,
 }
 
-/// What is wrong with a word.
+/// A flaw of a word.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum WordFlaw {
     /// It names no variant.

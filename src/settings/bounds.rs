@@ -51,7 +51,7 @@ words!([] struct AxisBounds {
     can_home: bool,
 });
 
-/// What a board needs to know beside its built axes.
+/// The rules and bounds that a board has beside its built axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Machine {
     /// Rules of operation.

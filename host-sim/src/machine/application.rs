@@ -51,11 +51,11 @@ pub struct Start<'a> {
     pub plan: &'a PlanSettings,
     /// Fault that the run before has left.
     pub fault: Option<FaultCode>,
-    /// What the machine says of itself.
+    /// Name, timer and number type for the greeting.
     pub identity: BoardIdentity,
 }
 
-/// What a machine says of itself in the greeting.
+/// Name, timer and number type of a machine, for the greeting.
 #[derive(Clone, Copy, Debug)]
 pub struct BoardIdentity {
     /// Name of the board.

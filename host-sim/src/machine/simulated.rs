@@ -17,7 +17,7 @@ use super::memory_flash::MemoryFlash;
 use super::timing::{OFF_TICKS, PORT_BYTES};
 use crate::plant::{SimulatedStage, StageParameters};
 
-/// What it says of itself.
+/// Name, timer and number type for the greeting.
 const IDENTITY: BoardIdentity = BoardIdentity {
     board: "simulated",
     cycle_hz: 0,

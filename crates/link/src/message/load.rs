@@ -103,7 +103,7 @@ pub enum LoadRequest {
     },
 }
 
-/// What a board takes, and what is loaded.
+/// The layout and number type that a board takes, and the axes that are loaded.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct LoadStatus {
     /// Layout of the words: it differs between releases whose axes differ.

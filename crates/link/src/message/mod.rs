@@ -250,6 +250,6 @@ pub enum Reply {
     Inputs(Inputs),
     /// The result of learning.
     Learning(Learning),
-    /// What a board takes, and what is loaded.
+    /// The layout and number type that a board takes, and the axes that are loaded.
     Load(LoadStatus),
 }
