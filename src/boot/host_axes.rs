@@ -1,18 +1,15 @@
 //! The start of a board that holds no settings: a host loads its axes.
 
-use core::mem::MaybeUninit;
-
-use quadrant::app::capture::CAPTURE_WORDS;
-use quadrant::app::{Axis, Control, HostAxes, Intake, Queues, Server, ServerParts};
+use quadrant::app::{HostAxes, Intake, ServerParts};
 use quadrant::axes::PerAxis;
 use quadrant::link::message::NumberType;
 use quadrant::reference::Motion;
 use quadrant::safety::{FaultCode, Operation};
 use quadrant::scalar::Scalar;
 
+use super::storage::StaticStorage;
 use super::{Machine, blank_axis, place_control, place_server};
 use crate::board;
-use crate::source::Source;
 
 /// Control rate, Hz: axes that are built for another are refused.
 const RATE_HZ: u32 = 10_000;
@@ -21,30 +18,6 @@ const _: () = {
     assert!(RATE_HZ as f64 >= lowest && RATE_HZ as f64 <= highest);
 };
 
-/// Static storage for all large objects: the stack has no room for them.
-pub(crate) struct StaticStorage<S: Scalar + 'static> {
-    axes: [MaybeUninit<Axis<S>>; 4],
-    queues: Queues<'static, S>,
-    capture: [u32; CAPTURE_WORDS],
-    control: MaybeUninit<Control<'static, 'static, S>>,
-    intake: MaybeUninit<Intake<'static>>,
-    server: MaybeUninit<Server<'static, 'static, S, Source>>,
-}
-
-impl<S: Scalar> StaticStorage<S> {
-    /// Returns the storage before the start.
-    pub(crate) const fn new() -> Self {
-        Self {
-            axes: [const { MaybeUninit::uninit() }; 4],
-            queues: Queues::new(),
-            capture: [0; CAPTURE_WORDS],
-            control: MaybeUninit::uninit(),
-            intake: MaybeUninit::uninit(),
-            server: MaybeUninit::uninit(),
-        }
-    }
-}
-
 /// Makes the machine without axes: it puts nothing out, and control keeps the outputs off until a host has loaded all of them.
 /// `crashed` is the fault that the last run left; `cycle_hz` is the rate of the timer that measures ticks.
 pub(crate) fn machine<S: Scalar>(
@@ -52,7 +25,7 @@ pub(crate) fn machine<S: Scalar>(
     crashed: Option<FaultCode>,
     cycle_hz: u32,
     number: NumberType,
-) -> Machine<S, Source> {
+) -> Machine<S> {
     let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
     let (control_ends, intake_ends, ends) = storage.queues.split();
     let plan = PerAxis::from_fn(|_| Motion::Hold);

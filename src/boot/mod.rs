@@ -4,31 +4,34 @@
 mod host_axes;
 #[cfg(not(feature = "lean"))]
 mod own_settings;
+mod storage;
 
 use core::mem::MaybeUninit;
 
 use quadrant::app::crash_record::CrashCause;
-use quadrant::app::{Axis, AxisSource, Control, ControlEnds, Intake, Server, ServerParts};
+use quadrant::app::{Axis, Control, ControlEnds, Intake, Server, ServerParts};
 use quadrant::hal::ResetCause;
 use quadrant::safety::{FaultCode, Operation};
 use quadrant::scalar::Scalar;
 use quadrant::stage::Plan;
 
+use crate::source::Source;
 use crate::{board, log};
 
 #[cfg(feature = "lean")]
-pub(crate) use host_axes::{StaticStorage, forget_starts, machine};
+pub(crate) use host_axes::{forget_starts, machine};
 #[cfg(not(feature = "lean"))]
-pub(crate) use own_settings::{StaticStorage, forget_starts, machine};
+pub(crate) use own_settings::{forget_starts, machine};
+pub(crate) use storage::StaticStorage;
 
 /// The two halves of the machine, ready for the first tick.
-pub(crate) struct Machine<S: Scalar + 'static, O: 'static> {
+pub(crate) struct Machine<S: Scalar + 'static> {
     /// The fast half, of the control interrupt.
     pub(crate) control: &'static mut Control<'static, 'static, S>,
     /// The link's bytes on their way, of the supervising task.
     pub(crate) intake: &'static mut Intake<'static>,
     /// The slow half, of the lowest task.
-    pub(crate) server: &'static mut Server<'static, 'static, S, O>,
+    pub(crate) server: &'static mut Server<'static, 'static, S, Source>,
     /// Control rate, Hz.
     pub(crate) rate_hz: u32,
     /// Lengths of the encoders' counts, mm.
@@ -75,9 +78,9 @@ fn place_control<S: Scalar>(
 
 /// Makes the slow half in its place.
 #[inline(never)]
-fn place_server<S: Scalar, O: AxisSource<'static, S>>(
-    place: &'static mut MaybeUninit<Server<'static, 'static, S, O>>,
-    parts: ServerParts<'static, 'static, S, O>,
-) -> &'static mut Server<'static, 'static, S, O> {
+fn place_server<S: Scalar>(
+    place: &'static mut MaybeUninit<Server<'static, 'static, S, Source>>,
+    parts: ServerParts<'static, 'static, S, Source>,
+) -> &'static mut Server<'static, 'static, S, Source> {
     place.write(Server::new(parts))
 }

@@ -2,11 +2,8 @@
 
 use core::mem::MaybeUninit;
 
-use quadrant::app::capture::CAPTURE_WORDS;
 use quadrant::app::start_record::StartRecord;
-use quadrant::app::{
-    Axis, Control, Intake, OwnSettings, OwnSettingsParts, Queues, Server, ServerParts,
-};
+use quadrant::app::{Intake, OwnSettings, OwnSettingsParts, ServerParts};
 use quadrant::axes::AxisName;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::link::message::{NumberType, Provenance};
@@ -17,40 +14,10 @@ use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 
+use super::storage::{SettingsStorage, StaticStorage};
 use super::{Machine, blank_axis, place_control, place_server};
 use crate::board::{self, SettingsFlash};
 use crate::log;
-use crate::source::Source;
-
-/// Static storage for all large objects: the stack has no room for them.
-pub(crate) struct StaticStorage<S: Scalar + 'static> {
-    settings: MaybeUninit<StageSettings>,
-    draft: MaybeUninit<StageSettings>,
-    axes: [MaybeUninit<Axis<S>>; 4],
-    queues: Queues<'static, S>,
-    buffer: [u8; BUFFER_BYTES],
-    capture: [u32; CAPTURE_WORDS],
-    control: MaybeUninit<Control<'static, 'static, S>>,
-    intake: MaybeUninit<Intake<'static>>,
-    server: MaybeUninit<Server<'static, 'static, S, Source>>,
-}
-
-impl<S: Scalar> StaticStorage<S> {
-    /// Returns the storage before the start.
-    pub(crate) const fn new() -> Self {
-        Self {
-            settings: MaybeUninit::uninit(),
-            draft: MaybeUninit::uninit(),
-            axes: [const { MaybeUninit::uninit() }; 4],
-            queues: Queues::new(),
-            buffer: [0; BUFFER_BYTES],
-            capture: [0; CAPTURE_WORDS],
-            control: MaybeUninit::uninit(),
-            intake: MaybeUninit::uninit(),
-            server: MaybeUninit::uninit(),
-        }
-    }
-}
 
 /// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
 /// timer that measures ticks.
@@ -60,9 +27,13 @@ pub(crate) fn machine<S: Scalar>(
     crashed: Option<FaultCode>,
     cycle_hz: u32,
     number: NumberType,
-) -> Machine<S, Source> {
-    let settings = defaults(&mut storage.settings);
-    let draft = defaults(&mut storage.draft);
+) -> Machine<S> {
+    let SettingsStorage {
+        in_force,
+        draft,
+        buffer,
+    } = &mut storage.settings;
+    let (settings, draft) = (defaults(in_force), defaults(draft));
     let Loaded {
         plan,
         provenance,
@@ -73,7 +44,7 @@ pub(crate) fn machine<S: Scalar>(
         flash,
         settings,
         draft,
-        &mut storage.buffer,
+        buffer,
         count_start(crashed.is_some()),
     );
     // The back buffer's content does not matter: it is built over before it is used.
@@ -104,7 +75,7 @@ pub(crate) fn machine<S: Scalar>(
             keep_draft,
             provenance,
             store,
-            buffer: &mut storage.buffer,
+            buffer,
             rates_hz: board::RATES_HZ,
         }),
         capture: &mut storage.capture,

@@ -135,7 +135,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 Decimal(MOST_RPM)
             )));
         }
-        let period_s = 1.0 / self.source.bounds().rate_hz;
+        let period_s = 1.0 / self.source.rate_hz();
         self.order(Order::Spindle(SpindleSpeed::from_rpm(rpm, period_s)))?;
         Ok(Reply::Done)
     }
