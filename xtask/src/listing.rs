@@ -81,15 +81,16 @@ impl Listing {
             } else if let Some(instruction) = instruction(line)
                 && let Some(function) = current.and_then(|address| functions.get_mut(&address))
             {
-                // At least one half-word; the next line or header corrects it.
+                // At least one half-word; what follows says how much.
                 function.range.end = instruction.address + 2;
                 function.instructions.push(instruction);
             }
         }
-        // A function ends where the next begins, but gaps between sections belong to none: 32-bit instructions only
-        // lengthen the last line by two.
-        for function in functions.values_mut() {
-            function.range.end += 2;
+        // The last instruction may have 32 bits; what the next function begins with belongs to that.
+        let mut next = u32::MAX;
+        for function in functions.values_mut().rev() {
+            function.range.end = (function.range.end + 2).min(next);
+            next = function.range.start;
         }
         Self { functions }
     }
@@ -151,5 +152,15 @@ mod tests {
         assert_eq!(function.instructions[1].mnemonic, "bl");
         assert_eq!(function.instructions[1].operands, "e0 <_ZN4core3fooE>");
         assert!(listing.at(0xd6).is_none() && listing.at(0xde).is_none());
+    }
+
+    #[test]
+    fn a_function_that_ends_in_a_short_instruction_does_not_reach_into_the_next() {
+        let listing = Listing::parse(
+            "000000d8 <first>:\n  d8:\tbl\tdc <second>\n\n000000dc <second>:\n  dc:\tbx\tlr\n\n\
+             000000de <third>:\n  de:\tbx\tlr\n",
+        );
+        let ranges: Vec<_> = listing.functions().map(|f| f.range.clone()).collect();
+        assert_eq!(ranges, [0xd8..0xdc, 0xdc..0xde, 0xde..0xe2]);
     }
 }
