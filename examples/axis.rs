@@ -1,7 +1,7 @@
 //! One axis under PID against a simulated mass with friction: the largest error, without feedforward and with it.
 use quadrant::axis::{Axis, AxisBuilder, AxisError, AxisState};
 use quadrant::control::{feedback::Feedback, pid::Pid};
-use quadrant::friction::{Direction, gms::Gms, stribeck::SlidingTable};
+use quadrant::friction::{Direction, gms, stribeck::SlidingTable};
 use quadrant::reference::{HarmonicSettings, Motion, MotionScale, MotionSettings};
 use quadrant::{command::Command, encoder::EncoderReading, feedforward::FeedforwardKind};
 
@@ -17,8 +17,8 @@ fn largest_error_um(kind: FeedforwardKind) -> Result<f32, AxisError> {
         .try_build()?;
     let (curves, gms) = (x.friction.sliding.map(|side| side.curve), &x.friction.gms);
     let surface = SlidingTable::<f64>::build(&curves, gms.attraction_v_s, 1e-4);
-    let elements = Gms::<f64, 10>::build(&gms.elements);
-    let (mut state, mut friction) = (AxisState::default(), elements.spread(0.0));
+    let elements = gms::Gms::<f64, 10>::build(&gms.elements);
+    let (mut state, mut friction) = (AxisState::default(), gms::GmsState::default());
     let (mut position, mut velocity, mut largest) = (0.0, 0.0, 0.0_f32);
     axis.handle_command(&mut state, Command::Run);
     for tick in 0..150_000 {

@@ -1,14 +1,14 @@
 //! A friction model alone: the hysteresis of GMS friction as it is pushed 50 um to and fro.
 
-use quadrant::friction::{Direction, gms::Gms, stribeck::SlidingTable};
+use quadrant::friction::{Direction, gms, stribeck::SlidingTable};
 
 fn main() {
     const PERIOD_S: f64 = 1e-3;
     let friction = quadrant::settings::presets::x_axis().friction;
     let curves = friction.sliding.map(|side| side.curve);
     let surface = SlidingTable::build(&curves, friction.gms.attraction_v_s, PERIOD_S);
-    let model = Gms::<f64, 10>::build(&friction.gms.elements);
-    let mut state = model.spread(0.0);
+    let model = gms::Gms::<f64, 10>::build(&friction.gms.elements);
+    let mut state = gms::GmsState::default();
     println!("position_um,friction_v");
     let mut position_mm = 0.0;
     for tick in 0..1000 {

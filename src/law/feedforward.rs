@@ -14,16 +14,16 @@
 //!
 //! Inertia (`a / A`) is separate and acts with any kind.
 //!
-//! The elements move with the first four kinds and with the smoothed GMS; the bristle moves with Dahl and LuGre. When a
+//! The elements move with GMS, combined and the smoothed GMS; the bristle moves with Dahl and LuGre. When a
 //! change of settings goes from one group to the other, the force goes with it: the bristle takes the elements' sum, the
-//! elements take their weights' shares of the bristle's force. The rest of the elements' memory is right again once the
+//! elements take their weights' shares of the bristle's force. After kinds without either, the model begins as in a lasting
+//! motion. The rest of the elements' memory is right again once the
 //! reference has moved over the pre-sliding range in one sense.
 
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
 
-use crate::law::friction::bristle::Bristle;
 use crate::law::friction::dahl::Dahl;
 use crate::law::friction::gms::{Gms, GmsState};
 use crate::law::friction::lugre::Lugre;
@@ -174,12 +174,14 @@ impl<S: Scalar> FeedforwardTerms<S> {
 /// The pre-sliding model of a kind, with what only that model needs.
 #[derive(Clone, Debug, PartialEq)]
 enum Presliding<S: Scalar, const N: usize> {
-    /// None, combined: the elements on the Stribeck curve.
+    /// Combined: the elements on the Stribeck curve.
     Gms(GmsOnSurface<S, N>),
-    /// Static: they carry their load for when a change makes them act.
-    Static(GmsOnSurface<S, N>),
     /// GMS: the elements at the breakaway level.
     Breakaway(GmsOnSurface<S, N>),
+    /// None: nothing moves.
+    None,
+    /// Static: no pre-sliding, the Stribeck curve in the sense of the velocity.
+    Static(SlidingTable<S>),
     Smoothed {
         elements: SmoothedGms<S, N>,
         surface: SlidingTable<S>,
@@ -190,11 +192,12 @@ enum Presliding<S: Scalar, const N: usize> {
 
 words!([S: Scalar, const N: usize] enum Presliding<S, N> {
     0 Gms { 0 model: GmsOnSurface<S, N> },
-    1 Static { 0 model: GmsOnSurface<S, N> },
-    2 Breakaway { 0 model: GmsOnSurface<S, N> },
-    3 Smoothed { elements elements: SmoothedGms<S, N>, surface surface: SlidingTable<S> },
-    4 Lugre { 0 model: Lugre<S> },
-    5 Dahl { 0 model: Dahl<S> },
+    1 Breakaway { 0 model: GmsOnSurface<S, N> },
+    2 None {},
+    3 Static { 0 surface: SlidingTable<S> },
+    4 Smoothed { elements elements: SmoothedGms<S, N>, surface surface: SlidingTable<S> },
+    5 Lugre { 0 model: Lugre<S> },
+    6 Dahl { 0 model: Dahl<S> },
 });
 
 /// The elements and what they slide on, the tables last.
@@ -215,25 +218,16 @@ words!([S: Scalar, const N: usize] struct GmsOnSurface<S, N> {
 /// The friction state of the feedforward; slack by default.
 #[derive(Clone, Debug, PartialEq)]
 pub struct FeedforwardState<S: Scalar, const N: usize> {
-    elements: GmsState<S, N>,
-    bristle: Bristle<S>,
-    last: LastModel,
-}
-
-/// The model that moved last.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-enum LastModel {
-    #[default]
-    Elements,
-    Bristle,
+    memory: GmsState<S, N>,
+    /// No pre-sliding model acts: the memory is not of the present.
+    idle: bool,
 }
 
 impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
     fn default() -> Self {
         Self {
-            elements: GmsState::default(),
-            bristle: Bristle::default(),
-            last: LastModel::Elements,
+            memory: GmsState::default(),
+            idle: false,
         }
     }
 }
@@ -241,30 +235,7 @@ impl<S: Scalar, const N: usize> Default for FeedforwardState<S, N> {
 impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
     /// The friction of the model that moved last, V.
     pub fn force(&self) -> S {
-        match self.last {
-            LastModel::Bristle => self.bristle.force(),
-            LastModel::Elements => self.elements.total(),
-        }
-    }
-
-    /// The elements, loaded by `spread` if the bristle moved last.
-    #[inline(always)]
-    fn elements(&mut self, spread: impl FnOnce(S) -> GmsState<S, N>) -> &mut GmsState<S, N> {
-        if self.last == LastModel::Bristle {
-            self.elements = spread(self.bristle.force());
-            self.last = LastModel::Elements;
-        }
-        &mut self.elements
-    }
-
-    /// The bristle, loaded if the elements moved last.
-    #[inline(always)]
-    fn bristle(&mut self) -> &mut Bristle<S> {
-        if self.last == LastModel::Elements {
-            self.bristle = Bristle::bent(self.elements.total());
-            self.last = LastModel::Bristle;
-        }
-        &mut self.bristle
+        self.memory.total()
     }
 }
 
@@ -323,7 +294,7 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// None at all, to be [built over](Self::build_over).
     pub(crate) fn blank() -> Self {
         Self {
-            presliding: Presliding::blank(),
+            presliding: Presliding::None,
             coulomb_gain: S::Gain::default(),
             gms_gain: S::Gain::default(),
             per_gms_gain: S::Gain::default(),
@@ -375,6 +346,35 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         self.presliding.fill_tables(friction, period_s);
     }
 
+    /// The memory of slack springs.
+    pub(crate) fn start(&self) -> FeedforwardState<S, N> {
+        FeedforwardState {
+            idle: !self.presliding.acts(),
+            ..FeedforwardState::default()
+        }
+    }
+
+    /// Goes on after a change of settings at a velocity, mm/s. Where no pre-sliding model acted before, the one that acts now begins
+    /// as it is in a lasting motion.
+    #[cold]
+    #[inline(never)]
+    pub(crate) fn go_on(&self, state: &mut FeedforwardState<S, N>, velocity: S) {
+        let acts = self.presliding.acts();
+        if acts && state.idle {
+            state.memory = GmsState::default();
+            if velocity != S::ZERO {
+                let direction = Direction::of(velocity);
+                let level = self.presliding.level(velocity.magnitude(), direction);
+                let force = match direction {
+                    Direction::Positive => level,
+                    Direction::Negative => -level,
+                };
+                state.memory.slide(force, direction);
+            }
+        }
+        state.idle = !acts;
+    }
+
     /// Lets the pre-sliding model carry `voltage` more, V, as far as friction can be; returns by how much the output grows, V.
     #[cold]
     #[inline(never)]
@@ -385,15 +385,15 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         let force = state.force();
         let change = (force + voltage.scale(self.per_gms_gain)).within(self.most) - force;
         match &self.presliding {
+            Presliding::None | Presliding::Static(_) => {}
             Presliding::Gms(GmsOnSurface { elements, .. })
-            | Presliding::Static(GmsOnSurface { elements, .. })
             | Presliding::Breakaway(GmsOnSurface { elements, .. }) => {
-                elements.load(state.elements(|force| elements.spread(force)), change);
+                elements.load(&mut state.memory, change);
             }
-            Presliding::Smoothed { elements, .. } => {
-                elements.load(state.elements(|force| elements.spread(force)), change);
+            Presliding::Smoothed { elements, .. } => elements.load(&mut state.memory, change),
+            Presliding::Lugre(_) | Presliding::Dahl(_) => {
+                state.memory.as_bristles(|bristles| bristles.load(change));
             }
-            Presliding::Lugre(_) | Presliding::Dahl(_) => state.bristle().load(change),
         }
         change.scale(self.gms_gain)
     }
@@ -414,22 +414,48 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         terms.viscous = velocity.scale(*self.viscous.of(direction));
         let (model, sliding) = match &self.presliding {
             Presliding::Gms(model) => (model, model.surface.at(speed, direction)),
-            Presliding::Static(model) => {
-                let sliding = model.surface.at(speed, direction);
-                terms.level = self.static_level(sliding.level, velocity);
-                (model, sliding)
-            }
             Presliding::Breakaway(model) => (model, *model.breakaway.of(direction)),
-            other => {
-                terms.gms = other.step_other(state, reference).scale(self.gms_gain);
+            _ => {
+                (terms.level, terms.gms) = self.step_other(state, reference);
                 return terms;
             }
         };
-        let elements = &model.elements;
-        let memory = state.elements(|force| elements.spread(force));
-        let force = elements.step(memory, reference.displacement, sliding);
+        let memory = &mut state.memory;
+        let force = model.elements.step(memory, reference.displacement, sliding);
         terms.gms = force.scale(self.gms_gain);
         terms
+    }
+
+    /// The level and the pre-sliding force of a kind without GMS elements, V: apart, so that those have the registers to themselves.
+    #[inline(never)]
+    fn step_other(
+        &self,
+        state: &mut FeedforwardState<S, N>,
+        reference: ReferenceStep<S>,
+    ) -> (S, S) {
+        let (velocity, displacement) = (reference.velocity, reference.displacement);
+        let (speed, direction) = (velocity.magnitude(), Direction::of(velocity));
+        let memory = &mut state.memory;
+        let force = match &self.presliding {
+            Presliding::Static(surface) => {
+                return (
+                    self.static_level(surface.at(speed, direction).level, velocity),
+                    S::ZERO,
+                );
+            }
+            Presliding::Smoothed { elements, surface } => {
+                elements.step(memory, displacement, surface.at(speed, direction))
+            }
+            Presliding::Lugre(model) => {
+                memory.as_bristles(|bristles| model.step(bristles, displacement, speed))
+            }
+            Presliding::Dahl(model) => {
+                memory.as_bristles(|bristles| model.step(bristles, displacement))
+            }
+            // None has no friction; the elements of the others are stepped above.
+            Presliding::None | Presliding::Gms(_) | Presliding::Breakaway(_) => S::ZERO,
+        };
+        (S::ZERO, force.scale(self.gms_gain))
     }
 
     /// The static model's level in the sense of the velocity, V; none at rest.
@@ -447,37 +473,31 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
 }
 
 impl<S: Scalar, const N: usize> Presliding<S, N> {
-    /// The force of a model but the GMS elements', V: apart, so that those have the registers to themselves.
-    #[inline(never)]
-    fn step_other(&self, state: &mut FeedforwardState<S, N>, reference: ReferenceStep<S>) -> S {
-        let (displacement, speed) = (reference.displacement, reference.velocity.magnitude());
-        match self {
-            Self::Smoothed { elements, surface } => {
-                let direction = Direction::of(reference.velocity);
-                let memory = state.elements(|force| elements.spread(force));
-                elements.step(memory, displacement, surface.at(speed, direction))
-            }
-            Self::Lugre(model) => model.step(state.bristle(), displacement, speed),
-            Self::Dahl(model) => model.step(state.bristle(), displacement),
-            // Not here: the feedforward takes them.
-            Self::Gms(_) | Self::Static(_) | Self::Breakaway(_) => S::ZERO,
-        }
+    /// True if there is a pre-sliding model.
+    fn acts(&self) -> bool {
+        !matches!(self, Self::None | Self::Static(_))
     }
 
-    fn blank() -> Self {
-        Self::Gms(GmsOnSurface {
-            elements: Gms::build(&[]),
-            breakaway: PerDirection::default(),
-            surface: SlidingTable::blank(),
-        })
+    /// The force of a lasting motion, V, not negative.
+    fn level(&self, speed: S, direction: Direction) -> S {
+        match self {
+            Self::None => S::ZERO,
+            Self::Static(surface)
+            | Self::Smoothed { surface, .. }
+            | Self::Gms(GmsOnSurface { surface, .. }) => surface.at(speed, direction).level,
+            Self::Breakaway(model) => model.breakaway.of(direction).level,
+            Self::Lugre(model) => model.level(speed, direction),
+            Self::Dahl(model) => model.level(direction),
+        }
     }
 
     /// Fills the tables of a model made by [`without_tables`](Self::without_tables) of the same parameters.
     fn fill_tables(&mut self, friction: &FrictionSettings, period_s: f64) {
         let curves = friction.sliding.map(|model| model.curve);
         match self {
-            Self::Gms(GmsOnSurface { surface, .. })
-            | Self::Static(GmsOnSurface { surface, .. })
+            Self::None => {}
+            Self::Static(surface)
+            | Self::Gms(GmsOnSurface { surface, .. })
             | Self::Breakaway(GmsOnSurface { surface, .. })
             | Self::Smoothed { surface, .. } => {
                 surface.fill(&curves, friction.gms.attraction_v_s, period_s);
@@ -510,7 +530,8 @@ impl<S: Scalar, const N: usize> Presliding<S, N> {
                 ),
                 surface: SlidingTable::blank(),
             },
-            (FeedforwardKind::Static, ..) => Self::Static(GmsOnSurface::build(friction, period_s)),
+            (FeedforwardKind::None, ..) => Self::None,
+            (FeedforwardKind::Static, ..) => Self::Static(SlidingTable::blank()),
             (FeedforwardKind::Gms, ..) => Self::Breakaway(GmsOnSurface::build(friction, period_s)),
             _ => Self::Gms(GmsOnSurface::build(friction, period_s)),
         }

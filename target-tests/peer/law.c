@@ -7,7 +7,7 @@ enum { AXES = 3, ELEMENTS = 4, NODES = 226, INTERVAL_BITS = 4 };
 
 /* Intervals of a table: one from zero to `bound`, then 16 in every octave. */
 struct octaves {
-    uint32_t key; /* exponent and leading mantissa bits of `bound` */
+    uint32_t key; /* exponent and leading mantissa bits of the interval before `bound` */
     float below;  /* turns an argument below `bound` into a place within the first interval */
     float bound;
 };
@@ -19,8 +19,8 @@ struct parameters {
     /* Feedforward: for positive and for negative velocities, for accelerations, and the elements' share. */
     float viscous[2], inertia, share;
     float stiffness[ELEMENTS], weight[ELEMENTS];
-    /* Tables: the gain of an error up to `range` mm, and level (V) and decay of the sliding surface for both senses. */
-    float range, largest;
+    /* Tables: the gain of an error, and level (V) and decay of the sliding surface for both senses. */
+    float largest;
     struct octaves gain_octaves, surface_octaves[2];
     float gain[NODES], surface[2][NODES][2];
 };
@@ -69,14 +69,14 @@ static inline uint32_t interval(const struct octaves *octaves, float argument, f
         return 0;
     }
     *place = (float)(int32_t)(number.bits & ((1u << SHIFT) - 1)) * (1.0f / (1u << SHIFT));
-    return (number.bits >> SHIFT) - octaves->key + 1;
+    return (number.bits >> SHIFT) - octaves->key;
 }
 
 /* k(e) e. */
 static inline float scaled_error(const struct parameters *law, float error)
 {
-    float size = __builtin_fabsf(error), place, gain;
-    uint32_t at = interval(&law->gain_octaves, size < law->range ? size : law->range, &place);
+    float place, gain;
+    uint32_t at = interval(&law->gain_octaves, __builtin_fabsf(error), &place);
 
     if (at >= NODES - 1)
         gain = law->gain[NODES - 1];
@@ -159,10 +159,10 @@ static inline float feedforward(const struct parameters *law, struct state *stat
     return 0.0f + viscous + friction(law, state, input, sense) * law->share + inertia;
 }
 
-static inline float feedback(const struct parameters *law, struct state *state, float error, float low,
-                             float high)
+/* Beside `base`; together they stay within the limit. */
+static inline float feedback(const struct parameters *law, struct state *state, float error, float base)
 {
-    float proportional, derivative, fast, term, integral, lost, wanted;
+    float proportional, derivative, fast, term, integral, lost, wanted, low, high;
 
     error = within(scaled_error(law, error), law->error_limit);
     proportional = error * law->proportional;
@@ -175,12 +175,14 @@ static inline float feedback(const struct parameters *law, struct state *state, 
     integral = state->integral + term;
     lost = term - (integral - state->integral);
     wanted = fast + integral;
-    if (wanted <= high && wanted >= low && __builtin_fabsf(integral) <= law->integral_limit) {
+    if (__builtin_fabsf(wanted + base) <= law->limit && __builtin_fabsf(integral) <= law->integral_limit) {
         state->integral = integral;
         state->lost = lost;
         return wanted;
     }
     /* At a bound: the integral takes nothing that would push the output further out. */
+    low = -law->limit - base;
+    high = law->limit - base;
     if (wanted > high ? error > 0.0f : wanted < low && error < 0.0f) {
         integral = state->integral;
     } else {
@@ -197,7 +199,7 @@ void c_law(const struct parameters laws[AXES], struct state states[AXES], const 
     for (int axis = 0; axis < AXES; axis++) {
         const struct parameters *law = &laws[axis];
         float base = feedforward(law, &states[axis], &inputs[axis]);
-        float rest = feedback(law, &states[axis], inputs[axis].error, -law->limit - base, law->limit - base);
+        float rest = feedback(law, &states[axis], inputs[axis].error, base);
 
         outputs[axis] = within(rest + base, law->limit);
     }

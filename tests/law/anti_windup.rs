@@ -67,10 +67,7 @@ impl Loop {
             error,
             velocity: 0.0,
         };
-        let output = self
-            .law
-            .step(&mut self.memory, input, -LIMIT_V, LIMIT_V)
-            .output;
+        let output = self.law.step(&mut self.memory, input, 0.0, LIMIT_V).output;
         let slot = self.tick % self.delay.len();
         let drive = core::mem::replace(&mut self.delay[slot], output) + load_v;
         self.tick += 1;

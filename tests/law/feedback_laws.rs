@@ -35,21 +35,23 @@ proptest! {
     fn output_is_finite_and_within_its_bounds_for_any_input(
         kind in laws(),
         inputs in prop::collection::vec((any_f32(), any_f32()), 40),
-        centre in -10.0f32..10.0,
+        base in -10.0f32..10.0,
     ) {
-        let (low, high) = (centre - 10.0, centre + 10.0);
+        // What is cut is a difference from the base, rounded.
+        let limit = 10.0f32;
+        let most = limit.next_up();
         let law = law::<f32>(kind);
         let mut state = FeedbackState::default();
         for (error, velocity) in inputs {
             // The reference is the law's own and always a number.
             let velocity = if velocity.is_finite() { velocity.clamp(-2e3, 2e3) } else { 0.0 };
-            let terms = law.step(&mut state, FeedbackInput { error, velocity }, low, high);
-            prop_assert!(terms.output >= low && terms.output <= high, "{terms:?}");
+            let terms = law.step(&mut state, FeedbackInput { error, velocity }, base, limit);
+            prop_assert!((terms.output + base).abs() <= most, "{terms:?}");
             prop_assert!(terms.proportional.is_finite() && terms.derivative.is_finite());
             prop_assert!(terms.integral.abs() <= 2.0, "{terms:?}");
         }
         // The memory has no trace of what was not a number: the loop works on.
-        let terms = law.step(&mut state, input(1e-3, 0.0), low, high);
+        let terms = law.step(&mut state, input(1e-3, 0.0), base, limit);
         prop_assert!(terms.derivative.is_finite() && terms.integral.abs() <= 2.0);
     }
 
@@ -63,7 +65,7 @@ proptest! {
         let mut state = FeedbackState::default();
         for (error, velocity) in inputs {
             let input = FeedbackInput { error: Fixed(error), velocity: Fixed(velocity) };
-            let terms = law.step(&mut state, input, -high, high);
+            let terms = law.step(&mut state, input, Fixed::ZERO, high);
             prop_assert!(terms.output >= -high && terms.output <= high, "{terms:?}");
         }
     }
@@ -76,8 +78,8 @@ proptest! {
         let law = law::<f64>(kind);
         let (mut here, mut there) = (FeedbackState::default(), FeedbackState::default());
         for (error, velocity) in inputs {
-            let one = law.step(&mut here, input(error, velocity), -10.0, 10.0).output;
-            let other = law.step(&mut there, input(-error, -velocity), -10.0, 10.0).output;
+            let one = law.step(&mut here, input(error, velocity), 0.0, 10.0).output;
+            let other = law.step(&mut there, input(-error, -velocity), 0.0, 10.0).output;
             prop_assert_eq!(one, -other);
         }
     }
@@ -92,9 +94,9 @@ proptest! {
         let mut states = (FeedbackState::default(), FeedbackState::default(), FeedbackState::default());
         let ten = Fixed::quantise(10.0, Quantity::Voltage);
         for error in errors {
-            let exact = exact.step(&mut states.0, input(error, velocity), -10.0, 10.0).output;
-            let single = single.step(&mut states.1, input(error, velocity), -10.0, 10.0).output;
-            let fixed = fixed.step(&mut states.2, input(error, velocity), -ten, ten).output;
+            let exact = exact.step(&mut states.0, input(error, velocity), 0.0, 10.0).output;
+            let single = single.step(&mut states.1, input(error, velocity), 0.0, 10.0).output;
+            let fixed = fixed.step(&mut states.2, input(error, velocity), Fixed::ZERO, ten).output;
             // The derivative alone multiplies an error's rounding by 54 V/mm.
             prop_assert!((f64::from(single) - exact).abs() < 2e-6, "{single} {exact}");
             let fixed = fixed.to_f64(Quantity::Voltage);
@@ -111,7 +113,7 @@ fn an_error_that_is_not_a_number_counts_as_none() {
             error: f32::NAN,
             velocity: 0.0,
         };
-        let terms = law::<f32>(kind).step(&mut state, nothing, -10.0, 10.0);
+        let terms = law::<f32>(kind).step(&mut state, nothing, 0.0, 10.0);
         assert_eq!(terms.output, 0.0, "{kind:?}");
         assert_eq!(state, FeedbackState::default(), "{kind:?}");
     }

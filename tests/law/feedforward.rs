@@ -137,6 +137,30 @@ fn inertia_acts_with_every_kind() {
     }
 }
 
+#[test]
+fn elements_take_over_the_force_of_bristles_and_stick() {
+    let step = |displacement: f64| ReferenceStep {
+        displacement,
+        velocity: displacement / PERIOD_S,
+        acceleration: 0.0,
+    };
+    let bristles = build::<f64>(FeedforwardKind::Lugre, &WHOLE);
+    let elements = build::<f64>(FeedforwardKind::Combined, &WHOLE);
+    let stiffness = friction().gms.stiffness_v_per_mm();
+    for sense in [1.0, -1.0] {
+        let mut state = FeedforwardState::<f64, 4>::default();
+        while state.force().abs() < 0.05 {
+            bristles.step(&mut state, step(sense * 1e-5));
+        }
+        let carried = state.force();
+        for displacement in [1e-6, -1e-6] {
+            let mut state = state.clone();
+            let force = elements.step(&mut state, step(displacement)).gms;
+            assert!((force - carried - stiffness * displacement).abs() < 1e-12);
+        }
+    }
+}
+
 proptest! {
     #![proptest_config(repeatable(300))]
 

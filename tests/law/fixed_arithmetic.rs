@@ -63,6 +63,9 @@ proptest! {
         prop_assert_eq!(f64::from(a.magnitude().0), clamp(wide_a.abs()));
         let (low, high) = if b < -b { (b, -b) } else { (-b, b) };
         prop_assert!(a.limit(low, high) >= low && a.limit(low, high) <= high);
+        let most = b.magnitude();
+        prop_assert_eq!(a.is_within(most), wide_a.abs() <= wide_b.abs().min(f64::from(i32::MAX)));
+        prop_assert_eq!(a.within(most), a.limit(-most, most));
     }
 
     #[test]

@@ -68,8 +68,8 @@ proptest! {
         let velocity = if backwards { -speed } else { speed };
         let mut states = (FeedbackState::default(), FeedbackState::default());
         for error in errors {
-            let ours = scheduled.step(&mut states.0, FeedbackInput { error, velocity }, -10.0, 10.0);
-            let its = frozen.step(&mut states.1, error, -10.0, 10.0);
+            let ours = scheduled.step(&mut states.0, FeedbackInput { error, velocity }, 0.0, 10.0);
+            let its = frozen.step(&mut states.1, error, 0.0, 10.0);
             prop_assert!((ours.output - its.output).abs() < 1e-12, "{ours:?} {its:?}");
         }
     }
@@ -84,14 +84,14 @@ fn the_integral_stays_when_the_speed_changes() {
             error: 0.02,
             velocity: 0.0,
         };
-        scheduled.step(&mut state, slow, -10.0, 10.0);
+        scheduled.step(&mut state, slow, 0.0, 10.0);
     }
     let input = |velocity| FeedbackInput {
         error: 0.0,
         velocity,
     };
-    let before = scheduled.step(&mut state, input(0.0), -10.0, 10.0).integral;
-    let after = scheduled.step(&mut state, input(9.0), -10.0, 10.0).integral;
+    let before = scheduled.step(&mut state, input(0.0), 0.0, 10.0).integral;
+    let after = scheduled.step(&mut state, input(9.0), 0.0, 10.0).integral;
     assert!(before > 0.05, "{before}");
     assert_eq!(before, after);
 }

@@ -34,10 +34,12 @@ proptest! {
     fn output_is_finite_and_within_its_bounds_for_any_error(
         gains in gains(),
         errors in prop::collection::vec(any_f32(), 40),
-        centre in -10.0f32..10.0,
+        base in -10.0f32..10.0,
         nonlinear in any::<bool>(),
     ) {
-        let (low, high) = (centre - 10.0, centre + 10.0);
+        // What is cut is a difference from the base, rounded.
+        let limit = 10.0f32;
+        let most = limit.next_up();
         let pid = Pid::<f32>::build(&gains, 10.0, PERIOD_S);
         let shape = NonlinearGainTable::<f32>::build(&NonlinearGain {
             rate_per_mm: 15.0,
@@ -46,13 +48,13 @@ proptest! {
         let mut state = FeedbackState::default();
         for error in errors {
             let error = if nonlinear { shape.scaled_error(error) } else { error };
-            let terms = pid.step(&mut state, error, low, high);
-            prop_assert!(terms.output >= low && terms.output <= high, "{terms:?}");
+            let terms = pid.step(&mut state, error, base, limit);
+            prop_assert!((terms.output + base).abs() <= most, "{terms:?}");
             prop_assert!(terms.proportional.is_finite() && terms.derivative.is_finite());
             prop_assert!(terms.integral.abs() <= 10.0, "{terms:?}");
         }
         // The memory has no trace of what was not a number: the loop works on.
-        let terms = pid.step(&mut state, 1e-3, low, high);
+        let terms = pid.step(&mut state, 1e-3, base, limit);
         prop_assert!(terms.derivative.is_finite() && terms.integral.abs() <= 10.0);
     }
 
@@ -65,7 +67,7 @@ proptest! {
         let high = Fixed::quantise(10.0, Quantity::Voltage);
         let mut state = FeedbackState::default();
         for error in errors {
-            let terms = pid.step(&mut state, Fixed(error), -high, high);
+            let terms = pid.step(&mut state, Fixed(error), Fixed::ZERO, high);
             prop_assert!(terms.output >= -high && terms.output <= high, "{terms:?}");
             prop_assert!(terms.integral >= -high && terms.integral <= high, "{terms:?}");
         }
@@ -76,7 +78,7 @@ proptest! {
 fn an_error_that_is_not_a_number_counts_as_none() {
     let pid = Pid::<f32>::build(&x_gains(), 2.0, PERIOD_S);
     let mut state = FeedbackState::default();
-    let terms = pid.step(&mut state, f32::NAN, -10.0, 10.0);
+    let terms = pid.step(&mut state, f32::NAN, 0.0, 10.0);
     assert_eq!(terms.output, 0.0);
     assert_eq!(state, FeedbackState::default());
 }
@@ -91,7 +93,7 @@ fn proportional_and_integral_terms_are_their_definitions() {
     let pid = Pid::<f64>::build(&gains, 2.0, PERIOD_S);
     let mut state = FeedbackState::default();
     for tick in 1..=1000 {
-        let terms = pid.step(&mut state, 0.1, -10.0, 10.0);
+        let terms = pid.step(&mut state, 0.1, 0.0, 10.0);
         assert!((terms.proportional - 0.1 * gains.kp_v_per_mm).abs() < 1e-15);
         let integral = 0.1 * gains.ki_v_per_mm_s * PERIOD_S * f64::from(tick);
         assert!((terms.integral - integral).abs() < 1e-12);
@@ -113,7 +115,7 @@ fn derivative_step_response_is_the_bilinear_one() {
     let pole = (2.0 * tau - PERIOD_S) / (2.0 * tau + PERIOD_S);
     let mut expected = 2.0 * kd / (2.0 * tau + PERIOD_S) * 0.01;
     for _ in 0..20 {
-        let terms = pid.step(&mut state, 0.01, -10.0, 10.0);
+        let terms = pid.step(&mut state, 0.01, 0.0, 10.0);
         assert!((terms.derivative - expected).abs() < 1e-12);
         expected *= pole;
     }
@@ -130,7 +132,7 @@ fn derivative_has_the_analytic_gain_and_phase_at_frequencies() {
         let mut state = FeedbackState::default();
         let (mut re, mut im) = (0.0, 0.0);
         for tick in -1000..10_000 {
-            let terms = pid.step(&mut state, 1e-3 * angle(tick).sin(), -10.0, 10.0);
+            let terms = pid.step(&mut state, 1e-3 * angle(tick).sin(), 0.0, 10.0);
             if tick >= 0 {
                 re += terms.derivative * angle(tick).sin() * 2e-4 / 1e-3;
                 im += terms.derivative * angle(tick).cos() * 2e-4 / 1e-3;
@@ -151,9 +153,9 @@ fn derivative_has_the_analytic_gain_and_phase_at_frequencies() {
 fn reset_gives_no_derivative_kick() {
     let pid = Pid::<f32>::build(&x_gains(), 2.0, PERIOD_S);
     let mut state = FeedbackState::default();
-    pid.step(&mut state, 3.0, -10.0, 10.0);
+    pid.step(&mut state, 3.0, 0.0, 10.0);
     pid.reset(&mut state, 0.5);
-    let terms = pid.step(&mut state, 0.5, -10.0, 10.0);
+    let terms = pid.step(&mut state, 0.5, 0.0, 10.0);
     assert_eq!(terms.derivative, 0.0);
     assert!((terms.output - 0.5 * 1.118).abs() < 1e-3);
 }
@@ -169,11 +171,11 @@ fn integral_stops_at_its_limit_and_leaves_it_at_once() {
         let pid = Pid::<f64>::build(&gains, 0.5, PERIOD_S);
         let mut state = FeedbackState::default();
         for _ in 0..10_000 {
-            pid.step(&mut state, sign * 0.1, -10.0, 10.0);
+            pid.step(&mut state, sign * 0.1, 0.0, 10.0);
         }
-        let held = pid.step(&mut state, sign * 0.1, -10.0, 10.0);
+        let held = pid.step(&mut state, sign * 0.1, 0.0, 10.0);
         assert_eq!(held.integral, sign * 0.5);
-        let back = pid.step(&mut state, -sign * 0.1, -10.0, 10.0);
+        let back = pid.step(&mut state, -sign * 0.1, 0.0, 10.0);
         assert!((back.integral - sign * (0.5 - 0.1 * 100.0 * PERIOD_S)).abs() < 1e-12);
     }
 }
@@ -189,15 +191,15 @@ fn integral_takes_nothing_that_pushes_a_cut_output_further_out() {
         let pid = Pid::<f64>::build(&gains, 5.0, PERIOD_S);
         let mut state = FeedbackState::default();
         for _ in 0..10_000 {
-            let terms = pid.step(&mut state, sign * 5.0, -3.0, 3.0);
+            let terms = pid.step(&mut state, sign * 5.0, 0.0, 3.0);
             assert!(terms.saturated);
             assert_eq!(terms.output, sign * 3.0);
             assert_eq!(terms.integral, 0.0);
         }
         // An error of the other sign is taken although the output is still cut.
-        let terms = pid.step(&mut state, -sign * 5.0, -3.0, 3.0);
+        let terms = pid.step(&mut state, -sign * 5.0, 0.0, 3.0);
         assert!(terms.saturated);
-        let again = pid.step(&mut state, -sign * 0.1, -3.0, 3.0);
+        let again = pid.step(&mut state, -sign * 0.1, 0.0, 3.0);
         assert!(!again.saturated);
         assert!((again.integral + sign * 0.1 * 100.0 * PERIOD_S).abs() < 1e-12);
     }
@@ -215,10 +217,10 @@ fn a_fixed_point_integral_collects_terms_below_its_step() {
     let pid = Pid::<Fixed>::build(&gains, 2.0, PERIOD_S);
     let mut state = FeedbackState::default();
     let high = Fixed::quantise(10.0, Quantity::Voltage);
-    let mut terms = pid.step(&mut state, Fixed(1), -high, high);
+    let mut terms = pid.step(&mut state, Fixed(1), Fixed::ZERO, high);
     assert_eq!(terms.integral, Fixed(0));
     for _ in 0..10_000 {
-        terms = pid.step(&mut state, Fixed(1000), -high, high);
+        terms = pid.step(&mut state, Fixed(1000), Fixed::ZERO, high);
     }
     let exact = 10_001.0 * 1000.0 * 1.5e-4;
     assert!(

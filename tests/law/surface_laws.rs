@@ -42,8 +42,8 @@ fn each_is_its_pid_at_small_errors() {
                 error,
                 velocity: 7.0,
             };
-            let ours = law_built.step(&mut states.0, input, -10.0, 10.0).output;
-            let its = pid.step(&mut states.1, error, -10.0, 10.0).output;
+            let ours = law_built.step(&mut states.0, input, 0.0, 10.0).output;
+            let its = pid.step(&mut states.1, error, 0.0, 10.0).output;
             largest = largest.max((ours - its).abs());
         }
         // The integral of a difference is a sum's end, not the trapezoid's: half a period of 0.1 mV/tick.
@@ -77,7 +77,7 @@ fn standing(settings: &FeedbackSettings, error: f64, velocity: f64) -> f64 {
     let law = settings.build(PERIOD_S);
     let mut state = FeedbackState::default();
     law.take_over(&mut state, error);
-    law.step(&mut state, FeedbackInput { error, velocity }, -10.0, 10.0)
+    law.step(&mut state, FeedbackInput { error, velocity }, 0.0, 10.0)
         .output
 }
 

@@ -187,8 +187,9 @@ impl Law {
             error: (reference.position_mm - measured_mm) as f32,
             velocity: ahead.velocity,
         };
-        let (low, high) = (-self.limit_v - base, self.limit_v - base);
-        let rest = self.feedback.step(&mut state.feedback, input, low, high);
+        let rest = self
+            .feedback
+            .step(&mut state.feedback, input, base, self.limit_v);
         let output_v = (rest.output + base).within(self.limit_v);
         DacCode::saturating(output_v.round_scaled(self.codes_per_volt))
     }

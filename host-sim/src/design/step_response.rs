@@ -82,7 +82,7 @@ pub fn step_response(
     for _ in 0..samples {
         let error = request.height_mm - axis.position_mm();
         let scaled = error * table.as_ref().map_or(1.0, |table| table.at(error));
-        let terms = pid.step(&mut state, scaled, -request.limit_v, request.limit_v);
+        let terms = pid.step(&mut state, scaled, 0.0, request.limit_v);
         position_mm.push(axis.position_mm());
         voltage_v.push(terms.output);
         axis.step(terms.output);

@@ -102,7 +102,7 @@ impl VaryingLoop {
                 return f64::INFINITY;
             }
             let scaled = if high { gain * error } else { error };
-            let terms = pid.step(&mut state, scaled, -NO_LIMIT_V, NO_LIMIT_V);
+            let terms = pid.step(&mut state, scaled, 0.0, NO_LIMIT_V);
             axis.step(terms.output);
             squares[sample * 10 / samples] += error * error;
         }

@@ -45,7 +45,7 @@ fn unrest_mm(error_mm: f64) -> f64 {
     for tick in 0..20_000 {
         let share = (f64::from(tick) / 5_000.0).min(1.0);
         let scaled = table.scaled_error(-axis.position_mm());
-        let terms = pid.step(&mut state, scaled, -LIMIT_V, LIMIT_V);
+        let terms = pid.step(&mut state, scaled, 0.0, LIMIT_V);
         axis.step(terms.output - share * load_v);
         if tick >= 18_000 {
             low = low.min(axis.position_mm());

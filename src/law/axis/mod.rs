@@ -968,13 +968,15 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *feedback = FeedbackState::default();
         *rest = RestState::default();
         *filters = FiltersState::default();
-        *friction = FeedforwardState::default();
+        *friction = self.feedforward.start();
         generator.reset();
         *plausibility = self.plausibility.start(shown);
         *preview = [here; PREVIEW_ROOM];
         *pulse = None;
         self.learning.resume(learning);
-        self.cancelling.start(cancelling);
+        if self.cancels {
+            self.cancelling.start(cancelling);
+        }
     }
 
     /// Starts or ends a motion, from where the reference stands. Only what
@@ -1199,6 +1201,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             velocity: seen.velocity,
             acceleration: state.acceleration,
         };
+        if changed {
+            self.feedforward.go_on(&mut state.friction, step.velocity);
+        }
         seen.feedforward = self.feedforward.step(&mut state.friction, step);
         let mut total = seen.feedforward.total();
         let error = seen.error;
@@ -1311,9 +1316,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         input: FeedbackInput<S>,
         base: S,
     ) -> FeedbackTerms<S> {
-        let limit = self.amplifier.limit;
-        self.feedback
-            .step(state, input, -limit - base, limit - base)
+        self.feedback.step(state, input, base, self.amplifier.limit)
     }
 
     /// Makes a change of settings bumpless: the output starts from where it was.
@@ -1324,6 +1327,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         state.rest.forget();
         if !self.learns {
             state.learning = LearningState::default();
+        }
+        if !self.cancels {
+            self.cancelling.start(&mut state.cancelling);
         }
         // The output under the new settings, computed on a copy, decides the offset.
         let mut trial = state.feedback.clone();
@@ -1346,19 +1352,21 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             state.feedback = FeedbackState::default();
             state.rest.forget();
             state.filters = FiltersState::default();
-            state.friction = FeedforwardState::default();
+            state.friction = self.feedforward.start();
             self.cancelling.start(&mut state.cancelling);
             state.telemetry.bumpless_offset = S::ZERO;
             self.stop(state);
         }
     }
 
-    /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick: what was learnt under others
-    /// is forgotten.
+    /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick: what was learnt and
+    /// cancelled under others is forgotten.
     #[inline(always)]
     pub(crate) fn output_zero(&self, state: &mut AxisState<S, N>, changed: bool) {
         if changed {
+            cold_path();
             state.learning = LearningState::default();
+            self.cancelling.start(&mut state.cancelling);
         }
         let measured = state.encoder.count();
         state.generator.hold();

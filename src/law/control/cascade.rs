@@ -93,14 +93,14 @@ impl<S: Scalar> Cascade<S> {
         }
     }
 
-    /// One control period; the output stays within `low..=high` (V), which must be ordered.
+    /// One control period; output and `base` together stay within +-`limit`, all in V.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut FeedbackState<S>,
         input: FeedbackInput<S>,
-        low: S,
-        high: S,
+        base: S,
+        limit: S,
     ) -> FeedbackTerms<S> {
         let error = self.inner.rate.clip(input.error);
         let wanted = error.scale(self.position) + input.velocity.scale(self.feedforward);
@@ -108,6 +108,6 @@ impl<S: Scalar> Cascade<S> {
         let proportional = (set - input.velocity).scale(self.velocity);
         let derivative = self.inner.rate.step(state, error);
         self.inner
-            .close(state, proportional, derivative, (low, high))
+            .close(state, proportional, derivative, (base, limit))
     }
 }

@@ -113,25 +113,25 @@ impl<S: Scalar> Feedback<S> {
         }
     }
 
-    /// One control period; the output stays within `low..=high` (V), which must be ordered.
+    /// One control period; output and `base` together stay within +-`limit`, all in V.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut FeedbackState<S>,
         input: FeedbackInput<S>,
-        low: S,
-        high: S,
+        base: S,
+        limit: S,
     ) -> FeedbackTerms<S> {
         match self {
-            Self::Pid(pid) => pid.step(state, input.error, low, high),
+            Self::Pid(pid) => pid.step(state, input.error, base, limit),
             Self::NPid(law) => {
                 let error = law.gain.scaled_error(input.error);
-                law.pid.step(state, error, low, high)
+                law.pid.step(state, error, base, limit)
             }
-            Self::Scheduled(law) => law.step(state, input, low, high),
-            Self::Cascade(law) => law.step(state, input, low, high),
-            Self::SlidingMode(law) => law.step(state, input.error, low, high),
-            Self::Nctf(law) => law.step(state, input.error, low, high),
+            Self::Scheduled(law) => law.step(state, input, base, limit),
+            Self::Cascade(law) => law.step(state, input, base, limit),
+            Self::SlidingMode(law) => law.step(state, input.error, base, limit),
+            Self::Nctf(law) => law.step(state, input.error, base, limit),
         }
     }
 }

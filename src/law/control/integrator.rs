@@ -29,23 +29,23 @@ impl<S: Scalar> Integrator<S> {
         }
     }
 
-    /// Closes a law: integrates `driver`, adds the other terms, and stays within `low..=high` (V), which must be
-    /// ordered. While the output is cut, the integral takes no driver that would push it further out, so it starts back
-    /// with the first one of the other sign.
+    /// Closes a law: integrates `driver`, adds the other terms, and stays with `base` within +-`limit`, all in V. While the
+    /// output is cut, the integral takes no driver that would push it further out, so it starts back with the first one of
+    /// the other sign.
     #[inline(always)]
     pub(super) fn close(
         &self,
         state: &mut FeedbackState<S>,
         driver: S,
         (proportional, derivative): (S, S),
-        (low, high): (S, S),
+        (base, limit): (S, S),
     ) -> FeedbackTerms<S> {
         let fast = proportional + derivative;
         let sum = driver.accumulate(state.integral, self.per_tick);
         let integral = S::total(sum);
         let wanted = fast + integral;
         // Most ticks: neither the output nor the integral is at a bound. Not so if either is not a number.
-        if wanted <= high && wanted >= low && integral.magnitude() <= self.limit {
+        if (wanted + base).is_within(limit) && integral.is_within(self.limit) {
             state.integral = sum;
             return FeedbackTerms {
                 proportional,
@@ -56,6 +56,7 @@ impl<S: Scalar> Integrator<S> {
             };
         }
         cold_path();
+        let (low, high) = (-limit - base, limit - base);
         let outward = if wanted > high {
             driver > S::ZERO
         } else {

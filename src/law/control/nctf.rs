@@ -112,14 +112,14 @@ impl<S: Scalar> Nctf<S> {
         }
     }
 
-    /// One control period; the output stays within `low..=high` (V), which must be ordered.
+    /// One control period; output and `base` together stay within +-`limit`, all in V.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut FeedbackState<S>,
         error: S,
-        low: S,
-        high: S,
+        base: S,
+        limit: S,
     ) -> FeedbackTerms<S> {
         let error = self.inner.rate.clip(error);
         let [speed] = self.characteristic.at(error.magnitude());
@@ -127,6 +127,6 @@ impl<S: Scalar> Nctf<S> {
         let proportional = velocity.scale(self.gain);
         let derivative = self.inner.rate.step(state, error);
         self.inner
-            .close(state, proportional, derivative, (low, high))
+            .close(state, proportional, derivative, (base, limit))
     }
 }

@@ -55,13 +55,11 @@ impl NonlinearGain {
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
 pub struct NonlinearGainTable<S: Scalar> {
-    range: S,
     largest: S,
     table: OctaveTable<S, 1>,
 }
 
 words!([S: Scalar] struct NonlinearGainTable<S> {
-    range: S,
     largest: S,
     table: OctaveTable<S, 1>,
 });
@@ -92,7 +90,6 @@ impl<S: Scalar> NonlinearGainTable<S> {
                 // Not clipped at emax: the kink would fall within an interval.
                 |error| [libm::cosh(gain.rate_per_mm * error)],
             ),
-            range: S::quantise(gain.range_mm, Quantity::Length),
             largest: S::quantise(gain.largest(), Quantity::Multiplier),
         }
     }
@@ -100,11 +97,8 @@ impl<S: Scalar> NonlinearGainTable<S> {
     /// k(e), from 1 to cosh(ko emax).
     #[inline(always)]
     pub fn at(&self, error: S) -> S {
-        let size = error.magnitude();
-        let [gain] = self
-            .table
-            .at(if size < self.range { size } else { self.range });
-        // Chords lie above a convex curve; the bound of the Popov criterion holds exactly.
+        let [gain] = self.table.at(error.magnitude());
+        // Chords lie above a convex curve, which rises beyond emax, too; the bound of the Popov criterion holds exactly.
         if gain < self.largest {
             gain
         } else {

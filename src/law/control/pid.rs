@@ -61,8 +61,8 @@ impl PidGains {
 /// let pid = Pid::<f64>::build(&gains, 5.0, 1e-3);
 /// let mut state = FeedbackState::default();
 /// // An error of 1 mm, and +-10 V to put out: 2 V at once, and 10 mV more in every tick.
-/// let first = pid.step(&mut state, 1.0, -10.0, 10.0);
-/// let second = pid.step(&mut state, 1.0, -10.0, 10.0);
+/// let first = pid.step(&mut state, 1.0, 0.0, 10.0);
+/// let second = pid.step(&mut state, 1.0, 0.0, 10.0);
 /// assert_eq!(first.proportional, 2.0);
 /// assert!((second.output - first.output - 0.01).abs() < 1e-12);
 /// ```
@@ -107,20 +107,20 @@ impl<S: Scalar> Pid<S> {
         self.derivative.take_over(state, error);
     }
 
-    /// One control period. `error` is the scaled error f(e) in mm; the output stays within `low..=high` (V), which
-    /// must be ordered.
+    /// One control period. `error` is the scaled error f(e) in mm; output and `base` together stay within
+    /// +-`limit`, all in V.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut FeedbackState<S>,
         error: S,
-        low: S,
-        high: S,
+        base: S,
+        limit: S,
     ) -> FeedbackTerms<S> {
         let error = self.derivative.clip(error);
         let proportional = error.scale(self.proportional);
         let derivative = self.derivative.step(state, error);
         self.integrator
-            .close(state, error, (proportional, derivative), (low, high))
+            .close(state, error, (proportional, derivative), (base, limit))
     }
 }

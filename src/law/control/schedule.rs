@@ -128,14 +128,14 @@ impl<S: Scalar> ScheduledPid<S> {
         core::array::from_fn(|i| here.shares[i] + beyond.scale(here.slopes[i]))
     }
 
-    /// One control period; the output stays within `low..=high` (V), which must be ordered.
+    /// One control period; output and `base` together stay within +-`limit`, all in V.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut FeedbackState<S>,
         input: FeedbackInput<S>,
-        low: S,
-        high: S,
+        base: S,
+        limit: S,
     ) -> FeedbackTerms<S> {
         let [kp, ki, kd] = self.shares(input.velocity.magnitude());
         let error = self.pid.derivative.clip(input.error);
@@ -150,6 +150,6 @@ impl<S: Scalar> ScheduledPid<S> {
         let driver = error.times(ki, Quantity::Multiplier);
         self.pid
             .integrator
-            .close(state, driver, (proportional, derivative), (low, high))
+            .close(state, driver, (proportional, derivative), (base, limit))
     }
 }

@@ -77,19 +77,19 @@ impl<S: Scalar> SlidingMode<S> {
         }
     }
 
-    /// One control period; the output stays within `low..=high` (V), which must be ordered. The saturated surface is
+    /// One control period; output and `base` together stay within +-`limit`, all in V. The saturated surface is
     /// told as the proportional term.
     #[inline(always)]
     pub fn step(
         &self,
         state: &mut FeedbackState<S>,
         error: S,
-        low: S,
-        high: S,
+        base: S,
+        limit: S,
     ) -> FeedbackTerms<S> {
         let error = self.inner.rate.clip(error);
         let distance = error.scale(self.line) + self.inner.rate.step(state, error);
         let switching = distance.within(self.switching);
-        self.inner.close(state, switching, S::ZERO, (low, high))
+        self.inner.close(state, switching, S::ZERO, (base, limit))
     }
 }

@@ -119,6 +119,11 @@ impl<S: Scalar> Dahl<S> {
         }
     }
 
+    /// The force of a lasting motion, V.
+    pub(crate) fn level(&self, direction: Direction) -> S {
+        self.sides.of(direction).level
+    }
+
     /// The friction in V after moving by `displacement` (mm); without a displacement nothing changes.
     #[inline(always)]
     pub fn step(&self, state: &mut Bristle<S>, displacement: S) -> S {

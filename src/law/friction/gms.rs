@@ -18,6 +18,7 @@ use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
+use super::bristle::Bristle;
 use super::direction::Direction;
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
@@ -86,14 +87,14 @@ words!([S: Scalar] struct ElementConfig<S> {
 /// The GMS model ready for the tick.
 ///
 /// ```
-/// use quadrant::friction::gms::{Gms, GmsElement};
+/// use quadrant::friction::gms::{Gms, GmsElement, GmsState};
 /// use quadrant::friction::stribeck::Sliding;
 ///
 /// let elements = [(100.0, 0.5), (20.0, 0.5)]
 ///     .map(|(stiffness_v_per_mm, weight)| GmsElement { stiffness_v_per_mm, weight });
 /// let model = Gms::<f64, 8>::build(&elements);
 /// let surface = Sliding::constant(0.2, 10.0, 1e-4); // 0.2 V
-/// let mut state = model.spread(0.0);
+/// let mut state = GmsState::default();
 /// // Before it slides, friction is a spring: 120 V/mm over the first half micrometre.
 /// assert!((model.step(&mut state, 0.5e-3, surface) - 0.06).abs() < 1e-12);
 /// // After a millimetre it has the level of the surface.
@@ -116,17 +117,20 @@ words!([S: Scalar, const N: usize] struct Gms<S, N> {
 pub struct GmsState<S: Scalar, const N: usize> {
     /// The elements' forces, V; while all slip, how far each was from its share of their sum when the last began to.
     pub(super) forces: [S; N],
-    /// The sum of the forces while all slip, V.
+    /// The sum of the forces while all slip, V; of bristles, their force.
     sum: S,
     /// Share that is left of the distances in `forces` while all slip, a [`Quantity::Fraction`].
     left: S,
     /// A bit for each element that slips, and [`BACKWARD`] after a motion towards smaller positions: one comparison tells that
-    /// all go on slipping.
+    /// all go on slipping. [`BRISTLES`] after a model of bristles: their force is to be spread.
     slipping: u32,
 }
 
 /// Bit above those of the elements.
 const BACKWARD: u32 = 1 << 31;
+
+/// Bit that a model of bristles leaves, with those of all elements.
+const BRISTLES: u32 = 1 << 30;
 
 impl Direction {
     /// Its bit in [`GmsState::slipping`].
@@ -151,18 +155,9 @@ impl<S: Scalar, const N: usize> Default for GmsState<S, N> {
 }
 
 impl<S: Scalar, const N: usize> GmsState<S, N> {
-    /// Sticking elements that carry `force` by their weights.
-    pub(super) fn carrying(force: S, weights: impl Iterator<Item = S::Gain>) -> Self {
-        let mut state = Self::default();
-        for (slot, weight) in state.forces.iter_mut().zip(weights) {
-            *slot = force.scale(weight);
-        }
-        state
-    }
-
     /// The bits of all elements.
     const ALL: u32 = {
-        assert!(N < 32);
+        assert!(N < 30);
         (1 << N) - 1
     };
 
@@ -190,6 +185,24 @@ impl<S: Scalar, const N: usize> GmsState<S, N> {
             force = force + element;
         }
         force
+    }
+
+    /// Lets every element slip on from its share of `sum`, V.
+    pub(crate) fn slide(&mut self, sum: S, direction: Direction) {
+        self.sum = sum;
+        self.left = S::ZERO;
+        self.slipping = Self::ALL | direction.bit();
+    }
+
+    /// Lets a model of bristles act on the force. Elements that act after it stick, and carry its force by their weights.
+    pub(crate) fn as_bristles<R>(&mut self, act: impl FnOnce(&mut Bristle<S>) -> R) -> R {
+        let mut bristles = Bristle::bent(self.total());
+        let result = act(&mut bristles);
+        self.sum = bristles.force();
+        // As if all slipped and nothing were left of their distances.
+        self.left = S::ZERO;
+        self.slipping = Self::ALL | BRISTLES;
+        result
     }
 
     /// Goes on with the sum of the elements, which all slip from now on; `one` is all of their distances.
@@ -243,11 +256,6 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
         }
     }
 
-    /// Sticking elements that carry `force` by their weights.
-    pub fn spread(&self, force: S) -> GmsState<S, N> {
-        GmsState::carrying(force, self.weights())
-    }
-
     /// The forces of the elements, V.
     pub fn forces(&self, state: &GmsState<S, N>) -> [S; N] {
         state.forces_by(self.weights())
@@ -291,7 +299,7 @@ impl<S: Scalar, const N: usize> Gms<S, N> {
             state.left = state.left.times(sliding.decay, Quantity::Fraction);
             return state.sum;
         }
-        if state.slipping & BACKWARD != direction.bit() {
+        if state.slipping & (BACKWARD | BRISTLES) != direction.bit() {
             state.stick(direction, self.weights());
         }
         let mut slipping = state.slipping;

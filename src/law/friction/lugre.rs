@@ -122,6 +122,12 @@ impl<S: Scalar> Lugre<S> {
         );
     }
 
+    /// The force of a lasting motion, V, but for the viscous friction.
+    pub(crate) fn level(&self, speed: S, direction: Direction) -> S {
+        let [level, _] = self.tables.of(direction).at(speed);
+        level
+    }
+
     /// `sigma0 z + sigma1 dz/dt` in V after a step at `speed` (mm/s, not negative) in the sense of `displacement` (mm);
     /// without a displacement nothing changes.
     #[inline(always)]

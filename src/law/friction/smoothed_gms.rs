@@ -96,11 +96,6 @@ impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
         }
     }
 
-    /// Elements that carry `force` by their weights.
-    pub fn spread(&self, force: S) -> GmsState<S, N> {
-        GmsState::carrying(force, self.weights())
-    }
-
     /// The forces of the elements, V.
     pub fn forces(&self, state: &GmsState<S, N>) -> [S; N] {
         state.forces_by(self.weights())

@@ -254,6 +254,12 @@ impl Scalar for Fixed {
     }
 
     #[inline(always)]
+    fn is_within(self, most: Self) -> bool {
+        // One comparison of an unsigned difference.
+        self.0.wrapping_add(most.0) as u32 <= (most.0 as u32) << 1
+    }
+
+    #[inline(always)]
     fn magnitude(self) -> Self {
         Self(self.0.saturating_abs())
     }
@@ -270,7 +276,7 @@ impl Scalar for Fixed {
         let key = (exponent << OCTAVE_INTERVAL_BITS)
             | ((normal >> (31 - OCTAVE_INTERVAL_BITS)) & ((1 << OCTAVE_INTERVAL_BITS) - 1));
         let place = (normal << (1 + OCTAVE_INTERVAL_BITS)) >> 2;
-        (key.wrapping_sub(start.key) as usize + 1, Self(place as i32))
+        (key.wrapping_sub(start.key) as usize, Self(place as i32))
     }
 
     #[inline(always)]

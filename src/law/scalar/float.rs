@@ -14,7 +14,7 @@ pub struct CompensatedSum<F> {
 }
 
 macro_rules! float_scalar {
-    ($float:ty, $bits:ty, $place:ty, $mantissa_bits:expr, $half:expr) => {
+    ($float:ty, $bits:ty, $mantissa_bits:expr, $half:expr, $place:expr) => {
         impl Scalar for $float {
             type Gain = $float;
             type Sum = CompensatedSum<$float>;
@@ -101,13 +101,8 @@ macro_rules! float_scalar {
             }
 
             #[inline(always)]
-            fn within(self, most: Self) -> Self {
-                if self.magnitude() <= most {
-                    self
-                } else {
-                    cold_path();
-                    self.limit(-most, most)
-                }
+            fn is_within(self, most: Self) -> bool {
+                self.magnitude() <= most
             }
 
             #[inline(always)]
@@ -122,11 +117,9 @@ macro_rules! float_scalar {
                     return (0, self * start.below);
                 }
                 const SHIFT: u32 = $mantissa_bits - OCTAVE_INTERVAL_BITS;
-                const PLACE: $float = 1.0 / (1u64 << SHIFT) as $float;
                 let bits = self.to_bits();
-                let interval = (bits >> SHIFT) as u32 - start.key;
-                let place = (bits & ((1 << SHIFT) - 1)) as $place as $float * PLACE;
-                (interval as usize + 1, place)
+                let interval = ((bits >> SHIFT) as u32).wrapping_sub(start.key);
+                (interval as usize, $place(bits << (<$bits>::BITS - SHIFT)))
             }
 
             #[inline(always)]
@@ -156,8 +149,10 @@ macro_rules! float_scalar {
     };
 }
 
-float_scalar!(f32, u32, i32, 23, 0.5);
+float_scalar!(f32, u32, 23, 0.5, |left: u32| left as f32 / 4_294_967_296.0);
 
 // The host's reference; kept off the target, where a double-precision operation is a library call.
 #[cfg(not(target_os = "none"))]
-float_scalar!(f64, u64, i64, 52, 0.5);
+// Signed, as a conversion of unsigned 64 bits takes several instructions.
+float_scalar!(f64, u64, 52, 0.5, |left: u64| (left >> 1) as i64 as f64
+    / 9_223_372_036_854_775_808.0);

@@ -1,6 +1,7 @@
 //! The operations that the control law needs of a number type.
 
 use core::fmt::Debug;
+use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use crate::law::words::{Words, words};
@@ -68,10 +69,18 @@ pub trait Scalar:
     /// The value within `low..=high`, which must be ordered; `NaN` gives zero.
     fn limit(self, low: Self, high: Self) -> Self;
 
-    /// The value within `-most..=most`; `NaN` gives zero.
+    /// True if the value is within `-most..=most`; not so of `NaN`. `most` must not be negative.
+    fn is_within(self, most: Self) -> bool;
+
+    /// The value within `-most..=most`; `NaN` gives zero. `most` must not be negative.
     #[inline(always)]
     fn within(self, most: Self) -> Self {
-        self.limit(-most, most)
+        if self.is_within(most) {
+            self
+        } else {
+            cold_path();
+            self.limit(-most, most)
+        }
     }
 
     /// The magnitude of the value.
@@ -97,7 +106,7 @@ pub trait Scalar:
 /// The start of a logarithmic table: the first octave's lower bound, a power of two.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct OctaveStart<S: Scalar> {
-    /// The key (exponent and leading mantissa bits) of the first octave's lower bound; negative, wrapped, when that lies
+    /// The key (exponent and leading mantissa bits) of the interval below the first octave; negative, wrapped, when that lies
     /// below a fixed-point format's step.
     pub(crate) key: u32,
     /// Turns a signal below the first octave into a place within the first interval.
@@ -130,11 +139,11 @@ impl<S: Scalar> OctaveStart<S> {
             below,
             bound,
         };
-        // Interval 1 starts at the bound, so a table based at key zero says which key the bound has.
+        // Interval 1 starts at the bound, so a table based at key zero says which key the interval before it has.
         let (interval, _) = bound.octave(origin);
         let skipped = ((held - exponent) as u32) << OCTAVE_INTERVAL_BITS;
         Self {
-            key: (interval as u32 - 1).wrapping_sub(skipped),
+            key: (interval as u32).wrapping_sub(1 + skipped),
             ..origin
         }
     }

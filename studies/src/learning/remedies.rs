@@ -170,11 +170,10 @@ pub(super) struct FedFriction {
 
 impl FedFriction {
     pub(super) fn new(axis: &AxisSettings, rate_hz: f64) -> Self {
-        let model = Gms::build(&axis.friction.gms.elements);
         let period_s = 1.0 / rate_hz;
         Self {
-            state: model.spread(0.0),
-            model,
+            state: GmsState::default(),
+            model: Gms::build(&axis.friction.gms.elements),
             surface: SlidingTable::build(
                 &axis.friction.sliding.map(|model| model.curve),
                 axis.friction.gms.attraction_v_s,

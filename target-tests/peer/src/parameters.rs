@@ -36,7 +36,6 @@ pub(crate) struct Parameters {
     pub(crate) share: f32,
     pub(crate) stiffness: [f32; ELEMENTS],
     pub(crate) weight: [f32; ELEMENTS],
-    pub(crate) range: f32,
     pub(crate) largest: f32,
     pub(crate) gain_octaves: Octaves,
     pub(crate) surface_octaves: [Octaves; 2],
@@ -67,7 +66,6 @@ impl Parameters {
             share: feedforward.gms as f32,
             stiffness: core::array::from_fn(|i| element(i).stiffness_v_per_mm as f32),
             weight: core::array::from_fn(|i| element(i).weight as f32),
-            range: gain.range_mm as f32,
             largest: gain.largest() as f32,
             gain_octaves: Octaves::up_to(gain_end),
             surface_octaves: senses.map(|sense| Octaves::up_to(surface_end(&sense.curve))),
@@ -91,7 +89,7 @@ impl Octaves {
     fn up_to(end: i32) -> Self {
         let bound = libm::scalbn(1.0, end - OCTAVES) as f32;
         Self {
-            key: bound.to_bits() >> 19,
+            key: (bound.to_bits() >> 19) - 1,
             below: 1.0 / bound,
             bound,
         }

@@ -66,8 +66,7 @@ fn feed_back(law: &Law, state: &mut State, input: &Input, base: f32) -> f32 {
         error: input.error,
         velocity: input.velocity,
     };
-    let (low, high) = (-law.limit - base, law.limit - base);
     law.feedback
-        .step(&mut state.feedback, input, low, high)
+        .step(&mut state.feedback, input, base, law.limit)
         .output
 }
