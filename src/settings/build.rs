@@ -41,7 +41,8 @@ const PROVING_MM: f64 = 1.0;
 /// Distance of the model without motion of the encoder that is a fault, mm, and in counts.
 const MODEL_DISTANCE_MM: f64 = 0.05;
 const MODEL_COUNTS: f64 = 20.0;
-/// The addition to that distance for the error of the dead time, over the way that the largest output brings within it.
+/// The addition to that distance for the error of the dead time, over gain times largest output times its square: a fifth of the
+/// way that this output brings within it.
 const DELAY_ERROR: f64 = 0.1;
 /// Speed that no load explains, mm/s, and in counts per tick.
 const MODEL_VELOCITY_MM_S: f64 = 80.0;
