@@ -3,6 +3,7 @@
 #![forbid(unsafe_code)]
 
 mod documented;
+mod figures;
 mod frames;
 mod layout;
 mod modules;
@@ -78,6 +79,12 @@ enum Verb {
     Web(WebArgs),
     /// Run the commands that README and docs show, in folders below target/documented
     Documented(documented::Options),
+    /// Hold what the pages say of instructions, cycles and sizes against the committed figures
+    Figures {
+        /// Write the figures into the pages
+        #[arg(long)]
+        overwrite: bool,
+    },
     /// Set up, then run every check there is
     Test {
         /// Only the firmware's own: lints, images, proofs
@@ -193,6 +200,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
         Verb::Peers => peers::run()?,
         Verb::Documented(options) => documented::run(&options)?,
+        Verb::Figures { overwrite } => figures::run(overwrite)?,
         Verb::Web(args) => {
             let page = web::build(toolchain()?)?;
             if args.check {

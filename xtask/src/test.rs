@@ -13,7 +13,7 @@ use xtask::image::{self, LIBRARY_TRIPLES, TRIPLES, Target};
 use xtask::toolchain::{self, Choice, Toolchain};
 use xtask::{command, prove};
 
-use crate::{documented, layout, setup, transcript, web};
+use crate::{documented, figures, layout, setup, transcript, web};
 
 /// Settings that a commissioning left, and seconds that the firmware runs on them.
 const COMMISSIONED: &str = "host-sim/data/identified-stage.toml";
@@ -74,6 +74,7 @@ pub(crate) fn run(choice: Choice) -> Result<bool> {
         .push(("setup".into(), started.elapsed().as_secs_f64(), Ok(())));
 
     let firmware = Beside::start(toolchain)?;
+    report.step("the figures in the pages", || figures::run(false));
     host(&mut report)?;
     firmware.finish(&mut report)?;
     report.step("the commands that the documentation shows", || {
