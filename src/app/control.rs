@@ -43,8 +43,7 @@ pub struct Control<'q, 'a, S: Scalar> {
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// Returns the fast half before the first tick.
-    // Not inlined: its frame is gone when the start goes on.
-    #[inline(never)]
+    #[inline(always)]
     pub fn new(
         axes: PerAxis<&'a mut Axis<S>>,
         operation: Operation,
