@@ -95,8 +95,9 @@ pub fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flo
                 .and_then(|word| u32::from_str_radix(word, 16).ok());
             return target.map_or(Flow::Indirect, Flow::To);
         }
-        let jumps = mnemonic.starts_with("bx") || mnemonic.starts_with("blx");
-        return if jumps && operands != "lr" {
+        let returns = mnemonic.starts_with("bx") && operands == "lr";
+        let by_register = mnemonic.starts_with("bx") || mnemonic.starts_with("blx");
+        return if by_register && !returns {
             Flow::Indirect
         } else {
             Flow::Onward
@@ -116,5 +117,35 @@ pub fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flo
     match target {
         Some(target) if function.symbol.ends_with("_veneer") => Flow::To(target & !1),
         _ => Flow::Indirect,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn flow_of(mnemonic: &str, operands: &str) -> Flow {
+        let instruction = Instruction {
+            address: 0,
+            mnemonic: mnemonic.into(),
+            operands: operands.into(),
+        };
+        let function = Function {
+            symbol: "f".into(),
+            name: "f".into(),
+            range: 0..2,
+            instructions: Vec::new(),
+        };
+        flow(&function, 0, &instruction)
+    }
+
+    #[test]
+    fn a_call_by_a_register_is_no_return_even_if_the_register_is_lr() {
+        assert!(matches!(flow_of("bx", "lr"), Flow::Onward));
+        assert!(matches!(flow_of("bxeq", "lr"), Flow::Onward));
+        assert!(matches!(flow_of("blx", "lr"), Flow::Indirect));
+        assert!(matches!(flow_of("blx", "r3"), Flow::Indirect));
+        assert!(matches!(flow_of("bx", "r3"), Flow::Indirect));
+        assert!(matches!(flow_of("bl", "e0 <g>"), Flow::To(0xe0)));
     }
 }

@@ -96,7 +96,7 @@ fn node(listing: &Listing, function: &Function) -> Result<Node> {
             )
         })?;
         match flow(function, index, instruction) {
-            Flow::To(target) if !function.range.contains(&target) => {
+            Flow::To(target) if leaves(function, instruction, target) => {
                 let callee = listing.at(target);
                 let callee = callee.with_context(|| format!("no function covers {target:#x}"))?;
                 node.calls.insert(callee.range.start);
@@ -112,6 +112,14 @@ fn node(listing: &Listing, function: &Function) -> Result<Node> {
         node.bytes
     );
     Ok(node)
+}
+
+/// Returns true if a branch is to another function, or a call of this one by itself.
+fn leaves(function: &Function, instruction: &Instruction, target: u32) -> bool {
+    let mnemonic = instruction.mnemonic.as_str();
+    // `bl`, and `bleq` and the like; `ble`, `blt` and `bls` are jumps.
+    let calls = mnemonic == "bl" || mnemonic.starts_with("bl") && mnemonic.len() == 4;
+    !function.range.contains(&target) || calls && target == function.range.start
 }
 
 /// Bytes by which an instruction lowers the stack pointer; none if that is not in the instruction. The sum over a
@@ -163,7 +171,7 @@ fn registers(list: &str) -> u32 {
 /// Returns the words that may be addresses in a function: among its instructions, and constants made of two halves.
 fn pointers_in_code(function: &Function) -> Vec<u32> {
     let mut pointers = Vec::new();
-    let mut halves: BTreeMap<&str, u32> = BTreeMap::new();
+    let mut halves: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
     for instruction in &function.instructions {
         let operands = instruction.operands.as_str();
         let register = operands.split(',').next().unwrap_or_default();
@@ -172,14 +180,15 @@ fn pointers_in_code(function: &Function) -> Vec<u32> {
                 let digits = operands.strip_prefix("0x");
                 pointers.extend(digits.and_then(|digits| u32::from_str_radix(digits, 16).ok()));
             }
-            "movw" | "mov" => {
-                if let Some(low) = immediate(operands) {
-                    halves.insert(register, low);
+            // With a condition, too: `movwne`.
+            name if name.starts_with("movt") => {
+                if let (Some(lows), Some(high)) = (halves.get(register), immediate(operands)) {
+                    pointers.extend(lows.iter().map(|low| low & 0xFFFF | high << 16));
                 }
             }
-            "movt" => {
-                if let (Some(low), Some(high)) = (halves.get(register), immediate(operands)) {
-                    pointers.push(low & 0xFFFF | high << 16);
+            name if name.starts_with("mov") => {
+                if let Some(low) = immediate(operands) {
+                    halves.entry(register).or_default().insert(low);
                 }
             }
             _ => {}
@@ -216,6 +225,19 @@ mod tests {
     fn what_cannot_be_known_is_refused() {
         assert_eq!(bytes("sub", "sp, sp, r4"), None);
         assert_eq!(bytes("mov", "sp, r7"), None);
+    }
+
+    #[test]
+    fn a_function_that_calls_itself_is_a_callee_of_its_own() {
+        let listing =
+            Listing::parse("000000d8 <again>:\n  d8:\tbl\td8 <again>\n  dc:\tblt.n\td8 <again>\n");
+        let of = |index: usize| {
+            let function = listing.at(0xd8).expect("it is listed");
+            leaves(function, &function.instructions[index], 0xd8)
+        };
+        assert_eq!((of(0), of(1)), (true, false));
+        let node = node(&listing, listing.at(0xd8).expect("it is listed")).expect("no frame");
+        assert_eq!(node.calls, BTreeSet::from([0xd8]));
     }
 
     #[test]

@@ -64,7 +64,8 @@ impl Listing {
         Ok(Self::parse(&text))
     }
 
-    fn parse(text: &str) -> Self {
+    /// Reads what the disassembler writes.
+    pub fn parse(text: &str) -> Self {
         let mut functions: BTreeMap<u32, Function> = BTreeMap::new();
         let mut current = None;
         for line in text.lines() {

@@ -7,14 +7,14 @@
 //! - all other code may call any of them.
 //!
 //! Formatters call each other by way of `core::fmt::write`: an error shows the error it holds. Each is counted once in a
-//! chain, all together: no error holds itself. Any other recursion is refused.
+//! chain, all together: no error holds itself. Another recursion is known with its depth ([`RECURSIONS`]), or refused.
 //!
 //! A panic is not added where it may happen but once, on top of everything, as is an interrupt that nobody asked for:
 //! neither returns. A hard fault starts the stack afresh.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet, VecDeque};
 
-use anyhow::{Context, Result, ensure};
+use anyhow::{Context, Result, bail, ensure};
 use petgraph::algo::tarjan_scc;
 use petgraph::graphmap::DiGraphMap;
 
@@ -23,9 +23,15 @@ use xtask::image::Image;
 
 /// Of a floating-point unit's context, the words to align it included: what the processor saves for a handler.
 const EXCEPTION_FRAME_BYTES: u32 = 4 * 27;
+/// Function that uses up the stack to inject a fault.
+const USES_UP: &str = "fault_injection::dig";
+/// What no chain goes through: it counts once, or is meant to leave no stack.
+const LEFT_OUT: [&str; 2] = [PANIC, USES_UP];
+/// Functions that call themselves, and how many of each can be under way: `frexp` scales a subnormal number, once.
+const RECURSIONS: [(&str, u32); 1] = [("libm::math::frexp::frexp", 2)];
 /// Function in which every panic ends.
 const PANIC: &str = "__rustc::rust_begin_unwind";
-/// The start, after which its frame is gone.
+/// The start, after which its frame is gone. It lets interrupts in at its end, when those that it called have returned.
 const START: &str = "__rtic_init_resources";
 /// Handler of interrupts that nobody asked for.
 const STRAY: &str = "DefaultHandler";
@@ -55,14 +61,20 @@ pub(crate) fn bound(image: &Image) -> Result<u32> {
         let (&root, _) = root.with_context(|| format!("the image has no function {name}"))?;
         deepest(&frames, root, without)
     };
-    let start = chain("Reset", &[PANIC])?;
-    let idle = chain("Reset", &[PANIC, START])?;
+    let start = chain("Reset", &LEFT_OUT)?;
+    let idle = chain("Reset", &[PANIC, USES_UP, START])?;
+    let (&reset, _) = frames
+        .nodes
+        .iter()
+        .find(|(_, node)| node.name == "Reset")
+        .context("the image has no start")?;
+    let end_of_start = down_to(&frames, reset, START)?;
     let mut handlers = Vec::new();
     let mut fresh = None;
-    let mut last = vec![(PANIC.to_owned(), chain(PANIC, &[])?)];
+    let mut last = vec![(PANIC.to_owned(), chain(PANIC, &[USES_UP])?)];
     for vector in unique(&frames.vectors) {
         let name = &frames.nodes[&vector].name;
-        let mut chain = deepest(&frames, vector, &[PANIC])?;
+        let mut chain = deepest(&frames, vector, &LEFT_OUT)?;
         chain.bytes += EXCEPTION_FRAME_BYTES;
         match name.as_str() {
             "Reset" => {}
@@ -74,6 +86,7 @@ pub(crate) fn bound(image: &Image) -> Result<u32> {
     println!("{}: the stack's deepest chains, bytes", image.target);
     print("start", &start);
     print("idle", &idle);
+    println!("  {end_of_start:6} the end of the start, where interrupts come in");
     for (name, chain) in &handlers {
         print(name, chain);
     }
@@ -83,10 +96,11 @@ pub(crate) fn bound(image: &Image) -> Result<u32> {
     let fresh = fresh.context("the image has no hard fault handler")?;
     print(FRESH, &fresh);
     let running: u32 = handlers.iter().map(|(_, chain)| chain.bytes).sum();
-    let busy = start.bytes.max(idle.bytes + running) + end.bytes;
+    let below = idle.bytes.max(end_of_start);
+    let busy = start.bytes.max(below + running) + end.bytes;
     let bytes = busy.max(fresh.bytes);
     println!(
-        "  bound: the larger of start and idle with every handler on top of it, and the end: {bytes}"
+        "  bound: the larger of start, and of idle or the start's end with every handler on top of it, and the end: {bytes}"
     );
     Ok(bytes)
 }
@@ -132,6 +146,32 @@ fn may_call(caller: &str, callee: &str) -> bool {
     }
 }
 
+/// The frames on the shortest way from a function to the one whose name contains `part`, without those that this calls.
+fn down_to(frames: &Frames, root: u32, part: &str) -> Result<u32> {
+    let mut waiting = VecDeque::from([(root, 0)]);
+    let mut seen = BTreeSet::from([root]);
+    while let Some((address, above)) = waiting.pop_front() {
+        let node = &frames.nodes[&address];
+        let bytes = above + node.bytes;
+        if node.name.contains(part) {
+            return Ok(bytes);
+        }
+        waiting.extend(
+            node.calls
+                .iter()
+                .filter(|callee| seen.insert(**callee))
+                .map(|callee| (*callee, bytes)),
+        );
+    }
+    bail!("{} does not lead to {part}", frames.nodes[&root].name)
+}
+
+/// How many calls of a function may be under way, if it calls itself as often as is known.
+fn times(node: &Node) -> Option<u32> {
+    let known = RECURSIONS.iter().find(|(name, _)| *name == node.name);
+    known.map(|(_, times)| *times)
+}
+
 /// The deepest chain from a function, without those whose names contain one of `without`.
 fn deepest(frames: &Frames, root: u32, without: &[&str]) -> Result<Chain> {
     let left_out = |node: &Node| without.iter().any(|part| node.name.contains(part));
@@ -163,7 +203,11 @@ fn deepest(frames: &Frames, root: u32, without: &[&str]) -> Result<Chain> {
             group_of.insert(address, index);
         }
         let recursive = group.len() > 1 || graph.contains_edge(group[0], group[0]);
-        if recursive {
+        let repeated = match group.as_slice() {
+            [alone] if recursive => times(&frames.nodes[alone]),
+            _ => None,
+        };
+        if recursive && repeated.is_none() {
             refuse_unless_formatting(frames, group)?;
         }
         let callees = group.iter().flat_map(|&address| graph.neighbors(address));
@@ -175,6 +219,7 @@ fn deepest(frames: &Frames, root: u32, without: &[&str]) -> Result<Chain> {
             .iter()
             .map(|address| frames.nodes[address].bytes)
             .sum();
+        let own = own * repeated.unwrap_or(1);
         depths.push((own + deepest.map_or(0, |callee| depths[callee].0), deepest));
     }
     let mut next = group_of.get(&root).copied();
@@ -227,8 +272,6 @@ pub(crate) fn check(image: &Image) -> Result<u32> {
 
 #[cfg(test)]
 mod tests {
-    use std::collections::BTreeSet;
-
     use super::*;
 
     fn frames(functions: &[(&str, u32, &[u32], bool)], by_address: &[u32]) -> Frames {
@@ -278,6 +321,29 @@ mod tests {
         assert_eq!(deepest(&all, 3, &[]).expect("none").bytes, 8);
         let one = frames(&functions, &[1]);
         assert_eq!(deepest(&one, 0, &[]).expect("none").bytes, 58);
+    }
+
+    #[test]
+    fn interrupts_come_in_on_top_of_the_starts_own_frame() {
+        let functions: [(&str, u32, &[u32], bool); 4] = [
+            ("Reset", 8, &[1], false),
+            ("main", 16, &[2, 3], false),
+            ("app::__rtic_init_resources", 100, &[3], false),
+            ("new", 1000, &[], false),
+        ];
+        let frames = frames(&functions, &[]);
+        assert_eq!(down_to(&frames, 0, START).expect("it leads there"), 124);
+        assert!(down_to(&frames, 3, START).is_err());
+    }
+
+    #[test]
+    fn a_known_recursion_counts_as_often_as_it_can_be_under_way() {
+        let functions: [(&str, u32, &[u32], bool); 2] = [
+            ("root", 8, &[1], false),
+            ("libm::math::frexp::frexp", 48, &[1], false),
+        ];
+        let frames = frames(&functions, &[]);
+        assert_eq!(deepest(&frames, 0, &[]).expect("known").bytes, 104);
     }
 
     #[test]
