@@ -85,9 +85,9 @@ pub(crate) fn run(image: &Image, overwrite: bool) -> Result<()> {
     };
     let growth = 100.0 * (f64::from(latency.spread()) / f64::from(expected.spread()) - 1.0);
     println!("  {key}: {growth:+.1} % against the committed spread");
-    difference.ensure(growth <= TOLERANCE_PERCENT, || {
+    difference.ensure(growth.abs() <= TOLERANCE_PERCENT, || {
         format!(
-            "{key}: the jitter has grown by {growth:.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
+            "{key}: the jitter has changed by {growth:+.1} %, more than {TOLERANCE_PERCENT} %; if that is wanted, \
              `cargo xtask saturation --overwrite-expected` accepts it"
         )
     })

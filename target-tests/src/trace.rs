@@ -3,20 +3,20 @@
 //! QEMU translates straight runs of instructions. It lists each once, when it is translated, and then writes a line whenever it
 //! is about to be executed.
 
-use std::collections::{BTreeMap, HashMap};
+use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
-use anyhow::{Context, Result, anyhow};
+use anyhow::{Context, Result, anyhow, ensure};
 use quadrant_sim::machine::emulator::{self, Clock, Emulator, Memory};
 
 use crate::attribution::Attribution;
 use crate::gdb::{Debugger, Port};
 use crate::reference_model;
 use crate::stages;
-use xtask::call_graph::CallGraph;
+use xtask::call_graph::{CallGraph, Flow, flow};
 use xtask::image::Image;
-use xtask::listing::Listing;
+use xtask::listing::{Function, Instruction, Listing};
 use xtask::prove::ROOT;
 
 /// Trace of an image.
@@ -58,8 +58,17 @@ impl Trace {
             listing,
             reached,
         } = self;
+        let frame = listing.at(*root).context("the root is listed")?;
+        let functions = reached.iter().filter_map(|start| listing.at(*start));
         let tally = Tally {
             root: *root,
+            returns: frame
+                .instructions
+                .iter()
+                .filter(|instruction| returns(instruction))
+                .map(|instruction| instruction.address)
+                .collect(),
+            calls: functions.flat_map(calls).collect(),
             inside: Box::new(|address| {
                 let start = listing.at(address)?.range.start;
                 reached.binary_search(&start).is_ok().then_some(start)
@@ -162,6 +171,10 @@ impl Tick {
 /// Follows a trace.
 struct Tally<'a> {
     root: u32,
+    /// The root's instructions that return.
+    returns: BTreeSet<u32>,
+    /// The instructions that call, and what.
+    calls: BTreeMap<u32, u32>,
     /// The first address of the function around an address, if it can be reached from the interrupt.
     inside: Box<dyn Fn(u32) -> Option<u32> + 'a>,
     attribution: Attribution,
@@ -181,13 +194,13 @@ impl Tally<'_> {
     /// Reads a trace to its end.
     fn read(mut self, trace: impl Read) -> Result<Vec<Tick>> {
         for_each_instruction(trace, |address| self.executed(address))?;
-        self.closed.extend(self.open.take().map(|open| open.tick));
+        ensure!(self.open.is_none(), "the trace ends within a tick");
         Ok(self.closed)
     }
 
     fn executed(&mut self, address: u32) -> Result<()> {
         if address == self.root {
-            self.closed.extend(self.open.take().map(|open| open.tick));
+            ensure!(self.open.is_none(), "a tick begins within another");
             self.open = Some(OpenTick {
                 tick: Tick::default(),
                 calls: Vec::new(),
@@ -197,11 +210,15 @@ impl Tally<'_> {
         let Some(open) = &mut self.open else {
             return Ok(());
         };
-        let Some(function) = (self.inside)(address) else {
-            // The interrupt has returned.
-            self.closed.extend(self.open.take().map(|open| open.tick));
-            return Ok(());
-        };
+        let called = open.tick.path.last().and_then(|last| self.calls.get(last));
+        ensure!(
+            called.is_none_or(|called| *called == address),
+            "the trace has {address:#x} after a call of {:#x}",
+            called.copied().unwrap_or_default()
+        );
+        let function = (self.inside)(address).with_context(|| {
+            format!("a tick is at {address:#x}, which the calls that are known do not reach")
+        })?;
         if let Some(depth) = open
             .calls
             .iter()
@@ -220,8 +237,31 @@ impl Tally<'_> {
         *open.tick.stages.entry(stage).or_default() += 1;
         open.tick.path.push(address);
         open.last = stage;
+        if self.returns.contains(&address) {
+            self.closed.extend(self.open.take().map(|open| open.tick));
+        }
         Ok(())
     }
+}
+
+/// Returns true if an instruction returns from its function.
+fn returns(instruction: &Instruction) -> bool {
+    let Instruction {
+        mnemonic, operands, ..
+    } = instruction;
+    let loads = mnemonic.starts_with("pop") || mnemonic.starts_with("ldm");
+    loads && operands.contains("pc") || mnemonic.starts_with("bx") && operands == "lr"
+}
+
+/// The calls of a function that are always taken, and what they call.
+fn calls(function: &Function) -> impl Iterator<Item = (u32, u32)> {
+    let instructions = function.instructions.iter().enumerate();
+    instructions.filter_map(
+        |(index, instruction)| match flow(function, index, instruction) {
+            Flow::To(target) if instruction.mnemonic == "bl" => Some((instruction.address, target)),
+            _ => None,
+        },
+    )
 }
 
 /// Calls back with the address of each instruction that a trace shows executed, in order.
