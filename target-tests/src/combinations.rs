@@ -103,6 +103,10 @@ pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
             );
         }
         ensure!(tally.differ == 0, "{axes:?}: {} words differ", tally.differ);
+        ensure!(
+            2 * tally.moving > tally.words,
+            "{axes:?}: they did not move"
+        );
         words += tally.words;
         moving += tally.moving;
     }
@@ -110,7 +114,6 @@ pub(crate) fn lockstep(toolchain: Toolchain, scalar: Scalar) -> Result<()> {
         "{} combinations of law and feedforward, {words} words compared, 0 differ, {moving} of them not zero",
         combinations.len()
     );
-    ensure!(2 * moving > words, "the stage did not move");
     Ok(())
 }
 

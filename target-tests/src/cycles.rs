@@ -203,13 +203,19 @@ impl Code {
         timed.cycles + if jumps { REFILL } else { 0 }
     }
 
-    /// Cycles that the flash makes them wait, if nothing is kept but the line in use.
+    /// Cycles that the flash makes them wait, if nothing is kept but the line in use. An instruction may have its second half in the
+    /// next line.
     fn lines(&self, from: u32, to: u32) -> u32 {
-        let literal = self
-            .at(from)
-            .is_some_and(|(timed, _)| timed.literal.is_some());
-        let fetch = to != OUTSIDE && (from == OUTSIDE || line(from) != line(to));
-        WAIT_STATES * (u32::from(literal) + u32::from(fetch))
+        let Some((timed, behind)) = self.at(from) else {
+            return WAIT_STATES * u32::from(to != OUTSIDE);
+        };
+        let last = line(behind - 2);
+        let fetches = [
+            timed.literal.is_some(),
+            last != line(from),
+            to != OUTSIDE && line(to) != last,
+        ];
+        WAIT_STATES * fetches.into_iter().map(u32::from).sum::<u32>()
     }
 
     /// Cycles along a path, without wait states.

@@ -148,7 +148,12 @@ pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, overwrite: bool) -> Resu
     println!(
         "longest stretches with interrupts masked, in instructions, with a line for the log in every millisecond:"
     );
-    for (place, length) in interrupt_latency::longest(&image)? {
+    let stretches = interrupt_latency::longest(&image)?;
+    ensure!(
+        !stretches.is_empty(),
+        "no place masks interrupts: none was looked at"
+    );
+    for (place, length) in stretches {
         println!("  {length:>6}  {place}");
     }
     jitter::run(&image, overwrite)

@@ -71,6 +71,19 @@ pub fn run_quietly(command: &mut Command) -> Result<()> {
     Ok(())
 }
 
+/// Returns an error if `cargo test`, as it would run, has no test to run: a name that matches none would pass.
+pub fn ensure_tests(test: &Command) -> Result<()> {
+    let mut list = command(test.get_program());
+    list.args(test.get_args()).arg("--list");
+    let names = output(&mut list)?;
+    ensure!(
+        names.lines().any(|line| line.ends_with(": test")),
+        "`{}` has no test to run",
+        spell(test)
+    );
+    Ok(())
+}
+
 /// Runs and returns what was printed.
 pub fn output(command: &mut Command) -> Result<String> {
     let output = command

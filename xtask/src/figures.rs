@@ -35,6 +35,10 @@ const SENTENCES: &[(&str, &str)] = &[
     ),
     (
         "docs/tick.md",
+        "it is beyond:\n{cycles: f32.no_cache + converter.no_cache} cycles",
+    ),
+    (
+        "docs/tick.md",
         "both are beyond, {cycles: fixed.no_wait_states} and {cycles: fixed.no_cache} cycles without the converter",
     ),
     (

@@ -15,6 +15,7 @@ pub(crate) fn run(toolchain: Toolchain, overwrite_expected: bool) -> Result<()> 
     test.args(["test", "--workspace", "--test", "suite"])
         .args(["--", "--include-ignored", "transcript::"])
         .env("QUADRANT_EMULATED_IMAGE", &image.path);
+    command::ensure_tests(&test)?;
     if overwrite_expected {
         test.env("QUADRANT_OVERWRITE_EXPECTED", "1");
     }

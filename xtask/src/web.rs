@@ -76,13 +76,13 @@ pub(crate) fn build(toolchain: Toolchain) -> Result<PathBuf> {
 /// Compares the page's converter words with the host's, and tries its view of a machine, in a browser.
 pub(crate) fn check(page: &Path) -> Result<()> {
     // Of the whole workspace, like the other tests: else the libraries would be built once more.
-    command::run(
-        command::command("cargo")
-            .args(["test", "--workspace", "--test", "browser", "--"])
-            .args(["--ignored", "--nocapture"])
-            .env(PAGE_VARIABLE, page)
-            .env("QUADRANT_BROWSER_TESTS", "required"),
-    )
+    let mut test = command::command("cargo");
+    test.args(["test", "--workspace", "--test", "browser", "--"])
+        .args(["--ignored", "--nocapture"])
+        .env(PAGE_VARIABLE, page)
+        .env("QUADRANT_BROWSER_TESTS", "required");
+    command::ensure_tests(&test)?;
+    command::run(&mut test)
 }
 
 /// Serves the page to this machine's browsers until the process is ended.

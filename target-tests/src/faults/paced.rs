@@ -165,5 +165,10 @@ pub(crate) fn watchdog(image: &Image) -> Result<(Finding, f64)> {
             FaultCode::WatchdogReset,
         )
     };
-    Ok((finding, f64::from(cycles) / f64::from(PERIOD_CYCLES)))
+    let periods = f64::from(cycles) / f64::from(PERIOD_CYCLES);
+    ensure!(
+        (95.0..105.0).contains(&periods),
+        "the watchdog took {periods:.1} control periods instead of 100"
+    );
+    Ok((finding, periods))
 }
