@@ -169,7 +169,7 @@ fn registers(list: &str) -> u32 {
 }
 
 /// Returns the words that may be addresses in a function: among its instructions, and constants made of two halves.
-fn pointers_in_code(function: &Function) -> Vec<u32> {
+pub(crate) fn pointers_in_code(function: &Function) -> Vec<u32> {
     let mut pointers = Vec::new();
     let mut halves: BTreeMap<&str, BTreeSet<u32>> = BTreeMap::new();
     for instruction in &function.instructions {
