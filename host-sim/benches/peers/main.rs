@@ -301,7 +301,7 @@ fn law_words(axis: &AxisSettings) -> Vec<u32> {
     .chain([law.inertia, law.share])
     .chain(law.stiffness)
     .chain(law.weight)
-    .chain([law.range, law.largest])
+    .chain([law.largest])
     .map(f32::to_bits)
     .collect();
     let [positive, negative] = law.surface_octaves;

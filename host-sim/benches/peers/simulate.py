@@ -16,7 +16,7 @@ OCTAVES = [("key", u4), ("below", f4), ("bound", f4)]
 LAW = np.dtype(
     [(name, f4) for name in ("limit", "proportional", "derivative", "pole", "integral", "error_limit", "integral_limit")]
     + [("viscous", f4, 2), ("inertia", f4), ("share", f4), ("stiffness", f4, ELEMENTS), ("weight", f4, ELEMENTS)]
-    + [("range", f4), ("largest", f4), ("gain_octaves", OCTAVES), ("surface_octaves", OCTAVES, 2)]
+    + [("largest", f4), ("gain_octaves", OCTAVES), ("surface_octaves", OCTAVES, 2)]
     + [("gain", f4, NODES), ("surface", f4, (2, NODES, 2))]
 )
 PLANT_NUMBERS = (
@@ -141,7 +141,6 @@ def run_numba(ticks, first, plant, law, references):
         low, high = -law["limit"] - base, law["limit"] - base
 
         size = abs(error)
-        size = size if size < law["range"] else law["range"]
         octaves = law["gain_octaves"]
         at, place = 0, zero
         if size < octaves["bound"]:
@@ -318,7 +317,7 @@ def run_numpy(ticks, plant, law, references):
         viscous = wanted["velocity"] * law["viscous"][rows, sense]
         base = viscous + carried * law["share"] + wanted["acceleration"] * law["inertia"]
         low, high = -law["limit"] - base, law["limit"] - base
-        at, place = place_in(np.minimum(np.abs(error), law["range"]), law["gain_octaves"]["bound"])
+        at, place = place_in(np.abs(error), law["gain_octaves"]["bound"])
         nodes = law["gain"]
         gain = nodes[rows, at] + (nodes[rows, at + 1] - nodes[rows, at]) * place
         error = np.clip(error * np.minimum(gain, law["largest"]), -law["error_limit"], law["error_limit"])
