@@ -345,6 +345,18 @@ fn what_is_recorded_has_the_unit_that_acts() {
 }
 
 #[test]
+fn a_motion_that_a_fault_ends_fails_though_nothing_waits_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = "set x/limits/following_error_mm 0.0006\nset x/limits/following_error_max_mm 0.0006\n\
+                  set x/limits/following_error_lag_s 0\napply\nenable\n\
+                  circle --radius-mm 5 --feed-mm-min 600 --turns 1\nrun\n";
+    let output = session(folder.path(), &[], script);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("the motion: fault 1"), "{errors}");
+}
+
+#[test]
 fn a_scope_of_several_units_has_a_chart_for_each() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(
