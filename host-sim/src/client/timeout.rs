@@ -6,7 +6,8 @@ use quadrant::link::message::{
     Body, CaptureRequest, InjectRequest, LoadRequest, SettingsRequest, StreamRequest,
 };
 
-/// Time for an answer: a request is served within two runs of the link's task, 2 ms, and a frame each way takes 12 ms.
+/// Time for an answer: a request that computes little is served within two runs of the link's task, 2 ms, and a frame each way
+/// takes 12 ms.
 pub(super) const ANSWER: Duration = Duration::from_millis(150);
 
 /// Time for an answer after which flash has been written, a sector of it erased.
@@ -15,6 +16,12 @@ const STORED: Duration = Duration::from_secs(6);
 /// Time for an answer after which settings that were applied before have been built, in software where the processor knows
 /// no double precision.
 const BUILT: Duration = Duration::from_secs(2);
+
+/// Time for an answer before which settings have been checked. Of each axis the firmware evaluates six friction curves some 2000
+/// times, exponential and power, and the Popov bound of each set of linear gains, up to four, at some 400 000 operations: millions of
+/// operations in double precision, each of tens of cycles where software computes them, so seconds at 180 MHz. It is a bound, not a
+/// measurement: too short a one would leave unsure what was done.
+const CHECKED: Duration = Duration::from_secs(6);
 
 /// Time for which, and pause after which, a request is repeated that the machine is too busy for.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
@@ -81,6 +88,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
 pub(super) const fn answer_timeout(body: &Body) -> Duration {
     match body {
         Body::Settings(SettingsRequest::Store(_)) => STORED,
+        Body::Settings(SettingsRequest::Apply) => CHECKED,
         Body::Enable => BUILT,
         _ => ANSWER,
     }

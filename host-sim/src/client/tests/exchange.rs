@@ -118,6 +118,19 @@ fn what_the_machine_refuses_is_reverted() {
     );
 }
 
+/// The machine checks them before it answers, in software where it knows no double precision.
+#[test]
+fn settings_have_time_to_be_checked() {
+    let (mut client, bench) = connected();
+    settings::set(&mut client, "/axes/0/feedback/pid/kp_v_per_mm", "0.5").unwrap();
+    bench.borrow_mut().answer_after_ms = 4000;
+    settings::apply(&mut client).unwrap();
+    assert_eq!(
+        bench.borrow().in_force.axes[0].feedback.pid.kp_v_per_mm,
+        0.5
+    );
+}
+
 #[test]
 fn a_name_needs_no_quotes_and_a_number_none_either() {
     let (mut client, bench) = connected();
