@@ -141,7 +141,7 @@ impl Arguments {
                 self.to_hz
             );
         }
-        Ok(())
+        Ok(self.excitation(self.amplitude_v).check_lines()?)
     }
 
     fn excitation(&self, rms_v: f64) -> Excitation {
