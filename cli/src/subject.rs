@@ -6,13 +6,13 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant_sim::machine::{Machine, TestAxis, Travel};
+use quadrant_sim::machine::{Machine, MachineError, TestAxis, Travel};
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::endpoint::Endpoint;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::command_line;
-use quadrant_cli::say;
+use quadrant_cli::{explained, say};
 
 /// Options that name the axis, the machine and the settings to start from.
 #[derive(Clone, Debug, Args)]
@@ -143,7 +143,7 @@ fn unknown_travel(axis: AxisName) -> String {
 }
 
 /// Runs `measure` on an axis, with the settings to start from: `start`, else those in force, which it has again
-/// afterwards, whatever came of it.
+/// afterwards, whatever came of it. `measure` writes its recordings: they are there though the settings are not taken back.
 pub(super) fn on_axis<T>(
     machine: &mut dyn Machine,
     axis: AxisName,
@@ -154,8 +154,22 @@ pub(super) fn on_axis<T>(
     let mut test_axis = machine.test_axis(axis, Travel::either_way(travel_mm))?;
     let before = test_axis.settings().clone();
     let outcome = measure(&mut *test_axis, start.unwrap_or(&before));
-    test_axis.apply(&before)?;
-    outcome
+    let restored = test_axis.apply(&before);
+    and_restored(outcome, restored)
+}
+
+/// The outcome of a measurement, after which a machine was to take its old settings back: of two errors both, the measurement's
+/// first.
+pub(super) fn and_restored<T>(
+    outcome: anyhow::Result<T>,
+    restored: Result<(), MachineError>,
+) -> anyhow::Result<T> {
+    let restored = restored.context("the machine did not take its old settings back");
+    match (outcome, restored) {
+        (outcome, Ok(())) => outcome,
+        (Ok(_), Err(error)) => Err(error),
+        (Err(first), Err(second)) => bail!("{}; {}", explained(&first), explained(&second)),
+    }
 }
 
 impl Subject {
@@ -180,7 +194,7 @@ impl Subject {
         Ok(Some(file.stage.axes[axis.index()].clone()))
     }
 
-    /// Runs `measure` on the machine's axis. `fallback_mm` is the travel of an axis of which none is known.
+    /// Runs `measure` on the machine's axis, as [`on_axis`]. `fallback_mm` is the travel of an axis of which none is known.
     pub(super) fn measure<T>(
         &self,
         seed: u64,
@@ -242,7 +256,101 @@ impl Destination {
 
 #[cfg(test)]
 mod tests {
+    use quadrant_sim::machine::{AxisInfo, Experiment, ExperimentError, LawStage};
+    use quadrant_sim::record::Recording;
+
     use super::*;
+
+    /// An axis of the simulated stage that does not take the settings back that it had.
+    struct Stubborn<'a> {
+        axis: Box<dyn TestAxis + 'a>,
+        applied: usize,
+    }
+
+    impl TestAxis for Stubborn<'_> {
+        fn info(&self) -> AxisInfo {
+            self.axis.info()
+        }
+
+        fn settings(&self) -> &AxisSettings {
+            self.axis.settings()
+        }
+
+        fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
+            self.applied += 1;
+            if self.applied > 1 {
+                return Err(MachineError::Connection("the cable is out".into()));
+            }
+            self.axis.apply(settings)
+        }
+
+        fn perform(
+            &mut self,
+            experiment: &Experiment,
+            progress: &mut dyn FnMut(f64),
+        ) -> Result<Recording, ExperimentError> {
+            self.axis.perform(experiment, progress)
+        }
+    }
+
+    struct StubbornStage(LawStage);
+
+    impl Machine for StubbornStage {
+        fn description(&self) -> String {
+            self.0.description()
+        }
+
+        fn is_simulated(&mut self) -> bool {
+            true
+        }
+
+        fn settings(&mut self) -> Result<StageSettings, MachineError> {
+            self.0.settings()
+        }
+
+        fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
+            self.0.free_travel(axis)
+        }
+
+        fn test_axis(
+            &mut self,
+            axis: AxisName,
+            travel: Travel,
+        ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
+            let axis = self.0.test_axis(axis, travel)?;
+            Ok(Box::new(Stubborn { axis, applied: 0 }))
+        }
+
+        fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
+            self.0.load(settings)
+        }
+
+        fn store(&mut self, provenance: &str) -> Result<(), MachineError> {
+            self.0.store(provenance)
+        }
+    }
+
+    /// The message of a measurement on it.
+    fn measured_in_vain(outcome: anyhow::Result<()>) -> String {
+        let mut machine = StubbornStage(LawStage::new(1));
+        let found = on_axis(&mut machine, AxisName::X, 20.0, None, |axis, base| {
+            axis.apply(base)?;
+            outcome
+        });
+        quadrant_cli::explained(&found.unwrap_err())
+    }
+
+    #[test]
+    fn a_measurement_that_failed_says_so_though_the_settings_are_not_taken_back_either() {
+        let one = measured_in_vain(Ok(()));
+        assert!(
+            one.contains("old settings") && one.contains("the cable is out"),
+            "{one}"
+        );
+        let both = measured_in_vain(Err(anyhow::anyhow!("nothing moved")));
+        assert!(both.starts_with("nothing moved"), "{both}");
+        assert!(both.contains("the cable is out"), "{both}");
+    }
 
     #[test]
     fn a_travel_is_as_much_either_way_or_from_one_end_to_the_other() {

@@ -25,7 +25,7 @@ use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
 use super::endpoint::Endpoint;
-use super::subject::{known_travel, travel_both_ways};
+use super::subject::{and_restored, known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
 use quadrant_cli::{say, terminal, warn};
@@ -244,22 +244,20 @@ impl Job<'_> {
                 .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
             self.request.run(&mut journal, &base, output.seed)
         };
-        machine
-            .load(&before)
-            .context("the machine did not take its old settings back")?;
+        let restored = machine.load(&before);
         let found = match outcome {
             Ok(found) => found,
-            Err(error) if Journal::is_empty(&experiments) => {
-                Journal::remove(&experiments)?;
-                return Err(
-                    error.context("the commissioning has ended before anything was measured")
-                );
-            }
             Err(error) => {
-                return Err(error.context(format!(
-                    "the commissioning has ended early; with --resume it goes on with what is in {}",
-                    experiments.display()
-                )));
+                let error = if Journal::is_empty(&experiments) {
+                    Journal::remove(&experiments)?;
+                    error.context("the commissioning has ended before anything was measured")
+                } else {
+                    error.context(format!(
+                        "the commissioning has ended early; with --resume it goes on with what is in {}",
+                        experiments.display()
+                    ))
+                };
+                return and_restored(Err(error), restored);
             }
         };
 
@@ -276,6 +274,8 @@ impl Job<'_> {
             text.push('\n');
         }
         Journal::remove(&experiments)?;
+        and_restored(Ok(()), restored)
+            .with_context(|| format!("what was found is in {}", path.display()))?;
         if self.apply && better {
             machine
                 .load(&file.stage)
@@ -472,6 +472,8 @@ mod tests {
         stage: LawStage,
         /// True if nothing can be measured; else every law but the PID shakes the axis.
         dead: bool,
+        /// True if the machine takes no settings any more.
+        deaf: bool,
     }
 
     struct SpoiltAxis<'a> {
@@ -507,6 +509,9 @@ mod tests {
         }
 
         fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
+            if self.deaf {
+                return Err(MachineError::Connection("the cable is out".into()));
+            }
             self.stage.load(settings)
         }
 
@@ -581,6 +586,7 @@ mod tests {
         let mut machine = Spoilt {
             stage: LawStage::new(1),
             dead: false,
+            deaf: false,
         };
         let before = machine.settings().unwrap();
         let done = commission_into(folder.path(), &mut machine).unwrap();
@@ -600,11 +606,30 @@ mod tests {
         let mut machine = Spoilt {
             stage: LawStage::new(1),
             dead: true,
+            deaf: false,
         };
         let error = commission_into(folder.path(), &mut machine).err().unwrap();
         let said = quadrant_cli::explained(&error);
         assert!(said.contains("the line is cut"), "{said}");
         assert!(!said.contains("--resume"), "{said}");
         assert!(!folder.path().join("x").join(EXPERIMENTS).exists());
+    }
+
+    #[test]
+    fn results_are_written_and_errors_told_though_the_machine_does_not_take_its_settings_back() {
+        for dead in [false, true] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut machine = Spoilt {
+                stage: LawStage::new(1),
+                dead,
+                deaf: true,
+            };
+            let error = commission_into(folder.path(), &mut machine).err().unwrap();
+            let said = quadrant_cli::explained(&error);
+            assert!(said.contains("the cable is out"), "{said}");
+            assert_eq!(said.contains("the line is cut"), dead, "{said}");
+            let kept = folder.path().join("x").join(PID_ALONE);
+            assert_eq!(kept.exists(), !dead, "{said}");
+        }
     }
 }

@@ -26,7 +26,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use clap::Args;
-use quadrant::link::message::AxisMode;
+use quadrant::link::message::{AxisMode, MachineState};
 use quadrant_cli::warn;
 use quadrant_sim::client::Client;
 
@@ -128,14 +128,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
 
 /// Stays until the motion ends that the session has started: the machine stops it when its host falls silent. A jog has no
 /// end, and is left to that. Returns false if somebody interrupted it.
+///
+/// # Errors
+/// A fault that has ended the motion, or a connection that is broken.
 fn stay(client: &mut Client) -> anyhow::Result<bool> {
     let mut told = false;
     while client.moves() && !client.is_interrupted() {
         // First, for what was acknowledged reaches the control law a little later.
         client.wait(LOOK)?;
         let status = client.status()?;
+        client.refuse_fault("the motion", &status)?;
         let jogs = status.axes.iter().any(|axis| axis.mode == AxisMode::Jog);
-        if status.is_at_rest() || jogs {
+        // Axes that brake for a fault have it latched when they stand.
+        let ended = status.is_at_rest() && status.state != MachineState::Stopping;
+        if ended || jogs {
             break;
         }
         if !told {

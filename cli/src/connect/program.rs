@@ -73,7 +73,7 @@ pub(super) fn stream_program(
     for (line, word) in &program.ignored {
         warn!("note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools");
     }
-    let stage = settings::dump(client)?;
+    let stage = settings::in_force(client)?;
     let status = settle::rest(client, Duration::from_secs(60))?;
     let origin_mm = references_mm(&status);
     let mut limits = Limits {

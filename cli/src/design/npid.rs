@@ -3,9 +3,8 @@
 use anyhow::bail;
 use clap::Args;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_proof;
 use quadrant_cli::output::{Output, command_line, share};
-use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear};
+use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear, filtered_proof};
 use quadrant_sim::design::pages::npid::NonlinearPage;
 use quadrant_sim::design::robustness::{Uncertainty, robustness};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
@@ -56,6 +55,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let plant = model.plant(&file)?;
     let settings = model.axis(&file).clone();
     let gains = settings.feedback.pid;
+    let filters = model.filters(&file);
     let sampled = model.sampled(&file)?;
     let Form::Sampled {
         sample_time_s,
@@ -69,8 +69,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         delay_s: plant.delay_s + computation_delay_s,
         ..plant
     };
-    let proof = sector_proof(&late, &gains, sample_time_s);
-    let margins = Process::Model(plant).margins(&gains, sampled)?;
+    let proof = filtered_proof(&late, &gains, &filters, sample_time_s);
+    let margins = Process::filtered(plant, &filters).margins(&gains, sampled)?;
     let range = match arguments.range_mm {
         Some(range_mm) if (1e-3..=10.0).contains(&range_mm) => Range::Fixed(range_mm),
         Some(range_mm) => bail!("--range-mm {range_mm}: it must be 0.001 to 10 mm"),
@@ -96,6 +96,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let destabiliser = VaryingLoop {
         plant: late,
         gains,
+        filters: &filters,
         sample_time_s,
     }
     .worst(1.0, margins.gain_crossover_hz);
@@ -104,6 +105,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let robustness = robustness(
         &late,
         &gains,
+        &filters,
         sample_time_s,
         &Uncertainty::independent(deviations),
         arguments.draws,
@@ -112,6 +114,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     bar.finish_and_clear();
     let steps = STEPS_MM.into_iter().flat_map(|height_mm| {
         let request = StepRequest {
+            filters: &filters,
             sample_time_s,
             computation_delay_s,
             height_mm,
@@ -128,6 +131,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             ..late
         },
         gains,
+        filters: filters.clone(),
         proof,
         gain,
         destabiliser,

@@ -122,6 +122,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { model, output, .. } = arguments;
     let (mut file, subject) = model.file(output)?;
     let sampled = model.sampled(&file)?;
+    let filters = model.filters(&file);
     let (process, subject) = match &arguments.frf {
         Some(path) => {
             let response = FrequencyResponse::read_csv(path)?;
@@ -132,9 +133,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 path.display(),
                 measured.lines()
             );
-            (Process::Measured(measured), subject)
+            let measured = Process::Measured {
+                response: measured,
+                filters: filters.clone(),
+            };
+            (measured, subject)
         }
-        None => (Process::Model(model.plant(&file)?), subject),
+        None => {
+            let process = Process::filtered(model.plant(&file)?, &filters);
+            (process, subject)
+        }
     };
     let current = model.axis(&file).feedback.pid;
     let request = PidRequest {
@@ -172,7 +180,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     });
     let step = match (&process, sampled) {
         (
-            Process::Model(plant),
+            Process::Model(plant) | Process::Modelled { plant, .. },
             Form::Sampled {
                 sample_time_s,
                 computation_delay_s,
@@ -182,6 +190,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             &found.gains,
             None,
             &StepRequest {
+                filters: &filters,
                 sample_time_s,
                 computation_delay_s,
                 limit_v: model.axis(&file).amplifier.output_limit_v,

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
+use quadrant::control::filter::FilterSettings;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_cli::output::Output;
@@ -84,6 +85,12 @@ impl Model {
     /// The axis' settings in them.
     pub(super) fn axis<'a>(&self, file: &'a SettingsFile) -> &'a AxisSettings {
         &file.stage.axes[self.axis.index()]
+    }
+
+    /// The filters behind the axis' law.
+    pub(super) fn filters(&self, file: &SettingsFile) -> Vec<FilterSettings> {
+        let filters = self.axis(file).feedback.filters.as_deref();
+        filters.unwrap_or_default().to_vec()
     }
 
     /// Returns the linear model, checked.

@@ -80,18 +80,15 @@ impl Measurement {
         output: &Output,
     ) -> anyhow::Result<Measured<FrfMeasurement>> {
         let settings = self.settings(output.seed);
-        let measured = subject.measure(output.seed, start, None, |test_axis, base| {
-            excite(test_axis, base, &settings)
-        })?;
-        let found = &measured.found;
-        for (index, recording) in found.recordings.iter().enumerate() {
-            recording.write_csv(&output.file(&format!("frf-recording-{}.csv", index + 1))?)?;
-        }
-        found
-            .estimate
-            .response
-            .write_csv(&output.file("frf.csv")?)?;
-        Ok(measured)
+        subject.measure(output.seed, start, None, |test_axis, base| {
+            let found = excite(test_axis, base, &settings)?;
+            for (recording, number) in found.recordings.iter().zip(1..) {
+                recording.write_csv(&output.file(&format!("frf-recording-{number}.csv"))?)?;
+            }
+            let response = &found.estimate.response;
+            response.write_csv(&output.file("frf.csv")?)?;
+            Ok(found)
+        })
     }
 
     /// The velocity of the axis, mm/s: it slides under feedback only.

@@ -46,6 +46,8 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
+/// File of the map in the folder for results.
+const MAP: &str = "friction-map.csv";
 /// Travel of an axis of which none is known, mm.
 pub(crate) const TRAVEL_MM: f64 = 200.0;
 
@@ -84,22 +86,24 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 output.seed,
                 start.as_ref(),
                 Some(TRAVEL_MM),
-                |test_axis, base| run_at_velocities(test_axis, base, &settings),
+                |test_axis, base| {
+                    let (map, recordings) = run_at_velocities(test_axis, base, &settings)?;
+                    for (recording, number) in recordings.iter().zip(1..) {
+                        let file = output.file(&format!("friction-recording-{number}.csv"))?;
+                        recording.write_csv(&file)?;
+                    }
+                    map.write_csv(&output.file(MAP)?)?;
+                    Ok(map)
+                },
             )?;
-            let (map, recordings) = measured.found;
-            for (index, recording) in recordings.iter().enumerate() {
-                recording
-                    .write_csv(&output.file(&format!("friction-recording-{}.csv", index + 1))?)?;
-            }
-            (map, measured.title, Some(measured.stage))
+            (measured.found, measured.title, Some(measured.stage))
         }
-        Some(path) => (
-            FrictionMap::read_csv(path)?,
-            recorded::title(std::slice::from_ref(path)),
-            None,
-        ),
+        Some(path) => {
+            let map = FrictionMap::read_csv(path)?;
+            map.write_csv(&output.file(MAP)?)?;
+            (map, recorded::title(std::slice::from_ref(path)), None)
+        }
     };
-    map.write_csv(&output.file("friction-map.csv")?)?;
     let found = fit_map(&map, exponent)?;
     output.table(&friction_table(&found))?;
     output.section(

@@ -220,10 +220,10 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option
             if start.is_some() {
                 test_axis.apply(base)?;
             }
-            move_to_and_fro(test_axis, arguments.rounds)
+            let recording = move_to_and_fro(test_axis, arguments.rounds)?;
+            recording.write_csv(&output.file("motion-recording.csv")?)?;
+            Ok(recording)
         },
     )?;
-    let recording = measured.found;
-    recording.write_csv(&output.file("motion-recording.csv")?)?;
-    Ok((recording, measured.title, Some(measured.stage)))
+    Ok((measured.found, measured.title, Some(measured.stage)))
 }

@@ -81,10 +81,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 output.seed,
                 start.as_ref(),
                 Some(TRAVEL_MM),
-                |test_axis, base| step_voltage(test_axis, base, &settings),
+                |test_axis, base| {
+                    let found = step_voltage(test_axis, base, &settings)?;
+                    let path = output.file("motor-constant-recording.csv")?;
+                    found.recording.write_csv(&path)?;
+                    Ok(found)
+                },
             )?;
-            let path = output.file("motor-constant-recording.csv")?;
-            measured.found.recording.write_csv(&path)?;
             (measured.found, measured.title, Some(measured.stage))
         }
     };

@@ -74,10 +74,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             };
             let start = start.as_ref().map(|stage| &stage.axes[index]);
             let measured = subject.measure(output.seed, start, None, |test_axis, base| {
-                coast(test_axis, base, &settings)
+                let found = coast(test_axis, base, &settings)?;
+                let path = output.file("nctf-recording.csv")?;
+                found.recording.write_csv(&path)?;
+                Ok(found)
             })?;
-            let path = output.file("nctf-recording.csv")?;
-            measured.found.recording.write_csv(&path)?;
             (measured.found, measured.title, Some(measured.stage))
         }
     };

@@ -93,12 +93,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     predicted.sort_by(|a, b| a.amplitude_v.total_cmp(&b.amplitude_v));
     bar.finish_and_clear();
 
-    if arguments.record.is_none() {
-        for (at, number) in measured.iter().zip(1..) {
-            let file = output.file(&format!("revise-recording-{number}.csv"))?;
-            at.recording.write_csv(&file)?;
-        }
-    }
     response.write_csv(&output.file("revise-frf.csv")?)?;
     output.table(&revise_table(&original, &revisions))?;
     let page = revise_page(
@@ -141,7 +135,7 @@ impl Arguments {
                 self.to_hz
             );
         }
-        Ok(())
+        Ok(self.excitation(self.amplitude_v).check_lines()?)
     }
 
     fn excitation(&self, rms_v: f64) -> Excitation {
@@ -198,9 +192,11 @@ impl Arguments {
                             bar.set_position((1000.0 * done) as u64);
                         };
                         let averages = self.averages;
-                        measured.push(AtRest::measure(
-                            test_axis, &settings, excitation, averages, report,
-                        )?);
+                        let at =
+                            AtRest::measure(test_axis, &settings, excitation, averages, report)?;
+                        let name = format!("revise-recording-{}.csv", index + 1);
+                        at.recording.write_csv(&self.output.file(&name)?)?;
+                        measured.push(at);
                     }
                     Ok((measured, settings))
                 })?;

@@ -111,10 +111,13 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
                 output.seed,
                 start.as_ref(),
                 Some(TRAVEL_MM),
-                |test_axis, base| sine.measure(test_axis, base),
+                |test_axis, base| {
+                    let (recording, sine) = sine.measure(test_axis, base)?;
+                    recording.write_csv(&output.file("virgin-curve-recording.csv")?)?;
+                    Ok((recording, sine))
+                },
             )?;
             let (recording, sine) = measured.found;
-            recording.write_csv(&output.file("virgin-curve-recording.csv")?)?;
             say!(
                 "Sine of {:.0} um at {} Hz",
                 1e3 * sine.amplitude_mm,

@@ -311,6 +311,52 @@ fn what_is_edited_and_does_not_act_yet_is_shown_and_what_a_file_would_change() {
 }
 
 #[test]
+fn a_test_that_would_write_over_an_edited_draft_is_refused_and_the_draft_stays() {
+    let folder = tempfile::tempdir().unwrap();
+    let script =
+        "set y/feedback/pid/kp_v_per_mm 0.5\nidentify motor-constant x --out a.csv\ndiff\n";
+    let output = session(folder.path(), &["--json", "--keep-going"], script);
+    assert_eq!(output.status.code(), Some(1));
+    let results = results(&String::from_utf8(output.stdout).unwrap());
+    let refused = results[1]["error"].to_string();
+    assert!(
+        refused.contains("/axes/1/feedback/pid/kp_v_per_mm") && refused.contains("`revert`"),
+        "{refused}"
+    );
+    assert_eq!(results[2]["result"][0]["other"], 0.5, "{results:?}");
+}
+
+#[test]
+fn what_is_recorded_has_the_unit_that_acts() {
+    let folder = tempfile::tempdir().unwrap();
+    succeeds(
+        folder.path(),
+        &[],
+        "enable\nhome x\nwait homed x\nmove x 10\nwait rest\nset x/encoder/resolution_mm 0.001\napply\n\
+         record --channels x.position --out at.csv --seconds 0.1\n",
+    );
+    let text = std::fs::read_to_string(folder.path().join("at.csv")).unwrap();
+    let last = text.lines().last().unwrap();
+    assert!(
+        last.split(',')
+            .any(|cell| cell.starts_with("10.0") || cell.starts_with("9.99")),
+        "{last}"
+    );
+}
+
+#[test]
+fn a_motion_that_a_fault_ends_fails_though_nothing_waits_for_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let script = "set x/limits/following_error_mm 0.0006\nset x/limits/following_error_max_mm 0.0006\n\
+                  set x/limits/following_error_lag_s 0\napply\nenable\n\
+                  circle --radius-mm 5 --feed-mm-min 600 --turns 1\nrun\n";
+    let output = session(folder.path(), &[], script);
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.contains("the motion: fault 1"), "{errors}");
+}
+
+#[test]
 fn a_scope_of_several_units_has_a_chart_for_each() {
     let folder = tempfile::tempdir().unwrap();
     succeeds(

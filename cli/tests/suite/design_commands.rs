@@ -3,6 +3,12 @@
 use crate::command;
 use std::path::Path;
 
+use quadrant::control::feedback::LawKind;
+use quadrant::control::filter::FilterSettings;
+use quadrant::control::popov::filtered_sector_bound;
+use quadrant::settings::StageSettings;
+use quadrant_sim::design::{Form, Process};
+use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
 use quadrant_sim::settings_file::SettingsFile;
 
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
@@ -103,6 +109,97 @@ fn a_design_goes_on_from_what_an_earlier_one_has_left_in_the_same_folder() {
         .feedback
         .pid;
     assert_ne!(built_in, pid);
+}
+
+#[test]
+fn a_design_counts_the_filters_of_its_axis() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let form = Form::Sampled {
+        sample_time_s: 1e-4,
+        computation_delay_s: 0.0,
+    };
+    let mut stage = StageSettings::simulated();
+    let notch = FilterSettings::notch(120.0, 0.4, 0.2);
+    stage.axes[0].feedback.filters = Some(std::iter::once(notch).collect());
+    stage.axes[0].feedback.law = LawKind::Pid;
+    let plant = stage.axes[0].plant.unwrap();
+    let lines = (2..=500).map(|line| {
+        let frequency_hz = 2.0 * f64::from(line);
+        ResponsePoint {
+            frequency_hz,
+            response: plant.response(std::f64::consts::TAU * frequency_hz),
+            coherence: 1.0,
+            relative_deviation: 1e-3,
+        }
+    });
+    let response = FrequencyResponse {
+        points: lines.collect(),
+    };
+    response.write_csv(&at.join("frf.csv")).unwrap();
+    SettingsFile::new(stage)
+        .write(&at.join("stage.toml"))
+        .unwrap();
+    let pid = |out: &str, more: &[&str]| {
+        let common = [
+            "pid",
+            "--settings",
+            "stage.toml",
+            "--sensitivity-peak",
+            "1.7",
+            "--design-on",
+            "sampled",
+            "--out",
+        ];
+        let words: Vec<&str> = common
+            .into_iter()
+            .chain([out])
+            .chain(more.iter().copied())
+            .collect();
+        succeed(at, &words);
+        let file = at.join(out).join("settings.toml");
+        let axis = SettingsFile::read(&file).unwrap().stage.axes[0].clone();
+        let process = Process::Modelled {
+            plant,
+            modes: Vec::new(),
+            filters: vec![notch],
+        };
+        let margins = process.margins(&axis.feedback.pid, form).unwrap();
+        assert!(margins.sensitivity_peak < 1.72, "{out}: {margins:?}");
+        // What is printed is that, too.
+        let printed = row(&at.join(out).join("margins.csv"), "sampled");
+        let peak: f64 = printed[5].parse().unwrap();
+        assert!(
+            (peak - margins.sensitivity_peak).abs() < 0.02,
+            "{out}: {peak} {margins:?}"
+        );
+    };
+    pid("model", &[]);
+    pid("measured", &["--frf", "frf.csv"]);
+    let npid = [
+        "npid",
+        "--settings",
+        "model/settings.toml",
+        "--draws",
+        "50",
+        "--out",
+        "npid",
+    ];
+    succeed(at, &npid);
+    let feedback = &SettingsFile::read(&at.join("npid/settings.toml"))
+        .unwrap()
+        .stage
+        .axes[0]
+        .feedback;
+    let bound = filtered_sector_bound(&plant, &feedback.pid, &[notch], 1e-4);
+    let largest = feedback.nonlinear.unwrap().largest();
+    assert!(
+        (largest / bound - 0.75).abs() < 1e-3,
+        "{largest} of {bound}"
+    );
+    let robust = row(&at.join("npid/robustness.csv"), "");
+    let median: f64 = robust[2].parse().unwrap();
+    assert!((median / bound - 1.0).abs() < 0.1, "{median} of {bound}");
 }
 
 #[test]

@@ -72,6 +72,14 @@ fn what_cannot_be_measured_or_fitted_is_refused_with_a_remedy() {
     let at = folder.path();
     let band = ["plant", "--axis", "x", "--from-hz", "150"];
     assert!(fail(at, &band).contains("misses the corner"));
+    let narrow = ["--axis", "x", "--from-hz", "4.1", "--to-hz", "4.2"];
+    for step in ["frf", "plant", "revise"] {
+        let words: Vec<&str> = [step].into_iter().chain(narrow).collect();
+        let said = fail(at, &words);
+        for part in ["4.1", "4.2", "every 2 Hz"] {
+            assert!(said.contains(part), "{step}: {said}");
+        }
+    }
     let strong = ["frf", "--axis", "x", "--amplitude-v", "0.6"];
     assert!(fail(at, &strong).contains("lower its amplitude"));
     assert!(fail(at, &["frf"]).contains("--axis"));

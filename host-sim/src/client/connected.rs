@@ -25,7 +25,7 @@ impl Machine for Client {
     }
 
     fn settings(&mut self) -> Result<StageSettings, MachineError> {
-        settings::dump(self).map_err(connection)
+        settings::in_force(self).map_err(connection)
     }
 
     /// The ways to the soft limits; `None` while the axis is not homed, has no soft limits, or stands beyond one.

@@ -140,6 +140,15 @@ pub enum ClientError {
     /// A motion is under way, which a measurement would mistake for its own.
     #[error("an axis moves: `stop`, and measure when all axes stand")]
     Moving,
+    /// Settings of the draft are edited, and a measurement would write its own over them.
+    #[error(
+        "the draft is edited and does not act ({paths}), and a measurement would write over it: `apply` or `revert` it first; what \
+         needs a restart, `store` and `reboot`"
+    )]
+    Edited {
+        /// The first path that is edited, and how many more there are.
+        paths: String,
+    },
     /// A condition was not met in time.
     #[error("{what}: not after {waited_s} s; {remedy}")]
     TimedOut {

@@ -86,7 +86,8 @@ pub fn references_mm(status: &Status) -> [f64; 3] {
 }
 
 /// Sends set points as fast as the machine has room for them. `progress` is told how many have been sent, and may let other
-/// things happen to the client. The motion ends after this, when the last of them is reached.
+/// things happen to the client. The motion ends after this, when the last of them is reached. A stream that fails is closed, and
+/// the axes brake: nothing of it waits in the machine.
 ///
 /// # Errors
 /// A set point that the machine refuses, a fault, or a connection that is broken.
@@ -96,7 +97,29 @@ pub fn stream(
     period_ticks: u16,
     progress: &mut dyn FnMut(&mut Client, usize) -> Result<(), ClientError>,
 ) -> Result<(), ClientError> {
-    let mut status = ask(client, StreamRequest::Open { period_ticks })?;
+    let opened = ask(client, StreamRequest::Open { period_ticks });
+    // Of a stream that was not begun there is nothing to close, and what moves is somebody else's.
+    if matches!(
+        opened,
+        Err(ClientError::Refused { .. } | ClientError::Fault { .. })
+    ) {
+        return opened.map(|_| ());
+    }
+    let sent = opened.and_then(|status| send(client, points, status, progress));
+    if sent.is_err() {
+        // The first error says more than that this fails, too.
+        let _ = client.request(Body::Stream(StreamRequest::Close));
+    }
+    sent
+}
+
+/// Sends the set points of a stream that is open.
+fn send(
+    client: &mut Client,
+    points: &[SetPoint],
+    mut status: StreamStatus,
+    progress: &mut dyn FnMut(&mut Client, usize) -> Result<(), ClientError>,
+) -> Result<(), ClientError> {
     let mut silent = 0_u32;
     while (status.next_sequence as usize) < points.len() {
         let sent = status.next_sequence as usize;

@@ -104,8 +104,14 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
 
 /// The value that acts at a path, if what acts has it.
 pub(super) fn acting(client: &mut Client, path: &str) -> Result<Option<Value>, ClientError> {
+    acting_bytes(client, path)?
+        .map(|value| decode(path, &value))
+        .transpose()
+}
+
+fn acting_bytes(client: &mut Client, path: &str) -> Result<Option<LeafValue>, ClientError> {
     match request_value(client, SettingsRequest::GetInForce(bounded("path", path)?)) {
-        Ok(value) => decode(path, &value).map(Some),
+        Ok(value) => Ok(Some(value)),
         Err(ClientError::Refused { .. }) => Ok(None),
         Err(error) => Err(error),
     }
@@ -196,14 +202,16 @@ pub fn provenance(client: &mut Client) -> Result<String, ClientError> {
     }
 }
 
-/// The length of a count of each axis, mm.
+/// The length of a count of each axis, as it acts, mm.
 ///
 /// # Errors
 /// A connection that is broken.
 pub fn resolutions_mm(client: &mut Client) -> Result<[f64; 3], ClientError> {
     let mut resolutions = [0.0; 3];
     for (axis, resolution) in resolutions.iter_mut().enumerate() {
-        let value = get(client, &format!("/axes/{axis}/encoder/resolution_mm"))?;
+        let path = format!("/axes/{axis}/encoder/resolution_mm");
+        let request = SettingsRequest::GetInForce(bounded("path", &path)?);
+        let value = decode(&path, &request_value(client, request)?)?;
         *resolution = value.as_f64().unwrap_or(f64::NAN);
     }
     Ok(resolutions)
@@ -245,6 +253,71 @@ pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
             .map_err(|source| ClientError::Setting { path, source })?;
     }
     Ok(settings)
+}
+
+/// Reads all settings that act, whatever the draft has; of a board that holds none, those whose axes this session has loaded.
+///
+/// # Errors
+/// As [`dump`].
+pub fn in_force(client: &mut Client) -> Result<StageSettings, ClientError> {
+    if let Some(loaded) = client.loaded() {
+        return Ok(loaded.clone());
+    }
+    let mut settings = StageSettings::simulated();
+    let drafted = list(client, "")?;
+    take_acting(client, &drafted, &mut settings)?;
+    // Leaves of parts that act and that the draft leaves out.
+    let mut others = Vec::new();
+    let _ = settings.list("", &mut |path| {
+        if !drafted.iter().any(|known| known == path) {
+            others.push(path.to_owned());
+        }
+    });
+    take_acting(client, &others, &mut settings)?;
+    Ok(settings)
+}
+
+/// Reads what acts at paths into settings; a leaf of a part that does not act is left out.
+fn take_acting(
+    client: &mut Client,
+    paths: &[String],
+    settings: &mut StageSettings,
+) -> Result<(), ClientError> {
+    for path in paths {
+        let Some(LeafValue { kind, bytes }) = acting_bytes(client, path)? else {
+            continue;
+        };
+        settings
+            .set_bytes(path, kind, &bytes)
+            .map_err(|source| ClientError::Setting {
+                path: path.clone(),
+                source,
+            })?;
+    }
+    Ok(())
+}
+
+/// Refuses to go on while the draft differs from what acts: what follows would write over it.
+///
+/// # Errors
+/// The settings that are edited, or a connection that is broken.
+pub(super) fn refuse_edited(client: &mut Client) -> Result<(), ClientError> {
+    if client.loaded().is_some() {
+        return Ok(());
+    }
+    let edited = paths(client, "edited", |cursor| SettingsRequest::Edited {
+        cursor,
+    })?;
+    let Some(first) = edited.first() else {
+        return Ok(());
+    };
+    let more = match edited.len() - 1 {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    Err(ClientError::Edited {
+        paths: format!("{first}{more}"),
+    })
 }
 
 /// Result of loading settings.

@@ -330,6 +330,6 @@ fn asks_for_less(error: &FrfError) -> bool {
     match error {
         FrfError::NotSliding { .. } => true,
         FrfError::Experiment(error) => error.ran_off(),
-        FrfError::Setting(_) | FrfError::Travel { .. } => false,
+        FrfError::Setting(_) | FrfError::NoLine(_) | FrfError::Travel { .. } => false,
     }
 }

@@ -35,7 +35,8 @@ pub fn with_best_pid(stage: &StageSettings) -> Result<StageSettings, DesignError
     let [x, ..] = &mut stage.axes;
     if let Some(plant) = x.plant {
         let filter_s = x.feedback.pid.derivative_filter_s;
-        x.feedback.pid = best_pid(&Process::Model(plant), form, filter_s)?.gains;
+        let filters = x.feedback.filters.as_deref().unwrap_or_default();
+        x.feedback.pid = best_pid(&Process::filtered(plant, filters), form, filter_s)?.gains;
         x.feedback.nonlinear = None;
         x.feedback.law = LawKind::Pid;
     }

@@ -1,7 +1,16 @@
 //! The nonlinear gain of N-PID: how large, and over which errors.
 
+use std::f64::consts::TAU;
+
+use quadrant::control::filter::FilterSettings;
 use quadrant::control::npid::NonlinearGain;
 use quadrant::control::pid::PidGains;
+use quadrant::control::plant_model::PlantModel;
+use quadrant::control::popov::{SectorProof, filtered_sector_bound, sector_proof};
+
+use super::form::Form;
+use super::loop_shape::OpenLoop;
+use super::process::Process;
 
 /// Rule by which ko and emax are chosen.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,6 +41,75 @@ impl Default for NonlinearRule {
     }
 }
 
+/// The gains up to which a loop with filters behind the law is proven stable: the Popov bound is the firmware's, line and circle
+/// bound are read off the frequency response.
+pub fn filtered_proof(
+    plant: &PlantModel,
+    gains: &PidGains,
+    filters: &[FilterSettings],
+    sample_time_s: f64,
+) -> SectorProof {
+    if filters.is_empty() {
+        return sector_proof(plant, gains, sample_time_s);
+    }
+    let popov = filtered_sector_bound(plant, gains, filters, sample_time_s);
+    if popov <= 1.0 {
+        return SectorProof {
+            popov,
+            slope_s: 0.0,
+            circle: 1.0,
+        };
+    }
+    let held = PlantModel {
+        delay_s: plant.delay_s + 0.5 * sample_time_s,
+        ..*plant
+    };
+    let (slope_s, circle) = line_and_circle(&Process::filtered(held, filters), gains);
+    SectorProof {
+        popov,
+        slope_s,
+        circle: circle.min(popov),
+    }
+}
+
+/// Frequencies of the plot, and the decades from [`LOWEST_HZ`] that they cover.
+const FREQUENCIES: u32 = 5000;
+const DECADES: f64 = 5.0;
+const LOWEST_HZ: f64 = 0.1;
+/// Largest q that is tried, s, and the thirds by which its interval shrinks.
+const SLOWEST_S: f64 = 1.0;
+const THIRDS: usize = 100;
+
+/// The q of the line that leaves the Popov plot furthest to its right, s, and the circle bound.
+fn line_and_circle(process: &Process, gains: &PidGains) -> (f64, f64) {
+    let open_loop = process.open_loop(gains, Form::Continuous);
+    let plot: Vec<(f64, f64)> = (0..FREQUENCIES)
+        .map(|index| {
+            let decades = DECADES * f64::from(index) / f64::from(FREQUENCIES);
+            let omega = TAU * LOWEST_HZ * 10.0_f64.powf(decades);
+            let l = open_loop.response(omega);
+            let h = l / (l + 1.0);
+            (h.re, omega * h.im)
+        })
+        .collect();
+    let foot = |slope_s: f64| {
+        plot.iter()
+            .map(|(re, im)| re - slope_s * im)
+            .fold(-f64::MIN_POSITIVE, f64::min)
+    };
+    // It is concave in q.
+    let (mut low, mut high) = (0.0, SLOWEST_S);
+    for _ in 0..THIRDS {
+        let third = (high - low) / 3.0;
+        if foot(low + third) < foot(high - third) {
+            low += third;
+        } else {
+            high -= third;
+        }
+    }
+    (low, 1.0 - 1.0 / foot(0.0))
+}
+
 /// The bounds of emax, mm.
 const RANGE_MM: (f64, f64) = (1e-3, 10.0);
 
@@ -51,4 +129,36 @@ pub fn choose_nonlinear(
         rate_per_mm: largest.acosh() / range_mm,
         range_mm,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quadrant::settings::presets::{X_GAINS, X_PLANT};
+
+    #[test]
+    fn line_and_circle_are_those_of_the_proof_where_there_is_no_filter() {
+        let proof = sector_proof(&X_PLANT, &X_GAINS, 0.0);
+        let (slope_s, circle) = line_and_circle(&Process::Model(X_PLANT), &X_GAINS);
+        assert!(
+            (slope_s / proof.slope_s - 1.0).abs() < 0.01,
+            "{slope_s} {proof:?}"
+        );
+        assert!(
+            (circle / proof.circle - 1.0).abs() < 1e-3,
+            "{circle} {proof:?}"
+        );
+    }
+
+    #[test]
+    fn a_notch_takes_from_every_bound() {
+        let notch = [FilterSettings::notch(120.0, 0.4, 0.2)];
+        let [with, without] =
+            [&notch[..], &[]].map(|filters| filtered_proof(&X_PLANT, &X_GAINS, filters, 1e-4));
+        assert!(1.0 < with.circle && with.circle < with.popov, "{with:?}");
+        assert!(
+            with.popov < without.popov && with.circle < without.circle,
+            "{with:?}"
+        );
+    }
 }

@@ -20,8 +20,11 @@ pub enum Process {
         modes: Vec<Mode>,
         filters: Vec<FilterSettings>,
     },
-    /// Its measured frequency response.
-    Measured(MeasuredResponse),
+    /// Its measured frequency response, and the filters behind the law.
+    Measured {
+        response: MeasuredResponse,
+        filters: Vec<FilterSettings>,
+    },
 }
 
 /// A loop of either kind.
@@ -33,11 +36,11 @@ pub enum AnyLoop<'a> {
     Sampled(SampledLoop),
     /// Measured response and PID, in either form.
     Measured(MeasuredLoop<'a>),
-    /// Model with modes, PID and filters, in either form.
+    /// Either with PID, modes and filters, in either form.
     Modal(ModalLoop<'a>),
 }
 
-/// A loop of the rigid model, times modes and filters. Through the converter's hold the product is that of the responses:
+/// A loop of the rigid model or of a measured response, times modes and filters. Through the converter's hold the product is that of the responses:
 /// modes lie far below the control rate.
 #[derive(Clone, Debug)]
 pub struct ModalLoop<'a> {
@@ -94,6 +97,8 @@ impl AnyLoop<'_> {
             Self::Measured(measured) if !measured.has_fallen(factor) => {
                 Err(MarginError::BandTooNarrow)
             }
+            // Filters amplify nothing.
+            Self::Modal(modal) => modal.rigid.check_band(factor),
             _ => Ok(()),
         }
     }
@@ -132,6 +137,18 @@ fn rigid_loop(plant: &PlantModel, gains: &PidGains, form: Form) -> AnyLoop<'stat
 }
 
 impl Process {
+    /// The axis of a model without modes, and the filters behind the law.
+    pub fn filtered(plant: PlantModel, filters: &[FilterSettings]) -> Self {
+        if filters.is_empty() {
+            return Self::Model(plant);
+        }
+        Self::Modelled {
+            plant,
+            modes: Vec::new(),
+            filters: filters.to_vec(),
+        }
+    }
+
     /// The loop that a PID closes around the process.
     pub fn open_loop(&self, gains: &PidGains, form: Form) -> AnyLoop<'_> {
         match (self, form) {
@@ -149,8 +166,17 @@ impl Process {
                 form,
             }),
             (Self::Model(plant), form) => rigid_loop(plant, gains, form),
-            (Self::Measured(response), form) => {
-                AnyLoop::Measured(MeasuredLoop::new(response, gains, form))
+            (Self::Measured { response, filters }, form) => {
+                let measured = AnyLoop::Measured(MeasuredLoop::new(response, gains, form));
+                if filters.is_empty() {
+                    return measured;
+                }
+                AnyLoop::Modal(ModalLoop {
+                    rigid: Box::new(measured),
+                    modes: &[],
+                    filters,
+                    form,
+                })
             }
         }
     }
@@ -159,8 +185,10 @@ impl Process {
     pub(super) fn controller(&self, gains: &PidGains, form: Form, omega_rad_s: f64) -> Complex64 {
         let pid = form.controller(gains, omega_rad_s);
         match self {
-            Self::Modelled { filters, .. } => pid * filters_at(filters, form, omega_rad_s),
-            Self::Model(_) | Self::Measured(_) => pid,
+            Self::Modelled { filters, .. } | Self::Measured { filters, .. } => {
+                pid * filters_at(filters, form, omega_rad_s)
+            }
+            Self::Model(_) => pid,
         }
     }
 
@@ -194,7 +222,7 @@ impl Process {
                 (plant.delay_s > 0.0 && lag(lowest) && !lag(highest))
                     .then(|| bisect(lowest, highest, lag) / std::f64::consts::TAU)
             }
-            Self::Measured(response) => response.half_turn_hz(),
+            Self::Measured { response, .. } => response.half_turn_hz(),
         }
     }
 }

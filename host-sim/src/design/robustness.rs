@@ -1,9 +1,10 @@
 //! Popov bound of an axis that differs from its model.
 
 use nalgebra::{Matrix4, Vector4};
+use quadrant::control::filter::FilterSettings;
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_bound;
+use quadrant::control::popov::filtered_sector_bound;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;
@@ -66,6 +67,7 @@ pub enum RobustnessError {
 pub fn robustness(
     plant: &PlantModel,
     gains: &PidGains,
+    filters: &[FilterSettings],
     sample_time_s: f64,
     uncertainty: &Uncertainty,
     draws: usize,
@@ -96,7 +98,7 @@ pub fn robustness(
         .collect();
     let mut bounds: Vec<f64> = models
         .par_iter()
-        .map(|model| sector_bound(model, gains, sample_time_s))
+        .map(|model| filtered_sector_bound(model, gains, filters, sample_time_s))
         .collect();
     bounds.sort_by(f64::total_cmp);
     Ok(Robustness { bounds })

@@ -1,5 +1,6 @@
 //! The step response of a linear axis under the firmware's own law, sample by sample.
 
+use quadrant::control::filter::{FilterSettings, Filters, FiltersState};
 use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
 use quadrant::control::pid::Pid;
 use quadrant::control::pid::PidGains;
@@ -10,7 +11,9 @@ use super::held_plant::{HeldPlant, HeldPlantRun};
 
 /// A step to answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct StepRequest {
+pub struct StepRequest<'a> {
+    /// Filters behind the law.
+    pub filters: &'a [FilterSettings],
     /// Control period, s; above zero.
     pub sample_time_s: f64,
     /// From reading the encoder to writing the converter, s; zero or more.
@@ -23,10 +26,11 @@ pub struct StepRequest {
     pub limit_v: f64,
 }
 
-impl Default for StepRequest {
+impl Default for StepRequest<'_> {
     /// 10 um at 10 kHz, for 0.3 s: so small that the derivative stays within 10 V.
     fn default() -> Self {
         Self {
+            filters: &[],
             sample_time_s: 1e-4,
             computation_delay_s: 0.0,
             height_mm: 0.01,
@@ -69,7 +73,7 @@ pub fn step_response(
     plant: &PlantModel,
     gains: &PidGains,
     nonlinear: Option<&NonlinearGain>,
-    request: &StepRequest,
+    request: &StepRequest<'_>,
 ) -> StepResponse {
     let period_s = request.sample_time_s;
     let pid = Pid::<f64>::build(gains, request.limit_v, period_s);
@@ -77,15 +81,19 @@ pub fn step_response(
     let held = HeldPlant::new(plant, period_s, request.computation_delay_s);
     let mut axis = HeldPlantRun::at_rest(held, 0.0);
     let mut state = FeedbackState::default();
+    let filters = Filters::<f64>::build(request.filters, period_s);
+    let mut filtered = FiltersState::default();
     let samples = (request.duration_s / period_s).ceil() as usize;
     let (mut position_mm, mut voltage_v) = (Vec::new(), Vec::new());
     for _ in 0..samples {
         let error = request.height_mm - axis.position_mm();
         let scaled = error * table.as_ref().map_or(1.0, |table| table.at(error));
         let terms = pid.step(&mut state, scaled, 0.0, request.limit_v);
+        let output = filters.step(&mut filtered, terms.output);
+        let output = output.clamp(-request.limit_v, request.limit_v);
         position_mm.push(axis.position_mm());
-        voltage_v.push(terms.output);
-        axis.step(terms.output);
+        voltage_v.push(output);
+        axis.step(output);
     }
     StepResponse {
         sample_time_s: period_s,

@@ -7,6 +7,7 @@
 
 use std::f64::consts::{PI, TAU};
 
+use quadrant::control::filter::{FilterSettings, Filters, FiltersState};
 use quadrant::control::pid::Pid;
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
@@ -45,9 +46,11 @@ pub struct Destabiliser {
 
 /// A sampled loop, at rest but for an error, with a varying gain on the error.
 #[derive(Clone, Copy, Debug)]
-pub struct VaryingLoop {
+pub struct VaryingLoop<'a> {
     pub plant: PlantModel,
     pub gains: PidGains,
+    /// Filters behind the law.
+    pub filters: &'a [FilterSettings],
     /// Control period, s.
     pub sample_time_s: f64,
 }
@@ -69,7 +72,7 @@ const FREQUENCIES: usize = 25;
 /// Angles of the turning family.
 const ANGLES: usize = 16;
 
-impl VaryingLoop {
+impl VaryingLoop<'_> {
     /// Growth of the motion: RMS error of the last tenth of the time over that of the fifth; below one when it dies out.
     pub fn growth(&self, gain: f64, switching: Switching) -> f64 {
         let period_s = self.sample_time_s;
@@ -77,6 +80,8 @@ impl VaryingLoop {
         let held = HeldPlant::new(&self.plant, period_s, 0.0);
         let mut axis = HeldPlantRun::at_rest(held, START_MM);
         let mut state = FeedbackState::default();
+        let filters = Filters::<f64>::build(self.filters, period_s);
+        let mut filtered = FiltersState::default();
         let mut previous = -START_MM;
         pid.reset(&mut state, previous);
         let samples = (FOLLOWED_S / period_s) as usize;
@@ -103,7 +108,7 @@ impl VaryingLoop {
             }
             let scaled = if high { gain * error } else { error };
             let terms = pid.step(&mut state, scaled, 0.0, NO_LIMIT_V);
-            axis.step(terms.output);
+            axis.step(filters.step(&mut filtered, terms.output));
             squares[sample * 10 / samples] += error * error;
         }
         (squares[9] / squares[4]).sqrt()

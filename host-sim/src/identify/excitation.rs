@@ -49,7 +49,35 @@ pub struct Excitation {
     pub seed: u64,
 }
 
+/// A band without a line that is excited.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "the band of {} to {} Hz holds no line of the excitation, which has one every {} Hz, the inverse of its period of {period_s} s: \
+     widen the band, or lengthen the period",
+    .band_hz.0, .band_hz.1, 1.0 / .period_s
+)]
+pub struct NoLine {
+    /// Lowest and highest frequency, Hz.
+    pub band_hz: (f64, f64),
+    /// Period of the excitation, s.
+    pub period_s: f64,
+}
+
 impl Excitation {
+    /// Checks that the band holds a line.
+    ///
+    /// # Errors
+    /// A band that lies between two lines.
+    pub fn check_lines(&self) -> Result<(), NoLine> {
+        if self.lines().is_empty() {
+            return Err(NoLine {
+                band_hz: self.band_hz,
+                period_s: self.period_s,
+            });
+        }
+        Ok(())
+    }
+
     /// Samples in a period at a rate.
     pub fn period(&self, rate_hz: f64) -> usize {
         ((self.period_s * rate_hz).round() as usize).max(2)

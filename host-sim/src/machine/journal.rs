@@ -5,6 +5,8 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 
+use quadrant::axes::AxisName;
+use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::AxisSettings;
 use serde::{Deserialize, Serialize};
 
@@ -16,7 +18,8 @@ use crate::record::Recording;
 const KEPT: &str = "json";
 
 /// A test axis whose experiments are kept in a folder. Those that are there already are not run again, as long as they are the
-/// same experiments under the same settings in the same order; settings act only once an experiment is run.
+/// same experiments under the same settings in the same order; settings act only once an experiment is run. One that was stopped
+/// is stopped again, as long as the series went on after it.
 pub struct Journal<'a> {
     axis: &'a mut dyn TestAxis,
     folder: PathBuf,
@@ -27,6 +30,8 @@ pub struct Journal<'a> {
     settings: AxisSettings,
     /// The settings are not in force yet.
     pending: bool,
+    /// The recording of the last experiment, if that was stopped.
+    interrupted: Option<Recording>,
 }
 
 /// An experiment that has ended.
@@ -35,7 +40,82 @@ struct Entry {
     name: String,
     /// Tells the experiment and its settings from others.
     key: u64,
-    recording: Recording,
+    /// Of an experiment that was stopped, up to there, if anything is left of it.
+    recording: Option<Recording>,
+    #[serde(default)]
+    stopped: Option<Stopped>,
+}
+
+/// Reason for which an experiment was stopped: one of those after which a series may go on with another.
+#[derive(Clone, Copy, Serialize, Deserialize)]
+enum Stopped {
+    Travel {
+        travel_mm: f64,
+        time_s: f64,
+    },
+    Overspeed {
+        max_velocity_mm_s: f64,
+        time_s: f64,
+    },
+    Fault {
+        number: u8,
+        axis: Option<AxisName>,
+        tick: u32,
+    },
+}
+
+impl Stopped {
+    /// The reason in an error; none of one that is no property of the axis, a broken connection for instance.
+    fn of(error: &ExperimentError) -> Option<Self> {
+        match *error {
+            ExperimentError::Travel {
+                travel_mm, time_s, ..
+            } => Some(Self::Travel { travel_mm, time_s }),
+            ExperimentError::Overspeed {
+                max_velocity_mm_s,
+                time_s,
+                ..
+            } => Some(Self::Overspeed {
+                max_velocity_mm_s,
+                time_s,
+            }),
+            ExperimentError::Fault { fault, .. } => Some(Self::Fault {
+                number: fault.code.number(),
+                axis: fault.axis,
+                tick: fault.tick,
+            }),
+            ExperimentError::Motion { .. }
+            | ExperimentError::Impossible { .. }
+            | ExperimentError::TimedOut { .. } => None,
+        }
+    }
+
+    /// The error that it was; none of a fault that this release does not know.
+    fn error(self, experiment: String) -> Option<ExperimentError> {
+        Some(match self {
+            Self::Travel { travel_mm, time_s } => ExperimentError::Travel {
+                experiment,
+                travel_mm,
+                time_s,
+            },
+            Self::Overspeed {
+                max_velocity_mm_s,
+                time_s,
+            } => ExperimentError::Overspeed {
+                experiment,
+                max_velocity_mm_s,
+                time_s,
+            },
+            Self::Fault { number, axis, tick } => ExperimentError::Fault {
+                experiment,
+                fault: Fault {
+                    code: FaultCode::from_number(number)?,
+                    axis,
+                    tick,
+                },
+            },
+        })
+    }
 }
 
 impl<'a> Journal<'a> {
@@ -55,6 +135,7 @@ impl<'a> Journal<'a> {
             next: 0,
             known: resume,
             pending: false,
+            interrupted: None,
         })
     }
 
@@ -81,10 +162,28 @@ impl<'a> Journal<'a> {
         hasher.finish()
     }
 
-    fn kept(&self, path: &Path, key: u64) -> Option<Recording> {
-        let bytes = fs::read(path).ok()?;
+    /// The file of an experiment.
+    fn path(&self, number: usize) -> PathBuf {
+        self.folder.join(format!("{number:03}.{KEPT}"))
+    }
+
+    /// The outcome of the next experiment, if it is kept.
+    fn kept(&mut self, key: u64) -> Option<Result<Recording, ExperimentError>> {
+        let bytes = fs::read(self.path(self.next)).ok()?;
         let entry: Entry = serde_json::from_slice(&bytes).ok()?;
-        (entry.key == key).then_some(entry.recording)
+        if entry.key != key {
+            return None;
+        }
+        let Some(stopped) = entry.stopped else {
+            return entry.recording.map(Ok);
+        };
+        // One that ended the series is tried again.
+        if !self.path(self.next + 1).exists() {
+            return None;
+        }
+        let error = stopped.error(entry.name)?;
+        self.interrupted = entry.recording;
+        Some(Err(error))
     }
 }
 
@@ -118,15 +217,17 @@ impl TestAxis for Journal<'_> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        let path = self.folder.join(format!("{:03}.{KEPT}", self.next));
-        self.next += 1;
         let key = self.key(experiment);
+        self.interrupted = None;
         if self.known
-            && let Some(recording) = self.kept(&path, key)
+            && let Some(outcome) = self.kept(key)
         {
+            self.next += 1;
             progress(1.0);
-            return Ok(recording);
+            return outcome;
         }
+        let path = self.path(self.next);
+        self.next += 1;
         let impossible = |reason: String| ExperimentError::Impossible {
             experiment: experiment.name.clone(),
             reason,
@@ -139,19 +240,33 @@ impl TestAxis for Journal<'_> {
                 .map_err(|error| impossible(error.to_string()))?;
             self.pending = false;
         }
-        let entry = Entry {
+        let entry = |recording, stopped| Entry {
             name: experiment.name.clone(),
             key,
-            recording: self.axis.perform(experiment, progress)?,
+            recording,
+            stopped,
         };
-        keep(&path, &entry).map_err(|error| {
-            impossible(format!("cannot be kept in {}: {error}", path.display()))
-        })?;
-        Ok(entry.recording)
+        match self.axis.perform(experiment, progress) {
+            Ok(recording) => {
+                keep(&path, &entry(Some(recording.clone()), None)).map_err(|error| {
+                    impossible(format!("cannot be kept in {}: {error}", path.display()))
+                })?;
+                Ok(recording)
+            }
+            Err(error) => {
+                self.interrupted = self.axis.interrupted().cloned();
+                if let Some(stopped) = Stopped::of(&error) {
+                    // An older series' next is not this one's. What stopped it says more than that it is not kept.
+                    let _ = fs::remove_file(self.path(self.next));
+                    let _ = keep(&path, &entry(self.interrupted.clone(), Some(stopped)));
+                }
+                Err(error)
+            }
+        }
     }
 
     fn interrupted(&self) -> Option<&Recording> {
-        self.axis.interrupted()
+        self.interrupted.as_ref()
     }
 }
 
@@ -196,6 +311,43 @@ mod tests {
         journal.perform(&hold(60), &mut |_| {}).unwrap();
         assert_eq!(other.settings(), &settings);
         assert_ne!(other.plant().position_mm(), axis().plant().position_mm());
+    }
+
+    /// One that drives the axis out of its travel.
+    fn too_far() -> Experiment {
+        Experiment {
+            name: "too far".to_owned(),
+            injection_v: vec![9.0; 5000],
+            ..hold(0)
+        }
+    }
+
+    #[test]
+    fn an_experiment_that_was_stopped_is_not_run_again_if_the_series_went_on() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut first, mut again) = (axis(), axis());
+        let run = |journal: &mut Journal<'_>| {
+            let stopped = journal.perform(&too_far(), &mut |_| {}).unwrap_err();
+            let end = journal.interrupted().cloned();
+            let after = journal.perform(&hold(50), &mut |_| {}).unwrap();
+            (format!("{stopped:?}"), end, after)
+        };
+        let before = run(&mut Journal::open(&mut first, folder.path(), false).unwrap());
+        assert!(before.1.is_some());
+        let after = run(&mut Journal::open(&mut again, folder.path(), true).unwrap());
+        assert!(before == after, "{} {}", before.0, after.0);
+        assert_eq!(again.plant().position_mm(), axis().plant().position_mm());
+    }
+
+    #[test]
+    fn an_experiment_that_ended_the_series_is_run_again() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut first, mut again) = (axis(), axis());
+        let mut journal = Journal::open(&mut first, folder.path(), false).unwrap();
+        assert!(journal.perform(&too_far(), &mut |_| {}).is_err());
+        let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
+        assert!(journal.perform(&too_far(), &mut |_| {}).is_err());
+        assert_ne!(again.plant().position_mm(), axis().plant().position_mm());
     }
 
     #[test]

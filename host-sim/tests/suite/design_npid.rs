@@ -12,9 +12,10 @@ use quadrant_sim::design::{ContinuousLoop, OpenLoop};
 
 const PERIOD_S: f64 = 1e-4;
 const CROSSOVER_HZ: f64 = 64.9;
-const X_LOOP: VaryingLoop = VaryingLoop {
+const X_LOOP: VaryingLoop<'_> = VaryingLoop {
     plant: X_PLANT,
     gains: X_GAINS,
+    filters: &[],
     sample_time_s: PERIOD_S,
 };
 
@@ -74,7 +75,7 @@ fn the_gain_takes_its_share_of_the_bound_over_the_range_that_friction_causes() {
 
 fn with(deviations: [f64; 4]) -> Robustness {
     let uncertainty = Uncertainty::independent(deviations);
-    robustness(&X_PLANT, &X_GAINS, PERIOD_S, &uncertainty, 200, 1).unwrap()
+    robustness(&X_PLANT, &X_GAINS, &[], PERIOD_S, &uncertainty, 200, 1).unwrap()
 }
 
 #[test]
@@ -106,7 +107,7 @@ fn impossible_correlations_and_no_draws_are_refused() {
     uncertainty.correlation[(0, 1)] = 2.0;
     uncertainty.correlation[(1, 0)] = 2.0;
     let run = |uncertainty: &Uncertainty, draws: usize| {
-        robustness(&X_PLANT, &X_GAINS, PERIOD_S, uncertainty, draws, 1)
+        robustness(&X_PLANT, &X_GAINS, &[], PERIOD_S, uncertainty, draws, 1)
     };
     assert_eq!(run(&uncertainty, 10), Err(RobustnessError::Correlation));
     let independent = Uncertainty::independent([0.1; 4]);

@@ -51,7 +51,10 @@ fn response(coherence: impl Fn(f64) -> f64) -> FrequencyResponse {
 }
 
 fn measured() -> Process {
-    Process::Measured(MeasuredResponse::new(&response(|_| 1.0), 0.9).unwrap())
+    Process::Measured {
+        response: MeasuredResponse::new(&response(|_| 1.0), 0.9).unwrap(),
+        filters: Vec::new(),
+    }
 }
 
 #[test]
@@ -192,7 +195,10 @@ fn a_response_that_ends_too_early_carries_no_design() {
             .filter(|point| point.frequency_hz < 70.0)
             .collect(),
     };
-    let process = Process::Measured(MeasuredResponse::new(&cut, 0.9).unwrap());
+    let process = Process::Measured {
+        response: MeasuredResponse::new(&cut, 0.9).unwrap(),
+        filters: Vec::new(),
+    };
     let gains = design(&Process::Model(X_PLANT), MARGINS, SAMPLED)
         .unwrap()
         .gains;

@@ -2,9 +2,9 @@
 
 use anyhow::Context as _;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_proof;
 use quadrant::settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, CrossCheck, commission};
+use quadrant_sim::design::npid::filtered_proof;
 use quadrant_sim::design::pages::npid::NonlinearPage;
 use quadrant_sim::design::pages::pid::PidPage;
 use quadrant_sim::design::robustness::{Uncertainty, robustness};
@@ -58,14 +58,16 @@ pub(super) fn controllers(context: &Context, progress: &Progress) -> anyhow::Res
         .nonlinear
         .context("the settings hold no nonlinear gain for the x axis: design one with `quadrant design npid`")?;
     let gains = x.feedback.pid;
+    let filters = x.feedback.filters.as_deref().unwrap_or_default();
     let sample_time_s = 1.0 / stage.rate_hz;
     let sampled = Form::Sampled {
         sample_time_s,
         computation_delay_s: 0.0,
     };
-    let process = Process::Model(plant);
+    let process = Process::filtered(plant, filters);
     let answer = |height_mm, nonlinear| {
         let request = StepRequest {
+            filters,
             sample_time_s,
             height_mm,
             limit_v: x.amplifier.output_limit_v,
@@ -97,6 +99,7 @@ pub(super) fn controllers(context: &Context, progress: &Progress) -> anyhow::Res
     let destabiliser = VaryingLoop {
         plant,
         gains,
+        filters,
         sample_time_s,
     }
     .worst(1.0, margins.gain_crossover_hz);
@@ -108,12 +111,14 @@ pub(super) fn controllers(context: &Context, progress: &Progress) -> anyhow::Res
             ..plant
         },
         gains,
-        proof: sector_proof(&plant, &gains, sample_time_s),
+        filters: filters.to_vec(),
+        proof: filtered_proof(&plant, &gains, filters, sample_time_s),
         gain,
         destabiliser,
         robustness: robustness(
             &plant,
             &gains,
+            filters,
             sample_time_s,
             &Uncertainty::independent(DEVIATIONS),
             DRAWS,

@@ -55,16 +55,17 @@ pub struct ConnectedAxis<'a> {
 }
 
 impl<'a> ConnectedAxis<'a> {
-    /// An axis of the machine, whose settings are read. Experiments keep it within `travel` of where it stands.
+    /// An axis of the machine, whose settings in force are read. Experiments keep it within `travel` of where it stands.
     ///
     /// # Errors
-    /// A motion that is under way, a connection that is broken, or a machine of another release.
+    /// A draft that is edited, a motion that is under way, a connection that is broken, or a machine of another release.
     pub fn new(
         client: &'a mut Client,
         axis: AxisName,
         travel: Travel,
     ) -> Result<Self, ClientError> {
-        let stage = settings::dump(client)?;
+        settings::refuse_edited(client)?;
+        let stage = settings::in_force(client)?;
         let status = client.status()?;
         if !status.is_at_rest() {
             return Err(ClientError::Moving);

@@ -1,12 +1,13 @@
 //! Settings to and from the machine.
 
+use quadrant::axes::AxisName;
 use quadrant::control::feedback::LawKind;
-use quadrant::link::message::AxisName;
-use quadrant::link::message::AxisSet;
+use quadrant::link::message::{self, AxisSet};
 use quadrant::settings::StageSettings;
 
 use super::connected;
 use crate::client::settings::{self, ExchangeError, whole_path};
+use crate::machine::{Machine, Travel};
 
 #[test]
 fn paths_may_be_written_short() {
@@ -35,6 +36,42 @@ fn what_is_dumped_is_what_the_machine_has() {
 }
 
 #[test]
+fn what_acts_is_read_beside_a_draft_that_has_more_and_less() {
+    let (mut client, bench) = connected();
+    bench.borrow_mut().in_force.axes[1].plant = None;
+    let acts = bench.borrow().in_force.clone();
+    for (path, value) in [
+        ("/axes/0/encoder/resolution_mm", "0.001"),
+        ("/axes/0/feedback/nonlinear", "null"),
+        ("/axes/2/feedback/pid/kp_v_per_mm", "0.5"),
+    ] {
+        settings::set(&mut client, path, value).unwrap();
+    }
+    assert_eq!(settings::in_force(&mut client).unwrap(), acts);
+    assert_eq!(Machine::settings(&mut client).unwrap(), acts);
+    assert_eq!(settings::resolutions_mm(&mut client).unwrap(), [0.0005; 3]);
+    let draft = settings::dump(&mut client).unwrap();
+    assert_eq!(draft.axes[0].encoder.resolution_mm, 0.001);
+}
+
+#[test]
+fn a_test_of_an_axis_does_not_write_over_what_is_edited() {
+    let (mut client, bench) = connected();
+    settings::set(&mut client, "/axes/1/feedback/pid/kp_v_per_mm", "0.5").unwrap();
+    let travel = Travel::either_way(10.0);
+    let error = client.test_axis(AxisName::X, travel).err().unwrap();
+    let text = error.to_string();
+    for part in ["/axes/1/feedback/pid/kp_v_per_mm", "`apply`", "`revert`"] {
+        assert!(text.contains(part), "{text}");
+    }
+    assert_eq!(bench.borrow().in_force, StageSettings::simulated());
+    let draft = settings::dump(&mut client).unwrap();
+    assert_eq!(draft.axes[1].feedback.pid.kp_v_per_mm, 0.5);
+    settings::apply(&mut client).unwrap();
+    assert!(client.test_axis(AxisName::X, travel).is_ok());
+}
+
+#[test]
 fn what_is_loaded_is_what_acts_parts_and_lists_included() {
     let (mut client, bench) = connected();
     let mut wanted = StageSettings::simulated();
@@ -44,7 +81,9 @@ fn what_is_loaded_is_what_acts_parts_and_lists_included() {
     wanted.axes[1].feedback.pid.kp_v_per_mm = 1.0 / 3.0;
     let loaded = settings::load(&mut client, &wanted).unwrap();
     assert_eq!(bench.borrow().in_force, wanted);
-    let changed = [AxisName::X, AxisName::Y].into_iter().collect::<AxisSet>();
+    let changed = [message::AxisName::X, message::AxisName::Y]
+        .into_iter()
+        .collect::<AxisSet>();
     assert_eq!(loaded.applied.changed, changed);
     assert_eq!(loaded.changed.len(), 4, "{:?}", loaded.changed);
     assert!(loaded.left.is_empty());
@@ -76,6 +115,19 @@ fn what_the_machine_refuses_is_reverted() {
     assert_eq!(
         settings::dump(&mut client).unwrap(),
         StageSettings::simulated()
+    );
+}
+
+/// The machine checks them before it answers, in software where it knows no double precision.
+#[test]
+fn settings_have_time_to_be_checked() {
+    let (mut client, bench) = connected();
+    settings::set(&mut client, "/axes/0/feedback/pid/kp_v_per_mm", "0.5").unwrap();
+    bench.borrow_mut().answer_after_ms = 4000;
+    settings::apply(&mut client).unwrap();
+    assert_eq!(
+        bench.borrow().in_force.axes[0].feedback.pid.kp_v_per_mm,
+        0.5
     );
 }
 

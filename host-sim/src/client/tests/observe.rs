@@ -3,16 +3,16 @@
 use std::time::Duration;
 
 use quadrant::link::message::AxisName;
-use quadrant::link::message::Body;
 use quadrant::link::message::Trigger;
 use quadrant::link::message::{AxisSignal, Channel, StageSignal};
+use quadrant::link::message::{Body, SetPoint};
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::connected;
-use crate::client::columns;
 use crate::client::samples::{Samples, TelemetryRecorder, arm, least_decimation, read_capture};
 use crate::client::set_points::{set_points, stream};
 use crate::client::test_axis::ConnectedAxis;
+use crate::client::{ClientError, columns};
 use crate::gcode::{Limits, Program, Trajectory};
 use crate::machine::{Drive, Experiment, TestAxis};
 use crate::record::{AxisLimits, Record};
@@ -199,6 +199,32 @@ fn a_program_arrives_whole_in_order_and_ends_at_rest() {
         let target = expected[axis] + [10.0, 0.0, -1.0][axis];
         assert!((end.position_mm - target).abs() < 1e-9);
     }
+}
+
+#[test]
+fn a_stream_that_fails_is_closed_and_one_that_did_not_begin_is_not() {
+    let (mut client, bench) = connected();
+    let points = [SetPoint::default(); 100];
+    // The outputs are off: somebody else's motion is not to be stopped.
+    let refused = stream(&mut client, &points, 20, &mut |_, _| Ok(()));
+    assert!(refused.is_err());
+    let asked = |name| {
+        bench
+            .borrow()
+            .requests
+            .iter()
+            .filter(|it| **it == name)
+            .count()
+    };
+    assert_eq!(asked("stream"), 1);
+    client.order(Body::Enable).unwrap();
+    let error = stream(&mut client, &points, 20, &mut |_, sent| {
+        assert!(sent < points.len());
+        Err(ClientError::Moving)
+    });
+    assert!(matches!(error, Err(ClientError::Moving)), "{error:?}");
+    let status = client.status().unwrap();
+    assert!(!status.running, "the stream is open still");
 }
 
 #[test]

@@ -9,8 +9,8 @@ use quadrant::link::message::MachineState;
 use quadrant::link::message::{Body, Event, LinkError, Message, Notice, Reply, Response};
 
 use super::connected;
-use crate::client::settle;
 use crate::client::{Client, ClientError};
+use crate::client::{settings, settle};
 use crate::machine::Transport;
 
 fn count(requests: &[&str], name: &str) -> usize {
@@ -48,6 +48,25 @@ fn a_request_that_may_be_repeated_survives_lost_answers() {
     bench.borrow_mut().lose_answers = 3;
     client.order(Body::Disable).unwrap();
     assert_eq!(count(&bench.borrow().requests, "disable"), 4);
+}
+
+/// It would end the motion of a host that is silent for half a second.
+#[test]
+fn a_machine_that_is_long_at_an_answer_hears_its_host_if_that_moves_it() {
+    let (mut client, bench) = connected();
+    let apply = |client: &mut Client| {
+        bench.borrow_mut().answer_after_ms = 2000;
+        bench.borrow_mut().requests.clear();
+        settings::apply(client).unwrap();
+        let asked = count(&bench.borrow().requests, "status");
+        // What came late is no answer to what comes next.
+        assert!(client.fault().unwrap().is_none());
+        asked
+    };
+    assert_eq!(apply(&mut client), 0);
+    client.order(Body::Enable).unwrap();
+    client.order(Body::Run).unwrap();
+    assert!(apply(&mut client) >= 6);
 }
 
 /// Somebody at the machine may have switched off meanwhile.

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use quadrant::control::filter::FilterSettings;
 use quadrant::control::npid::NonlinearGain;
 use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
@@ -12,7 +13,7 @@ use crate::design::pages::pid::{step_name, step_table};
 use crate::design::robustness::Robustness;
 use crate::design::step_response::{StepProperties, StepResponse};
 use crate::design::time_varying::{Destabiliser, Switching};
-use crate::design::{ContinuousLoop, OpenLoop};
+use crate::design::{Form, OpenLoop, Process};
 use crate::pages::{columns, lines, series};
 use crate::report::{Block, Cell, Colour, Page, Provenance, Section, Style, Table};
 
@@ -24,6 +25,8 @@ pub struct NonlinearPage {
     /// The model, its hold included in the delay as the proof counts it.
     pub plant: PlantModel,
     pub gains: PidGains,
+    /// Filters behind the law.
+    pub filters: Vec<FilterSettings>,
     pub proof: SectorProof,
     pub gain: NonlinearGain,
     /// The smallest destabilising gain of a search.
@@ -162,10 +165,8 @@ impl NonlinearPage {
 
     /// The Popov plot with its line (thesis, Fig 4.9).
     fn popov_block(&self) -> Block {
-        let open_loop = ContinuousLoop {
-            plant: self.plant,
-            gains: self.gains,
-        };
+        let process = Process::filtered(self.plant, &self.filters);
+        let open_loop = process.open_loop(&self.gains, Form::Continuous);
         let (mut real, mut imaginary) = (Vec::new(), Vec::new());
         for index in 0..3000 {
             let omega = TAU * 10.0_f64.powf(f64::from(index) / 3000.0 * 3.5);

@@ -5,7 +5,7 @@ use std::ops::Range;
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 
 use super::estimate::{Estimate, Estimator, estimates};
-use crate::identify::excitation::{Excitation, Waveform};
+use crate::identify::excitation::{Excitation, NoLine, Waveform};
 use crate::identify::setting::SettingError;
 use crate::machine::{
     Drive, Experiment, ExperimentError, Sides, TestAxis, approach, approach_from,
@@ -65,6 +65,9 @@ pub enum FrfError {
     /// A setting that cannot be.
     #[error(transparent)]
     Setting(#[from] SettingError),
+    /// A band without a line.
+    #[error(transparent)]
+    NoLine(#[from] NoLine),
     /// The travel does not allow a pass at this velocity.
     #[error(
         "a pass at {velocity_mm_s} mm/s needs {needed_mm:.0} mm of travel for a single period of {period_s} s, and there are \
@@ -189,7 +192,7 @@ impl FrfSettings {
             let expected = "an axis moves at constant velocity under feedback only";
             return refuse("bias velocity", self.bias_velocity_mm_s, expected);
         }
-        Ok(())
+        Ok(self.excitation.check_lines()?)
     }
 }
 

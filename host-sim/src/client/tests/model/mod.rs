@@ -29,6 +29,8 @@ pub(super) struct Bench {
     pub(super) lose_answers: u32,
     /// Bytes that the line adds before each answer.
     pub(super) noise: Vec<u8>,
+    /// Time for which the next answer is held back, ms.
+    pub(super) answer_after_ms: u32,
     /// The next exchange restarts the machine.
     pub(super) restart: bool,
     /// The fault that the next exchange finds.
@@ -227,6 +229,11 @@ impl SimulatedPeer for Model {
             }
             drop(bench);
             self.put(&Message::Response(response));
+        }
+        let mut bench = self.bench.borrow_mut();
+        if bench.answer_after_ms > 0 && !self.outbox.is_empty() {
+            bench.answer_after_ms -= 1;
+            return Ok(Vec::new());
         }
         Ok(std::mem::take(&mut self.outbox))
     }
