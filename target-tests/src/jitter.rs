@@ -148,6 +148,7 @@ fn drive(mut fixture: Fixture, tracer: &mut Tracer) -> Result<()> {
     })?;
     fixture.inject(Box::new(|input, _, _| input.request = Some(Command::Run)));
     let from = fixture.tick() + SETTLING;
+    let before = fixture.sent();
     while fixture.tick() < from + TICKS + 1 {
         if fixture.tick() == from {
             tracer.trace()?;
@@ -155,6 +156,7 @@ fn drive(mut fixture: Fixture, tracer: &mut Tracer) -> Result<()> {
         load::flood(&mut fixture)?;
         fixture.run(1)?;
     }
+    load::ensure_flooded(&fixture, before, TICKS)?;
     ensure!(
         fixture.outputs(from).is_some_and(|outputs| outputs.enabled),
         "the outputs went off"

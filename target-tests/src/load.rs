@@ -1,6 +1,6 @@
 //! Load on the firmware's link and capture.
 
-use anyhow::{Result, anyhow};
+use anyhow::{Result, anyhow, ensure};
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{
     AxisName, AxisSignal, Body, Channel, MAX_CHANNELS, Request, TelemetryRequest,
@@ -30,6 +30,16 @@ pub(crate) fn flood(fixture: &mut Fixture) -> Result<()> {
         let bytes = requests_and_garbage(fixture.tick())?;
         fixture.send_bytes(&bytes);
     }
+    Ok(())
+}
+
+/// Returns an error unless the firmware has taken a byte and more a tick since `before` of them had been [sent](Fixture::sent).
+pub(crate) fn ensure_flooded(fixture: &Fixture, before: u32, ticks: u32) -> Result<()> {
+    let taken = fixture.sent().wrapping_sub(before);
+    ensure!(
+        taken > ticks,
+        "only {taken} bytes in {ticks} ticks are no load"
+    );
     Ok(())
 }
 

@@ -188,6 +188,7 @@ fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
         fixture.inject(Box::new(|input, _, _| input.request = Some(Command::Run)));
     }
     ensure!(fixture.tick() < LOADED, "tick {} already", fixture.tick());
+    let before = fixture.sent();
     while fixture.tick() < FROM + TICKS + 1 {
         if fixture.tick() == FROM {
             tracer.trace()?;
@@ -196,6 +197,9 @@ fn drive(mut fixture: Fixture, tracer: &mut Tracer, load: Load) -> Result<()> {
             load::flood(&mut fixture)?;
         }
         fixture.run(1)?;
+    }
+    if load.flood {
+        load::ensure_flooded(&fixture, before, TICKS)?;
     }
     fixture.end().map(drop)
 }
