@@ -29,6 +29,8 @@ use crate::link_traffic::{self, arrival, framed};
 const BACKLOG: usize = 1_000;
 /// Requests to start afresh of which one is sent: each start takes memory for good.
 const RESTARTS: u64 = 1_000;
+/// Factors of plausible velocities.
+const SLOWER: [f64; 6] = [1.0, 1.0, 1e-3, 1e-6, 1e-12, f64::MIN_POSITIVE];
 
 /// Requests that whole frames may make.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -211,16 +213,18 @@ fn forged(payload: &[u8]) -> Vec<u8> {
 
 /// Makes of a request one that a machine may well take.
 fn plausible(body: Body, noise: &mut Noise, paths: &[String]) -> Body {
+    // A velocity may be so small that nothing that takes its time holds it.
+    let slow = SLOWER[noise.below(SLOWER.len() as u64) as usize];
     let mut value = |most: f64| noise.counts(1_000) as f64 / 1_000.0 * most;
     match body {
         Body::Move { axis, .. } => Body::Move {
             axis,
             target_mm: value(20.0),
-            velocity_mm_s: value(60.0),
+            velocity_mm_s: slow * value(60.0),
         },
         Body::Jog { axis, .. } => Body::Jog {
             axis,
-            velocity_mm_s: value(60.0),
+            velocity_mm_s: slow * value(60.0),
         },
         Body::Home(axes) if axes.is_empty() => Body::Home(AxisSet::ALL),
         Body::Stream(StreamRequest::Open { period_ticks }) => Body::Stream(StreamRequest::Open {

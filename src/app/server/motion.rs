@@ -148,17 +148,16 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 "a motion is under way; stop it before the plan is exchanged"
             )));
         }
-        let plan = PlanSettings::from(plan);
-        plan.validate(&self.source.bounds())
-            .map_err(|error| invalid(format_args!("{error}")))?;
-        self.hand_over(&plan)?;
+        self.hand_over(&PlanSettings::from(plan))?;
         self.defer(Work::Plan)
     }
 
-    /// Lays motions where control takes them from when it is ordered to.
+    /// Lays motions that keep to the bounds where control takes them from when it is ordered to.
     #[inline(never)]
     fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
         let bounds = self.source.bounds();
+        plan.validate(&bounds)
+            .map_err(|error| invalid(format_args!("{error}")))?;
         let plan = PerAxis::from_fn(|axis| {
             Motion::build(&plan.motions[index(axis)], bounds.scale_of(axis))
         });
