@@ -281,3 +281,26 @@ fn a_request_that_cannot_be_followed_is_refused_with_its_reason() {
         assert_eq!(refused(&rig, command), Some(Refusal::NotEnabled));
     }
 }
+
+#[test]
+fn a_stream_that_meets_another_one_ends_both_without_a_jump() {
+    let mut rig = enabled(&StageSettings::simulated(), &PlanSettings::default());
+    let mut segments = stream(500);
+    segments.truncate(250);
+    segments.extend(stream(500));
+    let mut feed = Feed::new(segments);
+    feed.serve(&mut rig);
+    rig.command(Command::StartStream);
+    let mut displacement = Position::ZERO;
+    let mut position = Position::ZERO;
+    for tick in 0..4_000 {
+        feed.serve(&mut rig);
+        follow(&mut rig, 1);
+        let x = rig.state.axes()[0].reference();
+        let change = (x - position - displacement).to_mm(5e-4) * 1e4;
+        assert!(change.abs() <= 0.4 + 0.001, "{change} at {tick}");
+        (position, displacement) = (x, x - position);
+    }
+    let fault = rig.state.safety().fault().expect("latched");
+    assert_eq!(fault.code, FaultCode::StreamUnderrun);
+}

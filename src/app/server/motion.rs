@@ -27,8 +27,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             Body::Disable => self.command(Command::Disable)?,
             Body::ResetFault => self.command(Command::ResetFault)?,
             Body::Stop => {
-                self.stream = None;
                 self.command(Command::Stop)?;
+                self.stream = None;
                 self.give_up_injection();
             }
             Body::Run => self.command(Command::Run)?,
