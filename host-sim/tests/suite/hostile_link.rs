@@ -82,10 +82,10 @@ struct Tally {
     moved_unasked: u64,
 }
 
-struct Bench {
-    running: Running<f32>,
+pub(crate) struct Bench {
+    pub(crate) running: Running<f32>,
     plant: SimulatedStage,
-    settings: StageSettings,
+    pub(crate) settings: StageSettings,
     line: Line,
     /// Hears what a port hears.
     ear: LinkServer,
@@ -114,6 +114,11 @@ fn starts_a_motion(body: &Body) -> bool {
 
 impl Bench {
     fn new() -> Self {
+        Self::with(|_| {})
+    }
+
+    /// A bench with a change to its settings.
+    pub(crate) fn with(change: impl FnOnce(&mut StageSettings)) -> Self {
         let mut settings = identified_settings().expect("the committed settings").stage;
         for (axis, default) in settings
             .axes
@@ -123,6 +128,7 @@ impl Bench {
             axis.homing = default.homing;
             axis.limits.travel_mm = default.limits.travel_mm;
         }
+        change(&mut settings);
         Self {
             running: start(&settings),
             plant: SimulatedStage::new(&StageParameters::real(), settings.rate_hz, 1),
@@ -136,7 +142,7 @@ impl Bench {
     }
 
     /// Sends bytes, and runs the machine until it has read most of what was sent.
-    fn send(&mut self, bytes: &[u8]) {
+    pub(crate) fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
             let (enable, motion, heard) = (
                 &mut self.asked_to_enable,
@@ -157,7 +163,7 @@ impl Bench {
         }
     }
 
-    fn tick(&mut self) {
+    pub(crate) fn tick(&mut self) {
         let inputs = self.plant.read_inputs(None);
         let (outputs, after) = self.running.tick(&inputs, &mut self.line);
         self.plant.step(&outputs);
@@ -199,7 +205,7 @@ impl Bench {
     }
 }
 
-fn whole(body: Body) -> Vec<u8> {
+pub(crate) fn whole(body: Body) -> Vec<u8> {
     [vec![frame::DELIMITER], framed(&Request { id: 7, body })].concat()
 }
 
