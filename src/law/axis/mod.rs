@@ -1225,7 +1225,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let base = total + state.telemetry.bumpless_offset + state.injected;
         let mut feedback = self.feed_back(&mut state.feedback, input, base);
         feedback.output = self.filters.step(&mut state.filters, feedback.output);
-        let output = (feedback.output + base).within(self.amplifier.limit);
+        let mut output = feedback.output + base;
+        if !output.is_within(self.amplifier.limit) {
+            cold_path();
+            output = output.within(self.amplifier.limit);
+            // The law keeps to the limit; filters behind it may not.
+            feedback.saturated = true;
+        }
         let seen = &mut state.telemetry;
         seen.feedback = feedback;
         seen.bumpless_offset = seen
