@@ -139,6 +139,34 @@ fn enable_waits_for_the_settings_that_were_applied_before_it() {
 }
 
 #[test]
+fn the_link_stays_open_when_the_operator_enables_before_the_settings_are_built() {
+    let mut changed = settings();
+    changed.axes[1].limits.max_velocity_mm_s = 100.0;
+    let mut tasks = Tasks::new(&settings(), 1);
+    let first = tasks.send(&[
+        slower(),
+        set("/axes/1/limits/max_velocity_mm_s", &changed),
+        Body::Settings(SettingsRequest::Apply),
+    ]);
+    tasks.upper.borrow_mut().operate(Command::Enable);
+    tasks.run(40);
+    assert!(matches!(
+        tasks.answers.get(&(first + 2)),
+        Some(Ok(Reply::Applied(_)))
+    ));
+    assert!(tasks.upper.borrow().outputs.enabled);
+    assert_eq!(tasks.ask(Body::Enable), Ok(Reply::Done));
+    tasks.ask(Body::Status).expect("answers");
+    // The settings come when the outputs are off.
+    tasks.ask(Body::Disable).expect("disables");
+    assert_eq!(tasks.ask(Body::Enable), Ok(Reply::Done));
+    tasks.run(40);
+    assert!(tasks.upper.borrow().outputs.enabled);
+    let upper = tasks.upper.borrow();
+    assert_eq!((upper.driven_while_busy, upper.guarded), (0, 0));
+}
+
+#[test]
 fn settings_that_may_change_while_driven_act_and_leave_the_outputs_on() {
     let mut tasks = enabled();
     let mut changed = settings();

@@ -64,9 +64,10 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         Ok(Reply::Done)
     }
 
-    /// True while settings that safety depends on are being built: control does not enable before it has them all.
+    /// True while settings that safety depends on are being built: control does not enable before it has them all. If it
+    /// drives already, because the operator was quicker, they wait until the outputs are off.
     pub(super) fn must_wait_to_enable(&self) -> bool {
-        self.needs_disabled && !self.pending.is_empty()
+        self.needs_disabled && !self.pending.is_empty() && !self.seen.view.safety.drives()
     }
 
     /// Enables the outputs.
