@@ -42,13 +42,14 @@ pub struct Control<'q, 'a, S: Scalar> {
 }
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
-    /// Returns the fast half before the first tick.
+    /// Returns the fast half before the first tick, for a control rate.
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
     pub fn new(
         axes: PerAxis<&'a mut Axis<S>>,
         operation: Operation,
         plan: Plan<S>,
+        rate_hz: u32,
         ends: ControlEnds<'q, 'a, S>,
     ) -> Self {
         Self {
@@ -66,7 +67,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             place: 0,
             orders: 0,
             plan_taken: false,
-            host: HostNeed::default(),
+            host: HostNeed::new(rate_hz),
             ends,
         }
     }

@@ -1,6 +1,5 @@
 //! Requests of a host on their whole way: from the link through server and queues to the tick, and back.
 
-use quadrant::app::LINK_TIMEOUT_TICKS;
 use quadrant::command::Command;
 use quadrant::link::message::{
     AxisName, AxisPoint, AxisSet, AxisSignal, Body, CapturePhase, CaptureRequest, CaptureStatus,
@@ -10,7 +9,7 @@ use quadrant::motion::MotionMode;
 use quadrant::safety::{AxisSwitches, FaultCode, HostNeeded, Switches};
 use quadrant_fault_bench::tasks::Tasks;
 
-use crate::preemption::{safety, settings};
+use crate::preemption::{LINK_TIMEOUT_TICKS, safety, settings};
 
 fn enabled(tasks: &mut Tasks) {
     tasks.ask(Body::Enable).expect("enables");

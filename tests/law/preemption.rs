@@ -1,6 +1,6 @@
 //! The tasks' agreements in every interleaving of them: nothing is decided on a state that has passed.
 
-use quadrant::app::LINK_TIMEOUT_TICKS;
+use quadrant::app::link_timeout_ticks;
 use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::link::frame::{self, FRAME_BYTES};
@@ -14,6 +14,9 @@ use quadrant::settings::StageSettings;
 use crate::common::Noise;
 use quadrant_fault_bench::flash::Flash;
 use quadrant_fault_bench::tasks::Tasks;
+
+/// The host counts as lost after so long.
+pub(crate) const LINK_TIMEOUT_TICKS: u32 = link_timeout_ticks(10_000);
 
 /// Settings that are soon checked: without a plant there is no bound to search.
 pub(crate) fn settings() -> StageSettings {
