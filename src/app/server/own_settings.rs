@@ -193,6 +193,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
             .map(Into::into)
             .collect();
         self.pending = changed;
+        self.changed = changed;
         self.needs_disabled = safety.is_some();
         Ok(Reply::Applied(Applied {
             changed,
@@ -246,7 +247,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
                     .collect();
                 if self.pending.is_empty() {
                     self.applied = self.applied.wrapping_add(1);
-                    self.push_event(self.seen.tick, Event::SettingsApplied(AxisSet::ALL));
+                    self.push_event(self.seen.tick, Event::SettingsApplied(self.changed));
                 }
             }
             // The control law has not taken the last one: the same axis again at the next poll.
