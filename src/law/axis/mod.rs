@@ -631,7 +631,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.homed
     }
 
-    /// True if the encoder has shown an index pulse since the axis was enabled or homed last.
+    /// True if the encoder has shown an index pulse since the axis was homed last, or since the start.
     pub(crate) fn is_indexed(&self) -> bool {
         self.index.is_seen()
     }
