@@ -205,7 +205,7 @@ pub struct InputRecord {
     pub readings: [EncoderReading; 3],
     /// The digital inputs.
     pub switches: Switches,
-    /// True if the host whose set points the axes follow has fallen silent.
+    /// True if the host that started the motion has fallen silent.
     pub link_lost: bool,
     /// True for converters with a stuck bit; see [`held`].
     pub stuck: [bool; 3],

@@ -199,7 +199,7 @@ mod app {
             tick: board.tick,
             idle: board.idle,
             supervision: Supervision::new(resolution_mm),
-            liveness: Liveness::default(),
+            liveness: Liveness::new(rate_hz),
             requests_in,
             requests_out,
             commands_in,

@@ -42,12 +42,13 @@ pub struct Control<'q, 'a, S: Scalar> {
 }
 
 impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
-    /// Returns the fast half before the first tick.
+    /// Returns the fast half before the first tick, for a control rate.
     #[inline(always)]
     pub fn new(
         axes: PerAxis<&'a mut Axis<S>>,
         operation: Operation,
         plan: Plan<S>,
+        rate_hz: u32,
         ends: ControlEnds<'q, 'a, S>,
     ) -> Self {
         Self {
@@ -65,7 +66,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             place: 0,
             orders: 0,
             plan_taken: false,
-            host: HostNeed::default(),
+            host: HostNeed::new(rate_hz),
             ends,
         }
     }
@@ -205,6 +206,20 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             },
         };
         *given = command.filter(|command| *command != Command::Enable || !self.exchanging);
+        if *given == Some(Command::Stop) {
+            self.drop_stream_items();
+        }
+    }
+
+    /// Drops what waits of a stream or of an injection, so that none of it comes before what is sent after a stop.
+    #[cold]
+    #[inline(never)]
+    fn drop_stream_items(&mut self) {
+        self.place = 0;
+        // As many as wait now: the server may be adding more.
+        for _ in 0..self.ends.stream_items.len() {
+            let _ = self.ends.stream_items.dequeue();
+        }
     }
 
     /// Acts on an order of the server; returns the command that it is or brings about.

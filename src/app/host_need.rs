@@ -9,16 +9,19 @@ use crate::law::safety::HostNeeded;
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, StageState};
 
-/// Ticks without a valid request after which a host counts as lost: 0.5 s at 10 kHz.
-pub const LINK_TIMEOUT_TICKS: u32 = 5_000;
+/// Ticks without a valid request after which a host counts as lost: half a second.
+pub const fn link_timeout_ticks(rate_hz: u32) -> u32 {
+    rate_hz / 2
+}
 
 /// Bits of all axes.
 const AXES: u8 = 0b111;
 
 /// The motions that need their host, and how long it has been silent. Kept by the control interrupt, so that no other task
 /// can keep it from ending them.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) struct HostNeed {
+    timeout_ticks: u32,
     /// A bit for each axis.
     motions: u8,
     /// Valid requests so far.
@@ -28,6 +31,16 @@ pub(super) struct HostNeed {
 }
 
 impl HostNeed {
+    /// No motion, at a control rate.
+    pub(super) const fn new(rate_hz: u32) -> Self {
+        Self {
+            timeout_ticks: link_timeout_ticks(rate_hz),
+            motions: 0,
+            frames: 0,
+            silent: 0,
+        }
+    }
+
     /// Takes the number of valid requests so far.
     #[inline(always)]
     pub(super) fn hear(&mut self, frames: u32) {
@@ -48,7 +61,7 @@ impl HostNeed {
     /// True if a motion needs its host, and it is silent.
     #[inline(always)]
     pub(super) const fn is_lost(&self) -> bool {
-        self.is_needed() && self.silent > LINK_TIMEOUT_TICKS
+        self.is_needed() && self.silent > self.timeout_ticks
     }
 
     /// Takes note of a command of the host.

@@ -42,7 +42,7 @@ pub use change_detector::{ChangeDetector, MAX_STATE_CHANGES, StateChange};
 pub use control::Control;
 
 pub use crate::law::stage::Inputs;
-pub use host_need::LINK_TIMEOUT_TICKS;
+pub use host_need::link_timeout_ticks;
 pub use intake::{Intake, Received};
 pub use liveness::Liveness;
 pub use queues::{ControlEnds, IntakeEnds, Queues, ServerEnds};

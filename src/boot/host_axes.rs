@@ -34,6 +34,7 @@ pub(crate) fn machine<S: Scalar>(
         [x, y, z],
         Operation::default(),
         plan,
+        RATE_HZ,
         control_ends,
     );
     control.start_unloaded();

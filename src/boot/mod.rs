@@ -71,9 +71,10 @@ fn place_control<S: Scalar>(
     axes: [&'static mut Axis<S>; 3],
     operation: Operation,
     plan: Plan<S>,
+    rate_hz: u32,
     ends: ControlEnds<'static, 'static, S>,
 ) -> &'static mut Control<'static, 'static, S> {
-    place.write(Control::new(axes.into(), operation, plan, ends))
+    place.write(Control::new(axes.into(), operation, plan, rate_hz, ends))
 }
 
 /// Makes the slow half in its place.

@@ -61,7 +61,14 @@ pub(crate) fn machine<S: Scalar>(
         .map(|axis| axis.encoder.resolution_mm);
     let operation = settings.operation();
     let (control_ends, intake_ends, ends) = storage.queues.split();
-    let control = place_control(&mut storage.control, axes, operation, plan, control_ends);
+    let control = place_control(
+        &mut storage.control,
+        axes,
+        operation,
+        plan,
+        rate_hz,
+        control_ends,
+    );
     let invalid = invalid.then_some(FaultCode::SettingsInvalid);
     for code in [crashed, invalid].into_iter().flatten() {
         control.start_faulted(code);

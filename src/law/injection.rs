@@ -7,6 +7,7 @@
 
 use crate::law::axes::AxisName;
 use crate::law::safety::FaultCode;
+use crate::law::safety::monitor::speed_limit;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::Position;
 
@@ -99,7 +100,7 @@ impl<S: Scalar> Injection<S> {
             coupling,
             volts: S::gain(volts_per_word, Quantity::Integer, Quantity::Voltage),
             travel,
-            max_speed: libm::round(256.0 * (counts_per_tick + 0.5)) as u32,
+            max_speed: speed_limit(counts_per_tick),
         }
     }
 

@@ -168,17 +168,17 @@ impl<S: Scalar> GeneratorState<S> {
         self.mode
     }
 
-    /// Ends whatever is followed.
+    /// Ends whatever is followed or waits to begin.
     #[inline(always)]
     pub(crate) fn hold(&mut self) {
         self.mode = MotionMode::Hold;
+        self.waiting = 0;
     }
 
-    /// Holds, and forgets what waits. The memory of a motion is made anew when it starts.
+    /// Holds, and forgets what is there of a stream. The memory of a motion is made anew when it starts.
     #[inline(always)]
     pub(crate) fn reset(&mut self) {
         self.hold();
-        self.waiting = 0;
         self.stream.clear();
     }
 }
@@ -252,6 +252,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
         state.ramp = self
             .stop_ramp
             .take_over(from.position, from.displacement, from.before);
+        state.waiting = 0;
         state.stopping = 0;
         state.mode = MotionMode::Stopping;
     }
@@ -295,7 +296,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
         if state.waiting > 0 {
             state.waiting -= 1;
             if state.mode == MotionMode::Plan && motion.finished(&state.motion) {
-                state.mode = MotionMode::Hold;
+                state.hold();
             }
             return (standing, GeneratorEvent::None);
         }

@@ -49,7 +49,7 @@ pub struct Inputs {
     pub settings_changed: PerAxis<bool>,
     /// This tick began late, or the last one ended after its deadline.
     pub deadline_missed: bool,
-    /// The signal of the host whose set points the axes follow is lost.
+    /// The host that started the motion has fallen silent.
     pub link_lost: bool,
 }
 

@@ -17,6 +17,9 @@ pub const POSITION_FRACTION_BITS: u32 = 16;
 /// Units of [`Position`] per encoder count, 2^16.
 pub const POSITION_UNITS_PER_COUNT: f64 = 65536.0;
 
+/// Largest velocity that a reference may be allowed, mm/s.
+pub const FASTEST_MM_S: f64 = 1e3;
+
 /// A position or a displacement in 2^-16 encoder counts. It holds +-1.4e14 counts, 70 000 km of half micrometres: sums
 /// and differences of what a machine can reach do not wrap, and the encoder's own sum saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]

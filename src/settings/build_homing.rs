@@ -8,7 +8,7 @@ use crate::law::reference::{Approach, MotionScale, Velocity};
 use crate::law::rounding;
 use crate::law::safety::AxisSwitches;
 use crate::law::scalar::Scalar;
-use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
+use crate::law::units::{EncoderCount, POSITION_UNITS_PER_COUNT, Position};
 
 /// Rest of an axis before its origin is defined, s: many times the longest preview at the usual control rates.
 const SETTLE_S: f64 = 0.02;
@@ -40,7 +40,7 @@ impl AxisSettings {
             creep_velocity: Velocity::from_mm_s(homing.latch_mm_s.min(search_mm_s), scale),
             debounce_ticks: rounding::round(homing.debounce_s * scale.rate_hz) as u32,
             settle_ticks: rounding::round(SETTLE_S * scale.rate_hz) as u32,
-            index_spacing: spacing.map(|counts| Position(i64::from(counts) << 16)),
+            index_spacing: spacing.map(|counts| EncoderCount(counts.into()).position()),
             home_offset: Position(whole_counts as i64),
             parking: Position::from_mm(park_mm, resolution_mm),
             travel: Position::from_mm(homing.travel_mm, resolution_mm),

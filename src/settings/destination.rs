@@ -90,8 +90,8 @@ impl StageSettings {
 
 impl StageBounds {
     /// The move of a homed axis from rest at `from` to `target_mm` at `velocity_mm_s`, within the axis' acceleration and
-    /// jerk. Hand it to the axis as its plan's motion and start it with
-    /// [`Command::StartMove`](crate::law::command::Command::StartMove).
+    /// jerk. [`PlanSettings::validate`](super::PlanSettings::validate) refuses one that takes too long. Hand it to the axis as its
+    /// plan's motion and start it with [`Command::StartMove`](crate::law::command::Command::StartMove).
     ///
     /// # Errors
     /// The axis is not homed, the target beyond its travel, or the velocity out of its range.

@@ -53,7 +53,7 @@ pub struct BrakeSettings {
     pub apply_s: f64,
 }
 
-/// Reactions of the stage while a host streams set points.
+/// Reactions of the stage while a host moves the axes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
 pub struct StreamingSettings {

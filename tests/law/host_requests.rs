@@ -1,6 +1,5 @@
 //! Requests of a host on their whole way: from the link through server and queues to the tick, and back.
 
-use quadrant::app::LINK_TIMEOUT_TICKS;
 use quadrant::command::Command;
 use quadrant::link::message::{
     AxisName, AxisPoint, AxisSet, AxisSignal, Body, CapturePhase, CaptureRequest, CaptureStatus,
@@ -10,7 +9,7 @@ use quadrant::motion::MotionMode;
 use quadrant::safety::{AxisSwitches, FaultCode, HostNeeded, Switches};
 use quadrant_fault_bench::tasks::Tasks;
 
-use crate::preemption::{safety, settings};
+use crate::preemption::{LINK_TIMEOUT_TICKS, safety, settings};
 
 fn enabled(tasks: &mut Tasks) {
     tasks.ask(Body::Enable).expect("enables");
@@ -61,6 +60,83 @@ fn a_stream_moves_the_axis_to_its_last_point() {
     let upper = tasks.upper.borrow();
     assert!(!upper.state().is_running());
     assert_eq!(upper.snapshot().axes[0].measured.0, 2000);
+}
+
+/// A set point of x at rest.
+fn at_rest(position_mm: f64) -> SetPoint {
+    let mut point = SetPoint::default();
+    point.axes[0].position_mm = position_mm;
+    point
+}
+
+/// Set points of x at rest, as a request.
+fn points(sequence: u32, positions_mm: &[f64], last: bool) -> Body {
+    Body::Stream(StreamRequest::Points {
+        sequence,
+        points: positions_mm.iter().copied().map(at_rest).collect(),
+        last,
+    })
+}
+
+fn open() -> Body {
+    Body::Stream(StreamRequest::Open { period_ticks: 1000 })
+}
+
+/// Runs until the axes rest; returns the least and the largest measured count of x.
+fn span_of_x(tasks: &mut Tasks) -> (i64, i64) {
+    let mut span = (0, 0);
+    for _ in 0..6000 {
+        tasks.step();
+        let x = tasks.upper.borrow().snapshot().axes[0].measured.0;
+        span = (span.0.min(x), span.1.max(x));
+    }
+    assert!(!tasks.upper.borrow().state().is_running());
+    span
+}
+
+#[test]
+fn a_stream_takes_the_place_of_one_that_never_began() {
+    let mut tasks = Tasks::new(&settings(), 1);
+    enabled(&mut tasks);
+    tasks.ask(open()).expect("opens");
+    tasks
+        .ask(points(0, &[0.5, 1.0, 1.5], false))
+        .expect("takes the points");
+    // Set points that are refused end nothing, and the client begins anew.
+    assert!(tasks.ask(points(3, &[900.0], false)).is_err());
+    tasks.ask(open()).expect("opens");
+    tasks
+        .ask(points(0, &[-0.5, -1.0], true))
+        .expect("takes the points");
+    assert_eq!(span_of_x(&mut tasks), (-2000, 0));
+}
+
+#[test]
+fn a_stream_that_was_closed_leaves_nothing_to_one_that_follows_at_once() {
+    for close in [Body::Stream(StreamRequest::Close), Body::Stop] {
+        let mut tasks = Tasks::new(&settings(), 1);
+        enabled(&mut tasks);
+        tasks.ask(open()).expect("opens");
+        tasks
+            .ask(points(0, &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6], false))
+            .expect("takes the points");
+        let first = tasks.send(&[
+            close,
+            open(),
+            points(0, &[0.1, 0.2, 0.3, 0.4, 0.5, 0.6], false),
+            open(),
+            points(0, &[-0.5, -1.0], true),
+        ]);
+        let span = span_of_x(&mut tasks);
+        for id in first..first + 5 {
+            assert!(
+                matches!(tasks.answers.get(&id), Some(Ok(_))),
+                "{id}: {:?}",
+                tasks.answers.get(&id)
+            );
+        }
+        assert_eq!(span, (-2000, 0));
+    }
 }
 
 #[test]

@@ -8,8 +8,9 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
+use quadrant::motion::MotionMode;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::{PlanSettings, Reason, StageSettings};
+use quadrant::settings::{InjectionSettings, PlanSettings, Reason, StageSettings};
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 use quadrant_fault_bench::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
@@ -391,6 +392,62 @@ fn what_was_learnt_outlives_disabling_and_ends_with_other_settings() {
     axis.rig.inputs.settings_changed[AxisName::X] = true;
     axis.tick();
     assert_eq!(axis.scale(), 1.0);
+}
+
+/// An axis that has learnt and rests, its loop opened with no voltage.
+fn opened() -> Axis<f32> {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
+    axis.command(Command::Run);
+    axis.run(5.0);
+    assert!(axis.scale() > 1.4, "{}", axis.scale());
+    axis.command(Command::Stop);
+    axis.run(0.5);
+    let request = InjectionSettings {
+        axis: AxisName::X,
+        open_loop: true,
+        with_plan: false,
+        limit_v: 1.0,
+        travel_mm: 10.0,
+        max_velocity_mm_s: 50.0,
+    };
+    let (injection, _) = learning().bounds().injection(&request).expect("within");
+    axis.rig.state.prepare_injection(injection);
+    axis.rig.state.offer_voltage(0, false);
+    axis.command(Command::StartInjection);
+    hold_open(&mut axis, 20, false);
+    assert_eq!(axis.rig.state.axes()[0].mode(), MotionMode::OpenLoop);
+    axis
+}
+
+/// Ticks of the open loop; `last`: it ends with them.
+fn hold_open(axis: &mut Axis<f32>, ticks: u32, last: bool) {
+    for tick in 1..=ticks {
+        if axis.rig.state.wants_voltage() {
+            axis.rig.state.offer_voltage(0, last && tick == ticks);
+        }
+        axis.tick();
+    }
+}
+
+#[test]
+fn other_settings_in_an_open_loop_begin_learning_anew() {
+    let mut axis = opened();
+    axis.rig.inputs.settings_changed[AxisName::X] = true;
+    hold_open(&mut axis, 1, false);
+    assert_eq!(axis.scale(), 1.0);
+}
+
+#[test]
+fn learning_goes_on_after_an_open_loop_as_after_enabling() {
+    let mut axis = opened();
+    let before = axis.scale();
+    hold_open(&mut axis, 1, true);
+    axis.tick();
+    axis.tick();
+    assert_ne!(axis.rig.state.axes()[0].mode(), MotionMode::OpenLoop);
+    // What was learnt stays; the noise that closed the gate is of before.
+    assert_eq!(axis.scale(), before);
+    assert_eq!(axis.rig.state.axes()[0].learning().gate(), 1.0);
 }
 
 #[test]

@@ -281,3 +281,70 @@ fn a_request_that_cannot_be_followed_is_refused_with_its_reason() {
         assert_eq!(refused(&rig, command), Some(Refusal::NotEnabled));
     }
 }
+
+#[test]
+fn a_stream_that_meets_another_one_ends_both_without_a_jump() {
+    let mut rig = enabled(&StageSettings::simulated(), &PlanSettings::default());
+    let mut segments = stream(500);
+    segments.truncate(250);
+    segments.extend(stream(500));
+    let mut feed = Feed::new(segments);
+    feed.serve(&mut rig);
+    rig.command(Command::StartStream);
+    let mut displacement = Position::ZERO;
+    let mut position = Position::ZERO;
+    for tick in 0..4_000 {
+        feed.serve(&mut rig);
+        follow(&mut rig, 1);
+        let x = rig.state.axes()[0].reference();
+        let change = (x - position - displacement).to_mm(5e-4) * 1e4;
+        assert!(change.abs() <= 0.4 + 0.001, "{change} at {tick}");
+        (position, displacement) = (x, x - position);
+    }
+    let fault = rig.state.safety().fault().expect("latched");
+    assert_eq!(fault.code, FaultCode::StreamUnderrun);
+}
+
+/// Ticks from a jog's start to the first motion of the reference of x, which waits for a longer preview.
+fn ticks_until_a_jog_moves(before: impl FnOnce(&mut Rig<f32>)) -> u32 {
+    let mut settings = StageSettings::simulated();
+    let [x, y, _] = &mut settings.axes;
+    (x.feedforward.preview_s, y.feedforward.preview_s) = (0.0, 3e-3);
+    let mut rig = enabled(&settings, &PlanSettings::default());
+    before(&mut rig);
+    let rest = rig.state.axes()[0].reference();
+    let fast = Velocity::from_mm_s(50.0, settings.motion_scale(0));
+    rig.inputs.command = Some(Command::Jog(AxisName::X, fast));
+    let mut ticks = 0;
+    while rig.state.axes()[0].reference() == rest {
+        follow(&mut rig, 1);
+        ticks += 1;
+    }
+    ticks
+}
+
+#[test]
+fn a_jog_begins_at_once_whatever_the_axis_waited_for_before() {
+    let usual = ticks_until_a_jog_moves(|_| {});
+    assert!(usual < 3, "{usual}");
+    let after_a_plan = ticks_until_a_jog_moves(|rig| {
+        // x has nothing to do in it.
+        rig.command(Command::Run);
+        follow(rig, 3);
+        assert!(!rig.state.is_running());
+    });
+    assert_eq!(after_a_plan, usual);
+    let after_a_stop = ticks_until_a_jog_moves(|rig| {
+        let mut feed = Feed::new(stream(500));
+        feed.serve(rig);
+        rig.command(Command::StartStream);
+        rig.command(Command::Stop);
+        for _ in 0..1000 {
+            follow(rig, 1);
+            if !rig.state.is_running() {
+                break;
+            }
+        }
+    });
+    assert_eq!(after_a_stop, usual);
+}

@@ -11,12 +11,9 @@ use quadrant::settings::{EmergencyReaction, StageSettings};
 use quadrant::stage::Outputs;
 
 use crate::common::Rig;
-use crate::preemption::{endless, plan, refused, safety, settings};
+use crate::preemption::{LINK_TIMEOUT_TICKS, endless, plan, refused, safety, settings};
 use crate::safety_faults::{follow, moving};
 use quadrant_fault_bench::tasks::Tasks;
-
-/// The host counts as lost after so long.
-const HOST_TICKS: u32 = 5000;
 
 fn tasks(change: impl FnOnce(&mut StageSettings)) -> Tasks {
     let mut settings = settings();
@@ -89,7 +86,7 @@ fn left_alone(host_needed: HostNeeded, by_host: bool) -> (SafetyState, i64) {
     } else {
         operate(&mut tasks, Command::Run);
     }
-    tasks.run(3 * HOST_TICKS);
+    tasks.run(3 * LINK_TIMEOUT_TICKS);
     let measured = tasks.upper.borrow().snapshot().axes[2].measured.0;
     (safety(&tasks), measured)
 }
@@ -130,7 +127,7 @@ fn a_motion_of_the_operator_needs_no_host_even_after_one_of_the_host() {
     assert!(!tasks.upper.borrow().state().is_running());
     operate(&mut tasks, Command::Run);
     assert!(tasks.upper.borrow().state().is_running());
-    tasks.run(3 * HOST_TICKS);
+    tasks.run(3 * LINK_TIMEOUT_TICKS);
     assert_eq!(safety(&tasks).fault(), None);
     let measured = tasks.upper.borrow().snapshot().axes[2].measured.0;
     assert!(measured >= 2 * PLAN_END, "{measured}");
@@ -144,7 +141,7 @@ fn homing_needs_its_host_too() {
     tasks
         .ask(Body::Home([WireAxis::Y].into_iter().collect()))
         .expect("starts");
-    tasks.run(HOST_TICKS - 500);
+    tasks.run(LINK_TIMEOUT_TICKS - 500);
     assert!(tasks.upper.borrow().state().is_running());
     tasks.run(3000);
     let code = safety(&tasks).fault().map(|fault| fault.code);
@@ -159,7 +156,7 @@ fn homing_goes_on_alone_if_the_settings_say_so() {
     tasks
         .ask(Body::Home([WireAxis::Y].into_iter().collect()))
         .expect("starts");
-    tasks.run(2 * HOST_TICKS);
+    tasks.run(2 * LINK_TIMEOUT_TICKS);
     assert!(tasks.upper.borrow().state().is_running());
 }
 
@@ -177,10 +174,10 @@ fn a_host_is_lost_half_a_second_after_the_tick_that_heard_it_last() {
     // Received by the run of the supervising task in tick `heard` - 1, and counted by the next.
     let heard = tasks.tick() + 10;
     tasks.send(&[Body::Status]);
-    tasks.run(2 * HOST_TICKS);
+    tasks.run(2 * LINK_TIMEOUT_TICKS);
     let fault = safety(&tasks).fault().expect("latched");
     assert_eq!(fault.code, FaultCode::LinkLost);
-    assert_eq!(fault.tick - heard, HOST_TICKS + 1);
+    assert_eq!(fault.tick - heard, LINK_TIMEOUT_TICKS + 1);
 }
 
 /// An injection of a few values with the plan, and then nobody asks anything.
@@ -220,7 +217,7 @@ fn a_plan_that_an_injection_started_needs_its_host_as_one_that_was_run() {
         (HostNeeded::EndlessMotion, plan(8.0), false),
     ] {
         let mut tasks = plan_of_an_injection(needed, plan);
-        tasks.run(HOST_TICKS + 3000);
+        tasks.run(LINK_TIMEOUT_TICKS + 3000);
         let lost = safety(&tasks).fault().map(|fault| fault.code);
         let expected = is_needed.then_some(FaultCode::LinkLost);
         assert_eq!(lost, expected, "{needed:?}");
@@ -233,7 +230,7 @@ fn an_endless_motion_needs_its_host_whatever_the_settings_say() {
     tasks.ask(Body::Enable).expect("enables");
     tasks.ask(endless()).expect("takes the plan");
     tasks.ask(Body::Run).expect("runs");
-    tasks.run(3 * HOST_TICKS);
+    tasks.run(3 * LINK_TIMEOUT_TICKS);
     let code = safety(&tasks).fault().map(|fault| fault.code);
     assert_eq!(code, Some(FaultCode::LinkLost));
 }
@@ -345,5 +342,35 @@ fn the_rules_decide_over_three_faults_and_every_other_has_its_own_reaction() {
             };
             assert_eq!(operation.reaction(code), expected, "{code:?}");
         }
+    }
+}
+
+#[test]
+fn a_host_counts_as_lost_after_half_a_second_at_every_control_rate() {
+    for rate_hz in [2.5e3, 1e4, 1.5e4] {
+        let mut tasks = tasks(|settings| {
+            settings.rate_hz = rate_hz;
+            for axis in &mut settings.axes {
+                axis.feedback.pid.derivative_filter_s = 1.0 / rate_hz;
+            }
+        });
+        tasks.ask(Body::Enable).expect("enables");
+        tasks
+            .ask(Body::Jog {
+                axis: WireAxis::Z,
+                velocity_mm_s: 2.0,
+            })
+            .expect("jogs");
+        let heard = tasks.tick();
+        while safety(&tasks).is_enabled() {
+            tasks.run(1);
+        }
+        let fault = safety(&tasks).fault().expect("latched");
+        assert_eq!(fault.code, FaultCode::LinkLost);
+        let silent_s = f64::from(fault.tick - heard) / rate_hz;
+        assert!(
+            (silent_s - 0.5).abs() < 0.02,
+            "{silent_s} s at {rate_hz} Hz"
+        );
     }
 }

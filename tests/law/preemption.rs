@@ -1,6 +1,6 @@
 //! The tasks' agreements in every interleaving of them: nothing is decided on a state that has passed.
 
-use quadrant::app::LINK_TIMEOUT_TICKS;
+use quadrant::app::link_timeout_ticks;
 use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::link::frame::{self, FRAME_BYTES};
@@ -14,6 +14,9 @@ use quadrant::settings::StageSettings;
 use crate::common::Noise;
 use quadrant_fault_bench::flash::Flash;
 use quadrant_fault_bench::tasks::Tasks;
+
+/// The host counts as lost after so long.
+pub(crate) const LINK_TIMEOUT_TICKS: u32 = link_timeout_ticks(10_000);
 
 /// Settings that are soon checked: without a plant there is no bound to search.
 pub(crate) fn settings() -> StageSettings {
@@ -136,6 +139,34 @@ fn enable_waits_for_the_settings_that_were_applied_before_it() {
     tasks.run(300);
     assert!(refused(tasks.answers.get(&(first + 2))));
     assert!(!tasks.upper.borrow().outputs.enabled);
+}
+
+#[test]
+fn the_link_stays_open_when_the_operator_enables_before_the_settings_are_built() {
+    let mut changed = settings();
+    changed.axes[1].limits.max_velocity_mm_s = 100.0;
+    let mut tasks = Tasks::new(&settings(), 1);
+    let first = tasks.send(&[
+        slower(),
+        set("/axes/1/limits/max_velocity_mm_s", &changed),
+        Body::Settings(SettingsRequest::Apply),
+    ]);
+    tasks.upper.borrow_mut().operate(Command::Enable);
+    tasks.run(40);
+    assert!(matches!(
+        tasks.answers.get(&(first + 2)),
+        Some(Ok(Reply::Applied(_)))
+    ));
+    assert!(tasks.upper.borrow().outputs.enabled);
+    assert_eq!(tasks.ask(Body::Enable), Ok(Reply::Done));
+    tasks.ask(Body::Status).expect("answers");
+    // The settings come when the outputs are off.
+    tasks.ask(Body::Disable).expect("disables");
+    assert_eq!(tasks.ask(Body::Enable), Ok(Reply::Done));
+    tasks.run(40);
+    assert!(tasks.upper.borrow().outputs.enabled);
+    let upper = tasks.upper.borrow();
+    assert_eq!((upper.driven_while_busy, upper.guarded), (0, 0));
 }
 
 #[test]

@@ -138,6 +138,26 @@ fn a_move_of_a_single_unit_arrives() {
 }
 
 #[test]
+fn a_move_that_takes_longer_than_the_tick_counter_holds_stays_slow() {
+    for max_velocity_mm_s in [1e-4, 3e-5, f64::MIN_POSITIVE] {
+        let motion = build::<f32>(PointToPointSettings {
+            distance_mm: 100.0,
+            max_velocity_mm_s,
+            max_acceleration_mm_s2: 2000.0,
+            max_jerk_mm_s3: 1e5,
+        });
+        let mut state = MotionState::default();
+        let mut last = Position::ZERO;
+        for _ in 0..10_000 {
+            let position = motion.step(&mut state).position;
+            let speed_mm_s = (position - last).0 as f64 * UNIT_MM * SCALE.rate_hz;
+            assert!(speed_mm_s.abs() < 1e-3, "{max_velocity_mm_s}: {speed_mm_s}");
+            last = position;
+        }
+    }
+}
+
+#[test]
 fn number_types_agree_on_the_position_to_the_unit() {
     let settings = PointToPointSettings {
         distance_mm: -3.3,

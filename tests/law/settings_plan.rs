@@ -108,6 +108,18 @@ fn a_move_longer_than_the_tick_counter_is_refused() {
 }
 
 #[test]
+fn a_move_to_where_the_axis_is_takes_no_time() {
+    let mut plan = PlanSettings::default();
+    plan.motions[1] = MotionSettings::PointToPoint(PointToPointSettings {
+        distance_mm: 0.0,
+        max_velocity_mm_s: 100.0,
+        max_acceleration_mm_s2: 1000.0,
+        max_jerk_mm_s3: 1e5,
+    });
+    assert_eq!(plan.validate(&StageSettings::simulated().bounds()), Ok(()));
+}
+
+#[test]
 fn a_travel_beyond_the_references_format_is_refused() {
     let stage = with_x(|axis| {
         axis.encoder.resolution_mm = 1e-6;

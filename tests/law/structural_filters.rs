@@ -8,6 +8,7 @@ use quadrant::control::filter::{FilterList, FilterSettings, Filters, FiltersStat
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::Reason;
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant::telemetry::LimitedBy;
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 
@@ -200,6 +201,27 @@ fn a_filter_that_is_put_in_while_the_output_stands_does_not_jolt() {
         }
         output = now;
     }
+}
+
+#[test]
+fn an_output_that_the_filters_take_beyond_its_limit_counts_as_limited() {
+    // Five times as much at its frequency, of which the tests' encoder shows an error.
+    let mut settings = with_filters(&[FilterSettings::low_pass(1500.0, 0.1)]);
+    settings.axes[0].amplifier.output_limit_v = 2.0;
+    let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
+    rig.start();
+    let mut limited = 0;
+    for tick in 0..2000 {
+        let phase = TAU * 1500.0 * PERIOD_S * f64::from(tick);
+        let counts = (30.0 * phase.sin()).round() as i32;
+        rig.inputs.set_counts([counts as u32, 0, 0]);
+        assert!(rig.tick().enabled);
+        let seen = rig.state.axes()[0].telemetry();
+        let at_limit = seen.output.abs() == 2.0;
+        assert_eq!(at_limit, seen.limited_by == LimitedBy::OutputLimit);
+        limited += u32::from(at_limit);
+    }
+    assert!(limited > 100, "{limited}");
 }
 
 #[test]

@@ -293,7 +293,8 @@ impl Tasks {
         let axes = axes.map(|axis| -> &'static mut Axis<f32> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, f32> = Box::leak(Box::new(Queues::new()));
         let (control_ends, intake_ends, ends) = queues.split();
-        let mut control = Control::new(axes, operation, plan, control_ends);
+        let mut control =
+            Control::new(axes, operation, plan, settings.rate_hz as u32, control_ends);
         if draft.is_some() {
             control.start_faulted(FaultCode::SettingsInvalid);
         }

@@ -176,8 +176,9 @@ impl<S: Scalar, O: AxisSource<'static, S>> Running<S, O> {
         let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
         let (control_ends, intake_ends, ends) = queues.split();
+        let rate_hz = source.rate_hz() as u32;
         Self {
-            control: Control::new(axes, operation, plan, control_ends),
+            control: Control::new(axes, operation, plan, rate_hz, control_ends),
             intake: Intake::new(intake_ends),
             supervision: Supervision::new(resolution_mm),
             server: Server::new(ServerParts {

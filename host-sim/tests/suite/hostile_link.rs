@@ -29,6 +29,8 @@ use crate::link_traffic::{self, arrival, framed};
 const BACKLOG: usize = 1_000;
 /// Requests to start afresh of which one is sent: each start takes memory for good.
 const RESTARTS: u64 = 1_000;
+/// Factors of plausible velocities.
+const SLOWER: [f64; 6] = [1.0, 1.0, 1e-3, 1e-6, 1e-12, f64::MIN_POSITIVE];
 
 /// Requests that whole frames may make.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,10 +82,10 @@ struct Tally {
     moved_unasked: u64,
 }
 
-struct Bench {
-    running: Running<f32>,
+pub(crate) struct Bench {
+    pub(crate) running: Running<f32>,
     plant: SimulatedStage,
-    settings: StageSettings,
+    pub(crate) settings: StageSettings,
     line: Line,
     /// Hears what a port hears.
     ear: LinkServer,
@@ -112,6 +114,11 @@ fn starts_a_motion(body: &Body) -> bool {
 
 impl Bench {
     fn new() -> Self {
+        Self::with(|_| {})
+    }
+
+    /// A bench with a change to its settings.
+    pub(crate) fn with(change: impl FnOnce(&mut StageSettings)) -> Self {
         let mut settings = identified_settings().expect("the committed settings").stage;
         for (axis, default) in settings
             .axes
@@ -121,6 +128,7 @@ impl Bench {
             axis.homing = default.homing;
             axis.limits.travel_mm = default.limits.travel_mm;
         }
+        change(&mut settings);
         Self {
             running: start(&settings),
             plant: SimulatedStage::new(&StageParameters::real(), settings.rate_hz, 1),
@@ -134,7 +142,7 @@ impl Bench {
     }
 
     /// Sends bytes, and runs the machine until it has read most of what was sent.
-    fn send(&mut self, bytes: &[u8]) {
+    pub(crate) fn send(&mut self, bytes: &[u8]) {
         for byte in bytes {
             let (enable, motion, heard) = (
                 &mut self.asked_to_enable,
@@ -155,7 +163,7 @@ impl Bench {
         }
     }
 
-    fn tick(&mut self) {
+    pub(crate) fn tick(&mut self) {
         let inputs = self.plant.read_inputs(None);
         let (outputs, after) = self.running.tick(&inputs, &mut self.line);
         self.plant.step(&outputs);
@@ -197,7 +205,7 @@ impl Bench {
     }
 }
 
-fn whole(body: Body) -> Vec<u8> {
+pub(crate) fn whole(body: Body) -> Vec<u8> {
     [vec![frame::DELIMITER], framed(&Request { id: 7, body })].concat()
 }
 
@@ -211,16 +219,18 @@ fn forged(payload: &[u8]) -> Vec<u8> {
 
 /// Makes of a request one that a machine may well take.
 fn plausible(body: Body, noise: &mut Noise, paths: &[String]) -> Body {
+    // A velocity may be so small that nothing that takes its time holds it.
+    let slow = SLOWER[noise.below(SLOWER.len() as u64) as usize];
     let mut value = |most: f64| noise.counts(1_000) as f64 / 1_000.0 * most;
     match body {
         Body::Move { axis, .. } => Body::Move {
             axis,
             target_mm: value(20.0),
-            velocity_mm_s: value(60.0),
+            velocity_mm_s: slow * value(60.0),
         },
         Body::Jog { axis, .. } => Body::Jog {
             axis,
-            velocity_mm_s: value(60.0),
+            velocity_mm_s: slow * value(60.0),
         },
         Body::Home(axes) if axes.is_empty() => Body::Home(AxisSet::ALL),
         Body::Stream(StreamRequest::Open { period_ticks }) => Body::Stream(StreamRequest::Open {

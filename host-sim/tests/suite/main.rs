@@ -9,6 +9,7 @@ mod default_gains;
 mod design_npid;
 mod design_pid;
 mod experiments;
+mod host_motions;
 mod hostile_link;
 mod identified_stage;
 mod identify_frf;

@@ -187,12 +187,8 @@ fn a_session_homes_moves_streams_changes_a_gain_and_survives_a_restart() {
         assert!(now.abs_diff(before) < 1000, "{before} {now}");
         before = now;
     }
-    assert!(
-        session
-            .events()
-            .iter()
-            .any(|event| matches!(event, Event::SettingsApplied(_)))
-    );
+    let x = [AxisName::X].into_iter().collect();
+    assert!(session.events().contains(&Event::SettingsApplied(x)));
     session.done(Body::Stop);
     session.until_rest();
     assert_eq!(session.status().fault, None);
@@ -280,6 +276,43 @@ fn samples_come_without_a_gap_as_long_as_the_line_carries_them() {
         }
     }
     assert!((1_990..=2_000).contains(&next), "{next}");
+}
+
+#[test]
+fn a_move_that_lasts_longer_than_the_tick_counter_is_refused() {
+    let mut session = Session::open();
+    session.done(Body::Enable);
+    session.run(100);
+    session.done(Body::Home([AxisName::X].into_iter().collect()));
+    session.until_rest();
+    let to = |target_mm, velocity_mm_s| Body::Move {
+        axis: AxisName::X,
+        target_mm,
+        velocity_mm_s,
+    };
+    for (velocity_mm_s, field) in [
+        (1e-4, "x.motion (duration, s) = "),
+        (3e-5, "x.motion (duration, s) = "),
+        (f64::MIN_POSITIVE, "x.motion.max_velocity_mm_s = "),
+    ] {
+        let text = session.refused(to(100.0, velocity_mm_s));
+        assert!(text.contains(field), "{text}");
+        assert!(text.contains(" is outside "), "{text}");
+    }
+    let before = session.status().axes[0].position_mm;
+    session.run(3000);
+    assert_eq!(session.status().state, MachineState::Enabled);
+    assert!((session.status().axes[0].position_mm - before).abs() < 2e-3);
+    // One that lasts 55 hours is none of them.
+    session.done(to(100.0, 1e-3));
+    session.run(1000);
+    session.done(Body::Stop);
+    session.until_rest();
+    session.done(to(1.0, 20.0));
+    session.until_rest();
+    session.done(to(1.0, 20.0));
+    session.until_rest();
+    assert_eq!(session.status().state, MachineState::Enabled);
 }
 
 #[test]

@@ -150,6 +150,8 @@ pub struct Server<'q, 'a, S: Scalar, O> {
     timing: TimingStatistics,
     /// Axes whose new settings are not built yet.
     pending: AxisSet,
+    /// Axes that the settings applied last have changed.
+    changed: AxisSet,
     /// Safety depends on a setting in which they differ.
     needs_disabled: bool,
     back_buffer: Option<&'a mut Axis<S>>,
@@ -193,6 +195,7 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             seen: Snapshot::default(),
             timing: TimingStatistics::default(),
             pending: AxisSet::NONE,
+            changed: AxisSet::NONE,
             needs_disabled: false,
             back_buffer: Some(parts.back_buffer),
             source: parts.source,

@@ -27,8 +27,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             Body::Disable => self.command(Command::Disable)?,
             Body::ResetFault => self.command(Command::ResetFault)?,
             Body::Stop => {
-                self.stream = None;
                 self.command(Command::Stop)?;
+                self.stream = None;
                 self.give_up_injection();
             }
             Body::Run => self.command(Command::Run)?,
@@ -64,9 +64,10 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         Ok(Reply::Done)
     }
 
-    /// True while settings that safety depends on are being built: control does not enable before it has them all.
+    /// True while settings that safety depends on are being built: control does not enable before it has them all. If it
+    /// drives already, because the operator was quicker, they wait until the outputs are off.
     pub(super) fn must_wait_to_enable(&self) -> bool {
-        self.needs_disabled && !self.pending.is_empty()
+        self.needs_disabled && !self.pending.is_empty() && !self.seen.view.safety.drives()
     }
 
     /// Enables the outputs.
@@ -148,17 +149,16 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 "a motion is under way; stop it before the plan is exchanged"
             )));
         }
-        let plan = PlanSettings::from(plan);
-        plan.validate(&self.source.bounds())
-            .map_err(|error| invalid(format_args!("{error}")))?;
-        self.hand_over(&plan)?;
+        self.hand_over(&PlanSettings::from(plan))?;
         self.defer(Work::Plan)
     }
 
-    /// Lays motions where control takes them from when it is ordered to.
+    /// Lays motions that keep to the bounds where control takes them from when it is ordered to.
     #[inline(never)]
     fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
         let bounds = self.source.bounds();
+        plan.validate(&bounds)
+            .map_err(|error| invalid(format_args!("{error}")))?;
         let plan = PerAxis::from_fn(|axis| {
             Motion::build(&plan.motions[index(axis)], bounds.scale_of(axis))
         });

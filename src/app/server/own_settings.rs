@@ -34,7 +34,7 @@ pub struct OwnSettingsParts<'a, F> {
     /// True if `draft` holds settings to look at, and not to be in force unasked: a set older than one that is damaged.
     /// Otherwise its content does not matter.
     pub keep_draft: bool,
-    /// The origin of the settings in force.
+    /// The origin of the stored settings.
     pub provenance: Provenance,
     /// The memory for settings.
     pub store: Store<F>,
@@ -95,7 +95,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
         self.source.store.flash()
     }
 
-    /// The origin of the settings in force, or of the stored ones.
+    /// The origin of the stored settings.
     pub const fn provenance(&self) -> &Provenance {
         &self.source.provenance
     }
@@ -193,6 +193,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
             .map(Into::into)
             .collect();
         self.pending = changed;
+        self.changed = changed;
         self.needs_disabled = safety.is_some();
         Ok(Reply::Applied(Applied {
             changed,
@@ -246,7 +247,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
                     .collect();
                 if self.pending.is_empty() {
                     self.applied = self.applied.wrapping_add(1);
-                    self.push_event(self.seen.tick, Event::SettingsApplied(AxisSet::ALL));
+                    self.push_event(self.seen.tick, Event::SettingsApplied(self.changed));
                 }
             }
             // The control law has not taken the last one: the same axis again at the next poll.

@@ -35,8 +35,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 self.stream_status()
             }
             StreamRequest::Close => {
-                self.stream = None;
                 self.command(Command::Stop)?;
+                self.stream = None;
                 Ok(Reply::Done)
             }
         }
@@ -61,6 +61,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             )));
         }
         let limits = self.source.bounds().stream_limits(view.homed.into_array());
+        // Nothing moves: it drops what control has of a stream that never began.
+        self.command(Command::Stop)?;
         let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
         self.stream = Some(OpenStream {
             planner: StreamPlanner::new(limits, period_ticks, start),

@@ -631,7 +631,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
         self.homed
     }
 
-    /// True if the encoder has shown an index pulse since the axis was enabled or homed last.
+    /// True if the encoder has shown an index pulse since the axis was homed last, or since the start.
     pub(crate) fn is_indexed(&self) -> bool {
         self.index.is_seen()
     }
@@ -1189,7 +1189,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     #[inline(never)]
     pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
         if state.mode() == MotionMode::OpenLoop {
-            return self.drive_open(state);
+            return self.drive_open(state, changed);
         }
         let moves = state.telemetry.velocity != S::ZERO;
         if state.rest.changes(moves) {
@@ -1225,7 +1225,13 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let base = total + state.telemetry.bumpless_offset + state.injected;
         let mut feedback = self.feed_back(&mut state.feedback, input, base);
         feedback.output = self.filters.step(&mut state.filters, feedback.output);
-        let output = (feedback.output + base).within(self.amplifier.limit);
+        let mut output = feedback.output + base;
+        if !output.is_within(self.amplifier.limit) {
+            cold_path();
+            output = output.within(self.amplifier.limit);
+            // The law keeps to the limit; filters behind it may not.
+            feedback.saturated = true;
+        }
         let seen = &mut state.telemetry;
         seen.feedback = feedback;
         seen.bumpless_offset = seen
@@ -1279,7 +1285,10 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     /// Puts the injected voltage out.
     #[cold]
     #[inline(never)]
-    fn drive_open(&self, state: &mut AxisState<S, N>) -> DacCode {
+    fn drive_open(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
+        if changed {
+            self.forget_learnt(state);
+        }
         let output = state.injected.within(self.amplifier.limit);
         state.telemetry.feedback = FeedbackTerms {
             saturated: output != state.injected,
@@ -1353,20 +1362,26 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             state.rest.forget();
             state.filters = FiltersState::default();
             state.friction = self.feedforward.start();
+            self.learning.resume(&mut state.learning);
             self.cancelling.start(&mut state.cancelling);
             state.telemetry.bumpless_offset = S::ZERO;
             self.stop(state);
         }
     }
 
-    /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick: what was learnt and
-    /// cancelled under others is forgotten.
+    /// Forgets what was learnt and cancelled under other settings.
+    #[cold]
+    #[inline(never)]
+    fn forget_learnt(&self, state: &mut AxisState<S, N>) {
+        state.learning = LearningState::default();
+        self.cancelling.start(&mut state.cancelling);
+    }
+
+    /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick.
     #[inline(always)]
     pub(crate) fn output_zero(&self, state: &mut AxisState<S, N>, changed: bool) {
         if changed {
-            cold_path();
-            state.learning = LearningState::default();
-            self.cancelling.start(&mut state.cancelling);
+            self.forget_learnt(state);
         }
         let measured = state.encoder.count();
         state.generator.hold();

@@ -20,6 +20,7 @@ use super::direction::{Direction, PerDirection};
 use super::stribeck::StribeckCurve;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::{OctaveTable, interpolation_error};
+use crate::law::units::FASTEST_MM_S;
 use crate::law::words::words;
 
 /// The LuGre model as a person writes it. Its surface is the static model's Stribeck curve.
@@ -36,8 +37,6 @@ pub struct LugreParameters {
 const LARGEST_STEP: f64 = 8.0;
 /// Largest error of the tabulated s(v) over Fs for the sake of a longer table.
 const TABLE_TOLERANCE: f64 = 2.5e-4;
-/// Largest velocity of any reference, mm/s.
-const FASTEST_MM_S: f64 = 1e3;
 
 /// The velocity at which the tables end, mm/s.
 fn table_end_mm_s(curve: &StribeckCurve, stiffness_v_per_mm: f64, step_s: f64) -> f64 {

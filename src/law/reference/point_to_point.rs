@@ -18,7 +18,7 @@ use crate::law::words::words;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PointToPointSettings {
-    /// Signed distance, mm; not zero.
+    /// Signed distance, mm.
     pub distance_mm: f64,
     /// Largest velocity, mm/s; above zero.
     pub max_velocity_mm_s: f64,
@@ -33,6 +33,9 @@ impl PointToPointSettings {
     /// a limit lowers the peak, not the time that smoothing takes.
     fn durations_s(&self) -> [f64; 3] {
         let distance = libm::fabs(self.distance_mm);
+        if distance == 0.0 {
+            return [0.0; 3];
+        }
         let (acceleration, jerk) = (self.max_acceleration_mm_s2, self.max_jerk_mm_s3);
         // The peak velocity of a move without a stretch at constant velocity solves D/v = v/a + a/j.
         let rise = acceleration / jerk;
@@ -88,13 +91,13 @@ impl<S: Scalar> PointToPoint<S> {
             .map(|seconds| (rounding::ceil(seconds * scale.rate_hz) as u32).max(1));
         // Rounded up one by one, they could overlap by a tick, and their jerks add.
         let acceleration = acceleration.max(jerk);
-        let velocity = velocity.max(acceleration + jerk);
+        let velocity = velocity.max(acceleration.saturating_add(jerk));
         let ticks = [velocity, acceleration, jerk];
-        let mut impulses = [(0, true); 8];
+        let mut impulses = [(0_u32, true); 8];
         for (subset, impulse) in impulses.iter_mut().enumerate() {
             for (index, length) in ticks.iter().enumerate() {
                 if subset >> index & 1 == 1 {
-                    impulse.0 += length;
+                    impulse.0 = impulse.0.saturating_add(*length);
                     impulse.1 = !impulse.1;
                 }
             }

@@ -105,14 +105,17 @@ impl StreamState {
     }
 
     /// Takes a segment from the queue; call it when [`StreamState::wants_segment`]. What is left of a stream that was
-    /// broken off is dropped: then only the first segment of another one is taken.
+    /// broken off is dropped: then only the first segment of another one is taken. One that comes before the end of the
+    /// stream ends it: it begins elsewhere, so both are dropped from there on.
     pub fn offer(&mut self, segment: &Segment) {
-        if self.begun || segment.first {
-            self.begun = true;
-            let [first, second] = &mut self.slots;
-            let next = if self.turned { first } else { second };
-            next.replace(segment);
+        if self.begun == segment.first {
+            self.begun = false;
+            return;
         }
+        self.begun = true;
+        let [first, second] = &mut self.slots;
+        let next = if self.turned { first } else { second };
+        next.replace(segment);
     }
 
     /// True if a stream can start from a reference at rest at `position`.

@@ -59,7 +59,7 @@ pub enum FaultCode {
     AmplifierFault = 14,
     /// The converter holds another word than was written.
     OutputMismatch = 15,
-    /// The host that streams set points, jogs or injects a voltage has fallen silent.
+    /// The host that started a motion has fallen silent.
     LinkLost = 16,
     /// The next set point of a stream did not come in time.
     StreamUnderrun = 17,
@@ -208,8 +208,8 @@ impl FaultCode {
                 "check the converter's bus and supply, and the shield of its cable",
             ],
             Self::LinkLost => [
-                "the host that streamed set points, jogged or injected a voltage has fallen silent",
-                "check the cable and the host; then begin again; a jog goes on only while its host asks something twice a second",
+                "the host that started the motion has fallen silent",
+                "check the cable and the host; then begin again: what a host moves needs a request of it every half second (operation.host_needed)",
             ],
             Self::StreamUnderrun => [
                 "the next set point of the stream did not come in time",

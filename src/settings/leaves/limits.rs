@@ -6,11 +6,16 @@ use super::row::{
     Exchange, LeafInfo, UNSET, at, at_most, exchanged, flag, name, number, period_s, times,
 };
 use crate::law::friction::Direction;
+use crate::law::units::FASTEST_MM_S;
 use crate::settings::axis::AxisSettings;
 use crate::settings::homing::HomeSwitch;
 
 /// The longest travel of an axis and of a motion, mm.
 pub(in crate::settings) const LONGEST_TRAVEL_MM: f64 = 1e4;
+/// The largest acceleration that an axis may be allowed, mm/s^2.
+pub(in crate::settings) const MOST_ACCELERATION_MM_S2: f64 = 3e4;
+/// The largest jerk that an axis may be allowed, mm/s^3.
+pub(in crate::settings) const MOST_JERK_MM_S3: f64 = 1e9;
 /// The fastest reference, in counts per tick: what the formats of the moves' velocity and of the displacement hold.
 const MOST_COUNTS_PER_TICK: f64 = 4096.0;
 /// The largest acceleration of a reference, in counts per tick squared: what the format of the moves' holds.
@@ -63,12 +68,12 @@ fn search_mm_s(axis: &AxisSettings, _: f64) -> f64 {
 #[rustfmt::skip]
 pub(super) const LEAVES: &[LeafInfo] = &exchanged(Exchange::Disabled, [
     number("limits.max_velocity_mm_s", "mm/s",
-        at(1e-3), at_most(1e3, "what the encoder's counter can follow", fastest_mm_s), 50.0,
+        at(1e-3), at_most(FASTEST_MM_S, "what the encoder's counter can follow", fastest_mm_s), 50.0,
         "Largest velocity of any reference; at twice this the encoder counts as faulty."),
     number("limits.max_acceleration_mm_s2", "mm/s²",
-        at(1e-3), at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 500.0,
+        at(1e-3), at_most(MOST_ACCELERATION_MM_S2, "256 counts per tick²", most_acceleration_mm_s2), 500.0,
         "Largest acceleration of any reference."),
-    number("limits.max_jerk_mm_s3", "mm/s³", at(1.0), at(1e9), 1e5,
+    number("limits.max_jerk_mm_s3", "mm/s³", at(1.0), at(MOST_JERK_MM_S3), 1e5,
         "Jerk of jogs, moves and homing."),
     number("limits.following_error_mm", "mm",
         times(1.0, "one count", resolution_mm), at_most(20.0, "2²³ counts", most_error_mm), 1.0,
@@ -82,10 +87,10 @@ pub(super) const LEAVES: &[LeafInfo] = &exchanged(Exchange::Disabled, [
         "Measured speed that is a fault, as a multiple of the largest velocity."),
     number("limits.braking_mm_s2", "mm/s²",
         times(1.0, "the largest acceleration, and what ends the largest velocity in a second", least_braking_mm_s2),
-        at_most(3e4, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
+        at_most(MOST_ACCELERATION_MM_S2, "256 counts per tick²", most_acceleration_mm_s2), 4000.0,
         "Deceleration of a stop after a fault."),
     number("limits.braking_jerk_mm_s3", "mm/s³",
-        times(1.0, "what builds the braking up in a second", least_braking_jerk_mm_s3), at(1e9), 1e6,
+        times(1.0, "what builds the braking up in a second", least_braking_jerk_mm_s3), at(MOST_JERK_MM_S3), 1e6,
         "Jerk of that stop."),
     number("limits.silent_s", "s", times(1.0, "the control period", period_s), at(10.0), 0.1,
         "Longest time without encoder motion while the output is above the share below; then the encoder counts as faulty."),
@@ -103,7 +108,7 @@ pub(super) const LEAVES: &[LeafInfo] = &exchanged(Exchange::Disabled, [
         "End of the travel towards which the switch is searched."),
     name("homing.switch", HomeSwitch::VARIANTS,
         "Switch that is searched: the home switch, or the limit switch at that end."),
-    number("homing.search_mm_s", "mm/s", at(1e-3), at(1e3), 10.0,
+    number("homing.search_mm_s", "mm/s", at(1e-3), at(FASTEST_MM_S), 10.0,
         "Velocity of the search and of the move after it; held to the axis' largest."),
     number("homing.latch_mm_s", "mm/s", at(1e-3), times(1.0, "that of the search", search_mm_s), 1.0,
         "Creep velocity: off the switch, over its edge and to the index pulse."),

@@ -61,7 +61,7 @@ const BRAKE: [LeafInfo; 2] = exchanged(Exchange::Disabled, [
 #[rustfmt::skip]
 const STREAMING: [LeafInfo; 2] = exchanged(Exchange::Disabled, [
     of_stage(name("streaming.link_lost", LossReaction::VARIANTS,
-        "Reaction when the host that streams set points falls silent: stop (brake, switch off, latch a fault) or hold (brake and hold).")),
+        "Reaction when the host of a motion falls silent: stop (brake, switch off, latch a fault) or hold (brake and hold).")),
     of_stage(name("streaming.underrun", LossReaction::VARIANTS,
         "Reaction when the next set point is late: stop or hold.")),
 ]);

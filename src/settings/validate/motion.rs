@@ -3,9 +3,12 @@
 use super::Place;
 use crate::law::axes::AxisName;
 use crate::law::reference::MotionSettings;
+use crate::law::units::FASTEST_MM_S;
 use crate::settings::bounds::{AxisBounds, StageBounds};
 use crate::settings::error::SettingsError;
-use crate::settings::leaves::limits::LONGEST_TRAVEL_MM;
+use crate::settings::leaves::limits::{
+    LONGEST_TRAVEL_MM, MOST_ACCELERATION_MM_S2, MOST_JERK_MM_S3,
+};
 use crate::settings::stage::PlanSettings;
 
 /// The longest travel of a motion, in counts: what the references' products hold.
@@ -57,13 +60,23 @@ fn validate_motion(
         }
         MotionSettings::PointToPoint(to) => {
             at.within("motion.distance_mm", to.distance_mm, -longest, longest)?;
-            at.within("motion.max_jerk_mm_s3", to.max_jerk_mm_s3, 1e-3, 1e9)?;
-            at.within("motion.max_velocity_mm_s", to.max_velocity_mm_s, 1e-6, 1e3)?;
+            at.within(
+                "motion.max_jerk_mm_s3",
+                to.max_jerk_mm_s3,
+                1e-3,
+                MOST_JERK_MM_S3,
+            )?;
+            at.within(
+                "motion.max_velocity_mm_s",
+                to.max_velocity_mm_s,
+                1e-6,
+                FASTEST_MM_S,
+            )?;
             at.within(
                 "motion.max_acceleration_mm_s2",
                 to.max_acceleration_mm_s2,
                 1e-3,
-                3e4,
+                MOST_ACCELERATION_MM_S2,
             )?;
             let most = MOST_TICKS / rate_hz;
             at.within("motion (duration, s)", to.duration_s(), 0.0, most)?;

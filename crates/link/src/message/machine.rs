@@ -162,7 +162,7 @@ pub struct Inputs {
     /// The inputs that are active: five bits an axis (negative limit, positive limit, home, amplifier fault, output mismatch),
     /// x lowest, and the emergency stop in bit 15.
     pub switches: u16,
-    /// The axes whose encoder has shown an index pulse since they were enabled or homed last.
+    /// The axes whose encoder has shown an index pulse since they were homed last, or since the start.
     pub indexed: AxisSet,
     /// The reason for which the outputs would not be enabled now, with its axis if it is one axis'.
     pub refusal: Option<String<256>>,

@@ -135,7 +135,7 @@ pub struct CaptureStatus {
     pub number: u16,
     /// The recorded channels.
     pub channels: Vec<Channel, MAX_CHANNELS>,
-    /// Control ticks from one sample to the next; 0 before it was first armed.
+    /// Control ticks from one sample to the next; 1 before it was first armed.
     pub decimation: u16,
     /// The record, if it is frozen.
     pub record: Option<CaptureRecord>,
