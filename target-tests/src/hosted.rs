@@ -76,7 +76,10 @@ pub(crate) fn traced(image: &Image) -> Result<Vec<Kind>> {
     kinds
         .into_iter()
         .map(|(name, indices)| {
-            let of_kind: Result<_> = indices.into_iter().map(|i| tick(i).cloned()).collect();
+            let of_kind: Result<_> = indices
+                .into_iter()
+                .map(|i| tick(i)?.whole().cloned())
+                .collect();
             Ok((name, of_kind?))
         })
         .collect()

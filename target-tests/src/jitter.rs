@@ -123,7 +123,7 @@ fn count(image: &Image) -> Result<Vec<u32>> {
         .context("the trace ends too early")?
         .iter()
         .map(|tick| {
-            let mut path = tick.path.iter();
+            let mut path = tick.whole()?.path.iter();
             let before = path.position(|address| stores.contains(address));
             let before = before.context("a tick puts no word out")?;
             Ok(u32::try_from(before)? + 1)

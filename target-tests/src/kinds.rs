@@ -177,5 +177,6 @@ fn trace(image: &Image, rehearsal: &Rehearsal, from: u32) -> Result<Vec<Tick>> {
         closed.len(),
         inputs.len() - from as usize
     );
+    closed.iter().try_for_each(|tick| tick.whole().map(drop))?;
     Ok(closed)
 }

@@ -172,7 +172,10 @@ fn count(image: &Image, load: Load) -> Result<Vec<u32>> {
     let counted = ticks
         .get(..TICKS as usize)
         .context("the trace ends too early")?;
-    Ok(counted.iter().map(|tick| tick.instructions()).collect())
+    counted
+        .iter()
+        .map(|tick| Ok(tick.whole()?.instructions()))
+        .collect()
 }
 
 /// Runs the motion, and the load from [`LOADED`] on.

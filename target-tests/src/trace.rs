@@ -7,7 +7,7 @@ use std::collections::{BTreeMap, BTreeSet, HashMap};
 use std::io::{BufRead, BufReader, Read};
 use std::process::Stdio;
 
-use anyhow::{Context, Result, anyhow, ensure};
+use anyhow::{Context, Result, anyhow, bail};
 use quadrant_sim::machine::emulator::{self, Clock, Emulator, Memory};
 
 use crate::attribution::Attribution;
@@ -159,9 +159,19 @@ pub(crate) struct Tick {
     pub(crate) stages: BTreeMap<&'static str, u32>,
     /// The addresses of its instructions, in the order of execution.
     pub(crate) path: Vec<u32>,
+    /// What is wrong with it; none of a tick that is whole.
+    flaw: Option<String>,
 }
 
 impl Tick {
+    /// Returns the tick, if all of its instructions are there. The last one before a trace pauses may be cut.
+    pub(crate) fn whole(&self) -> Result<&Self> {
+        match &self.flaw {
+            None => Ok(self),
+            Some(flaw) => bail!("a tick of the trace is not whole: {flaw}"),
+        }
+    }
+
     /// Its number of instructions.
     pub(crate) fn instructions(&self) -> u32 {
         self.path.len() as u32
@@ -194,13 +204,13 @@ impl Tally<'_> {
     /// Reads a trace to its end.
     fn read(mut self, trace: impl Read) -> Result<Vec<Tick>> {
         for_each_instruction(trace, |address| self.executed(address))?;
-        ensure!(self.open.is_none(), "the trace ends within a tick");
+        self.close(Some("the trace ends within it"));
         Ok(self.closed)
     }
 
     fn executed(&mut self, address: u32) -> Result<()> {
         if address == self.root {
-            ensure!(self.open.is_none(), "a tick begins within another");
+            self.close(Some("another begins within it"));
             self.open = Some(OpenTick {
                 tick: Tick::default(),
                 calls: Vec::new(),
@@ -211,14 +221,17 @@ impl Tally<'_> {
             return Ok(());
         };
         let called = open.tick.path.last().and_then(|last| self.calls.get(last));
-        ensure!(
-            called.is_none_or(|called| *called == address),
-            "the trace has {address:#x} after a call of {:#x}",
-            called.copied().unwrap_or_default()
-        );
-        let function = (self.inside)(address).with_context(|| {
-            format!("a tick is at {address:#x}, which the calls that are known do not reach")
-        })?;
+        if let Some(called) = called.filter(|called| **called != address) {
+            open.tick
+                .flaw
+                .get_or_insert_with(|| format!("{address:#x} comes after a call of {called:#x}"));
+        }
+        let Some(function) = (self.inside)(address) else {
+            open.tick.flaw.get_or_insert_with(|| {
+                format!("it is at {address:#x}, which the calls that are known do not reach")
+            });
+            return Ok(());
+        };
         if let Some(depth) = open
             .calls
             .iter()
@@ -238,9 +251,17 @@ impl Tally<'_> {
         open.tick.path.push(address);
         open.last = stage;
         if self.returns.contains(&address) {
-            self.closed.extend(self.open.take().map(|open| open.tick));
+            self.close(None);
         }
         Ok(())
+    }
+
+    /// Ends the tick that has begun, if there is one.
+    fn close(&mut self, flaw: Option<&str>) {
+        if let Some(OpenTick { mut tick, .. }) = self.open.take() {
+            tick.flaw = tick.flaw.or(flaw.map(str::to_owned));
+            self.closed.push(tick);
+        }
     }
 }
 
