@@ -20,6 +20,8 @@
 //! motion. The rest of the elements' memory is right again once the
 //! reference has moved over the pre-sliding range in one sense.
 
+use core::hint::cold_path;
+
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
@@ -405,25 +407,32 @@ impl<S: Scalar, const N: usize> Feedforward<S, N> {
         state: &mut FeedforwardState<S, N>,
         reference: ReferenceStep<S>,
     ) -> FeedforwardTerms<S> {
-        let mut terms = FeedforwardTerms {
-            inertia: reference.acceleration.scale(self.inertia),
-            ..FeedforwardTerms::default()
-        };
         let (velocity, speed) = (reference.velocity, reference.velocity.magnitude());
         let direction = Direction::of(velocity);
-        terms.viscous = velocity.scale(*self.viscous.of(direction));
+        let viscous = velocity.scale(*self.viscous.of(direction));
         let (model, sliding) = match &self.presliding {
             Presliding::Gms(model) => (model, model.surface.at(speed, direction)),
             Presliding::Breakaway(model) => (model, *model.breakaway.of(direction)),
             _ => {
-                (terms.level, terms.gms) = self.step_other(state, reference);
-                return terms;
+                cold_path();
+                let (level, gms) = self.step_other(state, reference);
+                let inertia = reference.acceleration.scale(self.inertia);
+                return FeedforwardTerms {
+                    level,
+                    viscous,
+                    gms,
+                    inertia,
+                };
             }
         };
         let memory = &mut state.memory;
         let force = model.elements.step(memory, reference.displacement, sliding);
-        terms.gms = force.scale(self.gms_gain);
-        terms
+        FeedforwardTerms {
+            level: S::ZERO,
+            viscous,
+            gms: force.scale(self.gms_gain),
+            inertia: reference.acceleration.scale(self.inertia),
+        }
     }
 
     /// The level and the pre-sliding force of a kind without GMS elements, V: apart, so that those have the registers to themselves.

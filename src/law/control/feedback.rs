@@ -1,5 +1,7 @@
 //! The feedback law of an axis: which one it is, and what they all share.
 
+use core::hint::cold_path;
+
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumCount, EnumString, VariantArray, VariantNames};
 
@@ -122,16 +124,29 @@ impl<S: Scalar> Feedback<S> {
         base: S,
         limit: S,
     ) -> FeedbackTerms<S> {
+        // What is hinted as rare works as well: the first two have the registers to themselves.
         match self {
             Self::Pid(pid) => pid.step(state, input.error, base, limit),
             Self::NPid(law) => {
                 let error = law.gain.scaled_error(input.error);
                 law.pid.step(state, error, base, limit)
             }
-            Self::Scheduled(law) => law.step(state, input, base, limit),
-            Self::Cascade(law) => law.step(state, input, base, limit),
-            Self::SlidingMode(law) => law.step(state, input.error, base, limit),
-            Self::Nctf(law) => law.step(state, input.error, base, limit),
+            Self::Scheduled(law) => {
+                cold_path();
+                law.step(state, input, base, limit)
+            }
+            Self::Cascade(law) => {
+                cold_path();
+                law.step(state, input, base, limit)
+            }
+            Self::SlidingMode(law) => {
+                cold_path();
+                law.step(state, input.error, base, limit)
+            }
+            Self::Nctf(law) => {
+                cold_path();
+                law.step(state, input.error, base, limit)
+            }
         }
     }
 }
