@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::kinds::{Kinds, USUAL, emulated, usual};
 use crate::trace::Tick;
-use xtask::golden::Golden;
+use xtask::golden::{self, Golden};
 use xtask::image::Scalar;
 use xtask::toolchain::Toolchain;
 
@@ -39,7 +39,7 @@ struct Count {
 
 /// File of the expected counts.
 const GOLDEN: Golden = Golden {
-    path: "target-tests/golden/instructions.toml",
+    path: golden::INSTRUCTIONS,
     head: "Written by `cargo xtask count --overwrite-expected`; `cargo xtask count` holds its figures against these.",
 };
 

@@ -13,7 +13,7 @@ use crate::cortex_m::{Core, ENTRY_AND_RETURN, REFILL, reads_literal};
 use crate::kinds::{Kinds, emulated};
 use crate::longest_path::{OUTSIDE, Transitions, whole};
 use crate::trace::Tick;
-use xtask::golden::Golden;
+use xtask::golden::{self, Golden};
 use xtask::image::{Image, Scalar};
 use xtask::listing::{Instruction, Listing};
 use xtask::toolchain::Toolchain;
@@ -36,7 +36,7 @@ const NO_CACHE_TOLERANCE_PERCENT: f64 = 20.0;
 
 /// File of the expected bounds.
 const GOLDEN: Golden = Golden {
-    path: "target-tests/golden/cycles.toml",
+    path: golden::CYCLES,
     head: "Written by `cargo xtask cycles --overwrite-expected`; `cargo xtask cycles` holds its figures against these.",
 };
 

@@ -17,7 +17,7 @@ use crate::hosted;
 use crate::load;
 use crate::trace::{Trace, Tracer};
 use crate::traced_run;
-use xtask::golden::Golden;
+use xtask::golden::{self, Golden};
 use xtask::image::Image;
 use xtask::listing::Listing;
 
@@ -39,7 +39,7 @@ const TOLERANCE_PERCENT: f64 = 5.0;
 
 /// File of the expected spread.
 const GOLDEN: Golden = Golden {
-    path: "target-tests/golden/jitter.toml",
+    path: golden::JITTER,
     head: "Written by `cargo xtask saturation --overwrite-expected`; `cargo xtask saturation` holds its figures against these.",
 };
 

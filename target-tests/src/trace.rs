@@ -16,7 +16,7 @@ use crate::reference_model;
 use crate::stages;
 use xtask::call_graph::{CallGraph, Flow, flow};
 use xtask::image::Image;
-use xtask::listing::{Function, Instruction, Listing};
+use xtask::listing::{Function, Listing};
 use xtask::prove::ROOT;
 
 /// Trace of an image.
@@ -65,7 +65,7 @@ impl Trace {
             returns: frame
                 .instructions
                 .iter()
-                .filter(|instruction| returns(instruction))
+                .filter(|instruction| instruction.returns())
                 .map(|instruction| instruction.address)
                 .collect(),
             calls: functions.flat_map(calls).collect(),
@@ -159,7 +159,7 @@ pub(crate) struct Tick {
     pub(crate) stages: BTreeMap<&'static str, u32>,
     /// The addresses of its instructions, in the order of execution.
     pub(crate) path: Vec<u32>,
-    /// What is wrong with it; none of a tick that is whole.
+    /// The reason for which it does not count; none of a tick that is whole.
     flaw: Option<String>,
 }
 
@@ -183,7 +183,7 @@ struct Tally<'a> {
     root: u32,
     /// The root's instructions that return.
     returns: BTreeSet<u32>,
-    /// The instructions that call, and what.
+    /// The called functions, by the addresses of the calls.
     calls: BTreeMap<u32, u32>,
     /// The first address of the function around an address, if it can be reached from the interrupt.
     inside: Box<dyn Fn(u32) -> Option<u32> + 'a>,
@@ -263,15 +263,6 @@ impl Tally<'_> {
             self.closed.push(tick);
         }
     }
-}
-
-/// Returns true if an instruction returns from its function.
-fn returns(instruction: &Instruction) -> bool {
-    let Instruction {
-        mnemonic, operands, ..
-    } = instruction;
-    let loads = mnemonic.starts_with("pop") || mnemonic.starts_with("ldm");
-    loads && operands.contains("pc") || mnemonic.starts_with("bx") && operands == "lr"
 }
 
 /// The calls of a function that are always taken, and what they call.

@@ -95,9 +95,8 @@ pub fn flow(function: &Function, index: usize, instruction: &Instruction) -> Flo
                 .and_then(|word| u32::from_str_radix(word, 16).ok());
             return target.map_or(Flow::Indirect, Flow::To);
         }
-        let returns = mnemonic.starts_with("bx") && operands == "lr";
         let by_register = mnemonic.starts_with("bx") || mnemonic.starts_with("blx");
-        return if by_register && !returns {
+        return if by_register && !instruction.returns() {
             Flow::Indirect
         } else {
             Flow::Onward
@@ -125,18 +124,9 @@ mod tests {
     use super::*;
 
     fn flow_of(mnemonic: &str, operands: &str) -> Flow {
-        let instruction = Instruction {
-            address: 0,
-            mnemonic: mnemonic.into(),
-            operands: operands.into(),
-        };
-        let function = Function {
-            symbol: "f".into(),
-            name: "f".into(),
-            range: 0..2,
-            instructions: Vec::new(),
-        };
-        flow(&function, 0, &instruction)
+        let listing = Listing::parse(&format!("00000000 <f>:\n   0:\t{mnemonic}\t{operands}\n"));
+        let function = listing.at(0).expect("it is listed");
+        flow(function, 0, &function.instructions[0])
     }
 
     #[test]

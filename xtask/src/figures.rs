@@ -9,14 +9,14 @@ use std::ops::Range;
 
 use anyhow::{Context, Result, bail, ensure};
 use toml::Value;
-use xtask::command;
+use xtask::{command, golden};
 
 /// The files of committed figures, and what they are called here.
 const FILES: [(&str, &str); 4] = [
-    ("count", "target-tests/golden/instructions.toml"),
-    ("cycles", "target-tests/golden/cycles.toml"),
-    ("jitter", "target-tests/golden/jitter.toml"),
-    ("sizes", "xtask/golden/sizes.toml"),
+    ("count", golden::INSTRUCTIONS),
+    ("cycles", golden::CYCLES),
+    ("jitter", golden::JITTER),
+    ("sizes", golden::SIZES),
 ];
 
 /// Pages and what they say, with figures as `{file: table.key}`, or sums and differences of several.
@@ -238,7 +238,7 @@ fn claims() -> Vec<(String, String)> {
 /// # Errors
 /// All that differs, and what a page no longer says.
 pub(crate) fn run(overwrite: bool) -> Result<()> {
-    let golden = golden()?;
+    let golden = read_all()?;
     let claims = claims();
     let mut pages = BTreeMap::new();
     for (page, _) in &claims {
@@ -281,7 +281,7 @@ pub(crate) fn run(overwrite: bool) -> Result<()> {
 }
 
 /// The files' tables, by the name of the file.
-fn golden() -> Result<BTreeMap<&'static str, Value>> {
+fn read_all() -> Result<BTreeMap<&'static str, Value>> {
     FILES
         .into_iter()
         .map(|(name, path)| {

@@ -10,6 +10,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::command;
 
+/// File of the instructions of control ticks.
+pub const INSTRUCTIONS: &str = "target-tests/golden/instructions.toml";
+/// File of the bounds of their cycles.
+pub const CYCLES: &str = "target-tests/golden/cycles.toml";
+/// File of the jitter of the output.
+pub const JITTER: &str = "target-tests/golden/jitter.toml";
+/// File of the images' sizes.
+pub const SIZES: &str = "xtask/golden/sizes.toml";
+
 /// A file of tables, each under the name of an image.
 pub struct Golden {
     /// Its path, from the workspace's folder.

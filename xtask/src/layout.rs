@@ -12,7 +12,7 @@ use object::{Endianness, Object, ObjectSection, elf};
 use serde::{Deserialize, Serialize};
 
 use crate::frames::pointers_in_code;
-use xtask::golden::Golden;
+use xtask::golden::{self, Golden};
 use xtask::image::{Board, Image, Target};
 use xtask::listing::{Instruction, Listing};
 
@@ -165,7 +165,7 @@ fn leaves(instruction: &Instruction, symbol: &str) -> bool {
 
 /// The committed sizes.
 const GOLDEN: Golden = Golden {
-    path: "xtask/golden/sizes.toml",
+    path: golden::SIZES,
     head: "Bytes that the images take, written by `cargo xtask sizes --overwrite-expected`.",
 };
 

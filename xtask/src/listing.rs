@@ -18,6 +18,15 @@ pub struct Instruction {
     pub operands: String,
 }
 
+impl Instruction {
+    /// Returns true if it returns from its function.
+    pub fn returns(&self) -> bool {
+        let loads = self.mnemonic.starts_with("pop") || self.mnemonic.starts_with("ldm");
+        loads && self.operands.contains("pc")
+            || self.mnemonic.starts_with("bx") && self.operands == "lr"
+    }
+}
+
 /// One function.
 pub struct Function {
     /// Its linker symbol.

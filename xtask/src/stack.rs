@@ -25,7 +25,7 @@ use xtask::image::Image;
 const EXCEPTION_FRAME_BYTES: u32 = 4 * 27;
 /// Function that uses up the stack to inject a fault.
 const USES_UP: &str = "fault_injection::dig";
-/// What no chain goes through: it counts once, or is meant to leave no stack.
+/// Functions that no chain goes through: one counts once, the other is meant to leave no stack.
 const LEFT_OUT: [&str; 2] = [PANIC, USES_UP];
 /// Functions that call themselves, and how many of each can be under way: `frexp` scales a subnormal number, once.
 const RECURSIONS: [(&str, u32); 1] = [("libm::math::frexp::frexp", 2)];
@@ -166,7 +166,7 @@ fn down_to(frames: &Frames, root: u32, part: &str) -> Result<u32> {
     bail!("{} does not lead to {part}", frames.nodes[&root].name)
 }
 
-/// How many calls of a function may be under way, if it calls itself as often as is known.
+/// Returns the number of calls of a function that may be under way, if it is one that calls itself.
 fn times(node: &Node) -> Option<u32> {
     let known = RECURSIONS.iter().find(|(name, _)| *name == node.name);
     known.map(|(_, times)| *times)
