@@ -302,7 +302,9 @@ mod app {
     async fn supervise(mut cx: supervise::Context) {
         let received = cx.shared.port.lock(|port| cx.local.intake.run(&mut port.0));
         FRAMES.store(cx.local.intake.frames(), Ordering::Relaxed);
-        if let Some(command) = received.urgent {
+        if let Some(urgent) = received.urgent {
+            let waiting = core::iter::from_fn(|| cx.local.requests_out.dequeue());
+            let command = Intake::overtake(urgent, waiting);
             // Before anything else, so that there is room.
             let _ = cx.local.commands_in.enqueue(command);
             print(cx.local.lines_in, LogEntry::Command(command));
@@ -311,6 +313,7 @@ mod app {
             let request = cx.local.requests_out.dequeue();
             let supervised = cx.local.supervision.run(snapshot, request);
             if let Some(command) = supervised.command {
+                cx.local.intake.note(command);
                 // Control empties this queue ten times as fast as it is filled.
                 let _ = cx.local.commands_in.enqueue(command);
                 print(cx.local.lines_in, LogEntry::Command(command));

@@ -11,6 +11,7 @@ use crate::law::admission::Lock;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use crate::law::reference::Motion;
 use crate::law::safety::{FaultCode, Operation, Station, Switches};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
@@ -33,6 +34,8 @@ pub struct Control<'q, 'a, S: Scalar> {
     place: usize,
     /// Orders taken so far; wraps.
     orders: u16,
+    /// Axes exchanged so far; wraps.
+    exchanges: u16,
     /// The last order to exchange the plan was carried out.
     plan_taken: bool,
     host: HostNeed,
@@ -65,6 +68,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             exchanging: false,
             place: 0,
             orders: 0,
+            exchanges: 0,
             plan_taken: false,
             host: HostNeed::new(rate_hz),
             ends,
@@ -187,7 +191,9 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         snapshot.renew(&self.stage(), &self.state);
         snapshot.switches = self.switches;
         snapshot.orders = self.orders;
+        snapshot.exchanges = self.exchanges;
         snapshot.plan_taken = self.plan_taken;
+        snapshot.planned = self.plan.iter().any(|motion| *motion != Motion::Hold);
     }
 
     /// Chooses the command of this tick. `unfit`: the settings are no longer those of a commissioned stage.
@@ -322,8 +328,17 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             needs_disabled,
             more,
             first,
+            new_origin,
         } = swap;
+        self.exchanges = self.exchanges.wrapping_add(1);
         self.exchanging = needs_disabled && more;
+        if needs_disabled {
+            // It was checked against the settings that acted until now. What is left of a stream or of an injection begins nothing.
+            self.plan = PerAxis::from_fn(|_| Motion::Hold);
+        }
+        if new_origin {
+            self.state.set_homed(name, false);
+        }
         if first {
             self.state.forget_encoder(name);
         }

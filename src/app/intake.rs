@@ -73,6 +73,23 @@ impl<'q> Intake<'q> {
         }
     }
 
+    /// Drops the requests of the operator that wait when a host's `Stop` or `Disable` has come: what was asked for before it does
+    /// not start after it. Returns the command to act on, which is `Disable` if the operator has asked for that.
+    pub fn overtake(urgent: Command, requests: impl Iterator<Item = Command>) -> Command {
+        requests.fold(urgent, |strongest, request| match request {
+            Command::Disable => request,
+            _ => strongest,
+        })
+    }
+
+    /// Takes note of a command of the operator's that is on its way to control: what a host asked for before a `Stop` or
+    /// `Disable`, and the server has not read yet, does not start after it either.
+    pub fn note(&mut self, command: Command) {
+        if matches!(command, Command::Stop | Command::Disable) {
+            self.ends.count_urgent();
+        }
+    }
+
     /// Number of valid requests so far, for [`Control::hear`](super::Control::hear).
     pub const fn frames(&self) -> u32 {
         self.frames

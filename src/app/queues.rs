@@ -51,6 +51,8 @@ pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) more: bool,
     /// It is the first that drives this axis since the start.
     pub(super) first: bool,
+    /// The axis is homed in another way than before: its position is not that of the machine until it is homed again.
+    pub(super) new_origin: bool,
 }
 
 /// An item that waits for the control law: of a stream or of an injection, never of both.

@@ -51,8 +51,12 @@ pub struct Snapshot<S> {
     pub injection: InjectionProgress,
     /// Orders of the server that control has taken; wraps.
     pub orders: u16,
+    /// Axes that control has exchanged; wraps.
+    pub exchanges: u16,
     /// True if the last order to exchange the plan was carried out.
     pub plan_taken: bool,
+    /// True if the plan moves an axis.
+    pub planned: bool,
 }
 
 impl<S: Scalar> Snapshot<S> {

@@ -10,7 +10,7 @@ use super::error::SettingsError;
 use super::leaves::rules::{SAFETY_OF_AN_AXIS, SAFETY_OF_THE_STAGE};
 use super::stage::StageSettings;
 use super::tree::{MAX_VALUE_BYTES, TreeError, same_in};
-use crate::law::axes::AxisName;
+use crate::law::axes::{AxisName, PerAxis};
 
 /// A set of settings that is edited leaf by leaf, and the one in force.
 #[derive(Debug)]
@@ -180,6 +180,11 @@ impl<'a> Draft<'a> {
     /// The first setting by which the draft differs and on which safety depends: the outputs have to be off for it.
     pub fn safety_change(&self) -> Option<SafetyLeaf> {
         self.settings.safety_change(self.in_force)
+    }
+
+    /// The axes whose homing the draft changes: where they find their origin is not where they found it.
+    pub fn new_origins(&self) -> PerAxis<bool> {
+        PerAxis::from_fn(|axis| self.settings.axis(axis).homing != self.in_force.axis(axis).homing)
     }
 
     /// Checks the draft as a whole, with `elements` the room for GMS elements, and says of each axis whether it has to be

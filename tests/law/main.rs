@@ -11,6 +11,7 @@ mod bumpless;
 mod cancelling;
 mod capture;
 mod change_detector;
+mod checked_motions;
 mod common;
 mod crash_record;
 mod decimals;

@@ -107,7 +107,7 @@ fn slower() -> Body {
 }
 
 /// Sets a leaf as it is in some settings.
-fn set(path: &str, settings: &StageSettings) -> Body {
+pub(crate) fn set(path: &str, settings: &StageSettings) -> Body {
     let mut bytes = [0; quadrant::settings::MAX_VALUE_BYTES];
     let (kind, length) = settings.get_bytes(path, &mut bytes).expect("a leaf");
     Body::Settings(SettingsRequest::Set {
@@ -623,4 +623,51 @@ fn a_crash_does_not_hide_invalid_settings() {
         quadrant::admission::refusal(view, Command::ResetFault),
         Some(quadrant::admission::Refusal::SettingsInvalid)
     );
+}
+
+#[test]
+fn an_enabling_that_the_operator_asked_for_first_does_not_act_after_a_hosts_disable() {
+    for (body, waiting) in [Body::Disable, Body::Stop]
+        .into_iter()
+        .flat_map(|body| (1..4).map(move |waiting| (body.clone(), waiting)))
+    {
+        let mut tasks = Tasks::new(&settings(), 1);
+        tasks.run(20);
+        for _ in 0..waiting {
+            tasks.upper.borrow_mut().operate(Command::Enable);
+        }
+        tasks.send(std::slice::from_ref(&body));
+        tasks.run(200);
+        let enabled = tasks.upper.borrow().outputs.enabled;
+        assert!(!enabled, "{body:?} after {waiting} requests");
+        // And it is over then.
+        tasks.upper.borrow_mut().operate(Command::Enable);
+        tasks.run(40);
+        assert!(tasks.upper.borrow().outputs.enabled, "{body:?}");
+    }
+}
+
+#[test]
+fn a_button_that_is_let_go_disables_whatever_the_host_asks_for_beside_it() {
+    let mut tasks = enabled();
+    tasks.upper.borrow_mut().operate(Command::Run);
+    tasks.upper.borrow_mut().operate(Command::Disable);
+    tasks.send(&[Body::Stop]);
+    tasks.run(40);
+    assert!(!tasks.upper.borrow().outputs.enabled);
+}
+
+#[test]
+fn what_a_host_asked_for_first_does_not_act_after_the_operators_disable() {
+    let mut tasks = Tasks::new(&settings(), 1);
+    tasks.held_up = 30;
+    let first = tasks.send(&[Body::Enable]);
+    tasks.run(50);
+    tasks.upper.borrow_mut().operate(Command::Disable);
+    tasks.run(1000);
+    assert!(refused(tasks.answers.get(&first)));
+    assert!(!tasks.upper.borrow().outputs.enabled);
+    tasks.ask(Body::Enable).expect("enables");
+    tasks.run(40);
+    assert!(tasks.upper.borrow().outputs.enabled);
 }

@@ -135,10 +135,16 @@ impl Upper {
 
     fn supervise(&mut self) {
         let received = self.intake.run(&mut self.line);
-        self.commands.extend(received.urgent);
+        if let Some(urgent) = received.urgent {
+            let command = Intake::overtake(urgent, self.requests.drain(..));
+            self.commands.push_back(command);
+        }
         let snapshot = self.control.snapshot();
         let supervised = self.supervision.run(&snapshot, self.requests.pop_front());
-        self.commands.extend(supervised.command);
+        if let Some(command) = supervised.command {
+            self.intake.note(command);
+            self.commands.push_back(command);
+        }
         if !supervised.glitches.is_empty() {
             self.control
                 .show_glitches(self.supervision.glitch_readings());

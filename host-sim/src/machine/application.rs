@@ -218,9 +218,15 @@ impl<S: Scalar, O: AxisSource<'static, S>> Running<S, O> {
         let seen = self.control.snapshot();
         self.seen = seen;
         let received = self.intake.run(serial);
-        self.commands.extend(received.urgent);
+        if let Some(urgent) = received.urgent {
+            let command = Intake::overtake(urgent, self.requests.drain(..));
+            self.commands.push_back(command);
+        }
         let supervised = self.supervision.run(&seen, self.requests.pop_front());
-        self.commands.extend(supervised.command);
+        if let Some(command) = supervised.command {
+            self.intake.note(command);
+            self.commands.push_back(command);
+        }
         self.control
             .show_glitches(self.supervision.glitch_readings());
         for event in supervised.events {

@@ -15,21 +15,12 @@ pub(super) enum Work {
     Restart,
     /// Only say what became of the plan.
     Plan,
-    /// Enable the outputs, once control has the settings that were applied before.
-    Enable,
 }
 
-/// A request that is answered when control has taken the order that it came to, or that waits for settings to be built.
+/// A request that is answered when control has taken the order that it came to.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Deferred {
     /// The request's number.
     pub(super) id: u16,
     pub(super) work: Work,
-}
-
-impl Deferred {
-    /// True if the outputs are to be enabled.
-    pub(super) fn enables(&self) -> bool {
-        self.work == Work::Enable
-    }
 }

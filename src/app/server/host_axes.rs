@@ -339,9 +339,11 @@ impl<'a, S: Scalar> Server<'_, 'a, S, HostAxes> {
             needs_disabled: true,
             more: handed != AxisSet::ALL,
             first: !self.source.ever,
+            new_origin: true,
         };
         match self.ends.swaps.enqueue(swap) {
             Ok(()) => {
+                self.exchanges = self.exchanges.wrapping_add(1);
                 self.source.handed = handed;
                 Ok(())
             }

@@ -74,9 +74,11 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 "with_plan: the plan needs the loop that open_loop opens; give one of them"
             )));
         }
+        if request.with_plan {
+            self.check_plan()?;
+        }
         let (injection, most) = self
-            .source
-            .bounds()
+            .bounds()?
             .injection(request)
             .map_err(|error| invalid(format_args!("{error}")))?;
         // There is room: nothing waits.

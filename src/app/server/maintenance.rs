@@ -21,7 +21,6 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             // Control keeps the lock until all axes are there.
             Work::Load(_) => self.order(Order::Lock(Lock::Loading))?,
             Work::Plan => self.order(Order::Plan)?,
-            Work::Enable => {}
         }
         self.deferred = Some(Deferred { id: 0, work });
         Ok(Reply::Done)
@@ -32,10 +31,6 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         if !self.is_settled() {
             return false;
         }
-        let waiting = &self.deferred;
-        if self.must_wait_to_enable() && waiting.as_ref().is_some_and(Deferred::enables) {
-            return false;
-        }
         let Some(Deferred { id, work }) = self.deferred.take() else {
             return false;
         };
@@ -44,7 +39,6 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             Work::Plan => Err(refused(format_args!(
                 "a motion is under way; stop it before the plan is exchanged"
             ))),
-            Work::Enable => self.check_not_stopped().and_then(|()| self.enable()),
             _ if self.seen.view.lock == Lock::Open => Err(outputs_on()),
             Work::Load(header) => O::begin_load(self, header),
             Work::Store(provenance) => O::store(self, provenance),

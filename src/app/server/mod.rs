@@ -5,8 +5,8 @@
 //! long (settings are built, flash is written) holds up the link alone, and neither `Stop` nor `Disable`, which the
 //! [`Intake`](super::Intake) finds by itself.
 //!
-//! No request is served before control has taken every order that came of the ones before it and a snapshot says so: each
-//! is judged on a state that knows of them all. What must not be overtaken by anything else either, such as the operator's
+//! No request is served before control has taken every order and all settings that came of the ones before it and a snapshot
+//! says so: each is judged on a state that knows of them all. What must not be overtaken by anything else either, such as the operator's
 //! button, is decided by control, and answered when it has ([`Deferred`]).
 
 mod deferred;
@@ -34,7 +34,7 @@ use super::{Axis, Snapshot, TimingStatistics};
 use crate::app::telemetry::Packer;
 use crate::hal::Serial;
 use crate::law::admission::Refusal;
-use crate::law::axes::AxisName;
+use crate::law::axes::{AxisName, PerAxis};
 use crate::law::scalar::Scalar;
 use crate::settings::StageBounds;
 use quadrant_link::frame::FrameCounters;
@@ -154,6 +154,8 @@ pub struct Server<'q, 'a, S: Scalar, O> {
     changed: AxisSet,
     /// Safety depends on a setting in which they differ.
     needs_disabled: bool,
+    /// Axes that are homed in another way by the settings applied last.
+    new_origins: PerAxis<bool>,
     back_buffer: Option<&'a mut Axis<S>>,
     source: O,
     stream: Option<OpenStream>,
@@ -173,6 +175,8 @@ pub struct Server<'q, 'a, S: Scalar, O> {
     reboot: bool,
     /// Orders sent to control so far; wraps.
     orders: u16,
+    /// Axes sent to control so far; wraps.
+    exchanges: u16,
     /// Urgent requests served so far, as far as is known; wraps.
     urgent: u32,
     deferred: Option<Deferred>,
@@ -197,6 +201,7 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             pending: AxisSet::NONE,
             changed: AxisSet::NONE,
             needs_disabled: false,
+            new_origins: PerAxis::splat(false),
             back_buffer: Some(parts.back_buffer),
             source: parts.source,
             stream: None,
@@ -215,6 +220,7 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             number: parts.number,
             reboot: false,
             orders: 0,
+            exchanges: 0,
             urgent: 0,
             deferred: None,
             locked: false,
@@ -303,9 +309,16 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
         false
     }
 
-    /// True if control has taken every order, and the snapshot knows what came of them.
+    /// True if control has taken every order and every axis that was built, and the snapshot knows what came of them. Axes that
+    /// wait until the outputs are off are waited for no longer than the outputs stay off.
     fn is_settled(&self) -> bool {
-        self.seen.orders == self.orders
+        let held_up = self.needs_disabled && self.seen.view.safety.drives();
+        self.seen.orders == self.orders && (held_up || !self.is_exchanging())
+    }
+
+    /// True while control has yet to take an axis with settings that were applied.
+    fn is_exchanging(&self) -> bool {
+        !self.pending.is_empty() || self.seen.exchanges != self.exchanges
     }
 
     /// Prepares a notice; returns true if there is one.

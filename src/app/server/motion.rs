@@ -11,7 +11,7 @@ use crate::law::decimal::Decimal;
 use crate::law::reference::{Motion, MotionSettings};
 use crate::law::safety::Station;
 use crate::law::scalar::Scalar;
-use crate::settings::PlanSettings;
+use crate::settings::{PlanSettings, StageBounds};
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
 
 impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
@@ -19,11 +19,10 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
         match body {
-            Body::Enable if self.must_wait_to_enable() => {
-                self.check(Command::Enable)?;
-                return self.defer(Work::Enable);
+            Body::Enable => {
+                self.command(Command::Enable)?;
+                self.arm_for_faults();
             }
-            Body::Enable => return self.enable(),
             Body::Disable => self.command(Command::Disable)?,
             Body::ResetFault => self.command(Command::ResetFault)?,
             Body::Stop => {
@@ -31,11 +30,15 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 self.stream = None;
                 self.give_up_injection();
             }
-            Body::Run => self.command(Command::Run)?,
+            Body::Run => {
+                self.check(Command::Run)?;
+                self.check_plan()?;
+                self.command(Command::Run)?;
+            }
             Body::Home(axes) => {
                 for axis in axes.iter().map(AxisName::from) {
                     self.check(Command::Home(axis))?;
-                    let known = self.source.bounds().can_home(axis);
+                    let known = self.bounds()?.can_home(axis);
                     known.map_err(|error| refused(format_args!("{error}")))?;
                 }
                 for axis in axes.iter().map(AxisName::from) {
@@ -64,17 +67,24 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         Ok(Reply::Done)
     }
 
-    /// True while settings that safety depends on are being built: control does not enable before it has them all. If it
-    /// drives already, because the operator was quicker, they wait until the outputs are off.
-    pub(super) fn must_wait_to_enable(&self) -> bool {
-        self.needs_disabled && !self.pending.is_empty() && !self.seen.view.safety.drives()
+    /// Returns the bounds of the motions, if they are those of the settings that control has.
+    pub(super) fn bounds(&self) -> Result<StageBounds, LinkError> {
+        if self.is_exchanging() {
+            return Err(refused(format_args!(
+                "settings that were applied wait until the outputs are off; disable them first"
+            )));
+        }
+        Ok(self.source.bounds())
     }
 
-    /// Enables the outputs.
-    pub(super) fn enable(&mut self) -> Result<Reply, LinkError> {
-        self.command(Command::Enable)?;
-        self.arm_for_faults();
-        Ok(Reply::Done)
+    /// Checks that the plan moves an axis.
+    pub(super) fn check_plan(&self) -> Result<(), LinkError> {
+        if self.seen.planned {
+            return Ok(());
+        }
+        Err(refused(format_args!(
+            "there is no plan: send one; settings that change with the outputs off drop the one before"
+        )))
     }
 
     /// Checks that the control law would take a command, as far as the last snapshot tells.
@@ -116,8 +126,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             self.seen.view.homed[index(axis)],
         );
         let motion = self
-            .source
-            .bounds()
+            .bounds()?
             .move_to(axis, ahead, homed, target_mm, velocity_mm_s)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let mut motions = [MotionSettings::Hold; 3];
@@ -156,7 +165,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     /// Lays motions that keep to the bounds where control takes them from when it is ordered to.
     #[inline(never)]
     fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
-        let bounds = self.source.bounds();
+        let bounds = self.bounds()?;
         plan.validate(&bounds)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let plan = PerAxis::from_fn(|axis| {

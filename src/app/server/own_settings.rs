@@ -171,6 +171,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
         }
         self.check_rate()?;
         let safety = self.source.draft.safety_change();
+        let new_origins = self.source.draft.new_origins();
         if let Some(leaf) = safety
             && self.seen.view.safety.drives()
         {
@@ -195,6 +196,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
         self.pending = changed;
         self.changed = changed;
         self.needs_disabled = safety.is_some();
+        self.new_origins = new_origins;
         Ok(Reply::Applied(Applied {
             changed,
             restart_needed: false,
@@ -237,9 +239,11 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
             needs_disabled: self.needs_disabled,
             more: self.pending.iter().nth(1).is_some(),
             first: false,
+            new_origin: self.new_origins[name],
         };
         match self.ends.swaps.enqueue(swap) {
             Ok(()) => {
+                self.exchanges = self.exchanges.wrapping_add(1);
                 self.pending = self
                     .pending
                     .iter()

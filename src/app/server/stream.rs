@@ -60,7 +60,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 "period_ticks = {period_ticks} is outside {LEAST_PERIOD_TICKS} to {MOST_SEGMENT_TICKS}"
             )));
         }
-        let limits = self.source.bounds().stream_limits(view.homed.into_array());
+        let limits = self.bounds()?.stream_limits(view.homed.into_array());
         // Nothing moves: it drops what control has of a stream that never began.
         self.command(Command::Stop)?;
         let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
