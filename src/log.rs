@@ -6,7 +6,6 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use quadrant::app::friction_monitor::FrictionChange;
-#[cfg(not(feature = "lean"))]
 use quadrant::app::glitch_monitor::GlitchEvent;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
@@ -17,11 +16,9 @@ use quadrant::hal::ResetCause;
 use quadrant::motion::MotionMode;
 use quadrant::safety::Fault;
 use quadrant::scalar::{Quantity, Scalar};
-#[cfg(not(feature = "lean"))]
 use quadrant::settings::StageSettings;
 
-use crate::board;
-use crate::source::Source;
+use crate::board::{self, SettingsFlash};
 
 /// Lines of a kind in a second at 10 kHz: more are counted, not printed.
 const LINES: u16 = 5;
@@ -36,7 +33,6 @@ pub(crate) enum LogEntry<S> {
     /// An event of the supervisor.
     Event(Event),
     /// A glitch or a circle has ended.
-    #[cfg(not(feature = "lean"))]
     Glitch(GlitchEvent),
     /// A command went to the control law.
     Command(Command),
@@ -61,7 +57,6 @@ pub(crate) fn started(cause: ResetCause) {
 }
 
 /// Logs the origin of the settings in force.
-#[cfg(not(feature = "lean"))]
 pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance: &str) {
     let mut paths = 0_usize;
     // An error of the tree would end the visit early, and show as a number that is too small.
@@ -75,7 +70,6 @@ pub(crate) fn settings_loaded(settings: &StageSettings, number: u32, provenance:
 }
 
 /// Warns if the settings in force are the default ones, and says what to do.
-#[cfg(not(feature = "lean"))]
 pub(crate) fn not_commissioned(settings: &StageSettings) {
     if !settings.is_commissioned() {
         defmt::warn!(
@@ -102,7 +96,6 @@ enum Topic {
     Link,
     Settings,
     Losses,
-    #[cfg_attr(feature = "lean", allow(dead_code))]
     Glitches,
     Friction,
 }
@@ -178,7 +171,6 @@ impl Printer {
                     print_event(event);
                 }
             }
-            #[cfg(not(feature = "lean"))]
             LogEntry::Glitch(event) => {
                 if self.limiter.admits(Topic::Glitches, tick) {
                     print_glitch(event);
@@ -236,13 +228,11 @@ fn print_event(event: Event) {
 }
 
 /// Micrometres and degrees to one digit.
-#[cfg(not(feature = "lean"))]
 fn tenths(value: f32) -> f32 {
     let rounding = if value < 0.0 { -0.5 } else { 0.5 };
     (10.0 * value + rounding) as i32 as f32 / 10.0
 }
 
-#[cfg(not(feature = "lean"))]
 fn print_glitch(event: GlitchEvent) {
     match event {
         GlitchEvent::Reversal {
@@ -280,19 +270,6 @@ fn print_friction(change: FrictionChange) {
     }
 }
 
-#[cfg(feature = "lean")]
-fn print_fault(fault: Fault, reaction: &str) {
-    defmt::error!(
-        "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}",
-        fault.code.number(),
-        fault.axis.map_or("the stage", AxisName::as_str),
-        fault.tick,
-        reaction,
-        fault.code.name()
-    );
-}
-
-#[cfg(not(feature = "lean"))]
 fn print_fault(fault: Fault, reaction: &str) {
     defmt::error!(
         "fault {=u8} on {=str} at tick {=u32}, {=str}: {=str}; {=str}",
@@ -337,7 +314,7 @@ impl EventLogger {
     /// Logs the changes since the last call. Once a poll of the server.
     pub(crate) fn log<S: Scalar>(
         &mut self,
-        server: &Server<'static, 'static, S, Source>,
+        server: &Server<'static, 'static, S, SettingsFlash>,
         seen: &Snapshot<S>,
         timing: TimingStatistics,
     ) {
@@ -351,7 +328,6 @@ impl EventLogger {
                 continue;
             }
             match change {
-                #[cfg(not(feature = "lean"))]
                 // The sum of what there is to say of settings needs the server.
                 StateChange::Stored => defmt::info!(
                     "settings stored: {=usize} paths, from {=str}",

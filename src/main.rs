@@ -18,8 +18,6 @@
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
 #[allow(unsafe_code)]
-// The lean firmware uses neither the flash for settings, nor a job, nor the count of starts.
-#[cfg_attr(feature = "lean", allow(dead_code))]
 mod board;
 #[cfg(all(
     target_os = "none",
@@ -31,11 +29,6 @@ mod boot;
     any(feature = "board-mps2", feature = "board-nucleo-f446re")
 ))]
 mod log;
-#[cfg(all(
-    target_os = "none",
-    any(feature = "board-mps2", feature = "board-nucleo-f446re")
-))]
-mod source;
 
 #[cfg(all(
     target_os = "none",
@@ -69,12 +62,11 @@ mod app {
     use quadrant::safety::AxisSwitches;
 
     use crate::board::{
-        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, Switches, Tick,
-        Watchdog,
+        self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
+        Switches, Tick, Watchdog,
     };
     use crate::boot::{self, StaticStorage};
     use crate::log::{self, EventLogger, LogEntry, Printer};
-    use crate::source::Source;
 
     /// The number type of the control law.
     #[cfg(not(feature = "scalar-fixed"))]
@@ -116,7 +108,7 @@ mod app {
     #[local]
     struct Local {
         control: &'static mut Control<'static, 'static, Number>,
-        server: &'static mut Server<'static, 'static, Number, Source>,
+        server: &'static mut Server<'static, 'static, Number, SettingsFlash>,
         amplifiers: Amplifiers,
         encoders: Encoders,
         switches: Switches,
@@ -165,14 +157,7 @@ mod app {
             server,
             rate_hz,
             resolution_mm,
-        } = boot::machine(
-            cx.local.storage,
-            #[cfg(not(feature = "lean"))]
-            board.flash,
-            crashed,
-            cycle_hz,
-            NUMBER,
-        );
+        } = boot::machine(cx.local.storage, board.flash, crashed, cycle_hz, NUMBER);
         defmt::info!("{=u32} control ticks per second, outputs off", rate_hz);
         let (requests_in, requests_out) = cx.local.requests.split();
         let (commands_in, commands_out) = cx.local.commands.split();
@@ -323,11 +308,9 @@ mod app {
                 let _ = cx.local.events_in.enqueue((snapshot.tick, event));
                 print(cx.local.lines_in, LogEntry::Event(event));
             }
-            #[cfg(not(feature = "lean"))]
             for glitch in &supervised.glitches {
                 print(cx.local.lines_in, LogEntry::Glitch(*glitch));
             }
-            #[cfg(not(feature = "lean"))]
             if !supervised.glitches.is_empty() {
                 // Control empties this queue at its next snapshot.
                 let _ = cx

@@ -27,8 +27,6 @@ pub(super) enum Endpoint {
 pub(super) enum LinkEndpoint {
     /// The firmware's application in this process.
     Simulated,
-    /// That of the lean firmware, which holds no settings.
-    SimulatedLean,
     /// The firmware's image in QEMU.
     Emulated(PathBuf),
     /// A board at a serial port.
@@ -88,7 +86,6 @@ impl LinkEndpoint {
 
     fn open(&self, seed: u64, flash: Option<&Path>, share: Option<&str>) -> anyhow::Result<Client> {
         match self {
-            Self::SimulatedLean => session(SimulatedLink::start_lean(seed), share),
             Self::Simulated => session(SimulatedLink::start(seed, flash)?, share),
             Self::Emulated(image) => emulated(image, seed, flash, share),
             Self::Serial(path) => {

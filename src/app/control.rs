@@ -7,7 +7,6 @@ use super::{Axis, Snapshot};
 use crate::app::capture::Capture;
 use crate::app::supervisor::PERIOD_TICKS;
 use crate::app::telemetry::{Observation, Sampler, SamplerState};
-use crate::law::admission::Lock;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
@@ -78,11 +77,6 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
     /// Starts with a fault latched, before the first tick: what the last run or the stored settings left. The first stays.
     pub fn start_faulted(&mut self, code: FaultCode) {
         self.state.start_faulted(code);
-    }
-
-    /// Keeps the outputs off until axes are loaded, before the first tick: of a machine that holds no settings.
-    pub fn start_unloaded(&mut self) {
-        self.state.lock(Lock::Loading);
     }
 
     /// Sets the glitch monitor's results, which telemetry channels show.
@@ -255,12 +249,12 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 self.state.tell_spindle(speed);
                 return None;
             }
-            Order::Lock(reason) => {
-                self.state.lock(reason);
+            Order::Lock => {
+                self.state.lock();
                 return None;
             }
-            Order::Unlock { reason, stored } => {
-                self.state.unlock(reason);
+            Order::Unlock { stored } => {
+                self.state.unlock();
                 if stored {
                     self.state.accept_settings();
                 }
@@ -298,7 +292,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                         let _ = self.ends.plans.dequeue();
                     }
                 }
-                Order::Plan | Order::Spindle(_) | Order::Lock(_) | Order::Unlock { .. } => {
+                Order::Plan | Order::Spindle(_) | Order::Lock | Order::Unlock { .. } => {
                     self.take_order(order);
                 }
             }
@@ -327,7 +321,6 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             operation,
             needs_disabled,
             more,
-            first,
             new_origin,
         } = swap;
         self.exchanges = self.exchanges.wrapping_add(1);
@@ -338,9 +331,6 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         }
         if new_origin {
             self.state.set_homed(name, false);
-        }
-        if first {
-            self.state.forget_encoder(name);
         }
         // There is one back buffer, so the queue has room for it.
         let replaced = core::mem::replace(&mut self.axes[name], axis);

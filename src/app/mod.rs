@@ -46,10 +46,7 @@ pub use host_need::link_timeout_ticks;
 pub use intake::{Intake, Received};
 pub use liveness::Liveness;
 pub use queues::{ControlEnds, IntakeEnds, Queues, ServerEnds};
-pub use server::{
-    AxisSource, HostAxes, OwnSettings, OwnSettingsParts, Poll, Server, ServerParts,
-    ServerStatistics, fingerprint,
-};
+pub use server::{Poll, Server, ServerParts, ServerStatistics};
 pub use snapshot::{AxisSnapshot, Snapshot, TimingStatistics};
 pub use supervision::{Supervised, Supervision};
 

@@ -7,7 +7,6 @@ use heapless_queues::spsc::{Consumer, Producer, Queue};
 use super::Axis;
 use crate::app::capture::Capture;
 use crate::app::telemetry::{Sample, Sampler};
-use crate::law::admission::Lock;
 use crate::law::axes::AxisName;
 use crate::law::cancelling::SpindleSpeed;
 use crate::law::command::Command;
@@ -29,11 +28,9 @@ pub(super) enum Order {
     /// Take the speed of the spindle over.
     Spindle(SpindleSpeed),
     /// Keep the outputs off.
-    Lock(Lock),
-    /// No longer keep the outputs off for this reason.
+    Lock,
+    /// No longer keep the outputs off.
     Unlock {
-        /// The reason.
-        reason: Lock,
         /// Valid settings were stored meanwhile.
         stored: bool,
     },
@@ -49,8 +46,6 @@ pub(super) struct AxisSwap<'a, S: Scalar> {
     pub(super) needs_disabled: bool,
     /// Another axis of the same settings follows: the outputs stay off until then.
     pub(super) more: bool,
-    /// It is the first that drives this axis since the start.
-    pub(super) first: bool,
     /// The axis is homed in another way than before: its position is not that of the machine until it is homed again.
     pub(super) new_origin: bool,
 }
@@ -82,7 +77,7 @@ const ONE: usize = 2;
 const ORDERS: usize = 8;
 /// Bytes of the link that wait for the server: two of the longest frames, as in the reference board's own ring.
 const BYTES: usize = 1024;
-const STREAM_ITEMS: usize = if cfg!(feature = "lean") { 8 } else { 16 };
+const STREAM_ITEMS: usize = 16;
 /// Samples of each tick of 3 ms at 10 kHz.
 const SAMPLES: usize = 32;
 

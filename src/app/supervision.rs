@@ -2,9 +2,7 @@
 
 use super::Snapshot;
 use super::friction_monitor::FrictionMonitor;
-use super::glitch_monitor::{GlitchEvent, MAX_GLITCH_EVENTS};
-#[cfg(not(feature = "lean"))]
-use super::glitch_monitor::{GlitchMonitor, GlitchReadings};
+use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
 use crate::app::supervisor::{Decision, Event, Supervisor};
 use crate::law::command::Command;
 use crate::law::scalar::Scalar;
@@ -29,7 +27,6 @@ const MAX_EVENTS: usize = 8;
 #[derive(Clone, Debug)]
 pub struct Supervision {
     supervisor: Supervisor,
-    #[cfg(not(feature = "lean"))]
     glitches: GlitchMonitor,
     friction: FrictionMonitor,
     runs: u32,
@@ -39,12 +36,10 @@ pub struct Supervision {
 const STATUS_RUNS: u32 = 1_000;
 
 impl Supervision {
-    /// Returns the task before its first run. `resolution_mm` are the lengths of the encoders' counts; the lean firmware, which
-    /// does not know them yet, watches no glitches.
-    pub fn new(#[cfg_attr(feature = "lean", allow(unused))] resolution_mm: [f64; 3]) -> Self {
+    /// Returns the task before its first run. `resolution_mm` are the lengths of the encoders' counts.
+    pub fn new(resolution_mm: [f64; 3]) -> Self {
         Self {
             supervisor: Supervisor::default(),
-            #[cfg(not(feature = "lean"))]
             glitches: GlitchMonitor::new(resolution_mm.map(|length| length as f32)),
             friction: FrictionMonitor::default(),
             runs: 0,
@@ -66,16 +61,12 @@ impl Supervision {
         Supervised {
             command,
             events: events.into_iter().chain(changes).flatten().collect(),
-            #[cfg(not(feature = "lean"))]
             glitches: self.glitches.step(snapshot),
-            #[cfg(feature = "lean")]
-            glitches: heapless::Vec::new(),
             status_due: self.runs.is_multiple_of(STATUS_RUNS),
         }
     }
 
     /// The glitch monitor's latest results, for [`Control::show_glitches`](super::Control::show_glitches).
-    #[cfg(not(feature = "lean"))]
     pub const fn glitch_readings(&self) -> GlitchReadings {
         self.glitches.readings()
     }

@@ -36,20 +36,9 @@ fn fail(cause: CrashCause, text: fmt::Arguments) -> ! {
     halt(Outcome::Failed)
 }
 
-#[cfg(not(feature = "lean"))]
 #[panic_handler]
 fn panic(info: &PanicInfo) -> ! {
     fail(CrashCause::Panic, format_args!("{info}"))
-}
-
-/// Tells the place alone: to format messages takes flash and stack.
-#[cfg(feature = "lean")]
-#[panic_handler]
-fn panic(info: &PanicInfo) -> ! {
-    match info.location() {
-        Some(place) => fail(CrashCause::Panic, format_args!("{place}")),
-        None => fail(CrashCause::Panic, format_args!("nowhere")),
-    }
 }
 
 /// The hard fault's vector. It begins with a fresh stack, as the old one may be what failed: whoever was interrupted is

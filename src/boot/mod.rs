@@ -1,28 +1,26 @@
-//! The start: static storage, where the axes come from, and the crash record of the last run.
+//! The start: settings, static storage, and the crash record of the last run.
 
-#[cfg(feature = "lean")]
-mod host_axes;
-#[cfg(not(feature = "lean"))]
-mod own_settings;
+mod settings;
 mod storage;
 
 use core::mem::MaybeUninit;
 
 use quadrant::app::crash_record::CrashCause;
 use quadrant::app::{Axis, Control, ControlEnds, Intake, Server, ServerParts};
+use quadrant::axes::AxisName;
 use quadrant::hal::ResetCause;
+use quadrant::link::message::NumberType;
 use quadrant::safety::{FaultCode, Operation};
 use quadrant::scalar::Scalar;
+use quadrant::settings::StageSettings;
 use quadrant::stage::Plan;
 
-use crate::source::Source;
-use crate::{board, log};
+use self::settings::{Loaded, count_start, load};
+use crate::board::{self, SettingsFlash};
+use crate::log;
 
-#[cfg(feature = "lean")]
-pub(crate) use host_axes::{forget_starts, machine};
-#[cfg(not(feature = "lean"))]
-pub(crate) use own_settings::{forget_starts, machine};
-pub(crate) use storage::StaticStorage;
+pub(crate) use self::settings::forget_starts;
+pub(crate) use self::storage::StaticStorage;
 
 /// The two halves of the machine, ready for the first tick.
 pub(crate) struct Machine<S: Scalar + 'static> {
@@ -31,11 +29,85 @@ pub(crate) struct Machine<S: Scalar + 'static> {
     /// The link's bytes on their way, of the supervising task.
     pub(crate) intake: &'static mut Intake<'static>,
     /// The slow half, of the lowest task.
-    pub(crate) server: &'static mut Server<'static, 'static, S, Source>,
+    pub(crate) server: &'static mut Server<'static, 'static, S, SettingsFlash>,
     /// Control rate, Hz.
     pub(crate) rate_hz: u32,
     /// Lengths of the encoders' counts, mm.
     pub(crate) resolution_mm: [f64; 3],
+}
+
+/// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
+/// timer that measures ticks.
+pub(crate) fn machine<S: Scalar>(
+    storage: &'static mut StaticStorage<S>,
+    flash: SettingsFlash,
+    crashed: Option<FaultCode>,
+    cycle_hz: u32,
+    number: NumberType,
+) -> Machine<S> {
+    let settings = defaults(&mut storage.settings);
+    let draft = defaults(&mut storage.draft);
+    let Loaded {
+        plan,
+        provenance,
+        store,
+        invalid,
+        keep_draft,
+    } = load(
+        flash,
+        settings,
+        draft,
+        &mut storage.buffer,
+        count_start(crashed.is_some()),
+    );
+    // The back buffer's content does not matter: it is built over before it is used.
+    let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
+    let mut axes = [x, y, z];
+    // Tables are filled and bounds are searched before the first tick is due.
+    for (name, axis) in AxisName::ALL.into_iter().zip(&mut axes) {
+        settings.build_axis_into(name, axis);
+    }
+    let rate_hz = settings.rate_hz as u32;
+    let resolution_mm = settings
+        .axes
+        .each_ref()
+        .map(|axis| axis.encoder.resolution_mm);
+    let operation = settings.operation();
+    let (control_ends, intake_ends, ends) = storage.queues.split();
+    let control = place_control(
+        &mut storage.control,
+        axes,
+        operation,
+        plan,
+        rate_hz,
+        control_ends,
+    );
+    let invalid = invalid.then_some(FaultCode::SettingsInvalid);
+    for code in [crashed, invalid].into_iter().flatten() {
+        control.start_faulted(code);
+    }
+    let parts = ServerParts {
+        ends,
+        back_buffer,
+        settings,
+        draft,
+        keep_draft,
+        provenance,
+        store,
+        buffer: &mut storage.buffer,
+        capture: &mut storage.capture,
+        board: board::NAME,
+        cycle_hz,
+        rates_hz: board::RATES_HZ,
+        number,
+    };
+    Machine {
+        control,
+        intake: storage.intake.write(Intake::new(intake_ends)),
+        server: place_server(&mut storage.server, parts),
+        rate_hz,
+        resolution_mm,
+    }
 }
 
 /// Logs the crash record of the last run; returns its fault, or that of a watchdog reset.
@@ -56,6 +128,12 @@ pub(crate) fn report_crash(cause: ResetCause) -> Option<FaultCode> {
         });
     }
     (cause == ResetCause::Watchdog).then_some(FaultCode::WatchdogReset)
+}
+
+/// Makes the default settings in their place.
+#[inline(never)]
+fn defaults(place: &mut MaybeUninit<StageSettings>) -> &mut StageSettings {
+    place.write(StageSettings::default())
 }
 
 /// Makes room for an axis.
@@ -80,8 +158,8 @@ fn place_control<S: Scalar>(
 /// Makes the slow half in its place.
 #[inline(never)]
 fn place_server<S: Scalar>(
-    place: &'static mut MaybeUninit<Server<'static, 'static, S, Source>>,
-    parts: ServerParts<'static, 'static, S, Source>,
-) -> &'static mut Server<'static, 'static, S, Source> {
+    place: &'static mut MaybeUninit<Server<'static, 'static, S, SettingsFlash>>,
+    parts: ServerParts<'static, 'static, S, SettingsFlash>,
+) -> &'static mut Server<'static, 'static, S, SettingsFlash> {
     place.write(Server::new(parts))
 }

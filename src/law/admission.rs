@@ -40,22 +40,10 @@ pub struct StageView {
     pub brake_moves: bool,
     /// The stations that may enable the outputs.
     pub enabled_by: EnabledBy,
-    /// Reason for which the outputs are kept off, if they are.
-    pub lock: Lock,
+    /// The outputs are kept off while flash is written, or until a restart.
+    pub locked: bool,
     /// The stored settings are damaged or were refused, and nobody has stored others since.
     pub settings_invalid: bool,
-}
-
-/// Reason for which the outputs are kept off, whatever is asked for.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Lock {
-    /// None.
-    #[default]
-    Open,
-    /// Flash is written, or a restart is due.
-    Maintenance,
-    /// A host has not loaded all axes yet.
-    Loading,
 }
 
 /// Reason why a command is not acted on.
@@ -93,8 +81,6 @@ pub enum Refusal {
     OperatorOnly,
     /// The outputs are kept off while flash is written, or until a restart.
     Locked,
-    /// No axes were loaded since the start, or not all of a set.
-    NotLoaded,
     /// The stored settings are damaged or were refused.
     SettingsInvalid,
     /// The axis moves though the outputs are off.
@@ -127,9 +113,6 @@ impl Refusal {
             Self::HostOnly => "the host alone may enable (operation.enabled_by)",
             Self::OperatorOnly => {
                 "the button at the machine alone enables (operation.enabled_by): hold it"
-            }
-            Self::NotLoaded => {
-                "no axes are loaded, or not all of them: `quadrant connect load FILE` loads them"
             }
             Self::Locked => "flash is being written, or a restart is due; ask again",
             Self::SettingsInvalid => {
@@ -212,9 +195,8 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
         }
         Command::Enable if view.safety == SafetyState::Start => Some(Refusal::Starting),
         Command::Enable if view.settings_invalid => Some(Refusal::SettingsInvalid),
-        Command::Enable if view.lock == Lock::Loading => Some(Refusal::NotLoaded),
         Command::Enable if !view.commissioned => Some(Refusal::NotCommissioned),
-        Command::Enable if view.lock == Lock::Maintenance => Some(Refusal::Locked),
+        Command::Enable if view.locked => Some(Refusal::Locked),
         Command::Enable if !view.safety.is_enabled() && view.moving.is_some() => {
             view.moving.map(Refusal::NotAtStandstill)
         }

@@ -3,8 +3,6 @@
 use core::array;
 use core::ops::{Deref, DerefMut, Index, IndexMut};
 
-use crate::law::words::{Words, words};
-
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, Display, EnumString, IntoStaticStr, VariantNames};
 
@@ -56,10 +54,6 @@ impl AxisName {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(transparent)]
 pub struct PerAxis<T>([T; 3]);
-
-words!([T: Words] struct PerAxis<T> {
-    0: [T; 3],
-});
 
 impl<T> PerAxis<T> {
     /// The values of x, y and z.

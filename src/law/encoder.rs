@@ -3,7 +3,6 @@
 use core::hint::cold_path;
 
 use crate::law::units::{EncoderCount, POSITION_FRACTION_BITS, Position};
-use crate::law::words::words;
 
 /// A board's reading of one encoder in one tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,12 +67,6 @@ pub struct Encoder {
     reversed: bool,
     largest_step: i32,
 }
-
-words!([] struct Encoder {
-    shift: u32,
-    reversed: bool,
-    largest_step: i32,
-});
 
 /// The memory of an encoder.
 #[derive(Clone, Debug, Default, PartialEq)]

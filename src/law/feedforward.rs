@@ -33,7 +33,6 @@ use crate::law::friction::smoothed_gms::SmoothedGms;
 use crate::law::friction::stribeck::{Sliding, SlidingTable};
 use crate::law::friction::{Direction, FrictionSettings, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// The friction models that act together.
 #[derive(
@@ -192,16 +191,6 @@ enum Presliding<S: Scalar, const N: usize> {
     Dahl(Dahl<S>),
 }
 
-words!([S: Scalar, const N: usize] enum Presliding<S, N> {
-    0 Gms { 0 model: GmsOnSurface<S, N> },
-    1 Breakaway { 0 model: GmsOnSurface<S, N> },
-    2 None {},
-    3 Static { 0 surface: SlidingTable<S> },
-    4 Smoothed { elements elements: SmoothedGms<S, N>, surface surface: SlidingTable<S> },
-    5 Lugre { 0 model: Lugre<S> },
-    6 Dahl { 0 model: Dahl<S> },
-});
-
 /// The elements and what they slide on, the tables last.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
@@ -210,12 +199,6 @@ struct GmsOnSurface<S: Scalar, const N: usize> {
     breakaway: PerDirection<Sliding<S>>,
     surface: SlidingTable<S>,
 }
-
-words!([S: Scalar, const N: usize] struct GmsOnSurface<S, N> {
-    elements: Gms<S, N>,
-    breakaway: PerDirection<Sliding<S>>,
-    surface: SlidingTable<S>,
-});
 
 /// The friction state of the feedforward; slack by default.
 #[derive(Clone, Debug, PartialEq)]
@@ -269,16 +252,6 @@ pub struct Feedforward<S: Scalar, const N: usize> {
     inertia: S::Gain,
     presliding: Presliding<S, N>,
 }
-
-words!([S: Scalar, const N: usize] struct Feedforward<S, N> {
-    coulomb_gain: S::Gain,
-    gms_gain: S::Gain,
-    per_gms_gain: S::Gain,
-    most: S,
-    viscous: PerDirection<S::Gain>,
-    inertia: S::Gain,
-    presliding: Presliding<S, N>,
-});
 
 impl<S: Scalar, const N: usize> Feedforward<S, N> {
     /// Makes the feedforward from validated parameters. Settings time only.

@@ -18,7 +18,6 @@ use crate::law::reference::{
 use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
-use crate::law::words::words;
 
 /// The homing routine of an axis, ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
@@ -26,11 +25,6 @@ pub struct Homing<S: Scalar> {
     parameters: HomingParameters,
     approach: Approach<S>,
 }
-
-words!([S: Scalar] struct Homing<S> {
-    parameters: HomingParameters,
-    approach: Approach<S>,
-});
 
 /// The parameters of homing, in the units of the tick.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -56,19 +50,6 @@ pub struct HomingParameters {
     /// Largest distance to the switch, and off it.
     pub travel: Position,
 }
-
-words!([] struct HomingParameters {
-    direction: Direction,
-    switch: AxisSwitches,
-    search_velocity: Velocity,
-    creep_velocity: Velocity,
-    debounce_ticks: u32,
-    settle_ticks: u32,
-    index_spacing: Option<Position>,
-    home_offset: Position,
-    parking: Position,
-    travel: Position,
-});
 
 /// Inputs of homing in a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -61,7 +61,7 @@ pub(crate) struct InjectedValue {
 }
 
 /// An injection ready for the tick. Made by
-/// [`StageBounds::injection`](crate::settings::StageBounds::injection).
+/// [`StageSettings::injection`](crate::settings::StageSettings::injection).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Injection<S: Scalar> {
     axis: AxisName,

@@ -37,8 +37,7 @@
 //! - Memory, which a tick changes: [`control::terms::FeedbackState`], [`axis::AxisState`].
 //!
 //! Everything for the tick is generic over the number type ([`scalar::Scalar`]): `f32`, fixed point, or `f64` on a host.
-//! Curves are tabulated ([`table`]); what there is one of for each axis is a [`axes::PerAxis`]; [`decimal`] writes numbers into messages,
-//! and [`words`] turns what was built into words for another machine.
+//! Curves are tabulated ([`table`]); what there is one of for each axis is a [`axes::PerAxis`]; [`decimal`] writes numbers into messages.
 
 pub mod admission;
 pub mod axes;
@@ -61,6 +60,5 @@ pub mod scalar;
 pub mod stage;
 pub mod table;
 pub mod units;
-pub mod words;
 
 pub use axis::telemetry;

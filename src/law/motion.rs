@@ -8,7 +8,6 @@ use crate::law::reference::{
 use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
-use crate::law::words::words;
 
 /// The source that the reference of an axis follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -45,18 +44,6 @@ pub struct ReferenceGenerator<S: Scalar> {
     /// Largest velocity of a jog of an axis that is not homed.
     reduced_velocity: Option<Velocity>,
 }
-
-words!([S: Scalar] struct ReferenceGenerator<S> {
-    stop_ramp: Ramp<S>,
-    jog_ramp: Ramp<S>,
-    max_velocity: Velocity,
-    soft_limits: Option<(Position, Position)>,
-    homing: Option<Homing<S>>,
-    stream: Stream<S>,
-    wait_ticks: u32,
-    stop_limit: Option<u32>,
-    reduced_velocity: Option<Velocity>,
-});
 
 impl<S: Scalar> ReferenceGenerator<S> {
     /// A generator that stops along `stop_ramp`, and jogs and homes along `jog_ramp` at up to `max_velocity`. Settings

@@ -15,7 +15,7 @@
 //! # Ok::<(), quadrant::settings::SettingsError>(())
 //! ```
 
-use crate::law::admission::{self, Lock, StageView};
+use crate::law::admission::{self, StageView};
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::axis::{Axis, AxisState, Commissioning};
 use crate::law::cancelling::SpindleSpeed;
@@ -116,7 +116,7 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     injection: InjectionState<S>,
     brake: BrakeState,
     /// The outputs are kept off: [`StageState::lock`].
-    lock: Lock,
+    locked: bool,
     /// The stored settings are damaged or were refused.
     settings_invalid: bool,
     axes: PerAxis<AxisState<S, N>>,
@@ -137,7 +137,7 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             settled: 0,
             injection: InjectionState::default(),
             brake: BrakeState::default(),
-            lock: Lock::Open,
+            locked: false,
             settings_invalid: false,
         }
     }
@@ -165,25 +165,16 @@ impl<S: Scalar, const N: usize> StageState<S, N> {
         });
     }
 
-    /// Keeps the outputs off until [`unlock`](Self::unlock) for the same reason, if they are off now: for what may not happen
-    /// while they are on, such as the erasure of flash. A lock that is there already stays. Returns true if they are kept off.
-    pub fn lock(&mut self, reason: Lock) -> bool {
-        if self.lock == Lock::Open && !self.safety.drives() {
-            self.lock = reason;
-        }
-        self.lock != Lock::Open
+    /// Keeps the outputs off until [`unlock`](Self::unlock), if they are off now: for what may not happen while they are
+    /// on, such as the erasure of flash. Returns true if they are kept off.
+    pub fn lock(&mut self) -> bool {
+        self.locked |= !self.safety.drives();
+        self.locked
     }
 
-    /// Ends a [`lock`](Self::lock) of this reason.
-    pub fn unlock(&mut self, reason: Lock) {
-        if self.lock == reason {
-            self.lock = Lock::Open;
-        }
-    }
-
-    /// Forgets what was measured of an axis that has never been enabled: what measured it was not set for its encoder.
-    pub fn forget_encoder(&mut self, axis: AxisName) {
-        self.axes[axis].forget_encoder();
+    /// Ends [`lock`](Self::lock).
+    pub fn unlock(&mut self) {
+        self.locked = false;
     }
 
     /// Takes note that valid settings were stored, or the stored ones erased: a reset clears
@@ -309,7 +300,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             commissioned: self.is_commissioned(),
             brake_moves: state.brake.is_moving(),
             enabled_by: self.operation.enabled_by,
-            lock: state.lock,
+            locked: state.locked,
             settings_invalid: state.settings_invalid,
         }
     }

@@ -6,7 +6,6 @@
 //! division or a search.
 
 use crate::law::scalar::{OCTAVE_INTERVAL_BITS, OctaveStart, Quantity, Scalar};
-use crate::law::words::words;
 
 /// Octaves of every table: from the end of the curve down to 2^-14 of it.
 const OCTAVES: usize = 14;
@@ -24,11 +23,6 @@ pub struct OctaveTable<S: Scalar, const CURVES: usize> {
     start: OctaveStart<S>,
     nodes: [[S; CURVES]; NODES],
 }
-
-words!([S: Scalar, const CURVES: usize] struct OctaveTable<S, CURVES> {
-    start: OctaveStart<S>,
-    nodes: [[S; CURVES]; NODES],
-});
 
 /// The argument of node `index` of a table that ends at `2^end_exponent`.
 fn node_argument(index: usize, end_exponent: i32) -> f64 {

@@ -7,7 +7,6 @@ use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
 use crate::law::rounding;
-use crate::law::words::words;
 
 use serde::{Deserialize, Serialize};
 
@@ -24,10 +23,6 @@ pub const FASTEST_MM_S: f64 = 1e3;
 /// and differences of what a machine can reach do not wrap, and the encoder's own sum saturates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Position(pub i64);
-
-words!([] struct Position {
-    0: i64,
-});
 
 impl Position {
     /// The origin of the axis.

@@ -11,7 +11,6 @@ use crate::law::control::plant_model::PlantModel;
 use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
 use crate::law::friction::FrictionSettings;
 use crate::law::learning::LearningSettings;
-use crate::law::words::words;
 
 /// Everything one axis' control law is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -56,14 +55,6 @@ pub struct EncoderSettings {
     #[serde(default = "index_tolerance_counts")]
     pub index_tolerance_counts: u32,
 }
-
-words!([] struct EncoderSettings {
-    resolution_mm: f64,
-    counter_bits: u8,
-    reversed: bool,
-    counts_per_index: Option<u32>,
-    index_tolerance_counts: u32,
-});
 
 fn index_tolerance_counts() -> u32 {
     EncoderSettings::default().index_tolerance_counts

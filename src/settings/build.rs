@@ -379,7 +379,7 @@ impl PlanSettings {
     /// # Errors
     /// The first field that is refused; see [`PlanSettings::validate`].
     pub fn build<S: Scalar>(&self, stage: &StageSettings) -> Result<Plan<S>, SettingsError> {
-        self.validate(&stage.bounds())?;
+        self.validate(stage)?;
         Ok(PerAxis::from_fn(|axis| {
             let index = axis as usize;
             Motion::build(&self.motions[index], stage.motion_scale(index))

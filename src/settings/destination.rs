@@ -3,12 +3,11 @@
 use core::fmt;
 
 use super::axis::AxisSettings;
-use super::bounds::StageBounds;
 use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
 use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
-use crate::law::reference::{PointToPointSettings, StreamLimits, Velocity};
+use crate::law::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
 use crate::law::units::Position;
 
 /// Reason why an axis is not moved.
@@ -86,9 +85,15 @@ impl StageSettings {
             AxisName::Z => z,
         }
     }
-}
 
-impl StageBounds {
+    /// The scale of an axis' motions.
+    pub fn scale_of(&self, axis: AxisName) -> MotionScale {
+        MotionScale {
+            resolution_mm: self.axis(axis).encoder.resolution_mm,
+            rate_hz: self.rate_hz,
+        }
+    }
+
     /// The move of a homed axis from rest at `from` to `target_mm` at `velocity_mm_s`, within the axis' acceleration and
     /// jerk. [`PlanSettings::validate`](super::PlanSettings::validate) refuses one that takes too long. Hand it to the axis as its
     /// plan's motion and start it with [`Command::StartMove`](crate::law::command::Command::StartMove).
@@ -104,7 +109,8 @@ impl StageBounds {
         velocity_mm_s: f64,
     ) -> Result<PointToPointSettings, MoveError> {
         let refuse = |flaw| Err(MoveError { axis, flaw });
-        let limits = &self.axes[axis];
+        let settings = self.axis(axis);
+        let limits = &settings.limits;
         if !homed {
             return refuse(MoveFlaw::NotHomed);
         }
@@ -127,7 +133,7 @@ impl StageBounds {
                 limit_mm_s: limits.max_velocity_mm_s,
             });
         }
-        let resolution_mm = limits.encoder.resolution_mm;
+        let resolution_mm = settings.encoder.resolution_mm;
         // From whole units to whole units, so that the move ends on the target's.
         let distance = Position::from_mm(target_mm, resolution_mm) - from;
         Ok(PointToPointSettings {
@@ -143,7 +149,7 @@ impl StageBounds {
     /// # Errors
     /// A speed above the axis' largest, or no number.
     pub fn jog_at(&self, axis: AxisName, velocity_mm_s: f64) -> Result<Velocity, MoveError> {
-        let limit_mm_s = self.axes[axis].max_velocity_mm_s;
+        let limit_mm_s = self.axis(axis).limits.max_velocity_mm_s;
         if !(velocity_mm_s >= -limit_mm_s && velocity_mm_s <= limit_mm_s) {
             return Err(MoveError {
                 axis,
@@ -162,13 +168,13 @@ impl StageBounds {
     /// # Errors
     /// The settings do not say how.
     pub fn can_home(&self, axis: AxisName) -> Result<(), MoveError> {
-        if self.axes[axis].can_home {
-            return Ok(());
+        match self.axis(axis).homing {
+            Some(_) => Ok(()),
+            None => Err(MoveError {
+                axis,
+                flaw: MoveFlaw::NoHoming,
+            }),
         }
-        Err(MoveError {
-            axis,
-            flaw: MoveFlaw::NoHoming,
-        })
     }
 
     /// Limits of streamed set points; the travel holds for axes that are homed.
@@ -177,7 +183,7 @@ impl StageBounds {
         let [of_x, of_y, of_z] = homed;
         [(x, of_x), (y, of_y), (z, of_z)].map(|(axis, homed)| {
             let scale = self.scale_of(axis);
-            let limits = &self.axes[axis];
+            let limits = &self.axis(axis).limits;
             let position = |value_mm| Position::from_mm(value_mm, scale.resolution_mm);
             StreamLimits {
                 scale,

@@ -1,8 +1,8 @@
 //! Requests to inject a voltage, checked against the settings. For the slow half.
 
-use super::bounds::StageBounds;
 use super::error::{Reason, SettingsError};
 use super::leaves::limits::LONGEST_TRAVEL_MM;
+use super::stage::StageSettings;
 use crate::law::axes::AxisName;
 use crate::law::injection::{Coupling, Injection};
 use crate::law::scalar::Scalar;
@@ -25,7 +25,7 @@ pub struct InjectionSettings {
     pub max_velocity_mm_s: f64,
 }
 
-impl StageBounds {
+impl StageSettings {
     /// Builds an injection, and says which magnitude of a word its limit is.
     ///
     /// # Errors
@@ -34,7 +34,7 @@ impl StageBounds {
         &self,
         request: &InjectionSettings,
     ) -> Result<(Injection<S>, u16), SettingsError> {
-        let axis = &self.axes[request.axis];
+        let axis = self.axis(request.axis);
         let within = |field, value: f64, most: f64| {
             // So written, what is not a number is refused.
             if value > 0.0 && value <= most {
@@ -47,14 +47,14 @@ impl StageBounds {
                 reason: Reason::OutOfRange { least: 0.0, most },
             })
         };
-        within("limit_v", request.limit_v, axis.output_limit_v)?;
+        within("limit_v", request.limit_v, axis.amplifier.output_limit_v)?;
         within("travel_mm", request.travel_mm, LONGEST_TRAVEL_MM)?;
         within(
             "max_velocity_mm_s",
             request.max_velocity_mm_s,
-            axis.max_velocity_mm_s,
+            axis.limits.max_velocity_mm_s,
         )?;
-        let volts_per_word = axis.full_scale_v / DacCode::FULL_SCALE;
+        let volts_per_word = axis.amplifier.full_scale_v / DacCode::FULL_SCALE;
         let resolution_mm = axis.encoder.resolution_mm;
         let counts_per_tick = request.max_velocity_mm_s / (resolution_mm * self.rate_hz);
         let coupling = match (request.open_loop, request.with_plan) {

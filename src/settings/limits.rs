@@ -3,8 +3,6 @@
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use crate::law::words::words;
-
 /// Limits of motion, of the tracking error and of the encoder signal.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
 #[serde(deny_unknown_fields)]
@@ -58,8 +56,6 @@ pub struct TravelSettings {
     /// Largest position, mm; above the smallest.
     pub positive: f64,
 }
-
-words!([] struct TravelSettings { negative: f64, positive: f64 });
 
 /// Defaults of the fields that a file may lack.
 macro_rules! defaults {

@@ -5,7 +5,6 @@
 //! defaults and meanings of all settings stand in one table, [`leaves`].
 
 mod axis;
-mod bounds;
 mod build;
 mod build_homing;
 mod defaults;
@@ -27,7 +26,6 @@ mod validate;
 pub(crate) mod value;
 
 pub use axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardSettings};
-pub use bounds::{AxisBounds, Machine, StageBounds};
 pub use destination::{MoveError, MoveFlaw};
 pub use error::{Reason, SettingsError};
 pub use feedback::FeedbackSettings;

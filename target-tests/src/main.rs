@@ -16,7 +16,6 @@ mod hosted;
 mod interrupt_latency;
 mod jitter;
 mod kinds;
-mod lean;
 mod load;
 mod lockstep;
 mod longest_path;
@@ -58,8 +57,6 @@ enum Verb {
     BoardSmoke,
     /// Inject every fault into the emulated firmware, and tell how it was found
     Faults(FaultArgs),
-    /// Load the emulated lean firmware over its link, and run a job on it
-    Lean,
     /// Count the instructions of one control tick, by stage and by kind of tick
     Count {
         /// Instead, those of the control law alone beside the same law in C
@@ -162,7 +159,6 @@ fn run(cli: Cli) -> Result<()> {
             };
             lockstep::run(toolchain, args.scalar, job, args.seconds, args.paced)
         }
-        Verb::Lean => lean::run(toolchain),
         Verb::BoardSmoke => board_smoke::run(toolchain),
         Verb::Faults(args) => {
             let only = args.only.as_deref();

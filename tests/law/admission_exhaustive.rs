@@ -3,7 +3,7 @@
 //! A view is finite. Of the three axes y stands for all: what is asked of an axis depends on that axis and on what holds for
 //! the whole stage.
 
-use quadrant::admission::{Lock, Refusal, StageView, refusal, refusal_from};
+use quadrant::admission::{Refusal, StageView, refusal, refusal_from};
 use quadrant::axes::{AxisName, PerAxis};
 use quadrant::command::Command;
 use quadrant::motion::MotionMode;
@@ -33,9 +33,7 @@ const MODES: [MotionMode; 7] = [
     MotionMode::OpenLoop,
 ];
 /// Flags of a view that are enumerated as bits.
-const FLAGS: u32 = 12;
-/// Reasons for which the outputs are kept off.
-const LOCKS: [Lock; 3] = [Lock::Open, Lock::Maintenance, Lock::Loading];
+const FLAGS: u32 = 13;
 
 fn commands() -> [Command; 10] {
     let scale = MotionScale {
@@ -68,7 +66,7 @@ fn starts(command: Command) -> bool {
 fn views() -> impl Iterator<Item = StageView> {
     STATES.into_iter().flat_map(|safety| {
         MODES.into_iter().flat_map(move |mode| {
-            (0..(LOCKS.len() as u32) << FLAGS).map(move |bits: u32| {
+            (0..1 << FLAGS).map(move |bits: u32| {
                 let flag = |bit: u32| bits >> bit & 1 == 1;
                 let on_axis = |yes: bool| PerAxis::from_fn(|axis| yes && axis == AXIS);
                 StageView {
@@ -91,7 +89,7 @@ fn views() -> impl Iterator<Item = StageView> {
                     injection_ready: flag(7),
                     injecting: flag(8),
                     commissioned: flag(9),
-                    lock: LOCKS[(bits >> 12) as usize],
+                    locked: flag(12),
                     settings_invalid: flag(10),
                     brake_moves: flag(11),
                     enabled_by: EnabledBy::Any,
@@ -127,7 +125,7 @@ fn nothing_is_enabled_unless_all_is_well() {
                     view.interlock.is_none()
                         && view.moving.is_none()
                         && view.commissioned
-                        && view.lock == Lock::Open
+                        && !view.locked
                         && !view.settings_invalid
                         && !view.brake_moves
                         && enabled_by != other,

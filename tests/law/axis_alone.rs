@@ -335,7 +335,6 @@ fn an_axis_at_rest_on_a_limit_switch_is_no_fault_and_may_leave_it() {
             rig.stand();
             assert!(rig.state.safety().is_enabled(), "at rest on {switch:?}");
             let jog = settings
-                .bounds()
                 .jog_at(AxisName::X, 2.0 * direction)
                 .expect("slow enough");
             rig.command(Command::Jog(AxisName::X, jog));
@@ -354,10 +353,7 @@ fn a_fault_that_held_the_axes_is_shown_until_something_moves_and_not_until_someb
     settings.streaming.link_lost = quadrant::settings::LossReaction::Hold;
     let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
     rig.start();
-    let velocity = settings
-        .bounds()
-        .jog_at(AxisName::X, 1.0)
-        .expect("slow enough");
+    let velocity = settings.jog_at(AxisName::X, 1.0).expect("slow enough");
     rig.command(Command::Stop);
     rig.command(Command::Jog(AxisName::X, velocity));
     rig.inputs.link_lost = true;
@@ -386,10 +382,7 @@ fn of_two_faults_that_hold_the_axes_the_first_is_shown_and_of_one_that_stops_the
         settings.streaming.link_lost = reaction;
         let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
         rig.start();
-        let velocity = settings
-            .bounds()
-            .jog_at(AxisName::X, 1.0)
-            .expect("slow enough");
+        let velocity = settings.jog_at(AxisName::X, 1.0).expect("slow enough");
         rig.command(Command::Stop);
         rig.command(Command::Jog(AxisName::X, velocity));
         let mut ticks = vec![];
@@ -413,10 +406,7 @@ fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_t
     let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
     rig.start();
     rig.command(Command::Stop);
-    let velocity = settings
-        .bounds()
-        .jog_at(AxisName::X, 10.0)
-        .expect("slow enough");
+    let velocity = settings.jog_at(AxisName::X, 10.0).expect("slow enough");
     rig.command(Command::Jog(AxisName::X, velocity));
     let mut most = 0.0f32;
     for tick in 0..3000 {

@@ -367,10 +367,7 @@ fn a_jog_and_standstill_fade_it_out() {
     axis.command(Command::Stop);
     axis.run(1.5);
     assert!(largest(&mut axis, 0.2) < 1e-3);
-    let jog = fixed()
-        .bounds()
-        .jog_at(AxisName::X, 5.0)
-        .expect("slow enough");
+    let jog = fixed().jog_at(AxisName::X, 5.0).expect("slow enough");
     axis.command(Command::Jog(AxisName::X, jog));
     assert!(largest(&mut axis, 1.0) < 1e-3);
 }

@@ -12,7 +12,6 @@ fn a_move_to_a_position_ends_on_it_from_wherever_it_starts() {
     let settings = StageSettings::simulated();
     for from in [Position(0), Position(123_456_789), Position(-7)] {
         let made = settings
-            .bounds()
             .move_to(AxisName::Y, from, true, 12.345_678, 50.0)
             .expect("within the travel");
         let end = from + Position::from_mm(made.distance_mm, 5e-4);
@@ -26,7 +25,6 @@ fn a_move_is_refused_unless_the_axis_knows_where_it_is_and_may_go_there() {
     let settings = StageSettings::simulated();
     let refused = |homed, target_mm, velocity_mm_s| {
         settings
-            .bounds()
             .move_to(AxisName::Z, Position::ZERO, homed, target_mm, velocity_mm_s)
             .expect_err("refused")
     };
@@ -49,15 +47,10 @@ fn a_move_is_refused_unless_the_axis_knows_where_it_is_and_may_go_there() {
 #[test]
 fn a_jog_is_refused_beyond_the_largest_velocity() {
     let settings = StageSettings::simulated();
-    let slow = settings.bounds().jog_at(AxisName::X, -3.0).expect("slow");
+    let slow = settings.jog_at(AxisName::X, -3.0).expect("slow");
     assert_eq!(slow, Velocity::from_mm_s(-3.0, settings.motion_scale(0)));
     for velocity_mm_s in [250.1, -250.1, f64::NAN] {
-        assert!(
-            settings
-                .bounds()
-                .jog_at(AxisName::X, velocity_mm_s)
-                .is_err()
-        );
+        assert!(settings.jog_at(AxisName::X, velocity_mm_s).is_err());
     }
 }
 
@@ -65,19 +58,14 @@ fn a_jog_is_refused_beyond_the_largest_velocity() {
 fn an_axis_without_homing_cannot_be_homed() {
     let settings = with_x(|axis| axis.homing = None);
     assert_eq!(settings.validate(4), Ok(()));
-    assert_eq!(settings.bounds().can_home(AxisName::Y), Ok(()));
-    let error = settings
-        .bounds()
-        .can_home(AxisName::X)
-        .expect_err("refused");
+    assert_eq!(settings.can_home(AxisName::Y), Ok(()));
+    let error = settings.can_home(AxisName::X).expect_err("refused");
     assert!(error.to_string().starts_with("x: the axis has no homing"));
 }
 
 #[test]
 fn the_travel_limits_a_stream_of_homed_axes_alone() {
-    let [x, y, _] = StageSettings::simulated()
-        .bounds()
-        .stream_limits([true, false, true]);
+    let [x, y, _] = StageSettings::simulated().stream_limits([true, false, true]);
     let end = Position::from_mm(200.0, 5e-4);
     assert_eq!(x.travel, Some((-end, end)));
     assert_eq!(y.travel, None);

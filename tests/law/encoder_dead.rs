@@ -161,10 +161,8 @@ impl<S: Scalar> Bench<S> {
                     travel_mm: 100.0,
                     max_velocity_mm_s: 250.0,
                 };
-                let (injection, _): (Injection<S>, u16) = StageSettings::simulated()
-                    .bounds()
-                    .injection(&request)
-                    .unwrap();
+                let (injection, _): (Injection<S>, u16) =
+                    StageSettings::simulated().injection(&request).unwrap();
                 self.rig.state.prepare_injection(injection);
                 self.feed();
                 Some(Command::StartInjection)

@@ -17,7 +17,7 @@ use crate::provocations::provoke;
 /// A motion both ways with noise, an error beyond emax, a stretch that saturates, a change of settings, and in the end
 /// a jump of half a 32-bit counter's range and one beyond the plausible.
 fn run<S: Scalar>(settings: &StageSettings, jumping: usize) -> Option<Trace> {
-    if settings.validate(4).is_err() || plan().validate(&settings.bounds()).is_err() {
+    if settings.validate(4).is_err() || plan().validate(settings).is_err() {
         return None;
     }
     let mut weaker = settings.clone();

@@ -53,10 +53,8 @@ impl<S: Scalar> Bench<S> {
     }
 
     pub(crate) fn begin(&mut self, request: &InjectionSettings, words: &[i16]) {
-        let (injection, _): (Injection<S>, u16) = StageSettings::simulated()
-            .bounds()
-            .injection(request)
-            .unwrap();
+        let (injection, _): (Injection<S>, u16) =
+            StageSettings::simulated().injection(request).unwrap();
         self.rig.state.prepare_injection(injection);
         self.words = words.to_vec();
         self.sent = 0;
@@ -271,7 +269,7 @@ fn what_is_out_of_range_is_refused_by_name() {
     let refused = |change: fn(&mut InjectionSettings)| {
         let mut request = request(true);
         change(&mut request);
-        let outcome = settings.bounds().injection::<f32>(&request);
+        let outcome = settings.injection::<f32>(&request);
         outcome.unwrap_err().to_string()
     };
     for (said, field) in [
@@ -308,7 +306,7 @@ proptest! {
         let mut rig: Rig<Fixed> = Rig::new(&settings, &PlanSettings::default());
         rig.tick();
         rig.command(Command::Enable);
-        if let Ok((injection, _)) = settings.bounds().injection(&request) {
+        if let Ok((injection, _)) = settings.injection(&request) {
             rig.state.prepare_injection(injection);
         }
         rig.inputs.command = Some(Command::StartInjection);

@@ -332,10 +332,7 @@ fn nothing_is_learnt_at_rest_or_from_a_jog() {
     let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
     axis.run(1.0);
     assert_eq!(axis.status(), LearningStatus::AtRest);
-    let jog = learning()
-        .bounds()
-        .jog_at(AxisName::X, 5.0)
-        .expect("slow enough");
+    let jog = learning().jog_at(AxisName::X, 5.0).expect("slow enough");
     axis.command(Command::Jog(AxisName::X, jog));
     axis.run(1.0);
     assert_eq!(axis.status(), LearningStatus::OtherMotion);
@@ -410,7 +407,7 @@ fn opened() -> Axis<f32> {
         travel_mm: 10.0,
         max_velocity_mm_s: 50.0,
     };
-    let (injection, _) = learning().bounds().injection(&request).expect("within");
+    let (injection, _) = learning().injection(&request).expect("within");
     axis.rig.state.prepare_injection(injection);
     axis.rig.state.offer_voltage(0, false);
     axis.command(Command::StartInjection);

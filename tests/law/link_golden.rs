@@ -30,26 +30,6 @@ pub(crate) fn flag() -> Value {
     }
 }
 
-/// The head of an axis of 128 words.
-pub(crate) fn header() -> LoadHeader {
-    LoadHeader {
-        part: LoadPart::Axis(Z),
-        fingerprint: 0x0102_0304,
-        number: NumberType::Fixed,
-        rate_hz: 10_000,
-        set: 300,
-        words: 128,
-        crc: 1,
-    }
-}
-
-/// A list of one word.
-pub(crate) fn one_word() -> Words {
-    let mut words = Words::new();
-    assert!(words.extend([1].into_iter()));
-    words
-}
-
 pub(crate) fn channels() -> Bounded<Channel, 8> {
     ["x.error", "z.code", "stage.tick"]
         .iter()
@@ -82,19 +62,6 @@ fn requests() -> Vec<(Body, &'static str)> {
         (Body::Inputs, "12"),
         (Body::Learning, "13"),
         (Body::Spindle { rpm: 3000.0 }, "14000000000070a740"),
-        (Body::Load(LoadRequest::State), "1500"),
-        (
-            Body::Load(LoadRequest::Begin(header())),
-            "1501\
-             01028486880801904eac02800101",
-        ),
-        (
-            Body::Load(LoadRequest::Words {
-                offset: 300,
-                words: one_word(),
-            }),
-            "1502ac020401000000",
-        ),
         (Body::ResetFault, "03"),
         (Body::Enable, "04"),
         (Body::Disable, "05"),

@@ -168,18 +168,6 @@ fn replies() -> Vec<(Result<Reply, LinkError>, &'static str)> {
             "0eac0201050000c03f\
              0000803f010000803e0000",
         ),
-        (
-            Ok(Reply::Load(LoadStatus {
-                fingerprint: 300,
-                number: NumberType::F32,
-                rate_hz: 10_000,
-                part: Some(LoadPart::Machine),
-                received: 128,
-                set: None,
-                axes: AxisSet::ALL,
-            })),
-            "0fac0200904e010080010007",
-        ),
         (Err(LinkError::Version { yours: 9, mine: 1 }), "000901"),
         (Err(LinkError::Undecodable), "01"),
         (Err(LinkError::NoHello), "02"),

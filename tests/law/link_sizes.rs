@@ -6,9 +6,9 @@ use quadrant::link::frame::{self, FRAME_BYTES, FrameCounters};
 use quadrant::link::message::AxisName;
 use quadrant::link::message::{
     AxisMode, AxisPoint, AxisSet, AxisStatus, Body, CaptureRequest, CaptureStatus, Event,
-    FaultReport, INJECT_VALUES, Identity, InjectRequest, LinkError, LoadRequest, Message, Notice,
-    NumberType, PathPage, Reply, Request, Response, SetPoint, SettingsRequest, Status,
-    StreamRequest, TelemetryRequest, Value, Voltages, WordPage,
+    FaultReport, INJECT_VALUES, Identity, InjectRequest, LinkError, Message, Notice, NumberType,
+    PathPage, Reply, Request, Response, SetPoint, SettingsRequest, Status, StreamRequest,
+    TelemetryRequest, Value, Voltages, WordPage,
 };
 use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
 use quadrant::link::message::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
@@ -82,10 +82,6 @@ fn largest_requests() -> Vec<Body> {
             sequence: u32::MAX,
             values: Voltages::new([i16::MIN; INJECT_VALUES].into_iter()),
             last: true,
-        }),
-        Body::Load(LoadRequest::Words {
-            offset: u16::MAX,
-            words: full_words(),
         }),
         Body::Telemetry(TelemetryRequest::Select {
             channels: channels(),

@@ -7,9 +7,8 @@ use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::AxisName;
 use quadrant::link::message::Channel;
 use quadrant::link::message::{
-    AxisPoint, AxisSet, Body, CaptureRequest, InjectRequest, LoadHeader, LoadPart, LoadRequest,
-    NumberType, Request, SetPoint, SettingsRequest, StreamRequest, TelemetryRequest, Value,
-    Voltages, Words,
+    AxisPoint, AxisSet, Body, CaptureRequest, InjectRequest, Request, SetPoint, SettingsRequest,
+    StreamRequest, TelemetryRequest, Value, Voltages,
 };
 use quadrant::link::message::{Edge, Level, Trigger};
 use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
@@ -187,32 +186,8 @@ impl Requests<'_> {
     }
 
     /// Any request, all its numbers finite.
-    fn load(&mut self) -> LoadRequest {
-        match self.below(3) {
-            0 => LoadRequest::State,
-            1 => LoadRequest::Begin(LoadHeader {
-                part: LoadPart::Axis(self.axis()),
-                fingerprint: self.bits() as u32,
-                number: NumberType::F32,
-                rate_hz: self.bits() as u32,
-                set: self.bits() as u32,
-                words: self.bits() as u16,
-                crc: self.bits() as u32,
-            }),
-            _ => {
-                let (mut words, count) = (Words::new(), self.below(113) as usize);
-                let fits = words.extend((0..count).map(|_| self.bits() as u32));
-                assert!(fits, "a block holds 112");
-                LoadRequest::Words {
-                    offset: self.bits() as u16,
-                    words,
-                }
-            }
-        }
-    }
-
     fn body(&mut self) -> Body {
-        match self.below(22) {
+        match self.below(21) {
             0 => Body::Hello,
             1 => Body::Status,
             2 => Body::Fault,
@@ -251,7 +226,6 @@ impl Requests<'_> {
             17 => Body::Inputs,
             18 => Body::Learning,
             19 => Body::Spindle { rpm: self.real() },
-            20 => Body::Load(self.load()),
             _ => Body::Reboot,
         }
     }

@@ -4,7 +4,6 @@ mod admission_exhaustive;
 mod anti_windup;
 mod axis_alone;
 mod axis_limits;
-mod axis_words;
 mod board_wiring;
 mod brake;
 mod bumpless;

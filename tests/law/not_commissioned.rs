@@ -1,6 +1,5 @@
 //! A board with nothing in its flash has no law: its outputs stay off, and a person learns what to do.
 
-use quadrant::admission::Lock;
 use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
 use quadrant::admission::refusal;
@@ -29,7 +28,7 @@ const READY: StageView = StageView {
     commissioned: false,
     brake_moves: false,
     enabled_by: EnabledBy::Any,
-    lock: Lock::Open,
+    locked: false,
     settings_invalid: false,
 };
 

@@ -127,7 +127,7 @@ fn run(settings: &StageSettings, axis: usize, moves: bool, run: Run) -> Trace {
 /// The result of every run, and the stage's rules of operation.
 pub(crate) fn provoke(settings: &StageSettings, axis: usize) -> Option<(Vec<Trace>, Operation)> {
     let stage = settings.build::<f32, 4>().ok()?;
-    plan().validate(&settings.bounds()).ok()?;
+    plan().validate(settings).ok()?;
     let moving = MOVING.iter().map(|each| run(settings, axis, true, *each));
     let standing = STANDING
         .iter()

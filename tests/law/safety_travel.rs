@@ -371,7 +371,6 @@ fn an_axis_without_soft_limits_goes_either_way_once_it_is_homed() {
         rig.state.set_homed(AxisName::X, true);
         rig.command(Command::Enable);
         let velocity = settings
-            .bounds()
             .jog_at(AxisName::X, velocity_mm_s)
             .expect("slow enough");
         rig.command(Command::Jog(AxisName::X, velocity));

@@ -141,7 +141,7 @@ fn defaults_are_valid_at_every_rate_they_claim_and_with_room() {
     assert_eq!(StageSettings::simulated().validate(4), Ok(()));
     assert_eq!(StageSettings::simulated().validate(10), Ok(()));
     assert_eq!(
-        PlanSettings::default().validate(&StageSettings::simulated().bounds()),
+        PlanSettings::default().validate(&StageSettings::simulated()),
         Ok(())
     );
 }

@@ -10,7 +10,7 @@ use crate::settings::check_message;
 fn plan_refusal(motion: MotionSettings) -> SettingsError {
     let mut plan = PlanSettings::default();
     plan.motions[1] = motion;
-    plan.validate(&StageSettings::simulated().bounds())
+    plan.validate(&StageSettings::simulated())
         .expect_err("refused")
 }
 
@@ -116,7 +116,7 @@ fn a_move_to_where_the_axis_is_takes_no_time() {
         max_acceleration_mm_s2: 1000.0,
         max_jerk_mm_s3: 1e5,
     });
-    assert_eq!(plan.validate(&StageSettings::simulated().bounds()), Ok(()));
+    assert_eq!(plan.validate(&StageSettings::simulated()), Ok(()));
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn a_travel_beyond_the_references_format_is_refused() {
     let mut plan = PlanSettings::default();
     let sine = HarmonicSettings::with_velocity(3000.0, 10.0, 1.0, 10.0);
     plan.motions[0] = MotionSettings::Harmonic(sine);
-    let error = plan.validate(&stage.bounds()).expect_err("refused");
+    let error = plan.validate(&stage).expect_err("refused");
     check_message(&error, AxisName::X, "motion.amplitude_mm");
     plan.motions[0] = MotionSettings::PointToPoint(PointToPointSettings {
         distance_mm: -3000.0,
@@ -137,6 +137,6 @@ fn a_travel_beyond_the_references_format_is_refused() {
         max_acceleration_mm_s2: 10.0,
         max_jerk_mm_s3: 10.0,
     });
-    let error = plan.validate(&stage.bounds()).expect_err("refused");
+    let error = plan.validate(&stage).expect_err("refused");
     check_message(&error, AxisName::X, "motion.distance_mm");
 }

@@ -1,6 +1,5 @@
 //! The commands that the supervising task lets through, and the events that it tells.
 
-use quadrant::admission::Lock;
 use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
 use quadrant::app::supervisor::{Decision, Event, Supervisor};
@@ -31,7 +30,7 @@ const DISABLED: StageView = StageView {
     commissioned: true,
     brake_moves: false,
     enabled_by: EnabledBy::Any,
-    lock: Lock::Open,
+    locked: false,
     settings_invalid: false,
 };
 const ENABLED: StageView = StageView {

@@ -90,32 +90,6 @@ const SENTENCES: &[(&str, &str)] = &[
         "docs/memory.md",
         "| **bound** | **{sizes: nucleo-f446re-f32.stack_bound}** |",
     ),
-    (
-        "docs/memory.md",
-        "| flash, bytes | 98 304 | {sizes: nucleo-f446re-f32.flash} | {sizes: nucleo-f446re-f32-lean.flash} |",
-    ),
-    (
-        "docs/memory.md",
-        "| variables, bytes | | {sizes: nucleo-f446re-f32.variables} | {sizes: nucleo-f446re-f32-lean.variables} |",
-    ),
-    (
-        "docs/memory.md",
-        "| stack at most in use, bytes | | {sizes: nucleo-f446re-f32.stack_bound} | {sizes: nucleo-f446re-f32-lean.stack_bound} |",
-    ),
-    (
-        "docs/memory.md",
-        "| 32 768 | {sizes: nucleo-f446re-f32.variables + nucleo-f446re-f32.stack_bound} | \
-         {sizes: nucleo-f446re-f32-lean.variables + nucleo-f446re-f32-lean.stack_bound} |",
-    ),
-    (
-        "docs/lean.md",
-        "| flash, bytes | {sizes: nucleo-f446re-f32.flash} | {sizes: nucleo-f446re-f32-lean.flash} |",
-    ),
-    (
-        "docs/lean.md",
-        "stack, bytes | {sizes: nucleo-f446re-f32.variables + nucleo-f446re-f32.stack_bound} | \
-         {sizes: nucleo-f446re-f32-lean.variables + nucleo-f446re-f32-lean.stack_bound} |",
-    ),
 ];
 
 /// The stages in the table of docs/tick.md.

@@ -42,34 +42,20 @@ pub struct Target {
     pub board: Board,
     /// The number type.
     pub scalar: Scalar,
-    /// True for the firmware that holds no settings.
-    pub lean: bool,
 }
 
 impl Target {
-    /// All there are: the firmware with settings of its own on each board and in each number type, and the lean one in `f32`.
-    pub const ALL: [Self; 6] = [
+    /// All there are: each board in each number type.
+    pub const ALL: [Self; 4] = [
         Self::new(Board::Mps2, Scalar::F32),
         Self::new(Board::Mps2, Scalar::Fixed),
         Self::new(Board::NucleoF446re, Scalar::F32),
         Self::new(Board::NucleoF446re, Scalar::Fixed),
-        Self::new(Board::Mps2, Scalar::F32).lean(),
-        Self::new(Board::NucleoF446re, Scalar::F32).lean(),
     ];
 
-    /// The firmware with settings of its own.
+    /// The firmware of a board in a number type.
     pub const fn new(board: Board, scalar: Scalar) -> Self {
-        Self {
-            board,
-            scalar,
-            lean: false,
-        }
-    }
-
-    /// The same without: a host loads its axes.
-    #[must_use]
-    pub const fn lean(self) -> Self {
-        Self { lean: true, ..self }
+        Self { board, scalar }
     }
 
     /// The Rust target. The emulated machine for fixed point is a Cortex-M3, which has no floating-point unit.
@@ -99,13 +85,7 @@ impl Target {
             Scalar::F32 => "",
             Scalar::Fixed => ",scalar-fixed",
         };
-        let lean = if self.lean { ",lean" } else { "" };
-        format!("{board}{number}{lean}")
-    }
-
-    /// Cargo's profile.
-    const fn profile(self) -> &'static str {
-        if self.lean { "lean" } else { "firmware" }
+        format!("{board}{number}")
     }
 
     /// Cargo's arguments to select the firmware of this target.
@@ -116,7 +96,7 @@ impl Target {
             "--bin".into(),
             "quadrant-firmware".into(),
             "--profile".into(),
-            self.profile().into(),
+            "firmware".into(),
             "--target".into(),
             self.triple().into(),
             "--features".into(),
@@ -131,8 +111,7 @@ impl fmt::Display for Target {
             .board
             .to_possible_value()
             .expect("no variant is hidden");
-        let lean = if self.lean { " lean" } else { "" };
-        write!(f, "{} {}{lean}", board.get_name(), self.scalar_name())
+        write!(f, "{} {}", board.get_name(), self.scalar_name())
     }
 }
 
@@ -194,7 +173,7 @@ fn link(toolchain: Toolchain, target: Target, path: &Path) -> Result<()> {
     let built = command::root()
         .join("target/firmware")
         .join(target.triple())
-        .join(target.profile())
+        .join("firmware")
         .join("quadrant-firmware");
     // Two boards share a triple: keep each image under a name of its own.
     let folder = path.parent().context("the image has a folder")?;

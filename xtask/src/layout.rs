@@ -55,9 +55,7 @@ pub(crate) fn check(image: &Image, overwrite: bool) -> Result<()> {
     stack_is_at_the_bottom(image)?;
     if image.target.board == Board::NucleoF446re {
         settings_are_left_alone(image)?;
-        if !image.target.lean {
-            erasing_calls_nothing(image)?;
-        }
+        erasing_calls_nothing(image)?;
     }
     let sizes = Sizes::of(image)?;
     println!(

@@ -63,8 +63,6 @@ enum Verb {
     BoardSmoke(Forwarded),
     /// Inject every fault into the emulated firmware, and tell how it was found
     Faults(Forwarded),
-    /// Load the emulated lean firmware over its link, and run a job on it
-    Lean(Forwarded),
     /// Count the instructions of one control tick, by stage and by kind of tick
     Count(Forwarded),
     /// Calculate the cycles of one control tick on the reference board, and a bound of them
@@ -125,18 +123,11 @@ struct TargetArgs {
     /// The firmware's number type
     #[arg(long, value_enum, default_value_t = Scalar::F32)]
     scalar: Scalar,
-    /// The firmware that holds no settings: a host loads its axes
-    #[arg(long)]
-    lean: bool,
 }
 
 impl From<TargetArgs> for Target {
     fn from(args: TargetArgs) -> Self {
-        Self {
-            board: args.board,
-            scalar: args.scalar,
-            lean: args.lean,
-        }
+        Self::new(args.board, args.scalar)
     }
 }
 
@@ -193,7 +184,6 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Emulate(args) => forward(toolchain()?, "emulate", args)?,
         Verb::BoardSmoke(args) => forward(toolchain()?, "board-smoke", args)?,
         Verb::Faults(args) => forward(toolchain()?, "faults", args)?,
-        Verb::Lean(args) => forward(toolchain()?, "lean", args)?,
         Verb::Count(args) => forward(toolchain()?, "count", args)?,
         Verb::Cycles(args) => forward(toolchain()?, "cycles", args)?,
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,

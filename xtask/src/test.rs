@@ -311,7 +311,6 @@ fn emulated(report: &mut Report, toolchain: Toolchain) -> Result<()> {
             &verb(&["combinations"]),
         );
     }
-    step("lean firmware, loaded over its link, mps2 f32", &["lean"]);
     step("control under overload, mps2 f32", &["saturation"]);
     report.step("a session through the console, end to end", || {
         transcript::run(toolchain, false)

@@ -114,8 +114,7 @@ pub(super) enum Command {
         /// The file: TOML.
         file: PathBuf,
     },
-    /// Load all settings from a file and let them act as a whole; what the machine refuses changes nothing. For a board that holds
-    /// no settings (the lean firmware) the axes are built here, and loaded while the outputs are off.
+    /// Load all settings from a file and let them act as a whole; what the machine refuses changes nothing.
     Load {
         /// The file: TOML, as from `dump` or `quadrant commission`.
         file: PathBuf,

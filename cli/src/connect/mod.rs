@@ -47,9 +47,6 @@ pub(super) struct Arguments {
     /// Seed of the simulated stage's noise; the same seed gives the same results.
     #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp", "look"])]
     seed: u64,
-    /// Let the simulated machine hold no settings, as the lean firmware does: `load FILE` loads axes that are built here.
-    #[arg(long, requires = "simulated", conflicts_with = "flash")]
-    lean: bool,
     /// Keep the flash of the simulated or emulated machine in a file, so that what is stored survives this command.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "tcp", "look"])]
     flash: Option<PathBuf>,
@@ -159,7 +156,6 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
         (_, Some(address), ..) => LinkEndpoint::Tcp(address.clone()),
         (_, _, Some(address), _) => LinkEndpoint::Look(address.clone()),
         (.., Some(image)) => LinkEndpoint::Emulated(image.clone()),
-        _ if named.simulated && arguments.lean => LinkEndpoint::SimulatedLean,
         _ if named.simulated => LinkEndpoint::Simulated,
         _ => anyhow::bail!(
             "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \

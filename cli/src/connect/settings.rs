@@ -3,11 +3,9 @@
 use std::path::Path;
 
 use anyhow::{Context, bail};
-use quadrant::link::message::{Applied, Body, LoadStatus, SettingsRequest};
-use quadrant::settings::StageSettings;
-use quadrant_cli::output::with_bar;
+use quadrant::link::message::{Applied, Body, SettingsRequest};
+use quadrant_sim::client::Client;
 use quadrant_sim::client::settings::{self, Difference, whole_path};
-use quadrant_sim::client::{Client, load};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
@@ -103,9 +101,6 @@ pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
 
 pub(super) fn load(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     let read = SettingsFile::read(file)?;
-    if let Some(board) = load::state(client)? {
-        return load_axes(client, file, &read.stage, &board);
-    }
     let loaded = settings::load(client, &read.stage)
         .with_context(|| format!("{} was not loaded", file.display()))?;
     let mut text = format!(
@@ -126,23 +121,6 @@ pub(super) fn load(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
         "applied": loaded.applied,
     });
     Ok(Answer::new(text, data))
-}
-
-/// Builds the axes here, for a board that holds no settings, and loads them.
-fn load_axes(
-    client: &mut Client,
-    file: &Path,
-    stage: &StageSettings,
-    board: &LoadStatus,
-) -> anyhow::Result<Answer> {
-    let loaded = with_bar("axes", |told| load::load(client, stage, board, told));
-    let loaded = loaded.with_context(|| format!("{} was not loaded", file.display()))?;
-    let text = format!(
-        "acting now on x, y, z: {} words built here, at most {} an axis; set {:08x}\nthe board holds no settings: load again after \
-         each restart",
-        loaded.words, loaded.axis_words, loaded.set
-    );
-    Ok(Answer::new(text, json!(loaded)))
 }
 
 pub(super) fn apply(client: &mut Client) -> anyhow::Result<Answer> {

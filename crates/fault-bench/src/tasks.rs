@@ -10,8 +10,8 @@ use std::rc::Rc;
 
 use embedded_storage::nor_flash::{ErrorType, NorFlash, ReadNorFlash};
 use quadrant::app::{
-    Axis, Control, Inputs, Intake, OwnSettings, OwnSettingsParts, Poll, Queues, Server,
-    ServerParts, Snapshot, Supervision, TimingStatistics,
+    Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
+    TimingStatistics,
 };
 use quadrant::command::Command;
 use quadrant::encoder::EncoderReading;
@@ -268,7 +268,7 @@ impl Serial for Port<'_> {
 pub struct Tasks {
     pub upper: Shared,
     pub flash: Rc<RefCell<Flash>>,
-    server: Server<'static, 'static, f32, OwnSettings<'static, SlowFlash>>,
+    server: Server<'static, 'static, f32, SlowFlash>,
     receiver: Receiver,
     next_id: u16,
     pub answers: BTreeMap<u16, Result<Reply, LinkError>>,
@@ -332,18 +332,16 @@ impl Tasks {
         let server = Server::new(ServerParts {
             ends,
             back_buffer,
-            source: OwnSettings::new(OwnSettingsParts {
-                settings: leak(settings),
-                draft: leak(draft.unwrap_or(settings)),
-                keep_draft: draft.is_some(),
-                provenance: Provenance::new(),
-                store: Store::new(slow, 0),
-                buffer: Box::leak(Box::new([0; BUFFER_BYTES])),
-                rates_hz: (2.5e3, 1.5e4),
-            }),
+            settings: leak(settings),
+            draft: leak(draft.unwrap_or(settings)),
+            keep_draft: draft.is_some(),
+            provenance: Provenance::new(),
+            store: Store::new(slow, 0),
+            buffer: Box::leak(Box::new([0; BUFFER_BYTES])),
             capture: Box::leak(Box::new([0; 64])),
             board: "tasks",
             cycle_hz: 0,
+            rates_hz: (2.5e3, 1.5e4),
             number: NumberType::F32,
         });
         let mut tasks = Self {

@@ -27,7 +27,7 @@ const BODY_BYTES: usize = PAYLOAD_BYTES + CRC_BYTES;
 
 const _: () = assert!(cobs::max_encoding_length(BODY_BYTES) < FRAME_BYTES);
 
-pub(crate) static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
+static CRC: Crc<u32> = Crc::<u32>::new(&CRC_32_ISO_HDLC);
 
 /// The CRC of any body followed by its own CRC.
 const RESIDUE: u32 = CRC_32_ISO_HDLC.residue ^ CRC_32_ISO_HDLC.xorout;

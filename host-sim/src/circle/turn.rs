@@ -105,7 +105,7 @@ pub fn run_path(
         },
     };
     job.plan
-        .validate(&job.stage.bounds())
+        .validate(&job.stage)
         .map_err(CircleRefusal::Limits)?;
     let axes = &job.stage.axes;
     let resolution_mm = axes.each_ref().map(|axis| axis.encoder.resolution_mm);

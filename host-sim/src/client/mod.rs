@@ -6,7 +6,6 @@
 //!
 //! - [`Client`]: a session; requests are answered or fail in words, notices are kept until they are asked for;
 //! - [`settings`]: leaf by leaf, and as the file that every other command reads;
-//! - [`load`]: axes built here, for a board that holds no settings;
 //! - [`adopt`]: the friction that an axis has learnt, taken into the settings;
 //! - [`samples`], [`columns`]: telemetry and captures, and their CSV files;
 //! - [`set_points`]: a part program, streamed;
@@ -22,7 +21,6 @@ pub mod columns;
 mod connected;
 mod error;
 mod interrupt;
-pub mod load;
 pub mod plot;
 pub mod samples;
 mod session;

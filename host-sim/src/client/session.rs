@@ -9,9 +9,7 @@ use quadrant::link::message::{
     Body, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice, Reply, Request,
     Status,
 };
-use quadrant::link::message::{MachineState, TelemetryBlock, text};
-use quadrant::safety::FaultCode;
-use quadrant::settings::StageSettings;
+use quadrant::link::message::{MachineState, TelemetryBlock};
 
 use super::error::ClientError;
 use super::interrupt::Interrupt;
@@ -48,8 +46,6 @@ pub struct Client {
     stopping: bool,
     notices: VecDeque<Notice>,
     dropped_notices: u64,
-    /// The settings whose axes this session has loaded into a board that holds none.
-    loaded: Option<Box<StageSettings>>,
 }
 
 impl Client {
@@ -70,7 +66,6 @@ impl Client {
             stopping: false,
             notices: VecDeque::new(),
             dropped_notices: 0,
-            loaded: None,
         };
         // Ends whatever the other end takes for a frame's beginning.
         client.send(&[DELIMITER])?;
@@ -87,15 +82,6 @@ impl Client {
     /// Never: a session is open.
     pub fn identity(&self) -> &Identity {
         self.identity.as_ref().expect("a session is open")
-    }
-
-    /// The settings whose axes this session has loaded into a board that holds none, and that has not restarted since.
-    pub(super) fn loaded(&self) -> Option<&StageSettings> {
-        self.loaded.as_deref()
-    }
-
-    pub(super) fn remember_loaded(&mut self, stage: &StageSettings) {
-        self.loaded = Some(Box::new(stage.clone()));
     }
 
     /// Time by the connection's clock: the machine's time, if it is a simulated one.
@@ -216,7 +202,7 @@ impl Client {
     /// As [`request`](Self::request).
     pub fn fault(&mut self) -> Result<Option<FaultReport>, ClientError> {
         match self.request(Body::Fault)? {
-            Reply::Fault(fault) => Ok(fault.map(explained)),
+            Reply::Fault(fault) => Ok(fault),
             other => Err(self.unexpected("fault", &other)),
         }
     }
@@ -369,7 +355,6 @@ impl Client {
         match self.ask(&Body::Hello)? {
             Ok(Reply::Identity(identity)) => {
                 self.identity = Some(identity);
-                self.loaded = None;
                 Ok(())
             }
             Ok(other) => Err(self.unexpected("hello", &other)),
@@ -522,17 +507,6 @@ impl Client {
     }
 }
 
-/// The report with cause and remedy, which a firmware without room for texts leaves to this program.
-fn explained(mut report: FaultReport) -> FaultReport {
-    if report.cause.is_empty()
-        && let Some(code) = FaultCode::from_number(report.code)
-    {
-        report.cause = text(format_args!("{}", code.cause()));
-        report.remedy = text(format_args!("{}", code.remedy()));
-    }
-    report
-}
-
 /// Returns the name of a reply.
 const fn reply_name(reply: &Reply) -> &'static str {
     match reply {
@@ -551,6 +525,5 @@ const fn reply_name(reply: &Reply) -> &'static str {
         Reply::Inject(_) => "the state of an injection",
         Reply::Inputs(_) => "the digital inputs",
         Reply::Learning(_) => "what was learnt",
-        Reply::Load(_) => "what is loaded",
     }
 }

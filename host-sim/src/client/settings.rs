@@ -236,14 +236,11 @@ pub enum ExchangeError {
     Reverted(ClientError),
 }
 
-/// Reads all settings of the machine's draft; of a board that holds none, those whose axes this session has loaded.
+/// Reads all settings of the machine's draft.
 ///
 /// # Errors
 /// A connection that is broken, or a machine of a later release.
 pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
-    if let Some(loaded) = client.loaded() {
-        return Ok(loaded.clone());
-    }
     let mut settings = StageSettings::simulated();
     // In the machine's order a part comes before its leaves.
     for path in list(client, "")? {
@@ -255,14 +252,11 @@ pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
     Ok(settings)
 }
 
-/// Reads all settings that act, whatever the draft has; of a board that holds none, those whose axes this session has loaded.
+/// Reads all settings that act, whatever the draft has.
 ///
 /// # Errors
 /// As [`dump`].
 pub fn in_force(client: &mut Client) -> Result<StageSettings, ClientError> {
-    if let Some(loaded) = client.loaded() {
-        return Ok(loaded.clone());
-    }
     let mut settings = StageSettings::simulated();
     let drafted = list(client, "")?;
     take_acting(client, &drafted, &mut settings)?;
@@ -302,9 +296,6 @@ fn take_acting(
 /// # Errors
 /// The settings that are edited, or a connection that is broken.
 pub(super) fn refuse_edited(client: &mut Client) -> Result<(), ClientError> {
-    if client.loaded().is_some() {
-        return Ok(());
-    }
     let edited = paths(client, "edited", |cursor| SettingsRequest::Edited {
         cursor,
     })?;

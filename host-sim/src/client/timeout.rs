@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use quadrant::link::message::{
-    Body, CaptureRequest, InjectRequest, LoadRequest, SettingsRequest, StreamRequest,
+    Body, CaptureRequest, InjectRequest, SettingsRequest, StreamRequest,
 };
 
 /// Time for an answer: a request that computes little is served within two runs of the link's task, 2 ms, and a frame each way
@@ -55,8 +55,7 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
             | SettingsRequest::Edited { .. }
             | SettingsRequest::Provenance,
         )
-        | Body::Capture(CaptureRequest::State | CaptureRequest::Read { .. })
-        | Body::Load(LoadRequest::State) => Idempotency::Query,
+        | Body::Capture(CaptureRequest::State | CaptureRequest::Read { .. }) => Idempotency::Query,
         // A later selection outdates an earlier one, whose blocks have another generation.
         Body::Telemetry(_)
         | Body::Disable
@@ -65,7 +64,6 @@ pub(super) const fn idempotency(body: &Body) -> Idempotency {
         | Body::Spindle { .. }
         | Body::Stream(StreamRequest::Points { .. } | StreamRequest::Close)
         | Body::Inject(InjectRequest::Values { .. } | InjectRequest::Close)
-        | Body::Load(LoadRequest::Begin(_) | LoadRequest::Words { .. })
         | Body::Settings(
             SettingsRequest::Set { .. } | SettingsRequest::Revert | SettingsRequest::Defaults,
         ) => Idempotency::Idempotent,

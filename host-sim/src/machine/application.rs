@@ -4,20 +4,18 @@
 use std::collections::VecDeque;
 
 use quadrant::app::{
-    Axis, AxisSource, Control, HostAxes, Inputs, Intake, OwnSettings, OwnSettingsParts, Poll,
-    Queues, Server, ServerParts, Snapshot, Supervision, TimingStatistics,
+    Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
+    TimingStatistics,
 };
-use quadrant::axes::PerAxis;
 use quadrant::command::Command;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
 use quadrant::lockstep::InputRecord;
-use quadrant::reference::Motion;
-use quadrant::safety::{FaultCode, Operation};
+use quadrant::safety::FaultCode;
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::{Outputs, Plan, StageState};
+use quadrant::stage::{Outputs, StageState};
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
 
 use super::memory_flash::MemoryFlash;
@@ -29,12 +27,12 @@ const RATES_HZ: (f64, f64) = (1e3, 1e5);
 /// Requests of the operator at the machine that may wait, as in the firmware.
 const REQUESTS: usize = 3;
 
-/// The application, as it runs between two starts; `O` is the source of its axes.
-pub struct Running<S: Scalar, O = OwnSettings<'static, MemoryFlash>> {
+/// The application, as it runs between two starts.
+pub struct Running<S: Scalar> {
     control: Control<'static, 'static, S>,
     intake: Intake<'static>,
     supervision: Supervision,
-    server: Server<'static, 'static, S, O>,
+    server: Server<'static, 'static, S, MemoryFlash>,
     seen: Snapshot<S>,
     /// Requests of the operator at the machine.
     requests: VecDeque<Command>,
@@ -108,107 +106,50 @@ impl<S: Scalar> Running<S> {
         let stage = settings.build::<S, FIRMWARE_ELEMENTS>()?;
         let plan = start.plan.build(settings)?;
         let (axes, operation) = stage.into_axes();
-        let source = OwnSettings::new(OwnSettingsParts {
-            settings,
-            draft,
-            keep_draft,
-            provenance,
-            store,
-            buffer,
-            rates_hz: RATES_HZ,
-        });
-        let mut running = Self::of(axes, operation, plan, resolution_mm, source, start.identity);
-        for code in [start.fault, invalid].into_iter().flatten() {
-            running.control.start_faulted(code);
-        }
-        Ok(running)
-    }
-
-    /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
-    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
-        self.run(inputs, serial, |server, outputs| {
-            server.flash().set_outputs_off(!outputs.enabled);
-        })
-    }
-
-    /// The flash that settings are stored in.
-    pub fn flash(&self) -> &MemoryFlash {
-        self.server.flash()
-    }
-}
-
-impl<S: Scalar> Running<S, HostAxes> {
-    /// As the lean firmware does after a reset: without axes, until a host loads them.
-    pub fn start_unloaded(identity: BoardIdentity, rate_hz: u32, fault: Option<FaultCode>) -> Self {
-        let blank = PerAxis::from_fn(|_| Axis::blank());
-        let mut running = Self::of(
-            blank,
-            Operation::default(),
-            PerAxis::from_fn(|_| Motion::Hold),
-            [0.0; 3],
-            HostAxes::new(rate_hz),
-            identity,
-        );
-        running.control.start_unloaded();
-        if let Some(code) = fault {
-            running.control.start_faulted(code);
-        }
-        running
-    }
-
-    /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
-    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
-        self.run(inputs, serial, |_, _| {})
-    }
-}
-
-impl<S: Scalar, O: AxisSource<'static, S>> Running<S, O> {
-    fn of(
-        axes: PerAxis<Axis<S>>,
-        operation: Operation,
-        plan: Plan<S>,
-        resolution_mm: [f64; 3],
-        source: O,
-        identity: BoardIdentity,
-    ) -> Self {
         // What the tasks share lives as long as the firmware does, and so it is here: a few tens of KB for each start.
         let back_buffer: &'static mut Axis<S> = Box::leak(Box::new(axes[0].clone()));
         let axes = axes.map(|axis| -> &'static mut Axis<S> { Box::leak(Box::new(axis)) });
         let queues: &'static mut Queues<'static, S> = Box::leak(Box::new(Queues::new()));
         let (control_ends, intake_ends, ends) = queues.split();
-        let rate_hz = source.rate_hz() as u32;
-        Self {
-            control: Control::new(axes, operation, plan, rate_hz, control_ends),
+        let rate_hz = settings.rate_hz as u32;
+        let mut control = Control::new(axes, operation, plan, rate_hz, control_ends);
+        for code in [start.fault, invalid].into_iter().flatten() {
+            control.start_faulted(code);
+        }
+        let identity = start.identity;
+        Ok(Self {
+            control,
             intake: Intake::new(intake_ends),
             supervision: Supervision::new(resolution_mm),
             server: Server::new(ServerParts {
                 ends,
                 back_buffer,
-                source,
+                settings,
+                draft,
+                keep_draft,
+                provenance,
+                store,
+                buffer,
                 capture: Box::leak(vec![0; CAPTURE_WORDS].into_boxed_slice()),
                 board: identity.board,
                 cycle_hz: identity.cycle_hz,
+                rates_hz: RATES_HZ,
                 number: identity.number,
             }),
             seen: Snapshot::default(),
             requests: VecDeque::new(),
             commands: VecDeque::new(),
-        }
+        })
     }
 
-    /// One control period; `told` learns the outputs before anything else of the server does.
-    fn run(
-        &mut self,
-        inputs: &InputRecord,
-        serial: &mut impl Serial,
-        told: impl FnOnce(&Server<'static, 'static, S, O>, &Outputs),
-    ) -> (Outputs, Poll) {
+    /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
+    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
         self.control.hear(self.intake.frames());
         let outputs = self.control.tick(&mut Inputs {
             command: self.commands.pop_front(),
             ..inputs.inputs()
         });
-        told(&self.server, &outputs);
+        self.server.flash().set_outputs_off(!outputs.enabled);
         if self.requests.len() < REQUESTS {
             self.requests.extend(inputs.request);
         }
@@ -236,6 +177,11 @@ impl<S: Scalar, O: AxisSource<'static, S>> Running<S, O> {
             .server
             .poll(serial, &self.seen, TimingStatistics::default());
         (outputs, after)
+    }
+
+    /// The flash that settings are stored in.
+    pub fn flash(&self) -> &MemoryFlash {
+        self.server.flash()
     }
 
     /// The control law's memory.

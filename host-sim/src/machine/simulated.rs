@@ -4,10 +4,9 @@
 
 use std::collections::VecDeque;
 
-use quadrant::app::{HostAxes, Poll};
+use quadrant::app::Poll;
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
-use quadrant::lockstep::InputRecord;
 use quadrant::safety::Switches;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Outputs;
@@ -59,33 +58,9 @@ fn start<'a>(defaults: &'a StageSettings, plan: &'a PlanSettings) -> Start<'a> {
     }
 }
 
-/// The lean application at its start.
-fn unloaded(rate_hz: f64) -> Application {
-    Application::Lean(Running::start_unloaded(IDENTITY, rate_hz as u32, None))
-}
-
-/// The application of either firmware.
-// There is one of it in a machine.
-#[allow(clippy::large_enum_variant)]
-enum Application {
-    /// With settings of its own.
-    Own(Running<f32>),
-    /// The lean one, which is loaded by a host.
-    Lean(Running<f32, HostAxes>),
-}
-
-impl Application {
-    fn tick(&mut self, inputs: &InputRecord, wire: &mut Wire) -> (Outputs, Poll) {
-        match self {
-            Self::Own(running) => running.tick(inputs, wire),
-            Self::Lean(running) => running.tick(inputs, wire),
-        }
-    }
-}
-
 /// The firmware's application on the simulated stage.
 pub struct SimulatedMachine {
-    running: Application,
+    running: Running<f32>,
     plant: SimulatedStage,
     defaults: StageSettings,
     wire: Wire,
@@ -117,38 +92,19 @@ impl SimulatedMachine {
         seed: u64,
         flash: MemoryFlash,
     ) -> Result<Self, SettingsError> {
-        let running = Running::start(start(settings, &PlanSettings::default()), flash)?;
-        Ok(Self::of(Application::Own(running), settings, truth, seed))
-    }
-
-    /// Starts a machine with the lean firmware, which holds no settings: a host loads its axes.
-    pub fn lean(truth: &StageParameters, seed: u64) -> Self {
-        let settings = StageSettings::simulated();
-        Self::of(unloaded(settings.rate_hz), &settings, truth, seed)
-    }
-
-    fn of(
-        running: Application,
-        settings: &StageSettings,
-        truth: &StageParameters,
-        seed: u64,
-    ) -> Self {
-        Self {
-            running,
+        Ok(Self {
+            running: Running::start(start(settings, &PlanSettings::default()), flash)?,
             plant: SimulatedStage::new(truth, settings.rate_hz, seed),
             defaults: settings.clone(),
             wire: Wire::default(),
             outputs: Outputs::default(),
             pressed: Switches::NONE,
-        }
+        })
     }
 
     /// Control ticks since the last start.
     pub fn tick(&self) -> u32 {
-        match &self.running {
-            Application::Own(running) => running.state().tick(),
-            Application::Lean(running) => running.state().tick(),
-        }
+        self.running.state().tick()
     }
 
     /// The outputs of the last tick.
@@ -166,12 +122,9 @@ impl SimulatedMachine {
         self.pressed = switches;
     }
 
-    /// Returns the flash for settings, if there is one.
-    pub fn flash(&self) -> Option<&MemoryFlash> {
-        match &self.running {
-            Application::Own(running) => Some(running.flash()),
-            Application::Lean(_) => None,
-        }
+    /// Returns the flash for settings.
+    pub fn flash(&self) -> &MemoryFlash {
+        self.running.flash()
     }
 
     /// Sends bytes to the machine.
@@ -205,13 +158,10 @@ impl SimulatedMachine {
 
     /// Starts the firmware afresh: what is in flash stays, and the stage stands where it stands.
     pub fn restart(&mut self) {
-        let Some(flash) = self.flash().cloned() else {
-            self.running = unloaded(self.defaults.rate_hz);
-            return;
-        };
+        let flash = self.flash().clone();
         let plan = PlanSettings::default();
         match Running::start(start(&self.defaults, &plan), flash) {
-            Ok(running) => self.running = Application::Own(running),
+            Ok(running) => self.running = running,
             // The defaults were accepted when the machine was made.
             Err(_) => unreachable!("the same settings were accepted before"),
         }

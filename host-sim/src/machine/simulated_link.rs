@@ -47,15 +47,6 @@ impl SimulatedLink {
             period: server_period(&settings),
         }))
     }
-
-    /// A machine with the lean firmware, which a host loads; `seed` decides the noise of its encoders.
-    pub fn start_lean(seed: u64) -> Loopback<Self> {
-        Loopback::new(Self {
-            machine: SimulatedMachine::lean(&StageParameters::real(), seed),
-            flash: None,
-            period: server_period(&StageSettings::simulated()),
-        })
-    }
 }
 
 impl SimulatedPeer for SimulatedLink {
@@ -66,8 +57,8 @@ impl SimulatedPeer for SimulatedLink {
         while self.machine.tick() % PERIOD_TICKS != 1 {
             self.machine.run(1);
         }
-        if let (Some(file), Some(flash)) = (&mut self.flash, self.machine.flash()) {
-            file.keep(flash.bytes())?;
+        if let Some(file) = &mut self.flash {
+            file.keep(self.machine.flash().bytes())?;
         }
         Ok(self.machine.receive())
     }

@@ -97,7 +97,7 @@ impl Bench {
     }
 
     fn planner(&self) -> StreamPlanner {
-        let limits = self.settings.bounds().stream_limits([true; 3]);
+        let limits = self.settings.stream_limits([true; 3]);
         let here = self
             .machine
             .state()
@@ -241,7 +241,6 @@ fn a_move_to_a_position_starts_from_where_the_axis_stands() {
         let z = &bench.machine.state().axes()[2];
         let settings = bench
             .settings
-            .bounds()
             .move_to(
                 AxisName::Z,
                 z.reference(),

@@ -20,7 +20,6 @@ mod identify_plant;
 mod identify_revise;
 mod identify_static_friction;
 mod identify_virgin_curve;
-mod lean_machine;
 mod machine_motion;
 mod npid_lasting_error;
 mod one_axis;

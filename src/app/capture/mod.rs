@@ -14,9 +14,8 @@ use crate::app::telemetry::{Observation, Selection, SelectionError, shown};
 use crate::law::scalar::Scalar;
 use trigger::Watch;
 
-/// Words of the ring: 8 KiB; 1024 samples of two channels are 0.1 s at 10 kHz. The lean firmware has a quarter: the trace of a
-/// fault, of eight channels, is 6.4 ms.
-pub const CAPTURE_WORDS: usize = if cfg!(feature = "lean") { 512 } else { 2048 };
+/// Words of the ring: 8 KiB; 1024 samples of two channels are 0.1 s at 10 kHz.
+pub const CAPTURE_WORDS: usize = 2048;
 
 /// Largest share of the ring before the trigger, percent: the sample at the trigger has room in any case.
 pub const MAX_PRE_TRIGGER_PERCENT: u8 = 100;

@@ -1,6 +1,6 @@
 //! Requests that wait for control.
 
-use quadrant_link::message::{LoadHeader, Provenance};
+use quadrant_link::message::Provenance;
 
 /// The work of a request that waits for control.
 // Nothing here can be boxed: there is no heap.
@@ -9,8 +9,6 @@ use quadrant_link::message::{LoadHeader, Provenance};
 pub(super) enum Work {
     /// Store the draft, with its origin, while the outputs are kept off.
     Store(Provenance),
-    /// Begin a set of axes, while the outputs are kept off.
-    Load(LoadHeader),
     /// Restart, while the outputs are kept off.
     Restart,
     /// Only say what became of the plan.

@@ -1,9 +1,10 @@
 //! A voltage that a host adds to an axis' output.
 
 use super::opened::OpenInjection;
-use super::{AxisSource, Server, invalid, refused};
+use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::app::supervisor::PERIOD_TICKS;
+use crate::hal::SettingsFlash;
 use crate::law::command::Command;
 use crate::law::injection::{BLOCK_VALUES, VoltageBlock};
 use crate::law::scalar::Scalar;
@@ -15,7 +16,7 @@ const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;
 /// Ticks after which a command that was sent shows in the snapshot.
 const ARRIVAL_TICKS: u32 = 3 * PERIOD_TICKS;
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     pub(super) fn serve_inject(&mut self, request: InjectRequest) -> Result<Reply, LinkError> {
         match request {
             InjectRequest::Open {
@@ -78,7 +79,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             self.check_plan()?;
         }
         let (injection, most) = self
-            .bounds()?
+            .in_force()?
             .injection(request)
             .map_err(|error| invalid(format_args!("{error}")))?;
         // There is room: nothing waits.

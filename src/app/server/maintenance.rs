@@ -1,13 +1,13 @@
 //! Requests that control decides on: what is done while it keeps the outputs off, and the exchange of the plan.
 
 use super::deferred::{Deferred, Work};
-use super::{AxisSource, Server, refused};
+use super::{Server, refused};
 use crate::app::queues::Order;
-use crate::law::admission::Lock;
+use crate::hal::SettingsFlash;
 use crate::law::scalar::Scalar;
 use quadrant_link::message::{LinkError, Message, Reply, Response};
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Asks control for what the work needs, and puts the answer off. The reply returned is not sent.
     pub(super) fn defer(&mut self, work: Work) -> Result<Reply, LinkError> {
         match work {
@@ -15,11 +15,9 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 if self.seen.view.safety.drives() {
                     return Err(outputs_on());
                 }
-                self.order(Order::Lock(Lock::Maintenance))?;
+                self.order(Order::Lock)?;
                 self.locked = true;
             }
-            // Control keeps the lock until all axes are there.
-            Work::Load(_) => self.order(Order::Lock(Lock::Loading))?,
             Work::Plan => self.order(Order::Plan)?,
         }
         self.deferred = Some(Deferred { id: 0, work });
@@ -39,9 +37,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             Work::Plan => Err(refused(format_args!(
                 "a motion is under way; stop it before the plan is exchanged"
             ))),
-            _ if self.seen.view.lock == Lock::Open => Err(outputs_on()),
-            Work::Load(header) => O::begin_load(self, header),
-            Work::Store(provenance) => O::store(self, provenance),
+            _ if !self.seen.view.locked => Err(outputs_on()),
+            Work::Store(provenance) => self.save(provenance),
             Work::Restart => {
                 self.reboot = true;
                 Ok(Reply::Done)
@@ -55,7 +52,6 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     /// Lets control enable the outputs again, once nothing needs them off.
     pub(super) fn release(&mut self) {
         let unlock = Order::Unlock {
-            reason: Lock::Maintenance,
             stored: self.accepted,
         };
         if self.locked && self.deferred.is_none() && !self.reboot && self.order(unlock).is_ok() {
@@ -64,6 +60,6 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
     }
 }
 
-pub(super) fn outputs_on() -> LinkError {
+fn outputs_on() -> LinkError {
     refused(format_args!("the outputs are on; disable them first"))
 }

@@ -10,14 +10,13 @@
 //! button, is decided by control, and answered when it has ([`Deferred`]).
 
 mod deferred;
-mod host_axes;
 mod inject;
 mod maintenance;
 mod motion;
 mod observe;
 mod opened;
-mod own_settings;
 mod recorder;
+mod settings;
 mod statistics;
 mod status;
 mod stream;
@@ -32,20 +31,20 @@ use self::transmit_buffer::TransmitBuffer;
 use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};
 use crate::app::telemetry::Packer;
-use crate::hal::Serial;
+use crate::hal::{Serial, SettingsFlash};
 use crate::law::admission::Refusal;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::scalar::Scalar;
-use crate::settings::StageBounds;
+use crate::settings::StageSettings;
+use crate::settings::draft::Draft;
+use crate::store::{BUFFER_BYTES, Store};
 use quadrant_link::frame::FrameCounters;
 use quadrant_link::message::{
-    AxisSet, Body, Event, LinkError, LoadHeader, LoadRequest, Message, Notice, NumberType,
-    Provenance, Reply, SettingsRequest, text,
+    AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply,
+    SettingsRequest, text,
 };
 use quadrant_link::server::LinkServer;
 
-pub use self::host_axes::{HostAxes, fingerprint};
-pub use self::own_settings::{OwnSettings, OwnSettingsParts};
 pub use self::statistics::ServerStatistics;
 
 /// Messages that one poll prepares at most.
@@ -54,80 +53,34 @@ const MESSAGES_PER_POLL: usize = 4;
 const EVENT_ROOM: usize = 8;
 
 /// The parts of a server.
-pub struct ServerParts<'q, 'a, S: Scalar, O> {
+pub struct ServerParts<'q, 'a, S: Scalar, F> {
     /// Its side of the queues.
     pub ends: ServerEnds<'q, 'a, S>,
-    /// The axis that the control law does not use, in which the next one is made.
+    /// The axis that the control law does not use, in which new settings are built.
     pub back_buffer: &'a mut Axis<S>,
-    /// The source of the axes.
-    pub source: O,
+    /// The settings in force.
+    pub settings: &'a mut StageSettings,
+    /// Memory for settings that are being edited.
+    pub draft: &'a mut StageSettings,
+    /// True if `draft` holds settings to look at, and not to be in force unasked: a set older than one that is damaged.
+    /// Otherwise its content does not matter.
+    pub keep_draft: bool,
+    /// The origin of the stored settings.
+    pub provenance: Provenance,
+    /// The memory for settings.
+    pub store: Store<F>,
+    /// Buffer for a set of settings on its way to the store.
+    pub buffer: &'a mut [u8; BUFFER_BYTES],
     /// Memory for a capture.
     pub capture: &'a mut [u32],
     /// The board's name.
     pub board: &'static str,
     /// Rate of the timer that measures ticks, Hz.
     pub cycle_hz: u32,
+    /// Control rates that the board is up to, Hz: the lowest and the highest.
+    pub rates_hz: (f64, f64),
     /// The number type of the control law.
     pub number: NumberType,
-}
-
-/// The source of a server's axes: settings of its own, or a host that has built them.
-pub trait AxisSource<'a, S: Scalar>: Sized {
-    /// Control rate, Hz.
-    fn rate_hz(&self) -> f64;
-
-    /// The bounds of the motions in force.
-    fn bounds(&self) -> StageBounds;
-
-    /// The refusal of everything that needs axes, if there are none.
-    fn refusal(&self) -> Option<Refusal> {
-        None
-    }
-
-    /// Serves a request about settings.
-    ///
-    /// # Errors
-    /// The request is refused.
-    fn serve_settings(
-        server: &mut Server<'_, 'a, S, Self>,
-        request: SettingsRequest,
-    ) -> Result<Reply, LinkError>;
-
-    /// Stores the draft while control keeps the outputs off.
-    ///
-    /// # Errors
-    /// It is not stored.
-    fn store(
-        _server: &mut Server<'_, 'a, S, Self>,
-        _provenance: Provenance,
-    ) -> Result<Reply, LinkError> {
-        Err(unsupported("store"))
-    }
-
-    /// Serves a request to load axes.
-    ///
-    /// # Errors
-    /// The request is refused.
-    fn serve_load(
-        _server: &mut Server<'_, 'a, S, Self>,
-        _request: LoadRequest,
-    ) -> Result<Reply, LinkError> {
-        Err(unsupported("load"))
-    }
-
-    /// Begins a set of axes, once control keeps the outputs off.
-    ///
-    /// # Errors
-    /// The set is refused.
-    fn begin_load(
-        _server: &mut Server<'_, 'a, S, Self>,
-        _header: LoadHeader,
-    ) -> Result<Reply, LinkError> {
-        Err(unsupported("load"))
-    }
-
-    /// Goes on with an exchange of axes. Once a poll.
-    fn exchange(server: &mut Server<'_, 'a, S, Self>);
 }
 
 /// The result of a poll.
@@ -140,7 +93,7 @@ pub enum Poll {
 }
 
 /// The slow half: the server of the link.
-pub struct Server<'q, 'a, S: Scalar, O> {
+pub struct Server<'q, 'a, S: Scalar, F> {
     ends: ServerEnds<'q, 'a, S>,
     link: LinkServer,
     /// Counts of the link before the byte that is being served.
@@ -157,7 +110,10 @@ pub struct Server<'q, 'a, S: Scalar, O> {
     /// Axes that are homed in another way by the settings applied last.
     new_origins: PerAxis<bool>,
     back_buffer: Option<&'a mut Axis<S>>,
-    source: O,
+    draft: Draft<'a>,
+    provenance: Provenance,
+    store: Store<F>,
+    buffer: &'a mut [u8; BUFFER_BYTES],
     stream: Option<OpenStream>,
     injection: Option<OpenInjection>,
     heard_tick: u32,
@@ -171,6 +127,7 @@ pub struct Server<'q, 'a, S: Scalar, O> {
     stored: u16,
     board: &'static str,
     cycle_hz: u32,
+    rates_hz: (f64, f64),
     number: NumberType,
     reboot: bool,
     /// Orders sent to control so far; wraps.
@@ -186,11 +143,11 @@ pub struct Server<'q, 'a, S: Scalar, O> {
     accepted: bool,
 }
 
-impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
+impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
     /// Returns a server without a client.
     // Not inlined: its frame is gone when the start goes on.
     #[inline(never)]
-    pub fn new(parts: ServerParts<'q, 'a, S, O>) -> Self {
+    pub fn new(parts: ServerParts<'q, 'a, S, F>) -> Self {
         let mut server = Self {
             ends: parts.ends,
             link: LinkServer::new(),
@@ -203,7 +160,14 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             needs_disabled: false,
             new_origins: PerAxis::splat(false),
             back_buffer: Some(parts.back_buffer),
-            source: parts.source,
+            draft: if parts.keep_draft {
+                Draft::edited(parts.settings, parts.draft)
+            } else {
+                Draft::new(parts.settings, parts.draft)
+            },
+            provenance: parts.provenance,
+            store: parts.store,
+            buffer: parts.buffer,
             stream: None,
             injection: None,
             heard_tick: 0,
@@ -217,6 +181,7 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             stored: 0,
             board: parts.board,
             cycle_hz: parts.cycle_hz,
+            rates_hz: parts.rates_hz,
             number: parts.number,
             reboot: false,
             orders: 0,
@@ -252,7 +217,7 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
         self.timing = timing;
         self.release();
         self.arm_at_start();
-        O::exchange(self);
+        self.build_pending();
         self.collect_capture();
         self.follow_stream();
         self.follow_injection();
@@ -357,10 +322,6 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             body,
             Body::Settings(SettingsRequest::Apply | SettingsRequest::Store(_)) | Body::Reboot
         );
-        let needs_axes = body.may_move() || matches!(body, Body::SetPlan(_) | Body::Spindle { .. });
-        if needs_axes && let Some(refusal) = self.source.refusal() {
-            return Err(refused(format_args!("{}", refusal.as_str())));
-        }
         if self.seen.view.brake_moves && (body.may_move() || waits) {
             return Err(busy(format_args!("{}", Refusal::BrakeMoves.as_str())));
         }
@@ -372,8 +333,7 @@ impl<'q, 'a, S: Scalar, O: AxisSource<'a, S>> Server<'q, 'a, S, O> {
             Body::Learning => Ok(Reply::Learning(self.learning())),
             Body::Stream(request) => self.serve_stream(request),
             Body::Inject(request) => self.serve_inject(request),
-            Body::Settings(request) => O::serve_settings(self, request),
-            Body::Load(request) => O::serve_load(self, request),
+            Body::Settings(request) => self.serve_settings(request),
             Body::Telemetry(request) => self.serve_telemetry(request),
             Body::Capture(request) => self.serve_capture(request),
             Body::Reboot => self.defer(Work::Restart),
@@ -412,11 +372,6 @@ fn invalid(reason: core::fmt::Arguments<'_>) -> LinkError {
 /// Returns the error of a request that may succeed later.
 fn busy(reason: core::fmt::Arguments<'_>) -> LinkError {
     LinkError::Busy(text(reason))
-}
-
-/// Returns the error of a request that this firmware does not serve.
-fn unsupported(name: &str) -> LinkError {
-    LinkError::Unsupported(text(format_args!("{name}")))
 }
 
 /// The index of an axis in arrays.

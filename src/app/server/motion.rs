@@ -1,9 +1,10 @@
 //! Requests that switch outputs and start motions.
 
 use super::deferred::Work;
-use super::{AxisSource, Server, busy, index, invalid, refused};
+use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::Order;
 use crate::app::supervisor;
+use crate::hal::SettingsFlash;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::cancelling::{MOST_RPM, SpindleSpeed};
 use crate::law::command::Command;
@@ -11,10 +12,10 @@ use crate::law::decimal::Decimal;
 use crate::law::reference::{Motion, MotionSettings};
 use crate::law::safety::Station;
 use crate::law::scalar::Scalar;
-use crate::settings::{PlanSettings, StageBounds};
+use crate::settings::{PlanSettings, StageSettings};
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Requests that are commands of the control law.
     #[inline(never)]
     pub(super) fn serve_command(&mut self, body: Body) -> Result<Reply, LinkError> {
@@ -38,7 +39,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             Body::Home(axes) => {
                 for axis in axes.iter().map(AxisName::from) {
                     self.check(Command::Home(axis))?;
-                    let known = self.bounds()?.can_home(axis);
+                    let known = self.in_force()?.can_home(axis);
                     known.map_err(|error| refused(format_args!("{error}")))?;
                 }
                 for axis in axes.iter().map(AxisName::from) {
@@ -51,8 +52,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             } => {
                 let axis = axis.into();
                 let velocity = self
-                    .source
-                    .bounds()
+                    .draft
+                    .in_force()
                     .jog_at(axis, velocity_mm_s)
                     .map_err(|error| invalid(format_args!("{error}")))?;
                 self.command(Command::Jog(axis, velocity))?;
@@ -67,14 +68,14 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         Ok(Reply::Done)
     }
 
-    /// Returns the bounds of the motions, if they are those of the settings that control has.
-    pub(super) fn bounds(&self) -> Result<StageBounds, LinkError> {
+    /// Returns the settings that motions are checked against, if control has them.
+    pub(super) fn in_force(&self) -> Result<&StageSettings, LinkError> {
         if self.is_exchanging() {
             return Err(refused(format_args!(
                 "settings that were applied wait until the outputs are off; disable them first"
             )));
         }
-        Ok(self.source.bounds())
+        Ok(self.draft.in_force())
     }
 
     /// Checks that the plan moves an axis.
@@ -126,7 +127,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             self.seen.view.homed[index(axis)],
         );
         let motion = self
-            .bounds()?
+            .in_force()?
             .move_to(axis, ahead, homed, target_mm, velocity_mm_s)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let mut motions = [MotionSettings::Hold; 3];
@@ -145,7 +146,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 Decimal(MOST_RPM)
             )));
         }
-        let period_s = 1.0 / self.source.rate_hz();
+        let period_s = 1.0 / self.draft.in_force().rate_hz;
         self.order(Order::Spindle(SpindleSpeed::from_rpm(rpm, period_s)))?;
         Ok(Reply::Done)
     }
@@ -162,14 +163,14 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         self.defer(Work::Plan)
     }
 
-    /// Lays motions that keep to the bounds where control takes them from when it is ordered to.
+    /// Lays motions that keep to their axes' limits where control takes them from when it is ordered to.
     #[inline(never)]
     fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
-        let bounds = self.bounds()?;
-        plan.validate(&bounds)
+        let settings = self.in_force()?;
+        plan.validate(settings)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let plan = PerAxis::from_fn(|axis| {
-            Motion::build(&plan.motions[index(axis)], bounds.scale_of(axis))
+            Motion::build(&plan.motions[index(axis)], settings.scale_of(axis))
         });
         self.ends.plans.enqueue(plan).map_err(|_| {
             busy(format_args!(

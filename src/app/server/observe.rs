@@ -1,9 +1,10 @@
 //! Requests about samples: telemetry and the capture.
 
-use super::{AxisSource, Server, busy, invalid, refused};
+use super::{Server, busy, invalid, refused};
 use crate::app::capture::Capture;
 use crate::app::queues::CaptureCommand;
 use crate::app::telemetry::{Packer, Sampler, Selection};
+use crate::hal::SettingsFlash;
 use crate::law::safety::SafetyState;
 use crate::law::scalar::Scalar;
 use quadrant_link::message::{
@@ -14,7 +15,7 @@ use quadrant_link::message::{
 /// Pre-trigger share of the capture that waits for faults, %.
 const FAULT_PRE_TRIGGER_PERCENT: u8 = 75;
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_telemetry(
         &mut self,

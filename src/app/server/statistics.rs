@@ -1,6 +1,7 @@
 //! Statistics of the server, for the board's own log.
 
-use super::{AxisSource, Server};
+use super::Server;
+use crate::hal::SettingsFlash;
 use crate::law::scalar::Scalar;
 
 /// Statistics of a server: counts that only grow, and wrap.
@@ -24,7 +25,7 @@ pub struct ServerStatistics {
     pub captures: u16,
 }
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Returns the statistics.
     pub fn statistics(&self) -> ServerStatistics {
         let frames = self.link.counters();

@@ -1,6 +1,7 @@
 //! Identity and status of the machine.
 
-use super::{AxisSource, Server};
+use super::Server;
+use crate::hal::SettingsFlash;
 use crate::law::admission;
 use crate::law::axes::{AxisName, PerAxis};
 use crate::law::command::Command;
@@ -14,13 +15,13 @@ use quadrant_link::message::{
     Status, text,
 };
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     pub(super) fn identity(&self) -> Identity {
         Identity {
             protocol: PROTOCOL_VERSION,
             firmware: text(format_args!("{}", env!("CARGO_PKG_VERSION"))),
             board: text(format_args!("{}", self.board)),
-            rate_hz: self.source.rate_hz(),
+            rate_hz: self.draft.in_force().rate_hz,
             cycle_hz: self.cycle_hz,
             number: self.number,
             tick: self.seen.tick,
@@ -29,13 +30,13 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
 
     pub(super) fn status(&self) -> Status {
         let view = &self.seen.view;
-        let bounds = self.source.bounds();
+        let settings = self.draft.in_force();
         let axes = core::array::from_fn(|index| {
-            let (axis, bounds) = (&self.seen.axes[index], &bounds.axes[index]);
+            let (axis, settings) = (&self.seen.axes[index], &settings.axes[index]);
             let measured = Position(axis.measured.0 << POSITION_FRACTION_BITS);
             AxisStatus {
                 mode: view.modes[index].into(),
-                position_mm: measured.to_mm(bounds.encoder.resolution_mm),
+                position_mm: measured.to_mm(settings.encoder.resolution_mm),
                 error_mm: axis.error.to_f32(Quantity::Length),
                 output_v: axis.output.to_f32(Quantity::Voltage),
                 limited_by: axis.limited_by.into(),
@@ -103,19 +104,13 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
             SafetyState::Faulted(fault) | SafetyState::Stopping(fault) => fault,
             _ => return None,
         };
-        // The lean firmware has no room for the texts: whoever asks knows them by the number.
-        let (cause, remedy) = if cfg!(feature = "lean") {
-            ("", "")
-        } else {
-            (fault.code.cause(), fault.code.remedy())
-        };
         Some(FaultReport {
             code: fault.code.number(),
             axis: fault.axis.map(Into::into),
             tick: fault.tick,
             name: text(format_args!("{}", fault.code.name())),
-            cause: text(format_args!("{cause}")),
-            remedy: text(format_args!("{remedy}")),
+            cause: text(format_args!("{}", fault.code.cause())),
+            remedy: text(format_args!("{}", fault.code.remedy())),
             captured: self.recorder.holds_trace_of(fault.tick),
         })
     }

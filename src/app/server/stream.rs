@@ -1,8 +1,9 @@
 //! Set points that a host streams.
 
 use super::opened::OpenStream;
-use super::{AxisSource, Server, invalid, refused};
+use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
+use crate::hal::SettingsFlash;
 use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::reference::{
@@ -16,7 +17,7 @@ use quadrant_link::message::{self, LinkError, Reply, StreamRequest, StreamStatus
 /// Segments that must wait before the axes start: the host is that far ahead.
 const START_SEGMENTS: usize = STREAM_ITEM_ROOM / 2;
 
-impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     #[inline(never)]
     pub(super) fn serve_stream(&mut self, request: StreamRequest) -> Result<Reply, LinkError> {
         match request {
@@ -60,7 +61,7 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
                 "period_ticks = {period_ticks} is outside {LEAST_PERIOD_TICKS} to {MOST_SEGMENT_TICKS}"
             )));
         }
-        let limits = self.bounds()?.stream_limits(view.homed.into_array());
+        let limits = self.in_force()?.stream_limits(view.homed.into_array());
         // Nothing moves: it drops what control has of a stream that never began.
         self.command(Command::Stop)?;
         let start = self.seen.axes.each_ref().map(|axis| axis.ahead);
@@ -88,8 +89,8 @@ impl<'a, S: Scalar, O: AxisSource<'a, S>> Server<'_, 'a, S, O> {
         point: &message::SetPoint,
         last: bool,
     ) -> Result<bool, LinkError> {
-        let bounds = self.source.bounds();
-        let scales: [MotionScale; 3] = AxisName::ALL.map(|axis| bounds.scale_of(axis));
+        let settings = self.draft.in_force();
+        let scales: [MotionScale; 3] = AxisName::ALL.map(|axis| settings.scale_of(axis));
         let room = self.ends.stream_items.ready();
         let stream = self.opened()?;
         if number < stream.next {

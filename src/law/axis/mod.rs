@@ -64,7 +64,6 @@ use crate::law::safety::travel::{Travel, TravelState};
 use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{DacCode, POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
-use crate::law::words::words;
 
 /// Ticks that the feedforward can look ahead at most: 3 ms at 10 kHz.
 pub const MAX_PREVIEW_TICKS: usize = 30;
@@ -82,12 +81,6 @@ struct Amplifier<S: Scalar> {
     codes_per_volt: S::Gain,
     offset_code: i32,
 }
-
-words!([S: Scalar] struct Amplifier<S> {
-    limit: S,
-    codes_per_volt: S::Gain,
-    offset_code: i32,
-});
 
 impl<S: Scalar> Amplifier<S> {
     #[inline(always)]
@@ -137,34 +130,6 @@ pub struct Axis<S: Scalar, const N: usize> {
     cancelling: Cancelling<S>,
 }
 
-words!([S: Scalar, const N: usize] struct Axis<S, N> {
-    encoder: Encoder,
-    overspeed: Overspeed,
-    reduced_speed: u32,
-    signal_loss: SignalLoss<S>,
-    preview_ticks: usize,
-    unit_mm: S::Gain,
-    following: Following<S>,
-    amplifier: Amplifier<S>,
-    bumpless_decay: S,
-    travel: Travel,
-    adapts: bool,
-    learns: bool,
-    cancels: bool,
-    feedback: Feedback<S>,
-    filters: Filters<S>,
-    feedforward: Feedforward<S, N>,
-    unit_mm_s: S::Gain,
-    plausibility: Plausibility,
-    overload: Overload,
-    index_spacing: IndexSpacing,
-    standstill: u32,
-    generator: ReferenceGenerator<S>,
-    commissioning: Commissioning,
-    learning: Learning<S>,
-    cancelling: Cancelling<S>,
-});
-
 /// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
 /// [`Done`](Self::Done).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -177,12 +142,6 @@ pub enum Commissioning {
     /// The axis was commissioned.
     Done,
 }
-
-words!([] enum Commissioning {
-    0 Inert {},
-    1 Missing {},
-    2 Done {},
-});
 
 /// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
 ///
@@ -665,12 +624,6 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// It stays until the next enabling. For telemetry; it divides.
     pub fn following_high_mark(&self) -> f32 {
         self.following.high_mark()
-    }
-
-    /// Forgets what the encoder has shown: the next reading is the first. For what enabling does not begin anew.
-    pub(crate) fn forget_encoder(&mut self) {
-        self.encoder = EncoderState::default();
-        self.index = IndexState::default();
     }
 
     /// Declares the present count that of the machine, or not: homing does, and a board whose encoders are absolute.

@@ -37,7 +37,6 @@ use self::response::{NODES, node_turns};
 use crate::law::reference::sine::{SINE_BITS, SinePolynomial};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Multiples of the spindle's frequency that are cancelled at most.
 pub const HARMONICS: usize = 3;
@@ -169,23 +168,6 @@ pub struct Cancelling<S: Scalar> {
     response: [[S; 2]; NODES],
 }
 
-words!([S: Scalar] struct Cancelling<S> {
-    on: bool,
-    multiples: [u32; HARMONICS],
-    speed: u32,
-    ramp: u32,
-    per_mm: S::Gain,
-    most: S,
-    share: S::Gain,
-    unit: S::Gain,
-    keep: S,
-    fade: S,
-    guard: Guard<S>,
-    follower: Follower<S>,
-    growth: [[S; 2]; NODES],
-    response: [[S; 2]; NODES],
-});
-
 /// The guard's constants.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Guard<S: Scalar> {
@@ -203,19 +185,6 @@ struct Guard<S: Scalar> {
     aside_steps: u16,
 }
 
-words!([S: Scalar] struct Guard<S> {
-    per_unit: S::Gain,
-    one: S,
-    excess: S,
-    share: S,
-    share_of_turn: S::Gain,
-    floor: S,
-    unlearn: S,
-    aside_times: S::Gain,
-    aside_cotangent: S::Gain,
-    aside_steps: u16,
-});
-
 /// The constants of the slip's follower.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Follower<S: Scalar> {
@@ -231,16 +200,6 @@ struct Follower<S: Scalar> {
     /// Change of the slip in a look at the least rotation, over what the vector's growth takes away in a step.
     change: S::Gain,
 }
-
-words!([S: Scalar] struct Follower<S> {
-    grown: S::Gain,
-    per_volt: S::Gain,
-    share: S,
-    least: S,
-    rotation: S,
-    slow: S,
-    change: S::Gain,
-});
 
 /// A multiple of the spindle's frequency.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

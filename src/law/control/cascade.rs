@@ -17,7 +17,6 @@ use serde::{Deserialize, Serialize};
 use super::surface::{SurfaceGains, SurfaceLoop};
 use super::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// The cascade as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -55,14 +54,6 @@ pub struct Cascade<S: Scalar> {
     velocity: S::Gain,
     pub(super) inner: SurfaceLoop<S>,
 }
-
-words!([S: Scalar] struct Cascade<S> {
-    position: S::Gain,
-    feedforward: S::Gain,
-    limit: S,
-    velocity: S::Gain,
-    inner: SurfaceLoop<S>,
-});
 
 impl<S: Scalar> Cascade<S> {
     /// Makes the cascade for a control period. Settings time only.

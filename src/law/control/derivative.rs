@@ -3,7 +3,6 @@
 
 use super::terms::FeedbackState;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// The largest error that a law acts on, mm: what [`Quantity::Length`] holds in fixed point, so that all number types
 /// see the same.
@@ -18,13 +17,6 @@ pub(super) struct Derivative<S: Scalar> {
     steady_change: S::Gain,
     error_limit: S,
 }
-
-words!([S: Scalar] struct Derivative<S> {
-    gain: S::Gain,
-    pole: S,
-    steady_change: S::Gain,
-    error_limit: S,
-});
 
 impl<S: Scalar> Derivative<S> {
     /// Makes `kd_v_s_per_mm` s / (1 + `filter_s` s) for a control period. Settings time only.

@@ -13,7 +13,6 @@ use super::schedule::ScheduledPid;
 use super::sliding_mode::SlidingMode;
 use super::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::scalar::Scalar;
-use crate::law::words::words;
 
 /// The feedback laws by name.
 #[derive(
@@ -85,15 +84,6 @@ pub enum Feedback<S: Scalar> {
     /// Nominal characteristic trajectory following.
     Nctf(Nctf<S>),
 }
-
-words!([S: Scalar] enum Feedback<S> {
-    0 Pid { 0 law: Pid<S> },
-    1 NPid { 0 law: NonlinearPid<S> },
-    2 Scheduled { 0 law: ScheduledPid<S> },
-    3 Cascade { 0 law: Cascade<S> },
-    4 SlidingMode { 0 law: SlidingMode<S> },
-    5 Nctf { 0 law: Nctf<S> },
-});
 
 impl<S: Scalar> Feedback<S> {
     /// True if the law reads the velocity of the reference.

@@ -25,7 +25,6 @@ use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Filters of an axis at most.
 pub const MAX_FILTERS: usize = 2;
@@ -150,14 +149,6 @@ struct Filter<S: Scalar> {
     roll_off: S::Gain,
 }
 
-words!([S: Scalar] struct Filter<S> {
-    hold: S::Gain,
-    drive: S::Gain,
-    integrate: S::Gain,
-    centre: S::Gain,
-    roll_off: S::Gain,
-});
-
 impl<S: Scalar> Filter<S> {
     fn build(settings: &FilterSettings, period_s: f64) -> Self {
         let gain = |value| S::gain(value, Quantity::Voltage, Quantity::Voltage);
@@ -200,10 +191,6 @@ pub struct FiltersState<S>([FilterState<S>; MAX_FILTERS]);
 /// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Filters<S: Scalar>(Vec<Filter<S>, MAX_FILTERS>);
-
-words!([S: Scalar] struct Filters<S> {
-    0: Vec<Filter<S>, MAX_FILTERS>,
-});
 
 impl<S: Scalar> Filters<S> {
     /// No filter.

@@ -5,7 +5,6 @@ use core::hint::cold_path;
 
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// The integral ready for the tick. It is held in volts, so that a change of its gain does not move the output.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -13,11 +12,6 @@ pub(super) struct Integrator<S: Scalar> {
     per_tick: S::Gain,
     limit: S,
 }
-
-words!([S: Scalar] struct Integrator<S> {
-    per_tick: S::Gain,
-    limit: S,
-});
 
 impl<S: Scalar> Integrator<S> {
     /// Makes the integral of a signal of quantity `of`, `gain` volts per unit of it and second, within +-`limit_v`;

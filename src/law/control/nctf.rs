@@ -21,7 +21,6 @@ use super::surface::{SurfaceGains, SurfaceLoop};
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
-use crate::law::words::words;
 
 /// Points of a characteristic at most.
 pub const MAX_POINTS: usize = 16;
@@ -86,12 +85,6 @@ pub struct Nctf<S: Scalar> {
     gain: S::Gain,
     pub(super) inner: SurfaceLoop<S>,
 }
-
-words!([S: Scalar] struct Nctf<S> {
-    characteristic: OctaveTable<S, 1>,
-    gain: S::Gain,
-    inner: SurfaceLoop<S>,
-});
 
 impl<S: Scalar> Nctf<S> {
     /// Makes the law for a control period from a characteristic that has at least one point. Settings time only.

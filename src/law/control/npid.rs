@@ -9,7 +9,6 @@ use serde::{Deserialize, Serialize};
 use super::pid::Pid;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
-use crate::law::words::words;
 
 /// The nonlinear gain as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -59,11 +58,6 @@ pub struct NonlinearGainTable<S: Scalar> {
     table: OctaveTable<S, 1>,
 }
 
-words!([S: Scalar] struct NonlinearGainTable<S> {
-    largest: S,
-    table: OctaveTable<S, 1>,
-});
-
 /// A PID behind the nonlinear gain. What every tick reads comes before the table, within reach of one address.
 #[derive(Clone, Debug, PartialEq)]
 #[repr(C)]
@@ -73,11 +67,6 @@ pub struct NonlinearPid<S: Scalar> {
     /// Scales the error.
     pub gain: NonlinearGainTable<S>,
 }
-
-words!([S: Scalar] struct NonlinearPid<S> {
-    pid: Pid<S>,
-    gain: NonlinearGainTable<S>,
-});
 
 impl<S: Scalar> NonlinearGainTable<S> {
     /// Tabulates the gain. Settings time only.

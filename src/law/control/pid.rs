@@ -11,7 +11,6 @@ use super::derivative::Derivative;
 use super::integrator::Integrator;
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// The gains of a PID with filtered derivative, `Kp + Ki/s + Kd s / (1 + tau s)`, as its design yields them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -72,12 +71,6 @@ pub struct Pid<S: Scalar> {
     pub(super) derivative: Derivative<S>,
     pub(super) integrator: Integrator<S>,
 }
-
-words!([S: Scalar] struct Pid<S> {
-    proportional: S::Gain,
-    derivative: Derivative<S>,
-    integrator: Integrator<S>,
-});
 
 impl<S: Scalar> Pid<S> {
     /// Makes the PID for a control period. The integral stays within +-`integral_limit_v`; with a limit of zero it is a

@@ -11,7 +11,6 @@ use serde::{Deserialize, Serialize};
 use super::pid::{Pid, PidGains};
 use super::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Points of a schedule at most.
 pub const MAX_POINTS: usize = 4;
@@ -57,12 +56,6 @@ struct Segment<S: Scalar> {
     slopes: [S::Gain; 3],
 }
 
-words!([S: Scalar] struct Segment<S> {
-    from: S,
-    shares: [S; 3],
-    slopes: [S::Gain; 3],
-});
-
 /// The scheduled PID ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct ScheduledPid<S: Scalar> {
@@ -70,11 +63,6 @@ pub struct ScheduledPid<S: Scalar> {
     /// Those not used repeat the last.
     segments: [Segment<S>; MAX_POINTS],
 }
-
-words!([S: Scalar] struct ScheduledPid<S> {
-    pid: Pid<S>,
-    segments: [Segment<S>; MAX_POINTS],
-});
 
 impl<S: Scalar> ScheduledPid<S> {
     /// Makes the law for a control period from a schedule that has at least one point. Settings time only.

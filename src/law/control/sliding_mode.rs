@@ -16,7 +16,6 @@ use serde::{Deserialize, Serialize};
 use super::surface::{SurfaceGains, SurfaceLoop};
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Sliding mode as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -50,12 +49,6 @@ pub struct SlidingMode<S: Scalar> {
     switching: S,
     pub(super) inner: SurfaceLoop<S>,
 }
-
-words!([S: Scalar] struct SlidingMode<S> {
-    line: S::Gain,
-    switching: S,
-    inner: SurfaceLoop<S>,
-});
 
 impl<S: Scalar> SlidingMode<S> {
     /// Makes the law for a control period. Settings time only.

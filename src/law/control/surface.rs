@@ -15,7 +15,6 @@ use super::integrator::Integrator;
 use super::pid::PidGains;
 use super::terms::{FeedbackState, FeedbackTerms};
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// A PI on `w = lambda e + de/dt`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -77,11 +76,6 @@ pub(super) struct SurfaceLoop<S: Scalar> {
     pub(super) rate: Derivative<S>,
     integrator: Integrator<S>,
 }
-
-words!([S: Scalar] struct SurfaceLoop<S> {
-    rate: Derivative<S>,
-    integrator: Integrator<S>,
-});
 
 impl<S: Scalar> SurfaceLoop<S> {
     /// Makes the PI for a control period. Settings time only.

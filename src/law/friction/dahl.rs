@@ -17,7 +17,6 @@ use super::bristle::Bristle;
 use super::direction::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::OctaveTable;
-use crate::law::words::words;
 
 /// Dahl's model as a person writes it. Its level is the Coulomb level of the static model.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -67,12 +66,6 @@ struct Side<S: Scalar> {
     travel: S::Gain,
 }
 
-words!([S: Scalar] struct Side<S> {
-    level: S,
-    per_level: S::Gain,
-    travel: S::Gain,
-});
-
 /// Dahl's model ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dahl<S: Scalar> {
@@ -80,12 +73,6 @@ pub struct Dahl<S: Scalar> {
     rate: OctaveTable<S, 1>,
     covered: OctaveTable<S, 1>,
 }
-
-words!([S: Scalar] struct Dahl<S> {
-    sides: PerDirection<Side<S>>,
-    rate: OctaveTable<S, 1>,
-    covered: OctaveTable<S, 1>,
-});
 
 impl<S: Scalar> Dahl<S> {
     /// Makes the model from its parameters and its level in V, positive, for each sense of motion. Settings time only.

@@ -5,7 +5,6 @@ use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
 use crate::law::scalar::Scalar;
-use crate::law::words::{Words, words};
 
 /// A sense of motion.
 #[derive(
@@ -19,11 +18,6 @@ pub enum Direction {
     /// Motion towards smaller positions.
     Negative,
 }
-
-words!([] enum Direction {
-    0 Positive {},
-    1 Negative {},
-});
 
 impl Direction {
     /// The sense of a velocity or a displacement; positive at rest.
@@ -46,11 +40,6 @@ pub struct PerDirection<T> {
     /// For motion towards smaller positions.
     pub negative: T,
 }
-
-words!([T: Words] struct PerDirection<T> {
-    positive: T,
-    negative: T,
-});
 
 impl<T> PerDirection<T> {
     /// The same thing both ways.

@@ -22,7 +22,6 @@ use super::bristle::Bristle;
 use super::direction::Direction;
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Elements in a settings file at most.
 pub const MAX_ELEMENTS: usize = 10;
@@ -79,11 +78,6 @@ struct ElementConfig<S: Scalar> {
     weight: S::Gain,
 }
 
-words!([S: Scalar] struct ElementConfig<S> {
-    stiffness: S::Gain,
-    weight: S::Gain,
-});
-
 /// The GMS model ready for the tick.
 ///
 /// ```
@@ -106,11 +100,6 @@ pub struct Gms<S: Scalar, const N: usize> {
     elements: [ElementConfig<S>; N],
     one: S,
 }
-
-words!([S: Scalar, const N: usize] struct Gms<S, N> {
-    elements: [ElementConfig<S>; N],
-    one: S,
-});
 
 /// The memory of the GMS model.
 #[derive(Clone, Debug, PartialEq)]

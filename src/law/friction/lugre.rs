@@ -21,7 +21,6 @@ use super::stribeck::StribeckCurve;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::{OctaveTable, interpolation_error};
 use crate::law::units::FASTEST_MM_S;
-use crate::law::words::words;
 
 /// The LuGre model as a person writes it. Its surface is the static model's Stribeck curve.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -65,11 +64,6 @@ pub struct Lugre<S: Scalar> {
     /// sigma1 / (sigma0 Ts).
     damping: S::Gain,
 }
-
-words!([S: Scalar] struct Lugre<S> {
-    tables: PerDirection<OctaveTable<S, 2>>,
-    damping: S::Gain,
-});
 
 impl<S: Scalar> Lugre<S> {
     /// Makes the model; `step_s` is the time between evaluations. Settings time only.

@@ -22,7 +22,6 @@ use super::direction::Direction;
 use super::gms::{GmsElement, GmsState};
 use super::stribeck::Sliding;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Parameters of the S-GMS beyond those of the GMS, as a person writes them.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -44,14 +43,6 @@ struct ElementConfig<S: Scalar> {
     per_eight_widths: S::Gain,
 }
 
-words!([S: Scalar] struct ElementConfig<S> {
-    stiffness: S::Gain,
-    weight: S::Gain,
-    width: S,
-    per_width: S::Gain,
-    per_eight_widths: S::Gain,
-});
-
 /// The S-GMS ready for the tick. `N` is the room for elements; those not used do not act.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SmoothedGms<S: Scalar, const N: usize> {
@@ -59,12 +50,6 @@ pub struct SmoothedGms<S: Scalar, const N: usize> {
     one: S,
     half: S::Gain,
 }
-
-words!([S: Scalar, const N: usize] struct SmoothedGms<S, N> {
-    elements: [ElementConfig<S>; N],
-    one: S,
-    half: S::Gain,
-});
 
 impl<S: Scalar, const N: usize> SmoothedGms<S, N> {
     /// Makes the model from the GMS's elements, at most `N` of them; any beyond are left out, so settings are checked

@@ -10,7 +10,6 @@ use serde::{Deserialize, Serialize};
 use super::direction::{Direction, PerDirection};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::table::{OctaveTable, interpolation_error};
-use crate::law::words::words;
 
 /// The Stribeck curve of one sense of motion.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
@@ -91,20 +90,11 @@ pub struct Sliding<S> {
     pub decay: S,
 }
 
-words!([S: Scalar] struct Sliding<S> {
-    level: S,
-    decay: S,
-});
-
 /// s(v) and the decay that goes with it, for both senses of motion, ready for the tick.
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlidingTable<S: Scalar> {
     tables: PerDirection<OctaveTable<S, 2>>,
 }
-
-words!([S: Scalar] struct SlidingTable<S> {
-    tables: PerDirection<OctaveTable<S, 2>>,
-});
 
 impl<S: Scalar> SlidingTable<S> {
     /// Tabulates the curves. `attraction_v_s` is C, in V/s; `step_s` the time between evaluations. Settings time only.

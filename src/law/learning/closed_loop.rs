@@ -8,7 +8,6 @@
 use crate::law::control::pid::PidGains;
 use crate::law::control::plant_model::PlantModel;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Inputs that are remembered; a power of two.
 const ROOM: usize = 8;
@@ -39,20 +38,6 @@ pub(super) struct ClosedLoop<S: Scalar> {
     rest: S,
     most: (S, S, S),
 }
-
-words!([S: Scalar] struct ClosedLoop<S> {
-    proportional: S::Gain,
-    integral: S::Gain,
-    derivative: S::Gain,
-    filter: S,
-    push: S::Gain,
-    keep: S,
-    spring: S::Gain,
-    half_step: S::Gain,
-    delay: usize,
-    rest: S,
-    most: (S, S, S),
-});
 
 /// The memory of the loop.
 #[derive(Clone, Debug, Default, PartialEq)]

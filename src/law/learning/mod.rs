@@ -34,7 +34,6 @@ use crate::law::control::plant_model::PlantModel;
 use crate::law::feedforward::FeedforwardTerms;
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Largest scale.
 pub const MOST_SCALE: f64 = 2.5;
@@ -165,20 +164,6 @@ pub struct Learning<S: Scalar> {
     estimate: Estimate<S>,
 }
 
-words!([S: Scalar] struct Learning<S> {
-    looks: u8,
-    block_steps: u8,
-    settling_steps: u16,
-    closed_loop: ClosedLoop<S>,
-    gate: Gate<S>,
-    unloaded: S::Gain,
-    per_unit: S::Gain,
-    one: S,
-    most: S,
-    inverses: (S, S),
-    estimate: Estimate<S>,
-});
-
 /// The sums and what moves the scale, ready for the tick.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Estimate<S: Scalar> {
@@ -200,23 +185,6 @@ struct Estimate<S: Scalar> {
     /// The gate less 1 below which the axis is shaken.
     shaken: S,
 }
-
-words!([S: Scalar] struct Estimate<S> {
-    step: S::Gain,
-    half: S::Gain,
-    keep: S,
-    guard_keep: S,
-    most_information: S,
-    rate: S::Gain,
-    pull: S::Gain,
-    most_change: S,
-    fade: S,
-    guard_share: S::Gain,
-    guard_least: S,
-    differs: S::Gain,
-    telling: S::Gain,
-    shaken: S,
-});
 
 /// The memory of learning.
 #[derive(Clone, Debug, Default, PartialEq)]

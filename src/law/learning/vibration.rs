@@ -7,7 +7,6 @@
 //! of several errors: of the encoder's noise, which they do not share, less is then folded into the band.
 
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Corner frequencies of the band, Hz: above the loop's own motions, and below most of the encoder's noise.
 const BAND_HZ: (f64, f64) = (40.0, 150.0);
@@ -43,17 +42,6 @@ pub(super) struct Gate<S: Scalar> {
     share: S::Gain,
     most: (S, S),
 }
-
-words!([S: Scalar] struct Gate<S> {
-    velocity: S::Gain,
-    low: S,
-    high: S::Gain,
-    keep: S,
-    take: S::Gain,
-    threshold: S,
-    share: S::Gain,
-    most: (S, S),
-});
 
 /// The memory of the gate.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -8,7 +8,6 @@ use super::sample::MotionScale;
 use crate::law::rounding;
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
-use crate::law::words::words;
 
 /// The longest average, as a power of two of ticks: 30 hours at 10 kHz.
 const MOST_EXPONENT: u32 = 30;
@@ -24,13 +23,6 @@ pub struct Approach<S: Scalar> {
     acceleration: u32,
     jerk: u32,
 }
-
-words!([S: Scalar] struct Approach<S> {
-    template: PointToPoint<S>,
-    fastest: i64,
-    acceleration: u32,
-    jerk: u32,
-});
 
 /// The power of two of ticks that is at least `seconds`.
 fn exponent(seconds: f64, rate_hz: f64) -> u32 {

@@ -12,7 +12,6 @@ use super::sample::{MotionScale, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
-use crate::law::words::words;
 
 /// A move as a person writes it.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -73,14 +72,6 @@ pub struct PointToPoint<S: Scalar> {
     velocity: S::Gain,
     acceleration: S::Gain,
 }
-
-words!([S: Scalar] struct PointToPoint<S> {
-    impulses: [(u32, bool); 8],
-    step: i128,
-    target: Position,
-    velocity: S::Gain,
-    acceleration: S::Gain,
-});
 
 impl<S: Scalar> PointToPoint<S> {
     /// Builds the move from validated settings. Settings time only.

@@ -11,7 +11,6 @@ use super::sample::{MotionScale, ReferenceSample};
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
-use crate::law::words::words;
 
 /// Fraction bits of a [`Velocity`].
 const FRACTION_BITS: u32 = 32;
@@ -25,10 +24,6 @@ const LARGEST: i64 = 1 << 61;
 /// away; at most +-2^29 units (8192 counts) in a tick.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Velocity(i64);
-
-words!([] struct Velocity {
-    0: i64,
-});
 
 impl Velocity {
     /// No motion: zero velocity.
@@ -105,15 +100,6 @@ pub struct Ramp<S: Scalar> {
     velocity: S::Gain,
     acceleration: S::Gain,
 }
-
-words!([S: Scalar] struct Ramp<S> {
-    jerk: i64,
-    levels: i32,
-    half_braking: Factor,
-    levels_per_unit: Factor,
-    velocity: S::Gain,
-    acceleration: S::Gain,
-});
 
 /// The memory of a ramp.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -337,11 +323,6 @@ struct Factor {
     mantissa: u32,
     shift: u32,
 }
-
-words!([] struct Factor {
-    mantissa: u32,
-    shift: u32,
-});
 
 impl Factor {
     /// The factor above zero; from 2^32 on it saturates.

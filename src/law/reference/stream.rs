@@ -8,7 +8,6 @@
 use super::sample::{MotionScale, ReferenceSample};
 use crate::law::scalar::{Quantity, Scalar};
 use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
-use crate::law::words::words;
 
 /// Fraction bits of the differences beyond those of a [`Position`].
 pub(super) const FRACTION_BITS: u32 = 64;
@@ -139,11 +138,6 @@ pub struct Stream<S: Scalar> {
     velocity: S::Gain,
     acceleration: S::Gain,
 }
-
-words!([S: Scalar] struct Stream<S> {
-    velocity: S::Gain,
-    acceleration: S::Gain,
-});
 
 impl<S: Scalar> Stream<S> {
     /// The gains of an axis. Settings time only.

@@ -9,8 +9,6 @@
 //! The law holds the axes while the brake moves, so that a hanging axis does not fall between brake and law. No motion
 //! starts meanwhile.
 
-use crate::law::words::words;
-
 /// The times that the brake takes, in ticks; zero, as without a brake, for none.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Brake {
@@ -19,11 +17,6 @@ pub struct Brake {
     /// From the end of the current to a brake that holds.
     pub apply_ticks: u32,
 }
-
-words!([] struct Brake {
-    release_ticks: u32,
-    apply_ticks: u32,
-});
 
 /// The state of the brake.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -3,7 +3,6 @@
 use strum::{EnumCount, FromRepr, IntoStaticStr, VariantArray};
 
 use crate::law::axes::AxisName;
-use crate::law::words::words;
 
 /// Reaction of the stage by itself to a fault it finds.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -15,12 +14,6 @@ pub enum Reaction {
     /// All axes brake under control and hold; nothing is latched.
     Hold,
 }
-
-words!([] enum Reaction {
-    0 Off {},
-    1 Stop {},
-    2 Hold {},
-});
 
 /// Cause for which the outputs were switched off. The numbers and the names are stable.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, EnumCount, FromRepr, IntoStaticStr, VariantArray)]

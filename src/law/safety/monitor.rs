@@ -4,7 +4,6 @@ use core::hint::cold_path;
 
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
-use crate::law::words::words;
 
 /// Counts within which an encoder with one dead line dithers.
 pub(super) const DITHER_COUNTS: u32 = 2;
@@ -22,10 +21,6 @@ const SPEED_NOISE_COUNTS: f64 = 0.5;
 pub struct Overspeed {
     limit: u32,
 }
-
-words!([] struct Overspeed {
-    limit: u32,
-});
 
 /// The memory of the filtered speed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -94,11 +89,6 @@ pub struct SignalLoss<S> {
     ticks: u32,
 }
 
-words!([S: Scalar] struct SignalLoss<S> {
-    level: S,
-    ticks: u32,
-});
-
 /// The time for which the output has been high, and the distance since.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SignalLossState {
@@ -156,12 +146,6 @@ pub struct IndexSpacing {
     reciprocal: u32,
     tolerance: u32,
 }
-
-words!([] struct IndexSpacing {
-    counts: u32,
-    reciprocal: u32,
-    tolerance: u32,
-});
 
 /// The low 32 bits of the count at the last index pulse.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -228,12 +212,6 @@ pub struct Following<S: Scalar> {
     per_speed: S::Gain,
     largest: S,
 }
-
-words!([S: Scalar] struct Following<S> {
-    at_rest: S,
-    per_speed: S::Gain,
-    largest: S,
-});
 
 /// The largest error so far, and the limit that it was compared with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -3,8 +3,6 @@
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use crate::law::words::words;
-
 use super::brake::Brake;
 use super::fault::{FaultCode, Reaction};
 
@@ -43,12 +41,6 @@ pub enum EnabledBy {
     Operator,
 }
 
-words!([] enum EnabledBy {
-    0 Any {},
-    1 Host {},
-    2 Operator {},
-});
-
 impl EnabledBy {
     /// True if a command to enable is heeded from there.
     pub const fn allows(self, station: Station) -> bool {
@@ -84,11 +76,6 @@ pub enum HostNeeded {
     EndlessMotion,
 }
 
-words!([] enum HostNeeded {
-    0 EveryMotion {},
-    1 EndlessMotion {},
-});
-
 /// Rules of operation of the stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Operation {
@@ -105,15 +92,6 @@ pub struct Operation {
     /// The holding brake.
     pub brake: Brake,
 }
-
-words!([] struct Operation {
-    enabled_by: EnabledBy,
-    host_needed: HostNeeded,
-    emergency_stop: Reaction,
-    link_lost: Reaction,
-    underrun: Reaction,
-    brake: Brake,
-});
 
 impl Operation {
     /// The reaction to a fault under these rules.

@@ -5,7 +5,6 @@
 //! nothing. In converter's words, so that all number types find the same.
 
 use crate::law::rounding;
-use crate::law::words::words;
 
 /// Ticks between two looks at an axis: those of [`is_due`](super::plausibility::is_due).
 const LOOK_TICKS: f64 = super::plausibility::DUE_TICKS as f64;
@@ -19,12 +18,6 @@ pub struct Overload {
     budget: i64,
     offset: i32,
 }
-
-words!([] struct Overload {
-    continuous: i64,
-    budget: i64,
-    offset: i32,
-});
 
 /// The squares of words, beyond the one that the motor bears for ever, that the motor has not got rid of yet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

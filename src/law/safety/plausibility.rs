@@ -25,7 +25,6 @@
 
 use super::monitor::{DITHER_COUNTS, SPEED_FILTER_BITS, SPEED_FRACTION_BITS};
 use crate::law::rounding;
-use crate::law::words::words;
 
 /// Ticks from one comparison of an axis to the next, as a power of two.
 const INTERVAL_BITS: u32 = 2;
@@ -123,23 +122,6 @@ pub struct Plausibility {
     proving_counts: u32,
     velocity: i32,
 }
-
-words!([] struct Plausibility {
-    modelled: bool,
-    shift: u32,
-    offset: i32,
-    push: i32,
-    lag: i32,
-    held: i32,
-    breakaway: i32,
-    drag: i32,
-    forget_shift: u32,
-    distance: i32,
-    first_load: i32,
-    load: i32,
-    proving_counts: u32,
-    velocity: i32,
-});
 
 /// An axis at a comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

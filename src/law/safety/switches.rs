@@ -3,7 +3,6 @@
 
 use super::fault::{EnableInterlock, FaultCode};
 use crate::law::axes::AxisName;
-use crate::law::words::words;
 
 /// Bits of each axis.
 const BITS_PER_AXIS: u32 = 5;
@@ -22,10 +21,6 @@ pub struct Switches(u16);
 /// The digital inputs of one axis.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct AxisSwitches(u16);
-
-words!([] struct AxisSwitches {
-    0: u16,
-});
 
 impl AxisSwitches {
     /// The negative limit switch is pressed.

@@ -4,7 +4,6 @@ use super::fault::FaultCode;
 use crate::law::reference::{Ramp, Velocity};
 use crate::law::scalar::Scalar;
 use crate::law::units::Position;
-use crate::law::words::words;
 
 /// A range of positions, made for one comparison.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -12,11 +11,6 @@ struct Range {
     low: Position,
     span: u64,
 }
-
-words!([] struct Range {
-    low: Position,
-    span: u64,
-});
 
 impl Range {
     /// From `low` to `high`; empty if they are out of order.
@@ -51,12 +45,6 @@ pub struct Travel {
     /// Largest growth of the speed in a tick, as a displacement.
     growth: Position,
 }
-
-words!([] struct Travel {
-    allowed: Range,
-    clear: Range,
-    growth: Position,
-});
 
 /// The memory of the soft limits: an axis that was enabled outside may come back.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

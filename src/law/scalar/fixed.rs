@@ -6,15 +6,10 @@ use core::ops::{Add, Neg, Sub};
 use super::number::{OCTAVE_INTERVAL_BITS, OctaveStart, Scalar};
 use super::quantity::Quantity;
 use crate::law::rounding;
-use crate::law::words::words;
 
 /// A saturating 32-bit number. The binary point is the [`Quantity`]'s, known to the code that holds the value.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Fixed(pub i32);
-
-words!([] struct Fixed {
-    0: i32,
-});
 
 /// A constant as a normalised mantissa and a shift, `mantissa * 2^-shift`: 31 significant bits whatever its size. Zero by
 /// default.
@@ -25,11 +20,6 @@ pub struct FixedGain {
     /// what is below, the complement shifts the signal to the left.
     right: u32,
 }
-
-words!([] struct FixedGain {
-    mantissa: i32,
-    right: u32,
-});
 
 impl Default for FixedGain {
     fn default() -> Self {

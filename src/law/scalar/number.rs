@@ -4,8 +4,6 @@ use core::fmt::Debug;
 use core::hint::cold_path;
 use core::ops::{Add, Neg, Sub};
 
-use crate::law::words::{Words, words};
-
 use super::quantity::Quantity;
 
 /// A number type that the control law runs on.
@@ -20,11 +18,10 @@ pub trait Scalar:
     + Add<Output = Self>
     + Sub<Output = Self>
     + Neg<Output = Self>
-    + Words
     + 'static
 {
     /// A constant that multiplies a signal, made by [`Scalar::gain`].
-    type Gain: Copy + Debug + Default + PartialEq + Send + Sync + Words + 'static;
+    type Gain: Copy + Debug + Default + PartialEq + Send + Sync + 'static;
 
     /// A sum over many ticks, wide enough that terms far below the signal's step still count.
     type Sum: Copy + Debug + Default + PartialEq + Send + Sync + 'static;
@@ -114,12 +111,6 @@ pub struct OctaveStart<S: Scalar> {
     /// The first octave's lower bound, or the format's step if that is larger.
     pub(crate) bound: S,
 }
-
-words!([S: Scalar] struct OctaveStart<S> {
-    key: u32,
-    below: S::Gain,
-    bound: S,
-});
 
 /// Intervals per octave of a logarithmic table, as a power of two: 2^4 = 16.
 pub(crate) const OCTAVE_INTERVAL_BITS: u32 = 4;

@@ -4,12 +4,12 @@ use super::Place;
 use crate::law::axes::AxisName;
 use crate::law::reference::MotionSettings;
 use crate::law::units::FASTEST_MM_S;
-use crate::settings::bounds::{AxisBounds, StageBounds};
+use crate::settings::axis::AxisSettings;
 use crate::settings::error::SettingsError;
 use crate::settings::leaves::limits::{
     LONGEST_TRAVEL_MM, MOST_ACCELERATION_MM_S2, MOST_JERK_MM_S3,
 };
-use crate::settings::stage::PlanSettings;
+use crate::settings::stage::{PlanSettings, StageSettings};
 
 /// The longest travel of a motion, in counts: what the references' products hold.
 const MOST_TRAVEL_COUNTS: f64 = 1_073_741_824.0;
@@ -22,10 +22,10 @@ impl PlanSettings {
     ///
     /// # Errors
     /// The first field that is refused.
-    pub fn validate(&self, stage: &StageBounds) -> Result<(), SettingsError> {
+    pub fn validate(&self, stage: &StageSettings) -> Result<(), SettingsError> {
         for ((name, axis), motion) in AxisName::ALL
             .into_iter()
-            .zip(&*stage.axes)
+            .zip(&stage.axes)
             .zip(&self.motions)
         {
             validate_motion(Place { axis: Some(name) }, motion, axis, stage.rate_hz)?;
@@ -37,7 +37,7 @@ impl PlanSettings {
 fn validate_motion(
     at: Place,
     motion: &MotionSettings,
-    axis: &AxisBounds,
+    axis: &AxisSettings,
     rate_hz: f64,
 ) -> Result<(), SettingsError> {
     let longest = (MOST_TRAVEL_COUNTS * axis.encoder.resolution_mm).min(LONGEST_TRAVEL_MM);
@@ -87,12 +87,12 @@ fn validate_motion(
         "motion (peak velocity, mm/s)",
         velocity,
         0.0,
-        axis.max_velocity_mm_s,
+        axis.limits.max_velocity_mm_s,
     )?;
     at.within(
         "motion (peak acceleration, mm/s^2)",
         acceleration,
         0.0,
-        axis.max_acceleration_mm_s2,
+        axis.limits.max_acceleration_mm_s2,
     )
 }

@@ -11,7 +11,6 @@ mod capture;
 mod channel;
 mod error;
 mod inject;
-mod load;
 mod machine;
 mod motion;
 mod notice;
@@ -24,7 +23,6 @@ pub use capture::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigge
 pub use channel::{AxisSignal, Channel, StageSignal, UnknownChannel, WordKind};
 pub use error::LinkError;
 pub use inject::{INJECT_VALUES, InjectRequest, InjectStatus, Voltages};
-pub use load::{Checksum, LoadHeader, LoadPart, LoadRequest, LoadStatus};
 pub use machine::{
     AxisLearning, AxisMode, AxisStatus, FaultReport, INPUTS, Identity, Inputs, Learning,
     LearningState, LimitedBy, MachineState, NumberType, Status,
@@ -118,8 +116,6 @@ pub enum Body {
         /// The speed, rpm, 0 to 1 000 000; zero if it stands.
         rpm: f64,
     },
-    /// A request to load axes that the host has built. [`Reply::Load`].
-    Load(LoadRequest),
 }
 
 impl Body {
@@ -250,6 +246,4 @@ pub enum Reply {
     Inputs(Inputs),
     /// The result of learning.
     Learning(Learning),
-    /// The layout and number type that a board takes, and the axes that are loaded.
-    Load(LoadStatus),
 }

@@ -61,8 +61,6 @@ impl Model {
                     captured: false,
                 })));
             }
-            // It holds settings of its own.
-            Body::Load(_) => return Err(LinkError::Unsupported(text(format_args!("load")))),
             // Nothing of the model turns.
             Body::Spindle { .. } => {}
             Body::ResetFault => self.fault = None,

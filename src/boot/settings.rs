@@ -1,116 +1,29 @@
-//! The start of a board that holds settings of its own: those in flash, or those of a job that a host has left.
-
-use core::mem::MaybeUninit;
+//! The settings to start with: those in flash, or those of a job that a host has left.
 
 use quadrant::app::start_record::StartRecord;
-use quadrant::app::{Intake, OwnSettings, OwnSettingsParts, ServerParts};
-use quadrant::axes::AxisName;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::link::message::{NumberType, Provenance};
+use quadrant::link::message::Provenance;
 use quadrant::lockstep::Job;
-use quadrant::safety::FaultCode;
 use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::stage::Plan;
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 
-use super::storage::{SettingsStorage, StaticStorage};
-use super::{Machine, blank_axis, place_control, place_server};
 use crate::board::{self, SettingsFlash};
 use crate::log;
 
-/// Loads the settings and makes the machine of them. `crashed` is the fault that the last run left; `cycle_hz` is the rate of the
-/// timer that measures ticks.
-pub(crate) fn machine<S: Scalar>(
-    storage: &'static mut StaticStorage<S>,
-    flash: SettingsFlash,
-    crashed: Option<FaultCode>,
-    cycle_hz: u32,
-    number: NumberType,
-) -> Machine<S> {
-    let SettingsStorage {
-        in_force,
-        draft,
-        buffer,
-    } = &mut storage.settings;
-    let (settings, draft) = (defaults(in_force), defaults(draft));
-    let Loaded {
-        plan,
-        provenance,
-        store,
-        invalid,
-        keep_draft,
-    } = load(
-        flash,
-        settings,
-        draft,
-        buffer,
-        count_start(crashed.is_some()),
-    );
-    // The back buffer's content does not matter: it is built over before it is used.
-    let [x, y, z, back_buffer] = storage.axes.each_mut().map(blank_axis);
-    let mut axes = [x, y, z];
-    // Tables are filled and bounds are searched before the first tick is due.
-    for (name, axis) in AxisName::ALL.into_iter().zip(&mut axes) {
-        settings.build_axis_into(name, axis);
-    }
-    let rate_hz = settings.rate_hz as u32;
-    let resolution_mm = settings
-        .axes
-        .each_ref()
-        .map(|axis| axis.encoder.resolution_mm);
-    let operation = settings.operation();
-    let (control_ends, intake_ends, ends) = storage.queues.split();
-    let control = place_control(
-        &mut storage.control,
-        axes,
-        operation,
-        plan,
-        rate_hz,
-        control_ends,
-    );
-    let invalid = invalid.then_some(FaultCode::SettingsInvalid);
-    for code in [crashed, invalid].into_iter().flatten() {
-        control.start_faulted(code);
-    }
-    let parts = ServerParts {
-        ends,
-        back_buffer,
-        source: OwnSettings::new(OwnSettingsParts {
-            settings,
-            draft,
-            keep_draft,
-            provenance,
-            store,
-            buffer,
-            rates_hz: board::RATES_HZ,
-        }),
-        capture: &mut storage.capture,
-        board: board::NAME,
-        cycle_hz,
-        number,
-    };
-    Machine {
-        control,
-        intake: storage.intake.write(Intake::new(intake_ends)),
-        server: place_server(&mut storage.server, parts),
-        rate_hz,
-        resolution_mm,
-    }
-}
-
 /// Results of loading the settings.
-struct Loaded<S: Scalar> {
+pub(super) struct Loaded<S: Scalar> {
     /// The motions of the axes.
-    plan: Plan<S>,
+    pub(super) plan: Plan<S>,
     /// The origin of the settings.
-    provenance: Provenance,
+    pub(super) provenance: Provenance,
     /// The store that holds them.
-    store: Store<SettingsFlash>,
+    pub(super) store: Store<SettingsFlash>,
     /// True if stored settings were refused or are damaged.
-    invalid: bool,
+    pub(super) invalid: bool,
     /// True if the draft holds settings that are stored and not in force.
-    keep_draft: bool,
+    pub(super) keep_draft: bool,
 }
 
 /// Puts into `settings` those in flash; without them those of the job that a host has left; without one, the defaults, on
@@ -121,7 +34,7 @@ struct Loaded<S: Scalar> {
 /// When a job cannot be decoded or is refused: then there is nothing that could safely be run.
 // Each step of the start has a frame of its own, gone when the next one begins.
 #[inline(never)]
-fn load<S: Scalar>(
+pub(super) fn load<S: Scalar>(
     flash: SettingsFlash,
     settings: &mut StageSettings,
     draft: &mut StageSettings,
@@ -185,7 +98,7 @@ fn load<S: Scalar>(
 }
 
 /// Counts this start; returns true if as many as allowed have not lasted.
-fn count_start(crashed: bool) -> bool {
+pub(super) fn count_start(crashed: bool) -> bool {
     let record = board::start_record::read().begin(crashed);
     board::start_record::write(record);
     record.is_safe_start()
@@ -220,12 +133,6 @@ fn take(bytes: Option<&[u8]>, settings: Option<&mut StageSettings>) -> PlanSetti
             bytes.len()
         ),
     }
-}
-
-/// Makes the default settings in their place.
-#[inline(never)]
-fn defaults(place: &mut MaybeUninit<StageSettings>) -> &mut StageSettings {
-    place.write(StageSettings::default())
 }
 
 /// Unwraps a build.

@@ -1,139 +1,64 @@
-//! Settings of the board's own: a draft is edited leaf by leaf, and takes effect as a whole.
+//! Requests about settings: a draft is edited leaf by leaf, and takes effect as a whole.
 
 use super::deferred::Work;
-use super::{AxisSource, Server, busy, index, invalid, refused};
+use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::AxisSwap;
 use crate::hal::SettingsFlash;
 use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
 use crate::law::friction::gms::FIRMWARE_ELEMENTS;
 use crate::law::scalar::Scalar;
-use crate::settings::draft::{ApplyError, Draft};
-use crate::settings::{MAX_VALUE_BYTES, StageBounds, StageSettings};
-use crate::store::{BUFFER_BYTES, Store};
+use crate::settings::draft::ApplyError;
+use crate::settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_link::message::{
     Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,
     Value, text,
 };
 
-/// Settings that the board holds itself, in flash, and builds its axes from.
-pub struct OwnSettings<'a, F> {
-    draft: Draft<'a>,
-    provenance: Provenance,
-    store: Store<F>,
-    buffer: &'a mut [u8; BUFFER_BYTES],
-    rates_hz: (f64, f64),
-}
-
-/// The parts of a board's own settings.
-pub struct OwnSettingsParts<'a, F> {
-    /// The settings in force.
-    pub settings: &'a mut StageSettings,
-    /// Memory for settings that are being edited.
-    pub draft: &'a mut StageSettings,
-    /// True if `draft` holds settings to look at, and not to be in force unasked: a set older than one that is damaged.
-    /// Otherwise its content does not matter.
-    pub keep_draft: bool,
-    /// The origin of the stored settings.
-    pub provenance: Provenance,
-    /// The memory for settings.
-    pub store: Store<F>,
-    /// Buffer for a set of settings on its way to the store.
-    pub buffer: &'a mut [u8; BUFFER_BYTES],
-    /// Control rates that the board is up to, Hz: the lowest and the highest.
-    pub rates_hz: (f64, f64),
-}
-
-impl<'a, F: SettingsFlash> OwnSettings<'a, F> {
-    /// Returns the settings, with nothing edited unless a draft is to be kept.
-    pub fn new(parts: OwnSettingsParts<'a, F>) -> Self {
-        Self {
-            draft: if parts.keep_draft {
-                Draft::edited(parts.settings, parts.draft)
-            } else {
-                Draft::new(parts.settings, parts.draft)
-            },
-            provenance: parts.provenance,
-            store: parts.store,
-            buffer: parts.buffer,
-            rates_hz: parts.rates_hz,
-        }
-    }
-}
-
-impl<'a, S: Scalar, F: SettingsFlash> AxisSource<'a, S> for OwnSettings<'a, F> {
-    fn rate_hz(&self) -> f64 {
-        self.draft.in_force().rate_hz
-    }
-
-    fn bounds(&self) -> StageBounds {
-        self.draft.in_force().bounds()
-    }
-
-    fn serve_settings(
-        server: &mut Server<'_, 'a, S, Self>,
-        request: SettingsRequest,
-    ) -> Result<Reply, LinkError> {
-        server.settings(request)
-    }
-
-    fn store(
-        server: &mut Server<'_, 'a, S, Self>,
-        provenance: Provenance,
-    ) -> Result<Reply, LinkError> {
-        server.save(provenance)
-    }
-
-    fn exchange(server: &mut Server<'_, 'a, S, Self>) {
-        server.build_pending();
-    }
-}
-
-impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
+impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// The memory for settings.
     pub const fn flash(&self) -> &F {
-        self.source.store.flash()
+        self.store.flash()
     }
 
     /// The origin of the stored settings.
     pub const fn provenance(&self) -> &Provenance {
-        &self.source.provenance
+        &self.provenance
     }
 
     /// Counts the paths of the draft. Visits them all: for rare occasions.
     pub fn paths(&self) -> usize {
         let mut paths = 0;
         // An error of the tree would end the visit early, and show as a number that is too small.
-        let _ = self.source.draft.settings().list("", &mut |_| paths += 1);
+        let _ = self.draft.settings().list("", &mut |_| paths += 1);
         paths
     }
 
     #[inline(never)]
-    fn settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
+    pub(super) fn serve_settings(&mut self, request: SettingsRequest) -> Result<Reply, LinkError> {
         match request {
-            SettingsRequest::Get(path) => value(self.source.draft.settings(), &path),
-            SettingsRequest::GetInForce(path) => value(self.source.draft.in_force(), &path),
+            SettingsRequest::Get(path) => value(self.draft.settings(), &path),
+            SettingsRequest::GetInForce(path) => value(self.draft.in_force(), &path),
             SettingsRequest::Set { path, value } => self
-                .source
                 .draft
                 .set_bytes(&path, value.kind, &value.bytes)
                 .map(|()| Reply::Done)
                 .map_err(|error| invalid(format_args!("{path}: {error}"))),
             SettingsRequest::List { cursor } => self.list(cursor, |_| true),
             SettingsRequest::Edited { cursor } => {
-                self.list(cursor, |path| self.source.draft.differs_at(path))
+                self.list(cursor, |path| self.draft.differs_at(path))
             }
             SettingsRequest::Apply => self.apply(),
             SettingsRequest::Revert => {
-                self.source.draft.revert();
+                self.draft.revert();
                 Ok(Reply::Done)
             }
             SettingsRequest::Defaults => {
-                self.source.draft.settings_mut().set_default();
+                self.draft.settings_mut().set_default();
                 Ok(Reply::Done)
             }
             SettingsRequest::Store(provenance) => self.defer(Work::Store(provenance)),
-            SettingsRequest::Provenance => Ok(Reply::Provenance(self.source.provenance.clone())),
+            SettingsRequest::Provenance => Ok(Reply::Provenance(self.provenance.clone())),
         }
     }
 
@@ -142,7 +67,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
     fn list(&self, cursor: u16, wanted: impl Fn(&str) -> bool) -> Result<Reply, LinkError> {
         let mut page = PathPage::default();
         let mut number = 0;
-        let visited = self.source.draft.settings().list("", &mut |path| {
+        let visited = self.draft.settings().list("", &mut |path| {
             if !wanted(path) {
                 return;
             }
@@ -170,14 +95,14 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
             )));
         }
         self.check_rate()?;
-        let safety = self.source.draft.safety_change();
-        let new_origins = self.source.draft.new_origins();
+        let safety = self.draft.safety_change();
+        let new_origins = self.draft.new_origins();
         if let Some(leaf) = safety
             && self.seen.view.safety.drives()
         {
             return Err(refused(format_args!("{leaf}")));
         }
-        let changed = match self.source.draft.apply(FIRMWARE_ELEMENTS) {
+        let changed = match self.draft.apply(FIRMWARE_ELEMENTS) {
             Ok(changed) => changed,
             Err(ApplyError::Refused(error)) => return Err(invalid(format_args!("{error}"))),
             // They stay in the draft: stored and restarted, they take effect.
@@ -205,8 +130,8 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
 
     /// Checks that the board is up to the draft's control rate.
     fn check_rate(&self) -> Result<(), LinkError> {
-        let (lowest, highest) = self.source.rates_hz;
-        let rate_hz = self.source.draft.settings().rate_hz;
+        let (lowest, highest) = self.rates_hz;
+        let rate_hz = self.draft.settings().rate_hz;
         if (lowest..=highest).contains(&rate_hz) {
             return Ok(());
         }
@@ -219,7 +144,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
     }
 
     /// Builds the next axis whose settings have changed into the back buffer, and hands it over.
-    fn build_pending(&mut self) {
+    pub(super) fn build_pending(&mut self) {
         if self.back_buffer.is_none() {
             self.back_buffer = self.ends.back_buffers.dequeue();
         }
@@ -230,7 +155,7 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
             return;
         };
         let name = pending.into();
-        let settings = self.source.draft.in_force();
+        let settings = self.draft.in_force();
         settings.build_axis_into(name, axis);
         let swap = AxisSwap {
             name,
@@ -238,7 +163,6 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
             operation: settings.operation(),
             needs_disabled: self.needs_disabled,
             more: self.pending.iter().nth(1).is_some(),
-            first: false,
             new_origin: self.new_origins[name],
         };
         match self.ends.swaps.enqueue(swap) {
@@ -261,19 +185,18 @@ impl<'a, S: Scalar, F: SettingsFlash> Server<'_, 'a, S, OwnSettings<'a, F>> {
 
     /// Stores the draft: the settings in force, unless it was edited since or needs a restart. Control keeps the outputs off.
     #[inline(never)]
-    fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
+    pub(super) fn save(&mut self, provenance: Provenance) -> Result<Reply, LinkError> {
         self.check_rate()?;
-        self.source
-            .store
+        self.store
             .save(
-                self.source.draft.settings(),
+                self.draft.settings(),
                 FIRMWARE_ELEMENTS,
                 &provenance,
-                self.source.buffer,
+                self.buffer,
             )
             .map_err(|error| LinkError::Storage(text(format_args!("{error}"))))?;
         self.accepted = true;
-        self.source.provenance = provenance;
+        self.provenance = provenance;
         self.stored = self.stored.wrapping_add(1);
         self.push_event(self.seen.tick, Event::SettingsStored);
         Ok(Reply::Done)
