@@ -206,20 +206,6 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             },
         };
         *given = command.filter(|command| *command != Command::Enable || !self.exchanging);
-        if *given == Some(Command::Stop) {
-            self.drop_stream_items();
-        }
-    }
-
-    /// Drops what waits of a stream or of an injection, so that none of it comes before what is sent after a stop.
-    #[cold]
-    #[inline(never)]
-    fn drop_stream_items(&mut self) {
-        self.place = 0;
-        // As many as wait now: the server may be adding more.
-        for _ in 0..self.ends.stream_items.len() {
-            let _ = self.ends.stream_items.dequeue();
-        }
     }
 
     /// Acts on an order of the server; returns the command that it is or brings about.

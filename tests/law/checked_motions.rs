@@ -11,7 +11,7 @@ use quadrant::link::message::{
 };
 use quadrant::safety::{AxisSwitches, Switches};
 use quadrant::settings::draft::Draft;
-use quadrant::settings::{HomeSwitch, HomingSettings, StageSettings};
+use quadrant::settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
 use quadrant_fault_bench::tasks::Tasks;
 
 use crate::common::Noise;
@@ -219,6 +219,20 @@ fn what_waits_of_a_stream_does_not_outlive_the_limits_that_it_was_checked_agains
     assert_eq!(tasks.upper.borrow().snapshot().axes[0].measured.0, 4000);
 }
 
+/// Settings of an x axis that is homed at the edge of its switch, which is `mark_mm` then.
+fn marked(mark_mm: f64) -> StageSettings {
+    let mut settings = limited(FAST);
+    settings.axes[0].homing = Some(HomingSettings {
+        direction: Direction::Negative,
+        switch: HomeSwitch::Home,
+        index: false,
+        mark_mm,
+        park_mm: mark_mm,
+        ..StageSettings::simulated().axes[0].homing.expect("homes")
+    });
+    settings
+}
+
 /// Homes x at the edge of a switch that is pressed beyond -0.2 mm.
 fn home_x(tasks: &mut Tasks) {
     all(
@@ -246,19 +260,31 @@ fn home_x(tasks: &mut Tasks) {
 }
 
 #[test]
+fn a_stream_keeps_to_the_travel_of_a_homed_axis() {
+    let mut settings = marked(-0.2);
+    settings.axes[0].limits.travel_mm = Some(TravelSettings {
+        negative: -0.5,
+        positive: 1.0,
+    });
+    let mut tasks = Tasks::new(&settings, 1);
+    home_x(&mut tasks);
+    all(&mut tasks, &[Body::Enable]);
+    for (end_mm, within) in [(1.5, false), (-1.0, false), (0.8, true)] {
+        let mut point = SetPoint::default();
+        point.axes[0].position_mm = end_mm;
+        let open = Body::Stream(StreamRequest::Open { period_ticks: 1000 });
+        all(&mut tasks, &[open]);
+        let answer = tasks.ask(Body::Stream(StreamRequest::Points {
+            sequence: 0,
+            points: [point].into_iter().collect(),
+            last: true,
+        }));
+        assert_eq!(answer.is_ok(), within, "{end_mm} mm: {answer:?}");
+    }
+}
+
+#[test]
 fn the_origin_does_not_outlive_the_homing_that_found_it() {
-    let marked = |mark_mm: f64| {
-        let mut settings = limited(FAST);
-        settings.axes[0].homing = Some(HomingSettings {
-            direction: Direction::Negative,
-            switch: HomeSwitch::Home,
-            index: false,
-            mark_mm,
-            park_mm: mark_mm,
-            ..StageSettings::simulated().axes[0].homing.expect("homes")
-        });
-        settings
-    };
     for (leaf, changed, stays) in [
         ("limits/max_velocity_mm_s", limited(SLOW), true),
         ("homing/mark_mm", marked(1.0), false),
@@ -414,4 +440,80 @@ fn no_order_of_requests_moves_an_axis_beyond_the_limits_in_force() {
     );
     let least = seeds as u32;
     assert!(runs > least && changes > least && moved > 1000 * least && fast > 100 * least);
+}
+
+/// Count of x where it is homed.
+const HOME: i64 = -400;
+
+/// An enabled stage whose x axis is homed.
+fn homed() -> Tasks {
+    let mut tasks = Tasks::new(&marked(-0.2), 1);
+    home_x(&mut tasks);
+    all(&mut tasks, &[Body::Enable]);
+    assert_eq!(tasks.upper.borrow().snapshot().axes[0].measured.0, HOME);
+    tasks
+}
+
+/// A move of x, as a request.
+fn move_x(target_mm: f64) -> Body {
+    Body::Move {
+        axis: AxisName::X,
+        target_mm,
+        velocity_mm_s: 20.0,
+    }
+}
+
+#[test]
+fn a_move_does_not_take_the_place_of_a_motion_that_the_operator_has_started_meanwhile() {
+    let mut overtaken = 0;
+    for phase in 0..30 {
+        let mut tasks = homed();
+        all(&mut tasks, &[plan(1.0, SLOW)]);
+        tasks.upper.borrow_mut().operate(Command::Run);
+        for _ in 0..phase {
+            tasks.step();
+        }
+        let id = tasks.send(&[move_x(-5.0)]);
+        let mut last = tasks.upper.borrow().state().axes()[0].reference().0;
+        for _ in 0..4000 {
+            tasks.step();
+            let now = tasks.upper.borrow().state().axes()[0].reference().0;
+            // 20 mm/s are 4 counts a tick; a server that is interrupted takes up to 25 of them.
+            assert!(
+                (now - last).abs() <= (26 * 5) << 16,
+                "a jump in phase {phase}"
+            );
+            last = now;
+        }
+        let done = matches!(tasks.answers.get(&id), Some(Ok(_)));
+        let end = tasks.upper.borrow().snapshot().axes[0].measured.0;
+        overtaken += u32::from(done && end == HOME + 2000);
+        assert!(
+            [HOME + 2000, -10_000].contains(&end),
+            "{end} in phase {phase}"
+        );
+        assert!(done || end == HOME + 2000, "{end} in phase {phase}");
+    }
+    assert!(overtaken > 0);
+}
+
+#[test]
+fn a_move_that_a_stop_has_overtaken_leaves_nothing_for_the_next_one() {
+    let mut tasks = homed();
+    // Commands in every tick let the order wait; then the operator's stop drops it.
+    tasks.upper.borrow_mut().inputs.command = Some(Command::Enable);
+    tasks.send(&[move_x(3.0)]);
+    tasks.run(40);
+    tasks.upper.borrow_mut().inputs.command = Some(Command::Stop);
+    tasks.run(2);
+    tasks.upper.borrow_mut().inputs.command = None;
+    tasks.run(40);
+    assert!(!tasks.upper.borrow().state().is_running());
+    for target_mm in [-1.0, 0.5] {
+        tasks.ask(move_x(target_mm)).expect("moves");
+        tasks.run(5000);
+        let end = tasks.upper.borrow().snapshot().axes[0].measured.0;
+        assert_eq!(end, (2000.0 * target_mm) as i64);
+    }
+    all(&mut tasks, &[plan(0.02, SLOW)]);
 }

@@ -45,6 +45,34 @@ fn the_offset_of_the_amplifier_is_no_load() {
     assert!(at(-8700).is_some());
 }
 
+#[test]
+fn rest_pays_for_no_later_load_and_a_long_one_counts_no_more_than_the_budget() {
+    let overload = Overload::new(8000.0, 32_000.0, 2.0, 0, PERIOD_S);
+    let looks = |s: f64| (s / LOOK_S) as usize;
+    // Ten minutes of rest: the motor is as cold as after one.
+    let mut state = OverloadState::default();
+    for _ in 0..looks(600.0) {
+        assert!(overload.step(&mut state, 0));
+    }
+    let until: usize = (1..)
+        .find(|_| !overload.step(&mut state, 32_000))
+        .expect("found");
+    assert!(until.abs_diff(looks(2.0)) <= 2, "{until} looks");
+    // Ten times as long as it bears: it cools from the budget. (32² - 8²) / 8² times 2 s at rest are enough for all of it.
+    for _ in 0..looks(20.0) {
+        overload.step(&mut state, 32_000);
+    }
+    let cooled: usize = (1..).find(|_| overload.step(&mut state, 0)).expect("cools");
+    assert_eq!(cooled, 1);
+    for _ in 0..looks(30.0) {
+        overload.step(&mut state, 0);
+    }
+    let until: usize = (1..)
+        .find(|_| !overload.step(&mut state, 32_000))
+        .expect("found");
+    assert!(until.abs_diff(looks(2.0)) <= 2, "{until} looks");
+}
+
 proptest! {
     #![proptest_config(repeatable(64))]
 

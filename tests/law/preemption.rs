@@ -671,3 +671,48 @@ fn what_a_host_asked_for_first_does_not_act_after_the_operators_disable() {
     tasks.run(40);
     assert!(tasks.upper.borrow().outputs.enabled);
 }
+
+/// Requests that fill the queue of bytes to the server, which does not read.
+fn fill_the_bytes(tasks: &mut Tasks) {
+    tasks.held_up = u32::MAX;
+    for _ in 0..40 {
+        tasks.send(&vec![Body::Status; 8]);
+        tasks.run(20);
+    }
+}
+
+#[test]
+fn a_stop_and_a_living_host_are_found_behind_a_full_queue_of_bytes() {
+    for body in [Body::Stop, Body::Disable] {
+        let mut tasks = enabled();
+        tasks.ask(endless()).expect("takes the plan");
+        tasks.ask(Body::Run).expect("runs");
+        tasks.run(2000);
+        fill_the_bytes(&mut tasks);
+        // As long as it asks, whether it is answered or not, the host is there.
+        for _ in 0..30 {
+            tasks.send(&[Body::Status]);
+            tasks.run(LINK_TIMEOUT_TICKS / 10);
+        }
+        assert!(tasks.upper.borrow().state().is_running());
+        tasks.send(std::slice::from_ref(&body));
+        tasks.run(2 * WORST_DELAY_TICKS);
+        let upper = tasks.upper.borrow();
+        let acted = match body {
+            Body::Stop => upper.snapshot().view.modes[1] == quadrant::motion::MotionMode::Stopping,
+            _ => !upper.outputs.enabled,
+        };
+        assert!(acted, "{body:?}");
+    }
+}
+
+#[test]
+fn of_a_stop_and_a_disabling_in_one_run_the_disabling_acts() {
+    for burst in [[Body::Stop, Body::Disable], [Body::Disable, Body::Stop]] {
+        let mut tasks = enabled();
+        tasks.held_up = u32::MAX;
+        tasks.send(&burst);
+        tasks.run(2 * WORST_DELAY_TICKS);
+        assert!(!tasks.upper.borrow().outputs.enabled, "{burst:?}");
+    }
+}

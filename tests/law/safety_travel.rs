@@ -388,3 +388,23 @@ fn an_axis_without_soft_limits_goes_either_way_once_it_is_homed() {
         assert!(measured.abs() > 5000, "{measured}");
     }
 }
+
+#[test]
+fn an_axis_that_is_enabled_outside_its_travel_may_stand_there_though_it_was_inside_before() {
+    let settings = travel(1.0);
+    let mut rig = homed(&settings);
+    rig.tick();
+    rig.command(Command::Disable);
+    for _ in 0..300 {
+        rig.inputs.readings[0].count += 10;
+        rig.tick();
+    }
+    rig.tick();
+    for _ in 0..100 {
+        rig.tick();
+    }
+    rig.command(Command::Enable);
+    for _ in 0..100 {
+        assert!(rig.tick().enabled, "{:?}", rig.state.safety());
+    }
+}
