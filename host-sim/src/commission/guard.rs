@@ -5,14 +5,11 @@
 //! one that strays from its plan, and its limit of the velocity one that is too fast to come to rest within the
 //! travel that is left. Both are set from the travel, for every experiment, and are not those that are handed over.
 
-use std::ops::Range;
-
-use quadrant::reference::MotionSettings;
 use quadrant::settings::AxisSettings;
 
 use super::ringing::{Ringing, ringing};
 use crate::machine::{
-    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, usable_mm,
+    AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, span_mm, usable_mm,
 };
 use crate::record::Recording;
 
@@ -196,19 +193,6 @@ const LATEST_S: f64 = 0.5;
 /// Share of the travel by which an experiment may begin beside its place.
 const SLACK: f64 = 0.06;
 
-/// Smallest and largest position of a motion, from where it begins, mm; none if that is not known beforehand.
-fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {
-    match motion {
-        MotionSettings::Hold => Some(0.0..0.0),
-        MotionSettings::PointToPoint(to) => Some(to.distance_mm.min(0.0)..to.distance_mm.max(0.0)),
-        // Whatever its phase.
-        MotionSettings::Harmonic(sine) if sine.phase_rad == 0.0 => {
-            Some(-sine.amplitude_mm..sine.amplitude_mm)
-        }
-        MotionSettings::Harmonic(sine) => Some(-2.0 * sine.amplitude_mm..2.0 * sine.amplitude_mm),
-    }
-}
-
 impl TestAxis for Guard<'_> {
     fn info(&self) -> AxisInfo {
         self.axis.info()
@@ -256,7 +240,7 @@ impl TestAxis for Guard<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::reference::PointToPointSettings;
+    use quadrant::reference::{MotionSettings, PointToPointSettings};
     use quadrant::settings::StageSettings;
 
     use super::*;

@@ -67,7 +67,8 @@ pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;
 pub use test_axis::{
-    AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, open_loop_mm, usable_mm,
+    AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, open_loop_mm, room_mm, span_mm,
+    usable_mm,
 };
 pub use transport::{Transport, encoded};
 pub use travel::Travel;

@@ -3,6 +3,8 @@
 //! Identification asks a [`TestAxis`] for an [`Experiment`] and works on the [`Recording`] that comes back; one that is
 //! read from a file is the same.
 
+use std::ops::Range;
+
 use quadrant::reference::MotionSettings;
 use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::{AxisSettings, SettingsError};
@@ -147,6 +149,30 @@ impl Sides {
     }
 }
 
+/// Smallest and largest position of a motion, from where it begins, mm; none if that is not known beforehand.
+pub fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {
+    match motion {
+        MotionSettings::Hold => Some(0.0..0.0),
+        MotionSettings::PointToPoint(to) => Some(to.distance_mm.min(0.0)..to.distance_mm.max(0.0)),
+        // Whatever its phase.
+        MotionSettings::Harmonic(sine) if sine.phase_rad == 0.0 => {
+            Some(-sine.amplitude_mm..sine.amplitude_mm)
+        }
+        MotionSettings::Harmonic(sine) => Some(-2.0 * sine.amplitude_mm..2.0 * sine.amplitude_mm),
+    }
+}
+
+/// Returns how far from where it begins an axis may go under a motion, mm: to the end of its travel towards which the motion goes,
+/// and to the nearer one under a motion both ways, or none. Towards the other end its following error holds it.
+pub fn room_mm(travel_mm: f64, here_mm: f64, motion: &MotionSettings) -> f64 {
+    let (ahead_mm, back_mm) = (travel_mm - here_mm, travel_mm + here_mm);
+    match span_mm(motion) {
+        Some(span) if span.start == 0.0 && span.end > 0.0 => ahead_mm,
+        Some(span) if span.end == 0.0 && span.start < 0.0 => back_mm,
+        _ => ahead_mm.min(back_mm),
+    }
+}
+
 /// Returns the positions between which an axis in open loop stays that stands at `here_mm`, mm.
 pub fn open_loop_mm(travel_mm: f64, here_mm: f64) -> (f64, f64) {
     let room = |to_end_mm: f64| {
@@ -246,5 +272,30 @@ impl ExperimentError {
     /// True if the axis was stopped because it was not where it should have been: under another controller it may be.
     pub fn strayed(&self) -> bool {
         self.ran_off() || self.fault() == Some(FaultCode::FollowingError)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use quadrant::reference::{HarmonicSettings, PointToPointSettings};
+
+    #[test]
+    fn a_motion_may_go_to_the_end_of_the_travel_that_it_goes_towards() {
+        let by = |distance_mm| {
+            MotionSettings::PointToPoint(PointToPointSettings {
+                distance_mm,
+                max_velocity_mm_s: 20.0,
+                max_acceleration_mm_s2: 200.0,
+                max_jerk_mm_s3: 4000.0,
+            })
+        };
+        // From near one end to near the other, as a pass on a short travel goes.
+        assert_eq!(room_mm(20.0, -12.9, &by(25.8)), 32.9);
+        assert_eq!(room_mm(20.0, 12.9, &by(-25.8)), 32.9);
+        assert!((room_mm(20.0, 12.9, &by(5.0)) - 7.1).abs() < 1e-12);
+        let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(2.0, 20.0, 1.0, 0.2));
+        assert!((room_mm(20.0, 12.9, &sine) - 7.1).abs() < 1e-12);
+        assert!((room_mm(20.0, -12.9, &MotionSettings::Hold) - 7.1).abs() < 1e-12);
     }
 }

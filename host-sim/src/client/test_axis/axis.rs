@@ -18,6 +18,7 @@ use crate::client::settings;
 use crate::client::settle;
 use crate::machine::{
     AxisInfo, Drive, Experiment, ExperimentError, MachineError, TestAxis, Travel, open_loop_mm,
+    room_mm,
 };
 use crate::record::Recording;
 
@@ -158,8 +159,7 @@ impl<'a> ConnectedAxis<'a> {
                     let (low_mm, high_mm) = open_loop_mm(self.travel.half_mm(), here_mm);
                     (here_mm - low_mm).min(high_mm - here_mm)
                 }
-                Drive::ClosedLoop(_) if moves => self.travel.half_mm(),
-                Drive::ClosedLoop(_) => self.travel.half_mm() - here_mm.abs(),
+                Drive::ClosedLoop(motion) => room_mm(self.travel.half_mm(), here_mm, &motion),
             };
             let mut plan = Injection::new(
                 experiment,
