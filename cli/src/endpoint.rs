@@ -35,8 +35,8 @@ pub(super) enum LinkEndpoint {
     Serial(String),
     /// A machine behind a socket.
     Tcp(String),
-    /// A machine that another program holds and shares.
-    Look(String),
+    /// A machine that another program holds and shares, and the token for it where it has one.
+    Look(String, Option<String>),
 }
 
 impl FromStr for Endpoint {
@@ -108,8 +108,8 @@ impl LinkEndpoint {
                 })?;
                 session(socket, share)
             }
-            Self::Look(address) => {
-                let socket = TcpTransport::look(address).with_context(|| {
+            Self::Look(address, token) => {
+                let socket = TcpTransport::look(address, token.as_deref()).with_context(|| {
                     format!(
                         "nobody shares a machine at {address}; whoever holds it gives `quadrant connect --share {address}`"
                     )
@@ -127,11 +127,21 @@ fn session(transport: impl Transport + 'static, share: Option<&str>) -> anyhow::
     };
     let shared = Shared::listen(transport, address)
         .with_context(|| format!("--share {address}: nobody can be listened to there"))?;
-    warn!(
-        "others may look: quadrant connect --look {}",
-        shared.address()
-    );
-    Ok(Client::open(shared)?)
+    let (address, token) = (shared.address(), shared.token().map(str::to_owned));
+    let client = Client::open(shared)?;
+    // Not before there is something to see.
+    match token {
+        None => {
+            warn!(
+                "others on this computer may look, stop and disable: quadrant connect --look {address}"
+            );
+        }
+        Some(token) => warn!(
+            "whoever on the network has the token may look, stop and disable; the token goes over it in the clear: quadrant connect \
+             --look {address} --token {token}"
+        ),
+    }
+    Ok(client)
 }
 
 /// Signals after which this program ends, heeded or not: the machine stops what its host has started when that is gone.

@@ -93,7 +93,8 @@ const LEAVING: Duration = Duration::from_secs(10);
 /// Leaves no outputs on.
 fn leave(session: &mut Session) -> anyhow::Result<()> {
     let client = &mut session.client;
-    if !client.status()?.state.drives() {
+    // The axes of a machine that another program holds are that program's.
+    if client.is_view() || !client.status()?.state.drives() {
         return Ok(());
     }
     say!("the outputs are on: the axes stop, and the outputs go off");
