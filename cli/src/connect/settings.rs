@@ -8,6 +8,7 @@ use quadrant::settings::StageSettings;
 use quadrant_cli::output::with_bar;
 use quadrant_sim::client::settings::{self, Difference, whole_path};
 use quadrant_sim::client::{Client, load};
+use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
@@ -96,7 +97,7 @@ pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
         records: Vec::new(),
         sets: Vec::new(),
     });
-    dumped.write(file)?;
+    dumped.write(file, whole::write)?;
     let text = format!("{}: the settings of all axes", file.display());
     Ok(Answer::new(text, json!({ "file": file })))
 }
