@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Context;
-use quadrant_cli::warn;
+use quadrant_cli::{terminal, warn};
 use quadrant_sim::client::{Client, Interrupt};
 use quadrant_sim::machine::{
     LawStage, Machine, SerialTransport, Shared, SimulatedLink, TcpTransport, Transport,
@@ -83,6 +83,7 @@ impl LinkEndpoint {
     ) -> anyhow::Result<Client> {
         let client = self.open(seed, flash, share)?;
         heed_signals(client.interrupt())?;
+        terminal::keep_modes();
         Ok(client)
     }
 
@@ -149,15 +150,36 @@ const SIGNALS: u32 = 3;
 
 /// Stops the axes on Ctrl-C, and when this program is to end.
 fn heed_signals(interrupt: Interrupt) -> anyhow::Result<()> {
-    ctrlc::set_handler(move || match interrupt.request() {
-        1 => warn!("stopping the axes; once more disables the outputs"),
-        SIGNALS.. => {
-            warn!("ended");
-            std::process::exit(130);
+    on_signals(move |ends| {
+        let requests = match ends {
+            true => interrupt.request_end(),
+            false => interrupt.request(),
+        };
+        match requests {
+            1 => warn!("stopping the axes; once more disables the outputs"),
+            SIGNALS.. => {
+                warn!("ended");
+                terminal::restore_modes();
+                std::process::exit(130);
+            }
+            _ => warn!("disabling the outputs"),
         }
-        _ => warn!("disabling the outputs"),
     })
     .context("cannot take Ctrl-C")
+}
+
+/// Calls `act` at every signal, with whether the program is to end after it: Ctrl-C is for what is under way alone.
+#[cfg(unix)]
+fn on_signals(act: impl Fn(bool) + Send + 'static) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    std::thread::spawn(move || signals.forever().for_each(|signal| act(signal != SIGINT)));
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn on_signals(act: impl Fn(bool) + Send + 'static) -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(move || act(false))
 }
 
 #[cfg(all(unix, feature = "emulated"))]

@@ -131,6 +131,51 @@ mod tests {
     }
 }
 
+/// The modes of the terminal that standard input is, as this program leaves it.
+#[cfg(unix)]
+static MODES: Mutex<Option<rustix::termios::Termios>> = Mutex::new(None);
+
+/// Lets Ctrl-C interrupt what is under way, also where an earlier program has left the terminal without, and keeps its modes for
+/// [`restore_modes`].
+#[cfg(unix)]
+pub fn keep_modes() {
+    use rustix::termios::{LocalModes, tcgetattr};
+    let needed = LocalModes::ISIG | LocalModes::ICANON;
+    let (Ok(mut kept), Ok(mut modes)) = (MODES.lock(), tcgetattr(rustix::stdio::stdin())) else {
+        return;
+    };
+    let found = modes.local_modes;
+    modes.local_modes |= needed;
+    *kept = Some(modes);
+    drop(kept);
+    if found & needed != needed {
+        restore_modes();
+    }
+}
+
+/// Gives the terminal the modes that it had, but for an interrupt that was missing.
+#[cfg(unix)]
+pub fn restore_modes() {
+    use rustix::process::getpgrp;
+    use rustix::termios::{OptionalActions, tcgetpgrp, tcsetattr};
+    let input = rustix::stdio::stdin();
+    if let Ok(kept) = MODES.lock()
+        && let Some(modes) = &*kept
+        // A program in the background would be stopped for it.
+        && tcgetpgrp(input).is_ok_and(|front| front == getpgrp())
+    {
+        let _ = tcsetattr(input, OptionalActions::Drain, modes);
+    }
+}
+
+/// Only Unix has terminals with modes.
+#[cfg(not(unix))]
+pub fn keep_modes() {}
+
+/// Only Unix has terminals with modes.
+#[cfg(not(unix))]
+pub fn restore_modes() {}
+
 /// Says whether everything was printed.
 ///
 /// # Errors

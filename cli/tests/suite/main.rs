@@ -16,4 +16,5 @@ mod record_bad_input;
 #[cfg(target_os = "linux")]
 mod record_large;
 mod sharing;
+mod terminal;
 mod transcript;
