@@ -110,27 +110,6 @@ impl<W: Write> fmt::Write for Plain<'_, W> {
     }
 }
 
-#[cfg(test)]
-mod tests {
-    use super::write_plain;
-
-    #[test]
-    fn what_acts_on_a_terminal_is_shown_by_its_number_and_text_is_as_it_was() {
-        let printed = |text: &str| {
-            let mut out = Vec::new();
-            write_plain(&mut out, format_args!("{text}")).unwrap();
-            String::from_utf8(out).unwrap()
-        };
-        let text = "x \u{b5}m \u{2801} \u{e4}\t1\n";
-        assert_eq!(printed(text), text);
-        // The clipboard, the cursor, a line written over, C1's sequences, and names from right to left.
-        assert_eq!(printed("\x1b]52;c;aGk=\x07"), "\\u001b]52;c;aGk=\\u0007");
-        assert_eq!(printed("a\rb\x08\x7f"), "a\\u000db\\u0008\\u007f");
-        assert_eq!(printed("\u{9b}2J\u{85}"), "\\u009b2J\\u0085");
-        assert_eq!(printed("\u{202e}lmot\u{2066}"), "\\u202elmot\\u2066");
-    }
-}
-
 /// The modes of the terminal that standard input is, as this program leaves it.
 #[cfg(unix)]
 static MODES: Mutex<Option<rustix::termios::Termios>> = Mutex::new(None);
@@ -186,5 +165,26 @@ pub fn finish() -> anyhow::Result<()> {
             Err(anyhow::Error::new(error).context("cannot write to standard output"))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::write_plain;
+
+    #[test]
+    fn what_acts_on_a_terminal_is_shown_by_its_number_and_text_is_as_it_was() {
+        let printed = |text: &str| {
+            let mut out = Vec::new();
+            write_plain(&mut out, format_args!("{text}")).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        let text = "x \u{b5}m \u{2801} \u{e4}\t1\n";
+        assert_eq!(printed(text), text);
+        // The clipboard, the cursor, a line written over, C1's sequences, and names from right to left.
+        assert_eq!(printed("\x1b]52;c;aGk=\x07"), "\\u001b]52;c;aGk=\\u0007");
+        assert_eq!(printed("a\rb\x08\x7f"), "a\\u000db\\u0008\\u007f");
+        assert_eq!(printed("\u{9b}2J\u{85}"), "\\u009b2J\\u0085");
+        assert_eq!(printed("\u{202e}lmot\u{2066}"), "\\u202elmot\\u2066");
     }
 }

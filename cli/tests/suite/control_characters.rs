@@ -133,3 +133,27 @@ fn a_file_that_is_refused_does_not_act_on_the_terminal() {
         }
     }
 }
+
+#[cfg(unix)]
+#[test]
+fn a_log_through_the_debug_probe_does_not_act_on_the_terminal() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = tempfile::tempdir().unwrap();
+    let probe = folder.path().join("probe-rs");
+    let elf = folder.path().join("firmware.elf");
+    std::fs::write(&elf, "an image").unwrap();
+    std::fs::write(folder.path().join("log"), ACTS.join("\n")).unwrap();
+    std::fs::write(&probe, "#!/bin/sh\ncat \"${0%/*}/log\"\n").unwrap();
+    std::fs::set_permissions(&probe, std::fs::Permissions::from_mode(0o755)).unwrap();
+    let path = std::env::var("PATH").unwrap();
+    let output = Command::new(env!("CARGO_BIN_EXE_quadrant"))
+        .args(["connect", "log", "--elf"])
+        .arg(&elf)
+        .env("PATH", format!("{}:{path}", folder.path().display()))
+        .output()
+        .unwrap();
+    assert!(output.status.success());
+    let said = String::from_utf8_lossy(&output.stdout);
+    assert!(said.contains("\\u001b]52;c;aGk="), "{said:?}");
+    assert_plain(&output);
+}

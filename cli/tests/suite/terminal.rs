@@ -110,7 +110,7 @@ impl Person {
     }
 
     /// Waits for the program's end, and checks the modes that it leaves.
-    fn is_left(mut self) -> Option<i32> {
+    fn gives_back(mut self) -> Option<i32> {
         let due = Instant::now() + SAID;
         let status = loop {
             if let Some(status) = self.child.try_wait().unwrap() {
@@ -152,7 +152,7 @@ fn an_interrupted_command_ends_and_the_prompt_goes_on() {
         person.sees("quadrant> ");
     }
     person.types("\x04");
-    assert_eq!(person.is_left(), Some(0));
+    assert_eq!(person.gives_back(), Some(0));
 }
 
 #[test]
@@ -165,7 +165,7 @@ fn a_terminal_without_an_interrupt_gets_one() {
     person.sees("interrupted: the axes have stopped");
     person.sees("quadrant> ");
     person.types("\x04");
-    assert_eq!(person.is_left(), Some(0));
+    assert_eq!(person.gives_back(), Some(0));
 }
 
 #[test]
@@ -173,12 +173,12 @@ fn a_signal_ends_the_prompt_and_leaves_the_terminal_as_it_was() {
     for name in ["-TERM", "-HUP"] {
         let person = Person::sits_down(|_| {});
         person.signal(name);
-        person.is_left();
+        person.gives_back();
         let mut person = Person::sits_down(|_| {});
         person.starts_a_motion();
         person.signal(name);
         person.sees("interrupted: the axes have stopped");
-        person.is_left();
+        person.gives_back();
     }
 }
 
@@ -190,5 +190,5 @@ fn the_third_signal_ends_at_once_and_leaves_the_terminal_as_it_was() {
     for name in ["-INT", "-TERM", "-HUP", "-CONT"] {
         person.signal(name);
     }
-    person.is_left();
+    person.gives_back();
 }

@@ -24,8 +24,9 @@ const MOST_NOTICES: usize = 1 << 14;
 /// Longest silence of a host that has started a motion: less than half of the machine's time-out.
 const ALIVE: Duration = Duration::from_millis(200);
 
-/// Longest silence of one that looks at a machine which another program holds.
+/// Longest silence of one that looks at a machine which another program holds, and time for what has come.
 const VIEWING: Duration = Duration::from_secs(1);
+const TAKING: Duration = Duration::from_millis(1);
 
 /// Time in which the axes come to rest after an interruption, before the outputs are disabled, and time between two looks.
 const STOPPING: Duration = Duration::from_secs(10);
@@ -305,8 +306,12 @@ impl Client {
         } else if self.moves && silent >= ALIVE {
             self.status()?
         } else {
-            if self.is_view() && silent >= VIEWING {
-                self.show_alive()?;
+            if self.is_view() {
+                if silent >= VIEWING {
+                    self.show_alive()?;
+                }
+                // One whose answers nobody takes is gone for its holder.
+                self.receive(self.now() + TAKING)?;
             }
             return Ok(());
         };

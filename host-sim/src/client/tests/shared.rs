@@ -164,3 +164,22 @@ fn a_viewer_that_leaves_disturbs_nobody() {
     let state = holder.status().unwrap().state;
     assert_eq!(look(&address).status().unwrap().state, state);
 }
+
+#[test]
+fn a_viewer_that_waits_stays_and_one_that_is_silent_is_gone() {
+    let (model, _) = Model::new();
+    let shared = Shared::listen(Loopback::new(model), "127.0.0.1:0").unwrap();
+    let address = shared.address().to_string();
+    let mut holder = Client::open(shared).unwrap();
+    let (mut waits, mut silent) = (look(&address), look(&address));
+    let began = Instant::now();
+    while began.elapsed() < Duration::from_secs(11) {
+        holder.keep_alive().unwrap();
+        // As at a prompt.
+        waits.keep_alive().unwrap();
+        thread::sleep(Duration::from_millis(50));
+    }
+    waits.status().unwrap();
+    let gone = silent.status().unwrap_err();
+    assert!(matches!(gone, ClientError::Connection { .. }), "{gone}");
+}
