@@ -4,7 +4,7 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use anyhow::Context;
-use quadrant_cli::warn;
+use quadrant_cli::{terminal, warn};
 use quadrant_sim::client::{Client, Interrupt};
 use quadrant_sim::machine::{
     LawStage, Machine, SerialTransport, Shared, SimulatedLink, TcpTransport, Transport,
@@ -33,8 +33,8 @@ pub(super) enum LinkEndpoint {
     Serial(String),
     /// A machine behind a socket.
     Tcp(String),
-    /// A machine that another program holds and shares.
-    Look(String),
+    /// A machine that another program holds and shares, and the token for it where it has one.
+    Look(String, Option<String>),
 }
 
 impl FromStr for Endpoint {
@@ -81,6 +81,7 @@ impl LinkEndpoint {
     ) -> anyhow::Result<Client> {
         let client = self.open(seed, flash, share)?;
         heed_signals(client.interrupt())?;
+        terminal::keep_modes();
         Ok(client)
     }
 
@@ -105,8 +106,8 @@ impl LinkEndpoint {
                 })?;
                 session(socket, share)
             }
-            Self::Look(address) => {
-                let socket = TcpTransport::look(address).with_context(|| {
+            Self::Look(address, token) => {
+                let socket = TcpTransport::look(address, token.as_deref()).with_context(|| {
                     format!(
                         "nobody shares a machine at {address}; whoever holds it gives `quadrant connect --share {address}`"
                     )
@@ -124,11 +125,21 @@ fn session(transport: impl Transport + 'static, share: Option<&str>) -> anyhow::
     };
     let shared = Shared::listen(transport, address)
         .with_context(|| format!("--share {address}: nobody can be listened to there"))?;
-    warn!(
-        "others may look: quadrant connect --look {}",
-        shared.address()
-    );
-    Ok(Client::open(shared)?)
+    let (address, token) = (shared.address(), shared.token().map(str::to_owned));
+    let client = Client::open(shared)?;
+    // Not before there is something to see.
+    match token {
+        None => {
+            warn!(
+                "others on this computer may look, stop and disable: quadrant connect --look {address}"
+            );
+        }
+        Some(token) => warn!(
+            "whoever on the network has the token may look, stop and disable; the token goes over it in the clear: quadrant connect \
+             --look {address} --token {token}"
+        ),
+    }
+    Ok(client)
 }
 
 /// Signals after which this program ends, heeded or not: the machine stops what its host has started when that is gone.
@@ -136,15 +147,36 @@ const SIGNALS: u32 = 3;
 
 /// Stops the axes on Ctrl-C, and when this program is to end.
 fn heed_signals(interrupt: Interrupt) -> anyhow::Result<()> {
-    ctrlc::set_handler(move || match interrupt.request() {
-        1 => warn!("stopping the axes; once more disables the outputs"),
-        SIGNALS.. => {
-            warn!("ended");
-            std::process::exit(130);
+    on_signals(move |ends| {
+        let requests = match ends {
+            true => interrupt.request_end(),
+            false => interrupt.request(),
+        };
+        match requests {
+            1 => warn!("stopping the axes; once more disables the outputs"),
+            SIGNALS.. => {
+                warn!("ended");
+                terminal::restore_modes();
+                std::process::exit(130);
+            }
+            _ => warn!("disabling the outputs"),
         }
-        _ => warn!("disabling the outputs"),
     })
     .context("cannot take Ctrl-C")
+}
+
+/// Calls `act` at every signal, with whether the program is to end after it: Ctrl-C is for what is under way alone.
+#[cfg(unix)]
+fn on_signals(act: impl Fn(bool) + Send + 'static) -> std::io::Result<()> {
+    use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+    let mut signals = signal_hook::iterator::Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+    std::thread::spawn(move || signals.forever().for_each(|signal| act(signal != SIGINT)));
+    Ok(())
+}
+
+#[cfg(not(unix))]
+fn on_signals(act: impl Fn(bool) + Send + 'static) -> Result<(), ctrlc::Error> {
+    ctrlc::set_handler(move || act(false))
 }
 
 #[cfg(all(unix, feature = "emulated"))]

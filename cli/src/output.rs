@@ -2,13 +2,13 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Context;
+use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use crate::say;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Block, Format, Page, Section, Table};
+use quadrant_sim::report::{Block, FIGURES, Format, Page, Section, Table};
 
 /// Options that every experiment has.
 #[derive(Clone, Debug, Args)]
@@ -22,6 +22,9 @@ pub struct Output {
     /// Formats of the results; may be given several times.
     #[arg(long, value_enum, default_values_t = Self::FORMATS, value_name = "FORMAT")]
     format: Vec<Format>,
+    /// Folder of these results below that of all.
+    #[arg(skip)]
+    below: PathBuf,
 }
 
 impl Output {
@@ -33,27 +36,66 @@ impl Output {
     #[must_use]
     pub fn below(&self, name: &str) -> Self {
         Self {
-            out: self.out.join(name),
+            below: self.below.join(name),
             ..self.clone()
         }
     }
 
+    fn folder(&self) -> PathBuf {
+        // Joined to nothing, a path would end in a slash.
+        self.out
+            .components()
+            .chain(self.below.components())
+            .collect()
+    }
+
     /// The path of a file in the folder, which is made.
+    ///
+    /// # Errors
+    /// A folder that cannot be made; a link that leads out of the folder for results.
     pub fn file(&self, name: &str) -> anyhow::Result<PathBuf> {
+        let folder = self.folder();
         std::fs::create_dir_all(&self.out)
             .with_context(|| format!("cannot make the folder {}", self.out.display()))?;
-        Ok(self.out.join(name))
+        let path = folder.join(name);
+        let mut on_the_way: Vec<&Path> =
+            path.ancestors().take_while(|it| *it != self.out).collect();
+        on_the_way.reverse();
+        for path in on_the_way {
+            self.refuse_link_out(path)?;
+        }
+        std::fs::create_dir_all(&folder)
+            .with_context(|| format!("cannot make the folder {}", folder.display()))?;
+        Ok(path)
+    }
+
+    /// Refuses a link that leads out of the folder for results: what is written into that one stays in it.
+    fn refuse_link_out(&self, path: &Path) -> anyhow::Result<()> {
+        if !path.is_symlink() {
+            return Ok(());
+        }
+        let inside = self.out.canonicalize()?;
+        // One that leads nowhere may lead there once it is written to.
+        if path.canonicalize().is_ok_and(|to| to.starts_with(inside)) {
+            return Ok(());
+        }
+        bail!(
+            "{} is a link out of {}, and nothing is written through it: remove it, or give another --out",
+            path.display(),
+            self.out.display()
+        )
     }
 
     /// Makes the folder, and finds out whether it can be written to: before anything is measured or computed.
     ///
     /// # Errors
-    /// A folder that cannot be made or written to.
+    /// A folder that cannot be made or written to, or that a link leads out of the folder for results.
     pub fn ready(&self) -> anyhow::Result<()> {
-        let probe = self.file(".quadrant-probe")?;
-        std::fs::write(&probe, [])
-            .and_then(|()| std::fs::remove_file(&probe))
-            .with_context(|| format!("cannot write to the folder {}", self.out.display()))
+        let folder = self.file(FIGURES)?;
+        let folder = folder.parent().unwrap_or(&self.out);
+        tempfile::tempfile_in(folder)
+            .with_context(|| format!("cannot write to the folder {}", folder.display()))?;
+        Ok(())
     }
 
     /// Writes a table where CSV is wanted, and prints it.
@@ -82,8 +124,10 @@ impl Output {
     /// The same, and says where it is instead of printing it.
     pub fn keep_page(&self, page: &Page, name: &str) -> anyhow::Result<Vec<String>> {
         let stem = name.strip_suffix(".html").unwrap_or(name);
-        page.write(&self.out, stem, &self.format)?;
-        let folder = self.out.display();
+        self.file(FIGURES)?;
+        let folder = self.folder();
+        page.write(&folder, stem, &self.format)?;
+        let folder = folder.display();
         let line = |format: &Format| match format {
             Format::Html => format!("{folder}/{stem}.html: open it in a browser"),
             Format::Json => format!("{folder}/{stem}.json: the page as data"),

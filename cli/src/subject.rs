@@ -7,6 +7,7 @@ use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::{Machine, MachineError, TestAxis, Travel};
+use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::endpoint::Endpoint;
@@ -243,7 +244,7 @@ impl Destination {
             .map(|path| path.display().to_string())
             .collect();
         file.add_provenance(&command_line(), axis.name(), records, sets);
-        file.write(path)?;
+        file.write(path, whole::write)?;
         say!(
             "{}: the settings with this {} of {}",
             path.display(),

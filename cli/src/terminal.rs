@@ -1,9 +1,11 @@
 //! Standard output and standard error, which may be closed or full: the work goes on, and its files are written.
 //!
-//! [`say!`](crate::say) and [`warn!`](crate::warn) stand in for `println!` and `eprintln!`, which panic there.
+//! [`say!`](crate::say) and [`warn!`](crate::warn) stand in for `println!` and `eprintln!`, which panic there. What they print may
+//! come from a board, a file or a link, so that nothing of it acts on the terminal: characters that would are shown by their
+//! number.
 
-use std::fmt::Arguments;
-use std::io::{self, Write};
+use std::fmt::{self, Arguments, Write as _};
+use std::io::{self, StdoutLock, Write};
 use std::sync::Mutex;
 
 /// The first error of standard output.
@@ -22,22 +24,136 @@ macro_rules! warn {
     ($($what:tt)*) => { $crate::terminal::print_error(format_args!("{}\n", format_args!($($what)*))) };
 }
 
+/// What empties a terminal, and begins at its top.
+const CLEAR: &[u8] = b"\x1b[2J\x1b[H";
+
 /// Prints to standard output, unless that has failed before.
 pub fn print(what: Arguments<'_>) {
+    to_output(|out| write_plain(out, what));
+}
+
+/// Empties the terminal that standard output is.
+pub fn clear() {
+    to_output(|out| out.write_all(CLEAR));
+}
+
+fn to_output(write: impl FnOnce(&mut StdoutLock<'static>) -> io::Result<()>) {
     let Ok(mut failed) = FAILED.lock() else {
         return;
     };
     if failed.is_none() {
         let mut out = io::stdout().lock();
-        *failed = out.write_fmt(what).and_then(|()| out.flush()).err();
+        *failed = write(&mut out).and_then(|()| out.flush()).err();
     }
 }
 
 /// Prints to standard error, if that can be.
 pub fn print_error(what: Arguments<'_>) {
     // There is nowhere left to tell it.
-    let _ = io::stderr().lock().write_fmt(what);
+    let _ = write_plain(&mut io::stderr().lock(), what);
 }
+
+/// Writes a text without anything that acts on a terminal.
+fn write_plain(out: &mut impl Write, what: Arguments<'_>) -> io::Result<()> {
+    let mut plain = Plain { out, failed: None };
+    let written = plain.write_fmt(what);
+    match plain.failed {
+        Some(error) => Err(error),
+        None => written.map_err(io::Error::other),
+    }
+}
+
+/// A text without anything that acts on a terminal.
+pub fn plain(text: &str) -> String {
+    text.chars().fold(String::new(), |mut plain, sign| {
+        let _ = match acts(sign) {
+            true => write!(plain, "\\u{:04x}", u32::from(sign)),
+            false => plain.write_char(sign),
+        };
+        plain
+    })
+}
+
+/// True for a character that moves the cursor, begins a sequence, or turns or hides the text behind it. Of the control
+/// characters, a line's end and a tab are text.
+const fn acts(sign: char) -> bool {
+    match sign {
+        '\n' | '\t' => false,
+        // C0, DEL and C1.
+        '\0'..='\u{1f}' | '\u{7f}'..='\u{9f}' => true,
+        // Direction of writing, separators of lines, and what has no width.
+        '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{206f}' => {
+            true
+        }
+        '\u{feff}' | '\u{fff9}'..='\u{fffb}' => true,
+        _ => false,
+    }
+}
+
+/// A writer that shows what [`acts`] by its number, as JSON does: a line of JSON stays the same value.
+struct Plain<'a, W> {
+    out: &'a mut W,
+    failed: Option<io::Error>,
+}
+
+impl<W: Write> fmt::Write for Plain<'_, W> {
+    fn write_str(&mut self, text: &str) -> fmt::Result {
+        let written = match text.contains(acts) {
+            true => self.out.write_all(plain(text).as_bytes()),
+            false => self.out.write_all(text.as_bytes()),
+        };
+        self.failed = written.err();
+        match self.failed {
+            Some(_) => Err(fmt::Error),
+            None => Ok(()),
+        }
+    }
+}
+
+/// The modes of the terminal that standard input is, as this program leaves it.
+#[cfg(unix)]
+static MODES: Mutex<Option<rustix::termios::Termios>> = Mutex::new(None);
+
+/// Lets Ctrl-C interrupt what is under way, also where an earlier program has left the terminal without, and keeps its modes for
+/// [`restore_modes`].
+#[cfg(unix)]
+pub fn keep_modes() {
+    use rustix::termios::{LocalModes, tcgetattr};
+    let needed = LocalModes::ISIG | LocalModes::ICANON;
+    let (Ok(mut kept), Ok(mut modes)) = (MODES.lock(), tcgetattr(rustix::stdio::stdin())) else {
+        return;
+    };
+    let found = modes.local_modes;
+    modes.local_modes |= needed;
+    *kept = Some(modes);
+    drop(kept);
+    if found & needed != needed {
+        restore_modes();
+    }
+}
+
+/// Gives the terminal the modes that it had, but for an interrupt that was missing.
+#[cfg(unix)]
+pub fn restore_modes() {
+    use rustix::process::getpgrp;
+    use rustix::termios::{OptionalActions, tcgetpgrp, tcsetattr};
+    let input = rustix::stdio::stdin();
+    if let Ok(kept) = MODES.lock()
+        && let Some(modes) = &*kept
+        // A program in the background would be stopped for it.
+        && tcgetpgrp(input).is_ok_and(|front| front == getpgrp())
+    {
+        let _ = tcsetattr(input, OptionalActions::Drain, modes);
+    }
+}
+
+/// Only Unix has terminals with modes.
+#[cfg(not(unix))]
+pub fn keep_modes() {}
+
+/// Only Unix has terminals with modes.
+#[cfg(not(unix))]
+pub fn restore_modes() {}
 
 /// Says whether everything was printed.
 ///
@@ -49,5 +165,26 @@ pub fn finish() -> anyhow::Result<()> {
             Err(anyhow::Error::new(error).context("cannot write to standard output"))
         }
         _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::write_plain;
+
+    #[test]
+    fn what_acts_on_a_terminal_is_shown_by_its_number_and_text_is_as_it_was() {
+        let printed = |text: &str| {
+            let mut out = Vec::new();
+            write_plain(&mut out, format_args!("{text}")).unwrap();
+            String::from_utf8(out).unwrap()
+        };
+        let text = "x \u{b5}m \u{2801} \u{e4}\t1\n";
+        assert_eq!(printed(text), text);
+        // The clipboard, the cursor, a line written over, C1's sequences, and names from right to left.
+        assert_eq!(printed("\x1b]52;c;aGk=\x07"), "\\u001b]52;c;aGk=\\u0007");
+        assert_eq!(printed("a\rb\x08\x7f"), "a\\u000db\\u0008\\u007f");
+        assert_eq!(printed("\u{9b}2J\u{85}"), "\\u009b2J\\u0085");
+        assert_eq!(printed("\u{202e}lmot\u{2066}"), "\\u202elmot\\u2066");
     }
 }

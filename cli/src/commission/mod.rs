@@ -20,7 +20,7 @@ use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
 use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
-use quadrant_sim::report::Table;
+use quadrant_sim::report::{Table, whole};
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
@@ -237,11 +237,15 @@ impl Job<'_> {
         };
         let base = file.stage.axes[axis as usize].clone();
         let folder = output.below(axis.as_str());
+        folder.ready()?;
         let experiments = folder.file(EXPERIMENTS)?;
         let outcome = {
             let mut test_axis = machine.test_axis(axis, travel)?;
             let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
                 .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
+            for path in journal.foreign() {
+                warn!("{} was not written here, and stays", path.display());
+            }
             self.request.run(&mut journal, &base, output.seed)
         };
         let restored = machine.load(&before);
@@ -449,7 +453,7 @@ impl Found {
             records,
             &["feedback", "friction", "feedforward", "plant"],
         );
-        file.write(path)?;
+        file.write(path, whole::write)?;
         for table in self.tables() {
             output.keep_table(&table)?;
         }
@@ -631,5 +635,56 @@ mod tests {
             let kept = folder.path().join("x").join(PID_ALONE);
             assert_eq!(kept.exists(), !dead, "{said}");
         }
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn nothing_is_written_through_a_link_and_nothing_deleted_that_is_not_its_own() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let [out, elsewhere] = ["out", "elsewhere"].map(|name| folder.path().join(name));
+        let all = || {
+            let entries = std::fs::read_dir(&elsewhere).unwrap();
+            entries.count()
+        };
+        std::fs::create_dir_all(out.join("x/experiments")).unwrap();
+        std::fs::create_dir(&elsewhere).unwrap();
+        let mut machine = Spoilt {
+            stage: LawStage::new(1),
+            dead: true,
+            deaf: false,
+        };
+        let mut refused = || {
+            let error = commission_into(&out, &mut machine).err().unwrap();
+            quadrant_cli::explained(&error)
+        };
+        let notes = out.join("x/experiments/notes.txt");
+        std::fs::write(&notes, "three weeks of work").unwrap();
+        let said = refused();
+        assert!(said.contains("the line is cut"), "{said}");
+        assert!(notes.exists());
+
+        for link in ["x", "x/figures", "settings.toml", "x/experiments"] {
+            let link = out.join(link);
+            let aside = folder.path().join("aside");
+            let was_there = std::fs::rename(&link, &aside).is_ok();
+            std::fs::create_dir_all(link.parent().unwrap()).unwrap();
+            symlink(&elsewhere, &link).unwrap();
+            let said = refused();
+            assert!(said.contains("link"), "{}: {said}", link.display());
+            assert!(said.contains(link.to_str().unwrap()), "{said}");
+            assert_eq!(all(), 0, "{}", link.display());
+            std::fs::remove_file(&link).unwrap();
+            if was_there {
+                std::fs::rename(&aside, &link).unwrap();
+            }
+        }
+        // One that is asked for may be a link itself.
+        let asked = folder.path().join("asked");
+        symlink(&elsewhere, &asked).unwrap();
+        let error = commission_into(&asked, &mut machine).err().unwrap();
+        let said = quadrant_cli::explained(&error);
+        assert!(said.contains("the line is cut"), "{said}");
+        assert!(elsewhere.join("x").exists());
     }
 }

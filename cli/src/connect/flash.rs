@@ -1,10 +1,11 @@
 //! A board's debug probe: `quadrant connect flash` and `log --elf`.
 
-use std::io::ErrorKind;
+use std::io::{self, BufRead, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
-use std::process::Command;
+use std::process::{Child, Command, ExitStatus, Stdio};
 
 use anyhow::{Context, bail};
+use quadrant_cli::say;
 
 use super::command::{FlashOptions, LogOptions};
 
@@ -39,8 +40,8 @@ pub(super) fn run(arguments: &FlashOptions) -> anyhow::Result<()> {
 
 fn probe_rs(words: &[&str], file: Option<&PathBuf>) -> anyhow::Result<()> {
     let mut command = Command::new("probe-rs");
-    command.args(words).args(file);
-    match command.status() {
+    command.args(words).args(file).stdout(Stdio::piped());
+    match command.spawn().and_then(shown) {
         Ok(status) if status.success() => Ok(()),
         Ok(status) => bail!("probe-rs {}: ended with {status}", words.join(" ")),
         Err(error) if error.kind() == ErrorKind::NotFound => bail!(
@@ -48,4 +49,14 @@ fn probe_rs(words: &[&str], file: Option<&PathBuf>) -> anyhow::Result<()> {
         ),
         Err(error) => Err(error).context("cannot run probe-rs"),
     }
+}
+
+/// Prints what a program prints, the board's log, until it ends.
+fn shown(mut program: Child) -> io::Result<ExitStatus> {
+    if let Some(output) = program.stdout.take() {
+        for line in BufReader::new(output).split(b'\n') {
+            say!("{}", String::from_utf8_lossy(&line?));
+        }
+    }
+    program.wait()
 }

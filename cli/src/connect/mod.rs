@@ -51,9 +51,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "FILE", conflicts_with_all = ["port", "tcp", "look"])]
     flash: Option<PathBuf>,
     /// Let others look at the machine meanwhile, with `quadrant connect --look HOST:PORT`: states, inputs, faults, events. They
-    /// may stop the axes and disable the outputs, and nothing else. 127.0.0.1 is this computer, 0.0.0.0 its network.
-    #[arg(long, value_name = "HOST:PORT", conflicts_with = "look")]
+    /// may stop the axes and disable the outputs, and nothing else. A port alone is for programs on this computer; with 0.0.0.0
+    /// before it, its network reaches it, and others need the token that is shown.
+    #[arg(long, value_name = "[HOST:]PORT", conflicts_with = "look")]
     share: Option<String>,
+    /// The token that the program shows that shares the machine beyond its computer.
+    #[arg(long, requires = "look")]
+    token: Option<String>,
     /// Print one JSON object a line: {"command": ..., "result": ...} or {"command": ..., "error": ...}.
     #[arg(long)]
     json: bool,
@@ -154,7 +158,7 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
     let endpoint = match (&named.port, &named.tcp, &named.look, &named.emulated) {
         (Some(path), ..) => LinkEndpoint::Serial(path.clone()),
         (_, Some(address), ..) => LinkEndpoint::Tcp(address.clone()),
-        (_, _, Some(address), _) => LinkEndpoint::Look(address.clone()),
+        (_, _, Some(address), _) => LinkEndpoint::Look(address.clone(), arguments.token.clone()),
         (.., Some(image)) => LinkEndpoint::Emulated(image.clone()),
         _ if named.simulated => LinkEndpoint::Simulated,
         _ => anyhow::bail!(

@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use quadrant::link::message::Channel;
 use quadrant_sim::client::samples::{Samples, TelemetryRecorder, least_decimation};
 use quadrant_sim::client::{columns, plot, settings};
-use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, stacked_svg};
+use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, stacked_svg, whole};
 use serde_json::json;
 
 use super::answer::{Answer, seconds};
@@ -18,8 +18,6 @@ use quadrant_cli::terminal;
 
 /// Time from one picture to the next.
 const PICTURE: Duration = Duration::from_millis(100);
-/// Clears the screen and goes to its upper left corner.
-const CLEAR: &str = "\x1b[2J\x1b[H";
 /// Most characters of a line and lines of a channel.
 const MOST_SIZE: usize = 1000;
 
@@ -50,7 +48,8 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
                 [width, height],
                 &resolutions_mm,
             );
-            terminal::print(format_args!("{CLEAR}{picture}"));
+            terminal::clear();
+            terminal::print(format_args!("{picture}"));
         }
     }
     let samples = recording.finish(client)?;
@@ -81,7 +80,7 @@ pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Resu
 }
 
 fn write(path: &Path, bytes: &[u8]) -> anyhow::Result<()> {
-    std::fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+    whole::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
 }
 
 /// The end of the samples, as much as `window` shows, one channel below the other.

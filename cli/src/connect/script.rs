@@ -7,7 +7,7 @@ use std::time::Duration;
 
 use anyhow::Context;
 use quadrant::link::message::Body;
-use quadrant_sim::client::settle;
+use quadrant_sim::client::{Client, settle};
 use rustyline::Editor;
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;
@@ -17,7 +17,7 @@ use super::completion::Completion;
 use super::dispatch;
 use super::line::{Said, parse};
 use super::session::Session;
-use quadrant_cli::say;
+use quadrant_cli::{say, terminal};
 
 /// Time of waiting for input after which the machine is told that its host is there.
 const ATTENTION: Duration = Duration::from_millis(100);
@@ -39,7 +39,7 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
         }
     });
     for index in 0.. {
-        let Some(line) = attended(session, &read) else {
+        let Some(line) = attended(session, &read, Client::is_interrupted) else {
             break;
         };
         let line = line.context("cannot read standard input")?;
@@ -70,8 +70,13 @@ fn one(session: &mut Session, line: &str, source: &str) -> bool {
     }
 }
 
-/// The next of what another thread reads, or nothing when that has ended or this program is to end; meanwhile the machine knows that its host is there.
-fn attended<T>(session: &mut Session, read: &Receiver<T>) -> Option<T> {
+/// The next of what another thread reads, or nothing when that or the session has ended; meanwhile the machine knows that its host
+/// is there.
+fn attended<T>(
+    session: &mut Session,
+    read: &Receiver<T>,
+    has_ended: fn(&Client) -> bool,
+) -> Option<T> {
     loop {
         match read.recv_timeout(ATTENTION) {
             Ok(line) => return Some(line),
@@ -79,7 +84,7 @@ fn attended<T>(session: &mut Session, read: &Receiver<T>) -> Option<T> {
             // A connection that is broken shows with the next command.
             Err(RecvTimeoutError::Timeout) => {
                 let _ = session.client.keep_alive();
-                if session.client.is_interrupted() {
+                if has_ended(&session.client) {
                     return None;
                 }
             }
@@ -93,7 +98,12 @@ const LEAVING: Duration = Duration::from_secs(10);
 /// Leaves no outputs on.
 fn leave(session: &mut Session) -> anyhow::Result<()> {
     let client = &mut session.client;
-    if !client.status()?.state.drives() {
+    if !client.interrupt().ends() {
+        // What was interrupted before has been said.
+        client.resume();
+    }
+    // The axes of a machine that another program holds are that program's.
+    if client.is_view() || !client.status()?.state.drives() {
         return Ok(());
     }
     say!("the outputs are on: the axes stop, and the outputs go off");
@@ -104,8 +114,18 @@ fn leave(session: &mut Session) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// A person: errors end nothing, Ctrl-C stops the axes, Ctrl-D ends.
+/// Gives the terminal its modes back, however the prompt ends: the editor may be in the middle of a line.
+struct Modes;
+
+impl Drop for Modes {
+    fn drop(&mut self) {
+        terminal::restore_modes();
+    }
+}
+
+/// A person: errors end nothing, Ctrl-C stops the axes and what is under way, Ctrl-D ends.
 fn prompt(session: &mut Session) -> anyhow::Result<()> {
+    let _modes = Modes;
     let mut editor =
         Editor::<Completion, DefaultHistory>::new().context("cannot use the terminal")?;
     editor.set_helper(Some(Completion::new()));
@@ -129,7 +149,7 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
     let mut interrupts = 0;
     loop {
         let line = match wanted.send(()) {
-            Ok(()) => attended(session, &read),
+            Ok(()) => attended(session, &read, |client| client.interrupt().ends()),
             Err(_) => None,
         };
         match line {

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
 use quadrant_sim::client::Client;
 use quadrant_sim::client::settings::{self, Difference, whole_path};
+use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
@@ -94,7 +95,7 @@ pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
         records: Vec::new(),
         sets: Vec::new(),
     });
-    dumped.write(file)?;
+    dumped.write(file, whole::write)?;
     let text = format!("{}: the settings of all axes", file.display());
     Ok(Answer::new(text, json!({ "file": file })))
 }

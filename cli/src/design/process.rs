@@ -9,6 +9,7 @@ use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_cli::output::Output;
 use quadrant_sim::design::Form;
+use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 
 use quadrant_cli::axis::Axis;
@@ -150,7 +151,7 @@ impl Model {
     ) -> anyhow::Result<()> {
         file.add_provenance(command, self.axis.name(), records, &[sets]);
         let path = output.file(SETTINGS)?;
-        file.write(&path)?;
+        file.write(&path, whole::write)?;
         say!(
             "{}: the settings of the stage with this {sets}",
             path.display()

@@ -9,6 +9,7 @@ use quadrant::control::popov::filtered_sector_bound;
 use quadrant::settings::StageSettings;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
+use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
@@ -103,7 +104,7 @@ fn a_design_goes_on_from_what_an_earlier_one_has_left_in_the_same_folder() {
     // Settings that something else has left are not taken for a beginning.
     let mut other = SettingsFile::new(after.stage);
     other.add_provenance("quadrant commission --axis x", "x", vec![], &[]);
-    other.write(&path).unwrap();
+    other.write(&path, whole::write).unwrap();
     succeed(at, &["npid"]);
     let built_in = SettingsFile::read(&path).unwrap().stage.axes[0]
         .feedback
@@ -138,7 +139,7 @@ fn a_design_counts_the_filters_of_its_axis() {
     };
     response.write_csv(&at.join("frf.csv")).unwrap();
     SettingsFile::new(stage)
-        .write(&at.join("stage.toml"))
+        .write(&at.join("stage.toml"), whole::write)
         .unwrap();
     let pid = |out: &str, more: &[&str]| {
         let common = [

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use quadrant::settings::StageSettings;
 use quadrant_sim::identify::response::FrequencyResponse;
+use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 
 fn succeed(folder: &Path, arguments: &[&str]) -> String {
@@ -242,7 +243,7 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
     );
     assert!(fresh.contains("Simulated, not measured"), "{fresh}");
     let file = SettingsFile::new(StageSettings::simulated());
-    file.write(&at.join("stage.toml")).unwrap();
+    file.write(&at.join("stage.toml"), whole::write).unwrap();
     succeed(
         at,
         &[

@@ -125,3 +125,57 @@ fn a_folder_that_cannot_be_is_refused_before_anything_is_computed() {
         assert!(output.stdout.is_empty(), "{words:?}");
     }
 }
+
+/// Runs a command that may write `blocks` of 512 bytes into a file; beyond that the write fails, or ends the program.
+fn with_little_room(folder: &std::path::Path, blocks: u32, ends: bool, words: &[&str]) -> Output {
+    let trap = if ends { "" } else { "trap '' XFSZ; " };
+    let limited = format!("{trap}ulimit -f {blocks}; exec \"$0\" \"$@\"");
+    Command::new("sh")
+        .args(["-c", &limited, env!("CARGO_BIN_EXE_quadrant")])
+        .args(words)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+#[test]
+fn a_file_that_cannot_be_written_to_its_end_is_the_old_one() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    for (words, name) in [
+        (
+            &["connect", "--simulated", "dump", "stage.toml"][..],
+            "stage.toml",
+        ),
+        (&["design", "pid", "--axis", "x", "--out", "."], "pid.html"),
+        (
+            &[
+                "connect",
+                "--simulated",
+                "record",
+                "--seconds",
+                "0.5",
+                "--out",
+                "run.csv",
+            ],
+            "run.csv",
+        ),
+    ] {
+        let whole = with_little_room(folder.path(), 1_000_000, false, words);
+        assert!(whole.status.success(), "{}", error_text(&whole));
+        let before = std::fs::read(at(name)).unwrap();
+        for ends in [false, true] {
+            let failed = with_little_room(folder.path(), 8, ends, words);
+            assert!(!failed.status.success(), "{words:?}");
+            assert_eq!(failed.status.code().is_none(), ends, "{words:?}");
+            assert!(std::fs::read(at(name)).unwrap() == before, "{words:?}");
+            if !ends {
+                assert!(
+                    error_text(&failed).contains(name),
+                    "{}",
+                    error_text(&failed)
+                );
+            }
+        }
+    }
+}

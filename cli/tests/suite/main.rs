@@ -7,6 +7,7 @@ mod command;
 mod commission;
 mod connect;
 mod connect_commission;
+mod control_characters;
 mod design_commands;
 mod identify_commands;
 mod interrupted;
@@ -14,4 +15,6 @@ mod part_program;
 mod record_bad_input;
 #[cfg(target_os = "linux")]
 mod record_large;
+mod sharing;
+mod terminal;
 mod transcript;

@@ -43,6 +43,7 @@ mod samples;
 mod scale;
 mod style;
 mod table;
+pub mod whole;
 mod write;
 
 pub use decimate::decimate;
@@ -57,4 +58,4 @@ pub use print::stacked_svg;
 pub use scale::Scale;
 pub use style::{Dash, Style};
 pub use table::{Cell, Column, Table};
-pub use write::Format;
+pub use write::{FIGURES, Format};

@@ -176,7 +176,7 @@ impl Table {
 
     /// Writes [`Self::to_csv`] into a file.
     pub fn write_csv(&self, path: &Path) -> Result<(), ReportError> {
-        std::fs::write(path, self.to_csv()?).map_err(|source| ReportError::Write {
+        crate::whole::write(path, self.to_csv()?).map_err(|source| ReportError::Write {
             path: path.to_owned(),
             source,
         })

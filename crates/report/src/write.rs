@@ -1,5 +1,6 @@
 //! A page as files, in the formats its readers want.
 
+use super::whole;
 use super::{Dots, Figure, Lines, Page, Plot, PolarDeviation, ReportError};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -7,7 +8,7 @@ use std::path::{Path, PathBuf};
 /// Names the meaning of a page's JSON; a change of meaning changes the number.
 const SCHEMA: &str = "quadrant-report/1";
 /// Folder of what is written figure by figure.
-const FIGURES: &str = "figures";
+pub const FIGURES: &str = "figures";
 
 /// A format of results.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -200,7 +201,7 @@ fn dots_csv(dots: &Dots, row: &mut dyn FnMut(Vec<String>)) {
 
 /// Writes a file.
 pub(super) fn file(path: &Path, text: &str) -> Result<(), ReportError> {
-    std::fs::write(path, text).map_err(|source| ReportError::Write {
+    whole::replace(path, text).map_err(|source| ReportError::Write {
         path: path.to_owned(),
         source,
     })

@@ -3,6 +3,7 @@
 //! TOML, with the names and units of [`StageSettings`], and above them where the numbers come from. A file is checked
 //! as a whole, against the firmware's own rules and its room for GMS elements.
 
+use std::io;
 use std::path::{Path, PathBuf};
 
 use quadrant::axes::AxisName;
@@ -184,13 +185,17 @@ impl SettingsFile {
         Ok(file)
     }
 
-    /// Checks and writes the file.
+    /// Checks the file, and has `write` write it.
     ///
     /// # Errors
     /// A value that the firmware would refuse, in which case nothing is written; or a file that cannot be written.
-    pub fn write(&self, path: &Path) -> Result<(), SettingsFileError> {
+    pub fn write(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&Path, String) -> io::Result<()>,
+    ) -> Result<(), SettingsFileError> {
         let text = self.text(path)?;
-        std::fs::write(path, text).map_err(|source| SettingsFileError::Io {
+        write(path, text).map_err(|source| SettingsFileError::Io {
             path: path.to_owned(),
             source,
         })
@@ -244,7 +249,9 @@ mod tests {
     fn a_fourth_axis_is_refused() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("stage.toml");
-        file().write(&path).unwrap();
+        file()
+            .write(&path, |path, text| std::fs::write(path, text))
+            .unwrap();
         let text = std::fs::read_to_string(&path).unwrap();
         let at = text.rfind("[[stage.axes]]").unwrap();
         let error = parse(&format!("{text}\n{}", &text[at..])).unwrap_err();
@@ -283,7 +290,9 @@ mod tests {
         written.stage.axes[1].feedback.nonlinear = None;
         written.stage.axes[2].plant = None;
         written.stage.axes[0].feedback.pid.kp_v_per_mm = 1.0 / 3.0;
-        written.write(&path).unwrap();
+        written
+            .write(&path, |path, text| std::fs::write(path, text))
+            .unwrap();
         assert_eq!(SettingsFile::read(&path).unwrap(), written);
     }
 
@@ -313,10 +322,15 @@ mod tests {
     fn refused_settings_are_not_written() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("stage.toml");
-        file().write(&path).unwrap();
+        file()
+            .write(&path, |path, text| std::fs::write(path, text))
+            .unwrap();
         let mut bad = file();
         bad.stage.rate_hz = f64::NAN;
-        assert!(bad.write(&path).is_err());
+        assert!(
+            bad.write(&path, |path, text| std::fs::write(path, text))
+                .is_err()
+        );
         assert_eq!(SettingsFile::read(&path).unwrap(), file());
     }
 

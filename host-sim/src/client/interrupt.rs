@@ -1,7 +1,7 @@
 //! A person's wish to stop, from outside of what is under way.
 
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 
 /// Requests to stop that a session has not heeded yet; clones are one. A signal's handler makes them, and the [`Client`]
 /// heeds them wherever it waits for the machine: the first stops the axes, a second disables the outputs.
@@ -16,6 +16,8 @@ struct Requests {
     waiting: AtomicU32,
     /// Requests since a person gave the last command.
     all: AtomicU32,
+    /// The program is to end.
+    ends: AtomicBool,
 }
 
 impl Interrupt {
@@ -23,6 +25,17 @@ impl Interrupt {
     pub fn request(&self) -> u32 {
         self.0.waiting.fetch_add(1, Ordering::Relaxed);
         self.0.all.fetch_add(1, Ordering::Relaxed) + 1
+    }
+
+    /// Asks to stop, and the program to end; as [`request`](Self::request).
+    pub fn request_end(&self) -> u32 {
+        self.0.ends.store(true, Ordering::Relaxed);
+        self.request()
+    }
+
+    /// True if the program was asked to end.
+    pub fn ends(&self) -> bool {
+        self.0.ends.load(Ordering::Relaxed)
     }
 
     /// Takes the requests that wait.

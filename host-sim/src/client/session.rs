@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 use std::io;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
@@ -14,13 +14,17 @@ use quadrant::link::message::{MachineState, TelemetryBlock};
 use super::error::ClientError;
 use super::interrupt::Interrupt;
 use super::timeout::{ANSWER, BUSY, BUSY_PAUSE, Idempotency, answer_timeout, idempotency};
-use crate::machine::{SimulatedIo, Transport, VIEWER_ID, encoded};
+use crate::machine::{PASSED_ON, SimulatedIo, Transport, VIEWER_IDS, encoded};
 
 /// Notices that are kept until someone asks for them; of more, the oldest are dropped.
 const MOST_NOTICES: usize = 1 << 14;
 
 /// Longest silence of a host that has started a motion: less than half of the machine's time-out.
 const ALIVE: Duration = Duration::from_millis(200);
+
+/// Longest silence of one that looks at a machine which another program holds, and time for what has come.
+const VIEWING: Duration = Duration::from_secs(1);
+const TAKING: Duration = Duration::from_millis(1);
 
 /// Time in which the axes come to rest after an interruption, before the outputs are disabled, and time between two looks.
 const STOPPING: Duration = Duration::from_secs(10);
@@ -37,6 +41,9 @@ pub struct Client {
     next_id: u16,
     /// Time of the last request.
     asked: Duration,
+    /// Time of the last look for others, by the connection's clock and by that of this computer: a simulated machine's time may
+    /// stand.
+    looked: (Duration, Instant),
     /// A motion may be under way, which the machine ends when its host falls silent.
     moves: bool,
     interrupt: Interrupt,
@@ -60,6 +67,7 @@ impl Client {
             identity: None,
             next_id: 1,
             asked: Duration::ZERO,
+            looked: (Duration::ZERO, Instant::now()),
             moves: false,
             interrupt: Interrupt::default(),
             interrupted: None,
@@ -261,6 +269,11 @@ impl Client {
         self.moves
     }
 
+    /// True if another program holds the machine, and this session looks at it.
+    pub fn is_view(&self) -> bool {
+        self.transport.is_view()
+    }
+
     /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
     /// its host has started when that falls silent. Asks for everything that others see, if they may look. Whoever lets time
     /// pass without [`wait`](Self::wait) calls this a few times a second.
@@ -269,17 +282,32 @@ impl Client {
     /// As [`request`](Self::request).
     pub fn keep_alive(&mut self) -> Result<(), ClientError> {
         self.heed_interrupt()?;
-        let shared = self.transport.is_shared();
-        if !(self.moves || shared) || self.now().saturating_sub(self.asked) < ALIVE {
+        let silent = self.now().saturating_sub(self.asked);
+        let status = if self.transport.is_shared() {
+            let (looked, at) = self.looked;
+            if self.now().saturating_sub(looked) < ALIVE && at.elapsed() < ALIVE {
+                return Ok(());
+            }
+            self.look()?
+        } else if self.moves && silent >= ALIVE {
+            self.status()?
+        } else {
+            if self.is_view() {
+                if silent >= VIEWING {
+                    self.show_alive()?;
+                }
+                // One whose answers nobody takes is gone for its holder.
+                self.receive(self.now() + TAKING)?;
+            }
             return Ok(());
-        }
-        let status = if shared { self.look()? } else { self.status()? };
+        };
         self.moves &= !status.is_at_rest();
         Ok(())
     }
 
     /// Asks for everything that others see who look at the machine.
     fn look(&mut self) -> Result<Status, ClientError> {
+        self.looked = (self.now(), Instant::now());
         self.inputs()?;
         self.learning()?;
         self.fault()?;
@@ -370,7 +398,7 @@ impl Client {
     /// answer to the first is an answer.
     fn ask(&mut self, body: &Body) -> Result<Result<Reply, LinkError>, ClientError> {
         let id = self.next_id;
-        self.next_id = (self.next_id + 1) % VIEWER_ID;
+        self.next_id = (self.next_id + 1) % VIEWER_IDS;
         let request = Request {
             id,
             body: body.clone(),
@@ -398,12 +426,14 @@ impl Client {
                 self.send(&[DELIMITER])?;
             }
             self.send(&bytes)?;
-            let due = self.now() + answer_timeout(body);
+            let timeout = self.answer_timeout(body);
+            let due = self.now() + timeout;
             while self.now() < due {
                 if let Some(result) = self.receive_for(id, due)? {
                     return Ok(result);
                 }
-                if answer_timeout(body) > ALIVE {
+                let silent = self.now().saturating_sub(self.asked);
+                if timeout > ALIVE && self.moves && silent >= ALIVE {
                     self.show_alive()?;
                 }
             }
@@ -425,17 +455,22 @@ impl Client {
         })
     }
 
-    /// Lets a machine that is long at an answer hear its host, if that moves it; nobody waits for what it answers to this.
-    fn show_alive(&mut self) -> Result<(), ClientError> {
-        if !self.moves || self.now().saturating_sub(self.asked) < ALIVE {
-            return Ok(());
+    /// Time for an answer. What one that looks asks of the machine goes through its holder.
+    fn answer_timeout(&self, body: &Body) -> Duration {
+        match body {
+            Body::Stop | Body::Disable if self.is_view() => answer_timeout(body) + PASSED_ON,
+            _ => answer_timeout(body),
         }
+    }
+
+    /// Lets the other end hear that this one is there; nobody waits for what it answers to this.
+    fn show_alive(&mut self) -> Result<(), ClientError> {
         self.asked = self.now();
         let request = Request {
             id: self.next_id,
             body: Body::Status,
         };
-        self.next_id = (self.next_id + 1) % VIEWER_ID;
+        self.next_id = (self.next_id + 1) % VIEWER_IDS;
         self.send(&encoded(&request))
     }
 

@@ -1,5 +1,6 @@
 //! A measured table as CSV: named columns of numbers, each within its bounds.
 
+use crate::report::whole;
 use std::path::{Path, PathBuf};
 
 /// Reasons for which a file holds no such table.
@@ -56,14 +57,17 @@ impl<const N: usize> Columns<N> {
             path: path.to_owned(),
             source,
         };
-        let mut writer = csv::Writer::from_path(path).map_err(refuse)?;
+        let mut writer = csv::Writer::from_writer(Vec::new());
         writer.write_record(self.names).map_err(refuse)?;
         for row in rows {
             writer
                 .write_record(row.map(|value| value.to_string()))
                 .map_err(refuse)?;
         }
-        writer.flush().map_err(|source| refuse(source.into()))
+        let text = writer
+            .into_inner()
+            .map_err(|error| refuse(error.into_error().into()))?;
+        whole::write(path, text).map_err(|source| refuse(source.into()))
     }
 
     /// Reads what [`write`](Self::write) writes; the order of the columns is free, others are passed over. `allows` is

@@ -3,6 +3,8 @@
 use std::io;
 use std::path::{Path, PathBuf};
 
+use crate::report::whole;
+
 /// A file that keeps a flash's content: every byte as the flash reads, 0xFF where it is erased.
 #[derive(Clone, Debug)]
 pub(super) struct FlashFile {
@@ -56,10 +58,7 @@ impl FlashFile {
         if self.kept == content {
             return Ok(());
         }
-        let mut beside = self.path.clone().into_os_string();
-        beside.push(".new");
-        std::fs::write(&beside, content)
-            .and_then(|()| std::fs::rename(&beside, &self.path))
+        whole::write(&self.path, content)
             .map_err(|error| told(&self.path, "cannot be written", &error))?;
         self.kept.clear();
         self.kept.extend(content);

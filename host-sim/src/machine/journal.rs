@@ -1,6 +1,6 @@
 //! A journal of experiments: each is kept when it has ended, so that a series that was interrupted goes on where it stood.
 
-use std::fs;
+use std::fs::{self, FileType};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -13,6 +13,7 @@ use serde::{Deserialize, Serialize};
 use super::error::MachineError;
 use super::test_axis::{AxisInfo, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;
+use crate::report::whole;
 
 /// Extension of a file with an experiment.
 const KEPT: &str = "json";
@@ -32,6 +33,8 @@ pub struct Journal<'a> {
     pending: bool,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
+    /// Files in the folder that no journal has written: they stay.
+    foreign: Vec<PathBuf>,
 }
 
 /// An experiment that has ended.
@@ -42,12 +45,64 @@ struct Entry {
     key: u64,
     /// Of an experiment that was stopped, up to there, if anything is left of it.
     recording: Option<Recording>,
-    #[serde(default)]
     stopped: Option<Stopped>,
+    /// Of all of the above, by which a file is found that was changed since.
+    sum: u64,
+}
+
+impl Entry {
+    fn new(name: &str, key: u64, recording: Option<Recording>, stopped: Option<Stopped>) -> Self {
+        let mut entry = Self {
+            name: name.to_owned(),
+            key,
+            recording,
+            stopped,
+            sum: 0,
+        };
+        entry.sum = entry.total();
+        entry
+    }
+
+    fn total(&self) -> u64 {
+        let mut hasher = DefaultHasher::new();
+        (&self.name, self.key, format!("{:?}", self.stopped)).hash(&mut hasher);
+        if let Some(recording) = &self.recording {
+            recording.sample_time_s.to_bits().hash(&mut hasher);
+            for column in [
+                &recording.reference_mm,
+                &recording.position_mm,
+                &recording.voltage_v,
+                &recording.injection_v,
+            ] {
+                column.len().hash(&mut hasher);
+                column
+                    .iter()
+                    .for_each(|value| value.to_bits().hash(&mut hasher));
+            }
+        }
+        hasher.finish()
+    }
+
+    /// Checks what a file holds, as a recording that is read from one is.
+    fn check(&self, path: &Path, decimation: usize) -> Result<(), String> {
+        if let Some(recording) = &self.recording {
+            let checked = recording.check(path, decimation);
+            checked.map_err(|error| error.to_string())?;
+        }
+        if self.sum != self.total() {
+            return Err(format!(
+                "{}, sum: {}, and what is there comes to {}: the file was changed since it was written",
+                path.display(),
+                self.sum,
+                self.total()
+            ));
+        }
+        Ok(())
+    }
 }
 
 /// Reason for which an experiment was stopped: one of those after which a series may go on with another.
-#[derive(Clone, Copy, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 enum Stopped {
     Travel {
         travel_mm: f64,
@@ -119,15 +174,18 @@ impl Stopped {
 }
 
 impl<'a> Journal<'a> {
-    /// A journal in a folder, which is made. Without `resume`, what is there is deleted.
+    /// A journal in a folder, which is made. Without `resume`, the experiments there are deleted, and [nothing
+    /// else](Self::foreign).
     ///
     /// # Errors
-    /// A folder that cannot be made or emptied.
+    /// A folder that is a link, or that cannot be made or emptied; a file that is no experiment under the name of one.
     pub fn open(axis: &'a mut dyn TestAxis, folder: &Path, resume: bool) -> io::Result<Self> {
-        if !resume {
-            Self::remove(folder)?;
-        }
+        let foreign = match resume {
+            true => Vec::new(),
+            false => Self::remove(folder)?,
+        };
         fs::create_dir_all(folder)?;
+        is_there(folder)?;
         Ok(Self {
             settings: axis.settings().clone(),
             axis,
@@ -136,23 +194,47 @@ impl<'a> Journal<'a> {
             known: resume,
             pending: false,
             interrupted: None,
+            foreign,
         })
     }
 
-    /// Deletes the journal in a folder: nothing is to be resumed.
+    /// Files that were in the folder, and that no journal has written: they were not deleted.
+    pub fn foreign(&self) -> &[PathBuf] {
+        &self.foreign
+    }
+
+    /// Deletes the experiments in a folder, and the folder if nothing else is in it: nothing is to be resumed. Returns what
+    /// stays.
     ///
     /// # Errors
-    /// A folder that cannot be deleted.
-    pub fn remove(folder: &Path) -> io::Result<()> {
-        match fs::remove_dir_all(folder) {
-            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
-            _ => Ok(()),
+    /// A folder that is a link, or a file that cannot be deleted or is no experiment under the name of one: nothing is deleted
+    /// then.
+    pub fn remove(folder: &Path) -> io::Result<Vec<PathBuf>> {
+        if !is_there(folder)? {
+            return Ok(Vec::new());
         }
+        let (mut own, mut foreign) = (Vec::new(), Vec::new());
+        for entry in fs::read_dir(folder)? {
+            let entry = entry?;
+            let path = entry.path();
+            match is_own(&path, entry.file_type()?)? {
+                true => own.push(path),
+                false => foreign.push(path),
+            }
+        }
+        for path in own {
+            fs::remove_file(path)?;
+        }
+        if foreign.is_empty() {
+            fs::remove_dir(folder)?;
+        }
+        foreign.sort();
+        Ok(foreign)
     }
 
     /// True if no experiment is kept in a folder.
     pub fn is_empty(folder: &Path) -> bool {
-        let kept = |entry: fs::DirEntry| entry.path().extension().is_some_and(|it| it == KEPT);
+        let kept = |entry: fs::DirEntry| is_named(&entry.path());
         fs::read_dir(folder).map_or(true, |entries| !entries.flatten().any(kept))
     }
 
@@ -168,30 +250,90 @@ impl<'a> Journal<'a> {
     }
 
     /// The outcome of the next experiment, if it is kept.
-    fn kept(&mut self, key: u64) -> Option<Result<Recording, ExperimentError>> {
-        let bytes = fs::read(self.path(self.next)).ok()?;
-        let entry: Entry = serde_json::from_slice(&bytes).ok()?;
+    ///
+    /// # Errors
+    /// A file that is none, or was changed.
+    fn kept(
+        &mut self,
+        key: u64,
+        decimation: usize,
+    ) -> Result<Option<Result<Recording, ExperimentError>>, String> {
+        let path = self.path(self.next);
+        let bytes = match fs::read(&path) {
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(None),
+            read => read.map_err(|error| format!("{}: {error}", path.display()))?,
+        };
+        let entry: Entry = serde_json::from_slice(&bytes)
+            .map_err(|error| format!("{}: {error}", path.display()))?;
         if entry.key != key {
-            return None;
+            return Ok(None);
         }
+        entry.check(&path, decimation)?;
         let Some(stopped) = entry.stopped else {
-            return entry.recording.map(Ok);
+            return Ok(entry.recording.map(Ok));
         };
         // One that ended the series is tried again.
         if !self.path(self.next + 1).exists() {
-            return None;
+            return Ok(None);
         }
-        let error = stopped.error(entry.name)?;
+        let Some(error) = stopped.error(entry.name) else {
+            return Ok(None);
+        };
         self.interrupted = entry.recording;
-        Some(Err(error))
+        Ok(Some(Err(error)))
+    }
+}
+
+/// True if a folder is there; no link to one, through which files elsewhere would be deleted and written.
+fn is_there(folder: &Path) -> io::Result<bool> {
+    match fs::symlink_metadata(folder) {
+        Err(error) if error.kind() == io::ErrorKind::NotFound => Ok(false),
+        Err(error) => Err(error),
+        Ok(seen) if seen.is_dir() => Ok(true),
+        Ok(_) => Err(io::Error::new(
+            io::ErrorKind::NotADirectory,
+            format!(
+                "{} is no folder, or a link to one: remove it, or give another folder for results",
+                folder.display()
+            ),
+        )),
+    }
+}
+
+/// True for the name of an experiment's file.
+fn is_named(path: &Path) -> bool {
+    let number = path.file_stem().and_then(|stem| stem.to_str());
+    path.extension().is_some_and(|extension| extension == KEPT)
+        && number.is_some_and(|number| {
+            number.len() >= 3 && number.bytes().all(|sign| sign.is_ascii_digit())
+        })
+}
+
+/// True if a journal has written the file.
+///
+/// # Errors
+/// It has the name of an experiment, and is none: a journal would write over it.
+fn is_own(path: &Path, kind: FileType) -> io::Result<bool> {
+    if !is_named(path) {
+        return Ok(kind.is_file() && whole::is_unfinished(path));
+    }
+    let is_entry = kind.is_file() && serde_json::from_slice::<Entry>(&fs::read(path)?).is_ok();
+    match is_entry {
+        true => Ok(true),
+        false => Err(io::Error::new(
+            io::ErrorKind::InvalidData,
+            format!(
+                "{} is no experiment of a commissioning, and has the name of one: move it away, or give another folder for \
+                 results",
+                path.display()
+            ),
+        )),
     }
 }
 
 /// Writes a file whole or not at all.
 fn keep(path: &Path, entry: &Entry) -> io::Result<()> {
-    let unfinished = path.with_extension("unfinished");
-    fs::write(&unfinished, serde_json::to_vec(entry)?)?;
-    fs::rename(unfinished, path)
+    whole::replace(path, serde_json::to_vec(entry)?)
 }
 
 impl TestAxis for Journal<'_> {
@@ -219,19 +361,24 @@ impl TestAxis for Journal<'_> {
     ) -> Result<Recording, ExperimentError> {
         let key = self.key(experiment);
         self.interrupted = None;
-        if self.known
-            && let Some(outcome) = self.kept(key)
-        {
-            self.next += 1;
-            progress(1.0);
-            return outcome;
-        }
-        let path = self.path(self.next);
-        self.next += 1;
         let impossible = |reason: String| ExperimentError::Impossible {
             experiment: experiment.name.clone(),
             reason,
         };
+        if self.known {
+            let kept = self.kept(key, experiment.decimation).map_err(|reason| {
+                impossible(format!(
+                    "{reason}; delete the file to run this and what follows it again, or all of them by leaving out --resume"
+                ))
+            })?;
+            if let Some(outcome) = kept {
+                self.next += 1;
+                progress(1.0);
+                return outcome;
+            }
+        }
+        let path = self.path(self.next);
+        self.next += 1;
         self.known = false;
         if self.pending {
             let settings = self.settings.clone();
@@ -240,12 +387,7 @@ impl TestAxis for Journal<'_> {
                 .map_err(|error| impossible(error.to_string()))?;
             self.pending = false;
         }
-        let entry = |recording, stopped| Entry {
-            name: experiment.name.clone(),
-            key,
-            recording,
-            stopped,
-        };
+        let entry = |recording, stopped| Entry::new(&experiment.name, key, recording, stopped);
         match self.axis.perform(experiment, progress) {
             Ok(recording) => {
                 keep(&path, &entry(Some(recording.clone()), None)).map_err(|error| {
@@ -359,5 +501,110 @@ mod tests {
         assert!(folder.path().read_dir().unwrap().count() > 0);
         Journal::open(&mut again, folder.path(), false).unwrap();
         assert_eq!(folder.path().read_dir().unwrap().count(), 0);
+    }
+
+    /// A journal of an experiment of which `change` made another file.
+    fn changed(change: impl FnOnce(&mut serde_json::Value)) -> Result<Recording, ExperimentError> {
+        let folder = tempfile::tempdir().unwrap();
+        let mut first = axis();
+        let mut journal = Journal::open(&mut first, folder.path(), false).unwrap();
+        journal.perform(&hold(50), &mut |_| {}).unwrap();
+        let path = folder.path().join("000.json");
+        let mut value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
+        change(&mut value);
+        fs::write(&path, value.to_string()).unwrap();
+        let mut again = axis();
+        let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
+        let outcome = journal.perform(&hold(50), &mut |_| {});
+        assert_eq!(again.plant().position_mm(), axis().plant().position_mm());
+        outcome
+    }
+
+    #[test]
+    fn a_file_that_was_changed_is_refused_by_its_name_field_and_value() {
+        use serde_json::json;
+        assert!(changed(|_| {}).is_ok());
+        let sets: [(&str, serde_json::Value, &[&str]); 8] = [
+            (
+                "sample_time_s",
+                json!(0.0),
+                &["column t_s", "0 s", "100 kHz"],
+            ),
+            ("sample_time_s", json!(-1e-4), &["column t_s", "-0.0001 s"]),
+            ("sample_time_s", json!(2e-4), &["sum"]),
+            (
+                "reference_mm",
+                json!([]),
+                &["column reference_mm", "0 values", "50"],
+            ),
+            (
+                "voltage_v",
+                json!(vec![0.3; 51]),
+                &["column voltage_v", "51 values"],
+            ),
+            (
+                "injection_v",
+                json!(vec![1e300; 50]),
+                &["column injection_v", "at most 20 V"],
+            ),
+            ("position_mm", json!(vec![0.0; 100]), &["50 values", "100"]),
+            ("position_mm", json!("here"), &["invalid type"]),
+        ];
+        for (field, value, parts) in sets {
+            let refused = changed(|entry| entry["recording"][field] = value.clone()).unwrap_err();
+            let refused = refused.to_string();
+            for part in parts.iter().chain(&["000.json", "--resume"]) {
+                assert!(refused.contains(part), "{field} {value}: {part}: {refused}");
+            }
+        }
+        let scale = |entry: &mut serde_json::Value, to: fn(f64) -> f64| {
+            for value in entry["recording"]["position_mm"].as_array_mut().unwrap() {
+                *value = json!(to(value.as_f64().unwrap()));
+            }
+        };
+        let doubled = changed(|entry| scale(entry, |mm| 2.0 * mm)).unwrap_err();
+        assert!(doubled.to_string().contains("sum"), "{doubled}");
+        let far = changed(|entry| entry["recording"]["position_mm"][1] = json!(1e300)).unwrap_err();
+        assert!(far.to_string().contains("10000 mm"), "{far}");
+        let stopped = changed(|entry| {
+            entry["stopped"] = json!({"Travel": {"travel_mm": -1.0, "time_s": -1.0}});
+        });
+        assert!(stopped.unwrap_err().to_string().contains("sum"));
+    }
+
+    #[test]
+    fn what_no_journal_has_written_stays() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path().join("experiments");
+        let mut first = axis();
+        let mut journal = Journal::open(&mut first, &at, false).unwrap();
+        journal.perform(&hold(50), &mut |_| {}).unwrap();
+        let notes = at.join("notes.txt");
+        fs::write(&notes, "three weeks of work").unwrap();
+        fs::create_dir(at.join("photographs")).unwrap();
+        let mut again = axis();
+        let journal = Journal::open(&mut again, &at, false).unwrap();
+        assert_eq!(journal.foreign(), [notes.clone(), at.join("photographs")]);
+        assert!(notes.exists() && !at.join("000.json").exists());
+        fs::write(at.join("001.json"), "{}").unwrap();
+        let refused = Journal::remove(&at).unwrap_err().to_string();
+        assert!(refused.contains("001.json"), "{refused}");
+        assert!(at.join("001.json").exists());
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn a_link_in_place_of_the_folder_is_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let elsewhere = folder.path().join("elsewhere");
+        fs::create_dir(&elsewhere).unwrap();
+        let at = folder.path().join("experiments");
+        std::os::unix::fs::symlink(&elsewhere, &at).unwrap();
+        for resume in [false, true] {
+            let mut axis = axis();
+            let refused = Journal::open(&mut axis, &at, resume).err().unwrap();
+            assert!(refused.to_string().contains("link"), "{refused}");
+        }
+        assert!(elsewhere.exists());
     }
 }

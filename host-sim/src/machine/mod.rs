@@ -62,7 +62,7 @@ pub use journal::Journal;
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
 pub use loopback::{Loopback, SimulatedPeer};
 pub use serial::{BAUD, SerialTransport, serial_ports};
-pub use shared::{Shared, VIEWER_ID};
+pub use shared::{MOST_VIEWERS, PASSED_ON, Shared, VIEWER_IDS};
 pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
 pub use tcp::TcpTransport;

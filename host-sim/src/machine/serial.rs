@@ -47,7 +47,7 @@ impl SerialTransport {
     /// # Errors
     /// A port that is not there, held by another program, or forbidden.
     pub fn open(path: &str) -> io::Result<Self> {
-        let claim = Claim::take(path)?;
+        let claim = Claim::port(path)?;
         let port = serialport::new(path, BAUD).timeout(TIMEOUT).open()?;
         Ok(Self {
             port,

@@ -4,6 +4,8 @@ use std::io::{self, Read, Write};
 use std::net::{TcpStream, ToSocketAddrs};
 use std::time::{Duration, Instant};
 
+use quadrant::link::frame::DELIMITER;
+
 use super::claim::Claim;
 use super::stream::{LEAST_TIMEOUT, TIMEOUT, ended, or_none};
 use super::transport::Transport;
@@ -13,7 +15,8 @@ pub struct TcpTransport {
     stream: TcpStream,
     address: String,
     opened: Instant,
-    _claim: Option<Claim>,
+    /// None of a machine that another program holds.
+    claim: Option<Claim>,
 }
 
 impl TcpTransport {
@@ -22,16 +25,21 @@ impl TcpTransport {
     /// # Errors
     /// An address that is none, where nobody answers within 5 s, or to which another program talks.
     pub fn connect(address: &str) -> io::Result<Self> {
-        let claim = Claim::take(address)?;
+        let claim = Claim::socket(address)?;
         Self::open(address, Some(claim))
     }
 
-    /// Connects to `host:port`, where another program lets others look at its machine.
+    /// Connects to `host:port`, where another program lets others look at its machine; beyond its own computer, those who have
+    /// its token.
     ///
     /// # Errors
     /// An address that is none, or where nobody answers within 5 s.
-    pub fn look(address: &str) -> io::Result<Self> {
-        Self::open(address, None)
+    pub fn look(address: &str, token: Option<&str>) -> io::Result<Self> {
+        let mut looking = Self::open(address, None)?;
+        if let Some(token) = token {
+            looking.send(&[token.as_bytes(), &[DELIMITER]].concat())?;
+        }
+        Ok(looking)
     }
 
     fn open(address: &str, claim: Option<Claim>) -> io::Result<Self> {
@@ -45,7 +53,7 @@ impl TcpTransport {
                         stream,
                         address: address.to_owned(),
                         opened: Instant::now(),
-                        _claim: claim,
+                        claim,
                     });
                 }
                 Err(error) => last = error,
@@ -77,7 +85,15 @@ impl Transport for TcpTransport {
         format!("tcp:{}", self.address)
     }
 
+    fn is_view(&self) -> bool {
+        self.claim.is_none()
+    }
+
     fn remedy(&self) -> &'static str {
+        if self.is_view() {
+            return "the program that holds the machine has ended, stands, or lets as many look as it may; the machine may go on, and \
+                    its own stop is the one to use";
+        }
         "check that the machine behind this address runs, and that nobody else is connected to it"
     }
 }

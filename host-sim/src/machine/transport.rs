@@ -37,6 +37,11 @@ pub trait Transport {
         false
     }
 
+    /// True if another program holds the machine, and lets this one look at it.
+    fn is_view(&self) -> bool {
+        false
+    }
+
     /// Inputs, supply and log of the machine, where a program can have them: of a simulated one.
     fn simulated_io(&mut self) -> Option<&mut dyn SimulatedIo> {
         None

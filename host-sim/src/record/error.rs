@@ -74,6 +74,20 @@ pub enum RecordError {
         /// Description of the fault.
         fault: UnusableSignal,
     },
+    /// A column is longer or shorter than the positions are.
+    #[error(
+        "{}, column {column}: {found} values, and {expected} positions; every sample has one of each", path.display()
+    )]
+    Lengths {
+        /// Path of the file.
+        path: PathBuf,
+        /// Name of the column.
+        column: &'static str,
+        /// Number of its values.
+        found: usize,
+        /// Number of positions.
+        expected: usize,
+    },
     /// There is no motion in so little.
     #[error("{}: {rows} rows of data; at least {MIN_ROWS} are needed", path.display())]
     TooFewRows {
@@ -104,8 +118,8 @@ pub enum RecordError {
     },
     /// The sample rate is not one that anything is controlled at.
     #[error(
-        "{}, column t_s: the sample time is {} s ({} Hz); 100 Hz to 100 kHz are allowed{hint}",
-        path.display(), Brief(*sample_time_s), Brief(*rate_hz)
+        "{}, column t_s: the sample time is {} s ({} Hz); {} Hz to 100 kHz are allowed{hint}",
+        path.display(), Brief(*sample_time_s), Brief(*rate_hz), Brief(*least_hz)
     )]
     SampleRate {
         /// Path of the file.
@@ -114,6 +128,8 @@ pub enum RecordError {
         sample_time_s: f64,
         /// Sampling rate of the record, Hz.
         rate_hz: f64,
+        /// Lowest rate that is allowed, Hz.
+        least_hz: f64,
         /// A guess at the reason, or nothing.
         hint: &'static str,
     },

@@ -161,13 +161,16 @@ impl Motion {
 
 /// The distance between the ends of a column's values, mm.
 pub(super) fn travel_mm(column: &Column) -> f64 {
-    let (low, high) = column
-        .values
-        .iter()
-        .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-            (low.min(*value), high.max(*value))
-        });
-    (high - low) * column.mm_per_unit
+    range(&column.values) * column.mm_per_unit
+}
+
+/// The distance between the least and the largest of some values; zero of none.
+pub(super) fn range(values: &[f64]) -> f64 {
+    let ends = (f64::INFINITY, f64::NEG_INFINITY);
+    let (low, high) = values.iter().fold(ends, |(low, high), value| {
+        (low.min(*value), high.max(*value))
+    });
+    (high - low).max(0.0)
 }
 
 /// Swapped columns cannot be proved: with preview an axis can lead its reference. But as a rule it lags.

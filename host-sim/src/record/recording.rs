@@ -62,6 +62,40 @@ impl Recording {
         }
     }
 
+    /// Checks a recording of which the file is no table, as far as one of any experiment can be checked: columns of one length, a
+    /// sample rate of which a machine controls `decimation` times as often at most, positions of an axis and voltages of an
+    /// amplifier. `path` is what messages call it.
+    ///
+    /// # Errors
+    /// The first column that is refused, with its value and what is allowed.
+    pub fn check(&self, path: &Path, decimation: usize) -> Result<(), RecordError> {
+        time::check_rate(path, self.sample_time_s, decimation)?;
+        let columns = [
+            ("reference_mm", &self.reference_mm),
+            ("position_mm", &self.position_mm),
+            ("voltage_v", &self.voltage_v),
+            ("injection_v", &self.injection_v),
+        ];
+        for (column, values) in columns {
+            let (found, expected) = (values.len(), self.len());
+            if found != expected {
+                return Err(RecordError::Lengths {
+                    path: path.to_owned(),
+                    column,
+                    found,
+                    expected,
+                });
+            }
+            match column {
+                "voltage_v" | "injection_v" => {
+                    check_voltage(path, column, values)?;
+                }
+                _ => check_travel(path, column, plausible::range(values))?,
+            }
+        }
+        Ok(())
+    }
+
     /// Writes it as CSV: `t_s`, `reference_mm`, `position_mm`, `voltage_v`, `injection_v`.
     ///
     /// # Errors
@@ -101,7 +135,8 @@ impl Recording {
         let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
         check(path, &columns)?;
         plausible::check_experiment(path, &columns)?;
-        check_travel(path, &columns)?;
+        let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
+        check_travel(path, "position", travel_mm)?;
         // A long recording need not hold its time as well.
         drop(columns.time);
         let position_mm = columns
@@ -126,18 +161,32 @@ impl Recording {
 }
 
 /// Refuses a position that no axis reaches, whatever the reference says.
-fn check_travel(path: &Path, columns: &Columns) -> Result<(), RecordError> {
-    let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
+fn check_travel(path: &Path, column: &'static str, travel_mm: f64) -> Result<(), RecordError> {
     if travel_mm <= MOST_TRAVEL_MM {
         return Ok(());
     }
     Err(RecordError::Useless {
         path: path.to_owned(),
-        column: "position",
+        column,
         fault: UnusableSignal::FarTravel {
             travel_mm,
             most_mm: MOST_TRAVEL_MM,
         },
+    })
+}
+
+/// Refuses what no amplifier's input takes; returns the largest magnitude, V.
+fn check_voltage(path: &Path, column: &'static str, values: &[f64]) -> Result<f64, RecordError> {
+    let largest = values
+        .iter()
+        .fold(0.0_f64, |most, value| most.max(value.abs()));
+    if largest <= MOST_VOLTS {
+        return Ok(largest);
+    }
+    Err(RecordError::Useless {
+        path: path.to_owned(),
+        column,
+        fault: UnusableSignal::NotVoltage { largest },
     })
 }
 
@@ -163,13 +212,7 @@ fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
     let Some(voltage) = &columns.voltage else {
         return Ok(());
     };
-    let largest = voltage
-        .values
-        .iter()
-        .fold(0.0_f64, |most, value| most.max(value.abs()));
-    if largest > MOST_VOLTS {
-        return refuse("voltage_v", UnusableSignal::NotVoltage { largest });
-    }
+    let largest = check_voltage(path, "voltage_v", &voltage.values)?;
     if largest < LEAST_VOLTS {
         let least_v = LEAST_VOLTS;
         return refuse(

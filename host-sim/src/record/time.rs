@@ -46,6 +46,29 @@ fn is_plausible(step: f64) -> bool {
     (RATES_HZ.0..=RATES_HZ.1).contains(&(1.0 / step).round())
 }
 
+/// Refuses a sample time, s, of which no machine is controlled in the `decimation`th part at most.
+pub(super) fn check_rate(
+    path: &Path,
+    sample_time_s: f64,
+    decimation: usize,
+) -> Result<(), RecordError> {
+    let least_hz = RATES_HZ.0 / decimation.max(1) as f64;
+    if (least_hz..=RATES_HZ.1).contains(&(1.0 / sample_time_s).round()) {
+        return Ok(());
+    }
+    Err(RecordError::SampleRate {
+        path: path.to_owned(),
+        sample_time_s,
+        rate_hz: 1.0 / sample_time_s,
+        least_hz,
+        hint: if is_plausible(sample_time_s * 1e-3) {
+            "; this looks like milliseconds in a column named t_s"
+        } else {
+            ""
+        },
+    })
+}
+
 /// Looks for the first step that is refused.
 fn check_steps(path: &Path, values: &[f64], lines: &Lines) -> Result<(), RecordError> {
     let fault = |index: usize, fault| RecordError::Time {
@@ -67,18 +90,7 @@ fn check_steps(path: &Path, values: &[f64], lines: &Lines) -> Result<(), RecordE
     }
     // The median is the sample time even where some rows are missing.
     let median = median(steps.clone());
-    if !is_plausible(median) {
-        return Err(RecordError::SampleRate {
-            path: path.to_owned(),
-            sample_time_s: median,
-            rate_hz: 1.0 / median,
-            hint: if is_plausible(median * 1e-3) {
-                "; this looks like milliseconds in a column named t_s"
-            } else {
-                ""
-            },
-        });
-    }
+    check_rate(path, median, 1)?;
     if let Some(i) = steps
         .iter()
         .position(|step| (step - median).abs() > TOLERANCE * median)

@@ -1,8 +1,9 @@
 //! Traces of our own runs, as CSV.
 
-use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
+
+use crate::report::whole;
 
 /// A trace that was not written.
 #[derive(Debug, thiserror::Error)]
@@ -45,14 +46,14 @@ pub fn write_trace(path: &Path, columns: &[(&str, &[f64])]) -> Result<(), TraceE
             found: other.len(),
         });
     }
-    write_columns(path, columns).map_err(|source| TraceError::Write {
+    whole::write_by(path, |out| write_columns(out, columns)).map_err(|source| TraceError::Write {
         path: path.to_owned(),
         source,
     })
 }
 
-fn write_columns(path: &Path, columns: &[(&str, &[f64])]) -> io::Result<()> {
-    let mut csv = csv::Writer::from_writer(BufWriter::new(File::create(path)?));
+fn write_columns(out: &mut dyn Write, columns: &[(&str, &[f64])]) -> io::Result<()> {
+    let mut csv = csv::Writer::from_writer(out);
     csv.write_record(columns.iter().map(|(name, _)| name))?;
     let mut cell = Vec::new();
     for row in 0..columns.first().map_or(0, |(_, values)| values.len()) {

@@ -25,6 +25,7 @@ use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, SimulatedAxis, StageParameters};
+use quadrant_sim::report::whole;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use serde::{Deserialize, Serialize};
@@ -297,7 +298,7 @@ impl Case {
 
     /// Writes the four runs side by side, a line every millisecond, as CSV.
     fn write_trace(&self, path: &Path, runs: [&Run; 4]) -> csv::Result<()> {
-        let mut writer = csv::Writer::from_path(path)?;
+        let mut writer = csv::Writer::from_writer(Vec::new());
         let stride = (runs[0].errors.len() as f64 / RUN_S * MOMENT_S).round() as usize;
         let [off, fixed, learning, cancelling] = runs;
         for (index, (learns, cancels)) in
@@ -321,8 +322,8 @@ impl Case {
                 cancelling_v: cancels.cancelling_v,
             })?;
         }
-        writer.flush()?;
-        Ok(())
+        let text = writer.into_inner().map_err(|error| error.into_error())?;
+        Ok(whole::write(path, text)?)
     }
 
     fn describe(&self) -> String {

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
 use anyhow::Context as _;
-use quadrant_sim::report::Section;
+use quadrant_sim::report::{Section, whole};
 use serde::{Deserialize, Serialize};
 
 use crate::report::Context;
@@ -137,10 +137,7 @@ impl Store {
     /// Writes a part's file, whole or not at all.
     pub(super) fn write(&self, part: &str, key: &Key, sections: &[Section]) -> anyhow::Result<()> {
         let path = self.path(part);
-        let unfinished = self.folder.join(format!("{part}.json.unfinished"));
         let text = serde_json::to_string(&Written { key, sections })?;
-        fs::write(&unfinished, text)
-            .with_context(|| format!("cannot write {}", unfinished.display()))?;
-        fs::rename(&unfinished, &path).with_context(|| format!("cannot write {}", path.display()))
+        whole::write(&path, text).with_context(|| format!("cannot write {}", path.display()))
     }
 }

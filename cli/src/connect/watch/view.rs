@@ -1,6 +1,7 @@
 //! The picture: 80 x 24 and larger.
 
 use quadrant::link::message::{Channel, MachineState};
+use quadrant_cli::terminal::plain;
 use quadrant_sim::client::{columns, with_reset};
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
@@ -51,13 +52,11 @@ pub(super) fn draw(watch: &Watch, frame: &mut Frame) {
             .axis
             .map(|axis| format!(" of {axis}"))
             .unwrap_or_default();
-        let text = vec![
-            Line::from(format!(
-                "fault {} {}{axis}: {}",
-                found.code, found.name, found.cause
-            )),
-            Line::from(format!("remedy: {}", with_reset(&found.remedy))),
+        let text = [
+            format!("fault {} {}{axis}: {}", found.code, found.name, found.cause),
+            format!("remedy: {}", with_reset(&found.remedy)),
         ];
+        let text: Vec<Line> = text.map(|line| Line::from(plain(&line))).into();
         frame.render_widget(Paragraph::new(text).style(Color::Red), fault);
     }
     frame.render_widget(axes(watch), table);
@@ -67,7 +66,7 @@ pub(super) fn draw(watch: &Watch, frame: &mut Frame) {
     frame.render_widget(gain_line(watch), gain);
     draw_charts(watch, frame, charts);
     frame.render_widget(
-        Line::from(watch.message.as_str()).style(Modifier::DIM),
+        Line::from(plain(&watch.message)).style(Modifier::DIM),
         message,
     );
     if watch.help {
@@ -91,7 +90,7 @@ fn headline(watch: &Watch) -> Line<'_> {
         Span::raw(format!(
             " {motion}  {:.1} s  {}{}",
             f64::from(status.tick) / watch.rate_hz,
-            watch.machine,
+            plain(&watch.machine),
             if watch.capturing {
                 "  capture armed"
             } else {
@@ -123,7 +122,8 @@ fn lamp_line(watch: &Watch) -> Line<'_> {
         spans.push(Span::raw("  "));
     }
     if let Some(refusal) = &watch.inputs.refusal {
-        spans.push(Span::styled(format!("  refused: {refusal}"), Modifier::DIM));
+        let refused = plain(&format!("  refused: {refusal}"));
+        spans.push(Span::styled(refused, Modifier::DIM));
     }
     Line::from(spans)
 }
