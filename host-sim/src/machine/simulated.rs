@@ -67,6 +67,8 @@ pub struct SimulatedMachine {
     outputs: Outputs,
     /// Inputs that somebody holds pressed, beside those of the stage.
     pressed: Switches,
+    /// The smallest and the largest position of each table so far, mm from where it stood at first.
+    been_mm: [(f64, f64); 3],
 }
 
 impl SimulatedMachine {
@@ -99,6 +101,7 @@ impl SimulatedMachine {
             wire: Wire::default(),
             outputs: Outputs::default(),
             pressed: Switches::NONE,
+            been_mm: [(0.0, 0.0); 3],
         })
     }
 
@@ -115,6 +118,11 @@ impl SimulatedMachine {
     /// The stage under it.
     pub fn plant_mut(&mut self) -> &mut SimulatedStage {
         &mut self.plant
+    }
+
+    /// The smallest and the largest position of each table so far, mm from where it stood at first: for judging.
+    pub fn been_mm(&self) -> [(f64, f64); 3] {
+        self.been_mm
     }
 
     /// Presses inputs, or lets go of them: emergency stop, switches, amplifier faults.
@@ -151,6 +159,10 @@ impl SimulatedMachine {
         let (outputs, after) = self.running.tick(&inputs, &mut self.wire);
         self.outputs = outputs;
         self.plant.step(&self.outputs);
+        for ((low_mm, high_mm), axis) in self.been_mm.iter_mut().zip(self.plant.axes()) {
+            *low_mm = low_mm.min(axis.position_mm());
+            *high_mm = high_mm.max(axis.position_mm());
+        }
         if after == Poll::Reboot {
             self.restart();
         }

@@ -16,6 +16,12 @@ pub trait SimulatedIo {
     /// A machine that does not start.
     fn power_cycle(&mut self) -> io::Result<()>;
 
+    /// The smallest and the largest position of each table so far, mm from where it stood at first, for judging; nothing, where
+    /// that is not known.
+    fn been_mm(&self) -> Option<[(f64, f64); 3]> {
+        None
+    }
+
     /// The lines that the firmware has logged since the last call; nothing, where there is no log.
     ///
     /// # Errors

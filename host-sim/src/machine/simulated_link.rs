@@ -30,7 +30,24 @@ impl SimulatedLink {
     /// # Errors
     /// Defaults that are refused, or a file that is no flash.
     pub fn start(seed: u64, flash: Option<&Path>) -> io::Result<Loopback<Self>> {
-        let settings = StageSettings::simulated();
+        Self::on(
+            &StageSettings::simulated(),
+            &StageParameters::real(),
+            seed,
+            flash,
+        )
+    }
+
+    /// The same on any stage, with `settings` as the defaults of its firmware.
+    ///
+    /// # Errors
+    /// Defaults that are refused, or a file that is no flash.
+    pub fn on(
+        settings: &StageSettings,
+        truth: &StageParameters,
+        seed: u64,
+        flash: Option<&Path>,
+    ) -> io::Result<Loopback<Self>> {
         let flash = flash
             .map(|path| FlashFile::open(path, FLASH_BYTES))
             .transpose()?;
@@ -38,13 +55,12 @@ impl SimulatedLink {
             .as_ref()
             .and_then(|file| MemoryFlash::of(file.content().to_vec()))
             .unwrap_or_default();
-        let machine =
-            SimulatedMachine::with_flash(&settings, &StageParameters::real(), seed, content)
-                .map_err(io::Error::other)?;
+        let machine = SimulatedMachine::with_flash(settings, truth, seed, content)
+            .map_err(io::Error::other)?;
         Ok(Loopback::new(Self {
             machine,
             flash,
-            period: server_period(&settings),
+            period: server_period(settings),
         }))
     }
 }
@@ -80,6 +96,10 @@ impl SimulatedIo for SimulatedLink {
     fn power_cycle(&mut self) -> io::Result<()> {
         self.machine.power_cycle();
         Ok(())
+    }
+
+    fn been_mm(&self) -> Option<[(f64, f64); 3]> {
+        Some(self.machine.been_mm())
     }
 
     /// The library's code logs nothing: that is the firmware's business.

@@ -9,7 +9,7 @@ use quadrant_sim::plant::{
 };
 
 use super::subject::Subject;
-use super::{Line, Outcome, judge_subject};
+use super::{Line, Outcome, Path, judge_subject};
 
 /// Stiffness of the pre-sliding range of LuGre and Dahl, V/mm: that of the simulated stage's x axis.
 const STIFFNESS_V_PER_MM: f64 = 15.0;
@@ -124,7 +124,7 @@ pub(super) fn table() {
     );
     say!("|---|---|---|---|---|");
     for case in cases() {
-        say!("{}", row(&judge_subject(&case)));
+        say!("{}", row(&judge_subject(&case, Path::Law)));
     }
 }
 

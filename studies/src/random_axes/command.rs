@@ -64,7 +64,7 @@ pub fn run(arguments: &Arguments) -> anyhow::Result<()> {
 /// Commissions the axis of a seed, judges the result, and leaves its page in a folder.
 fn judge_with_page(seed: u64, folder: Option<&Path>) -> Line {
     let subject = RandomAxis::new(seed).subject();
-    let judged = judged(&subject);
+    let judged = judged(&subject, super::Path::of(seed));
     if let Some(folder) = folder {
         let path = folder.join(format!("{seed}.html"));
         // The result is worth more than its page.

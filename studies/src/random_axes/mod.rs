@@ -11,9 +11,11 @@ mod subject;
 
 use std::time::Instant;
 
+use quadrant::axes::AxisName;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant_sim::commission::bootstrap::measuring_settings;
+use quadrant_sim::client::{Client, ClientError};
+use quadrant_sim::commission::bootstrap::{self, measuring_settings};
 use quadrant_sim::commission::verify::run_sine;
 use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
 use quadrant_sim::design::DesignError;
@@ -21,8 +23,10 @@ use quadrant_sim::experiment::metrics::worst_and_mean;
 use quadrant_sim::experiment::sine_test::SineTest;
 use quadrant_sim::identify::plant::PlantError;
 use quadrant_sim::machine::{
-    AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, approach,
+    AxisInfo, Experiment, ExperimentError, Machine, MachineError, SimulatedLink, SimulatedTestAxis,
+    TestAxis, approach,
 };
+use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;
 use serde::{Deserialize, Serialize};
 
@@ -99,10 +103,55 @@ const WORSE: f64 = 1.02;
 /// Share of the travel that a judging sine takes at most.
 const MOST_TRAVEL: f64 = 0.4;
 
+/// Way from the commissioning to the axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Path {
+    /// The law alone, on an axis that warms.
+    Law,
+    /// The firmware's application behind a link, as a person's machine is; the axis does not warm.
+    Simulated,
+}
+
+/// Seeds of which one goes over [`Path::Simulated`].
+const SIMULATED_SHARE: u64 = 8;
+
+impl Path {
+    /// The way of a seed in a campaign.
+    pub const fn of(seed: u64) -> Self {
+        if seed.is_multiple_of(SIMULATED_SHARE) {
+            Self::Simulated
+        } else {
+            Self::Law
+        }
+    }
+}
+
+/// An axis as it is reached.
+enum Bench<'a> {
+    Law(SimulatedTestAxis),
+    Linked(Box<dyn TestAxis + 'a>),
+}
+
+impl Bench<'_> {
+    fn axis(&self) -> &dyn TestAxis {
+        match self {
+            Self::Law(axis) => axis,
+            Self::Linked(axis) => &**axis,
+        }
+    }
+
+    fn axis_mut(&mut self) -> &mut dyn TestAxis {
+        match self {
+            Self::Law(axis) => axis,
+            Self::Linked(axis) => &mut **axis,
+        }
+    }
+}
+
 /// An axis that counts the time for which it is used, and warms meanwhile.
 struct Timed<'a> {
     subject: &'a Subject,
-    test_axis: SimulatedTestAxis,
+    bench: Bench<'a>,
     used_s: f64,
     tried: Vec<Tried>,
 }
@@ -125,15 +174,15 @@ struct Judged {
 
 impl TestAxis for Timed<'_> {
     fn info(&self) -> AxisInfo {
-        self.test_axis.info()
+        self.bench.axis().info()
     }
 
     fn settings(&self) -> &AxisSettings {
-        self.test_axis.settings()
+        self.bench.axis().settings()
     }
 
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
-        self.test_axis.apply(settings)
+        self.bench.axis_mut().apply(settings)
     }
 
     fn perform(
@@ -141,8 +190,8 @@ impl TestAxis for Timed<'_> {
         experiment: &Experiment,
         progress: &mut dyn FnMut(f64),
     ) -> Result<Recording, ExperimentError> {
-        let outcome = self.test_axis.perform(experiment, progress);
-        let recorded = outcome.as_ref().ok().or(self.test_axis.interrupted());
+        let outcome = self.bench.axis_mut().perform(experiment, progress);
+        let recorded = outcome.as_ref().ok().or(self.bench.axis().interrupted());
         let lasted_s = recorded.map_or(0.0, Recording::duration_s);
         self.tried.push(Tried {
             name: experiment.name.clone(),
@@ -151,29 +200,96 @@ impl TestAxis for Timed<'_> {
         });
         let recording = outcome?;
         self.used_s += lasted_s;
-        if let Some(warmed) = self.subject.warmed(self.used_s) {
-            self.test_axis.change(warmed);
+        if let Bench::Law(axis) = &mut self.bench
+            && let Some(warmed) = self.subject.warmed(self.used_s)
+        {
+            axis.change(warmed);
         }
         Ok(recording)
     }
 
     fn interrupted(&self) -> Option<&Recording> {
-        self.test_axis.interrupted()
+        self.bench.axis().interrupted()
     }
 }
 
 /// Commissions the axis of a seed and judges the result.
 pub fn judge(seed: u64) -> Line {
-    judge_subject(&RandomAxis::new(seed).subject())
+    judge_subject(&RandomAxis::new(seed).subject(), Path::of(seed))
 }
 
 /// Commissions an axis and judges the result.
-pub fn judge_subject(subject: &Subject) -> Line {
-    judged(subject).line
+pub fn judge_subject(subject: &Subject, path: Path) -> Line {
+    judged(subject, path).line
+}
+
+/// What came of a commissioning, and how far the table was from the middle of its travel at most, mm.
+struct Tested {
+    found: Result<Commissioned, CommissionError>,
+    used_s: f64,
+    tried: Vec<Tried>,
+    farthest_mm: f64,
+}
+
+/// Commissions the axis, with the law alone.
+fn with_the_law(subject: &Subject, base: &AxisSettings) -> Tested {
+    let axis = SimulatedTestAxis::new(0, subject.parameters.clone(), subject.seed);
+    let mut timed = Timed {
+        subject,
+        bench: Bench::Law(axis.with_travel(subject.travel)),
+        used_s: 0.0,
+        tried: Vec::new(),
+    };
+    let found = run(&mut timed, base);
+    Tested {
+        found,
+        used_s: timed.used_s,
+        farthest_mm: match &timed.bench {
+            Bench::Law(axis) => axis.farthest_mm(),
+            Bench::Linked(_) => f64::INFINITY,
+        },
+        tried: timed.tried,
+    }
+}
+
+/// Commissions the x axis of a machine behind a link, which has it beside the simulated stage's others.
+fn over_a_link(subject: &Subject, base: &AxisSettings) -> Result<Tested, MachineError> {
+    let mut settings = StageSettings::simulated();
+    settings.axes[0] = bootstrap::zero_gain_settings(base);
+    settings.axes[0].homing = None;
+    let mut truth = StageParameters::real();
+    truth.axes[0] = subject.parameters.clone();
+    let connection = |error: ClientError| MachineError::Connection(Box::new(error));
+    let link = SimulatedLink::on(&settings, &truth, subject.seed, None)
+        .map_err(|error| MachineError::Connection(Box::new(error)))?;
+    let mut client = Client::open(link).map_err(connection)?;
+    let (found, used_s, tried) = {
+        let mut timed = Timed {
+            subject,
+            bench: Bench::Linked(client.test_axis(AxisName::X, subject.travel)?),
+            used_s: 0.0,
+            tried: Vec::new(),
+        };
+        (run(&mut timed, base), timed.used_s, timed.tried)
+    };
+    let start_mm = subject.travel.start_mm();
+    let been_mm = client.simulated_io().and_then(|io| io.been_mm());
+    Ok(Tested {
+        found,
+        used_s,
+        tried,
+        farthest_mm: been_mm.map_or(f64::INFINITY, |[(low_mm, high_mm), ..]| {
+            (start_mm + low_mm).abs().max((start_mm + high_mm).abs())
+        }),
+    })
+}
+
+fn run(axis: &mut dyn TestAxis, base: &AxisSettings) -> Result<Commissioned, CommissionError> {
+    commission(axis, base, &CommissionSettings::default(), &mut |_, _| {})
 }
 
 /// Commissions an axis and judges the result, with everything that was tried.
-fn judged(subject: &Subject) -> Judged {
+fn judged(subject: &Subject, path: Path) -> Judged {
     let began = Instant::now();
     let Subject {
         seed,
@@ -184,18 +300,15 @@ fn judged(subject: &Subject) -> Judged {
     let mut base = StageSettings::simulated().axes[0].clone();
     base.encoder.resolution_mm = parameters.resolution_mm;
     base.amplifier.full_scale_v = parameters.full_scale_v;
-    let mut axis = Timed {
-        subject,
-        test_axis: SimulatedTestAxis::new(0, parameters.clone(), *seed).with_travel(*travel),
-        used_s: 0.0,
-        tried: Vec::new(),
+    let tested = match path {
+        Path::Law => with_the_law(subject, &base),
+        Path::Simulated => over_a_link(subject, &base).unwrap_or_else(|error| Tested {
+            found: Err(error.into()),
+            used_s: 0.0,
+            tried: Vec::new(),
+            farthest_mm: 0.0,
+        }),
     };
-    let found = commission(
-        &mut axis,
-        &base,
-        &CommissionSettings::default(),
-        &mut |_, _| {},
-    );
     let mut line = Line {
         seed: *seed,
         outcome: Outcome::RefusedWrongly,
@@ -205,12 +318,12 @@ fn judged(subject: &Subject) -> Judged {
         trial_worst: None,
         gain_ratio: None,
         feedforward: String::new(),
-        axis_min: axis.used_s / 60.0,
+        axis_min: tested.used_s / 60.0,
         computed_s: 0.0,
         axis: subject.description.clone(),
         reason: String::new(),
     };
-    let found = match found {
+    let found = match tested.found {
         Ok(found) => {
             line.fill(&found, subject);
             Some(found)
@@ -223,14 +336,14 @@ fn judged(subject: &Subject) -> Judged {
             None
         }
     };
-    if axis.test_axis.farthest_mm() > travel.half_mm() {
+    if tested.farthest_mm > travel.half_mm() {
         line.outcome = Outcome::LeftTravel;
     }
     line.computed_s = began.elapsed().as_secs_f64();
     Judged {
         line,
         found,
-        tried: axis.tried,
+        tried: tested.tried,
     }
 }
 

@@ -1,7 +1,8 @@
 //! Commissioning of axes that nobody tuned it on.
 
+use quadrant_sim::machine::Travel;
 use quadrant_studies::random_axes::cases::cases;
-use quadrant_studies::random_axes::{Outcome, RandomAxis, judge, judge_subject};
+use quadrant_studies::random_axes::{Outcome, Path, RandomAxis, judge, judge_subject};
 use rayon::prelude::*;
 
 #[test]
@@ -38,11 +39,53 @@ fn the_cheapest_of_the_named_axes_are_commissioned() {
         .collect();
     assert_eq!(cases.len(), names.len());
     cases.par_iter().for_each(|case| {
-        let line = judge_subject(case);
+        let line = judge_subject(case, Path::Law);
         println!("{line:?}");
         assert_eq!(line.outcome, Outcome::Commissioned, "{line:?}");
         assert!(line.mean_ratio.unwrap() < 0.4, "{line:?}");
     });
+}
+
+/// Random axes on short travels, also from near one end, behind a link: the way that every board takes.
+#[test]
+fn axes_with_short_travels_are_commissioned_over_the_firmwares_path() {
+    let travels = [
+        Travel::either_way(5.0),
+        Travel::either_way(15.0),
+        Travel::either_way(40.0),
+        Travel::either_way(60.0),
+        Travel {
+            negative_mm: 2.0,
+            positive_mm: 30.0,
+        },
+        Travel {
+            negative_mm: 5.0,
+            positive_mm: 40.0,
+        },
+    ];
+    let lines: Vec<_> = (1..)
+        .map(RandomAxis::new)
+        .filter(RandomAxis::is_rigid)
+        .zip(travels)
+        .collect::<Vec<_>>()
+        .into_par_iter()
+        .map(|(axis, travel)| {
+            let mut subject = axis.subject();
+            subject.travel = travel;
+            judge_subject(&subject, Path::Simulated)
+        })
+        .collect();
+    for line in &lines {
+        println!("{line:?}");
+        // A law that is hardly better than the PID may be refused for it.
+        let ends = [Outcome::Commissioned, Outcome::PidAlone].contains(&line.outcome);
+        assert!(ends, "{line:?}");
+    }
+    let commissioned = lines
+        .iter()
+        .filter(|line| line.outcome == Outcome::Commissioned)
+        .count();
+    assert!(commissioned >= 5, "{commissioned} of {}", lines.len());
 }
 
 /// Axes that once left their travel: a hanging one, in open loop, one on which a first controller ran away, and one of a soft spring, in
