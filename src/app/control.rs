@@ -37,6 +37,9 @@ pub struct Control<'q, 'a, S: Scalar> {
     exchanges: u16,
     /// The last order to exchange the plan was carried out.
     plan_taken: bool,
+    /// The axes whose motion in the plan is a move of their own, and what the plan has for them.
+    moved: PerAxis<bool>,
+    behind_moves: Plan<S>,
     host: HostNeed,
     ends: ControlEnds<'q, 'a, S>,
     plan: Plan<S>,
@@ -69,6 +72,8 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             orders: 0,
             exchanges: 0,
             plan_taken: false,
+            moved: PerAxis::splat(false),
+            behind_moves: no_motion(),
             host: HostNeed::new(rate_hz),
             ends,
         }
@@ -126,6 +131,9 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let outputs = stage.tick(&self.plan, &mut self.state, inputs);
         if self.host.is_needed() {
             self.host.update(&self.state);
+        }
+        if self.moved.contains(&true) {
+            self.end_moves();
         }
         outputs
     }
@@ -220,6 +228,10 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 if self.state.axes()[name].is_running() {
                     return None;
                 }
+                if !self.moved[name] {
+                    self.moved[name] = true;
+                    self.behind_moves[name] = self.plan[name].clone();
+                }
                 self.plan[name] = plan[name].clone();
                 Command::StartMove(name)
             }
@@ -228,6 +240,7 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
                 self.plan_taken = !self.state.is_running();
                 if self.plan_taken {
                     self.plan = plan;
+                    self.moved = PerAxis::splat(false);
                 }
                 return None;
             }
@@ -250,6 +263,18 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         let needed = self.operation.host_needed;
         self.host.start(command, needed, &self.plan);
         self.heeded(Station::Host, command)
+    }
+
+    /// Gives axes whose moves have ended their motion in the plan back: `Run` repeats no move.
+    #[cold]
+    #[inline(never)]
+    fn end_moves(&mut self) {
+        for name in AxisName::ALL {
+            if self.moved[name] && !self.state.axes()[name].is_running() {
+                self.moved[name] = false;
+                core::mem::swap(&mut self.plan[name], &mut self.behind_moves[name]);
+            }
+        }
     }
 
     /// The command, unless it would enable and does not come from whom the rules of now allow to.
@@ -313,7 +338,8 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
         self.exchanging = needs_disabled && more;
         if needs_disabled {
             // It was checked against the settings that acted until now. What is left of a stream or of an injection begins nothing.
-            self.plan = PerAxis::from_fn(|_| Motion::Hold);
+            self.plan = no_motion();
+            self.moved = PerAxis::splat(false);
         }
         if new_origin {
             self.state.set_homed(name, false);
@@ -398,4 +424,9 @@ impl<'q, 'a, S: Scalar> Control<'q, 'a, S> {
             let _ = self.ends.captures.enqueue(capture);
         }
     }
+}
+
+/// A plan that moves nothing.
+fn no_motion<S: Scalar>() -> Plan<S> {
+    PerAxis::from_fn(|_| Motion::Hold)
 }

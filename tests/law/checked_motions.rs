@@ -517,3 +517,26 @@ fn a_move_that_a_stop_has_overtaken_leaves_nothing_for_the_next_one() {
     }
     all(&mut tasks, &[plan(0.02, SLOW)]);
 }
+
+#[test]
+fn a_run_after_a_move_runs_the_plan_and_not_the_move() {
+    let mut tasks = homed();
+    all(&mut tasks, &[move_x(1.0)]);
+    tasks.run(5000);
+    assert!(refused(Some(&tasks.ask(Body::Run))), "there is no plan");
+    all(&mut tasks, &[plan(2.0, SLOW), move_x(-3.0)]);
+    tasks.run(6000);
+    all(&mut tasks, &[move_x(0.0)]);
+    tasks.run(6000);
+    for end in [4000, 8000] {
+        all(&mut tasks, &[Body::Run]);
+        tasks.run(6000);
+        let counts = tasks
+            .upper
+            .borrow()
+            .snapshot()
+            .axes
+            .map(|axis| axis.measured.0);
+        assert_eq!(counts, [end, end, end]);
+    }
+}
