@@ -49,6 +49,11 @@ pub trait Serial {
 
     /// Sends the beginning of `bytes`; returns how many were taken, 0 while earlier ones are on their way.
     fn write(&mut self, bytes: &[u8]) -> usize;
+
+    /// True once everything that was taken has left: a reset cuts nothing off then.
+    fn has_sent(&mut self) -> bool {
+        true
+    }
 }
 
 /// The flash that settings are stored in. Writing it may stop the processor for as long as an erasure takes.

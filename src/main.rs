@@ -170,8 +170,9 @@ mod app {
         let (glitches_in, glitches_out) = cx.local.glitches.split();
         let (events_in, events_out) = cx.local.events.split();
         let (lines_in, lines_out) = cx.local.lines.split();
-        board.tick.start(rate_hz);
+        // First: it waits for its own clock, and the first tick would be late.
         board.watchdog.start();
+        board.tick.start(rate_hz);
         let local = Local {
             control,
             server,
@@ -375,6 +376,10 @@ mod app {
 
         fn write(&mut self, bytes: &[u8]) -> usize {
             self.0.lock(|port| hal::Serial::write(&mut port.0, bytes))
+        }
+
+        fn has_sent(&mut self) -> bool {
+            self.0.lock(|port| hal::Serial::has_sent(&mut port.0))
         }
     }
 

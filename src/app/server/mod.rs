@@ -226,7 +226,11 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
                 return Poll::Continue;
             }
             if self.reboot {
-                return Poll::Reboot;
+                return if serial.has_sent() {
+                    Poll::Reboot
+                } else {
+                    Poll::Continue
+                };
             }
             if !(self.conclude() || self.answer() || self.notify()) {
                 break;

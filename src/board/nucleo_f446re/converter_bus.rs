@@ -12,7 +12,7 @@ use quadrant::drivers::ad5754r::Sequencer;
 use quadrant::drivers::ad5754r::steps::{
     BYTE_AT, FRAME_STEPS, FRAMES_AT, MAX_STEPS, PIN_CHANGES, PINS_AT, PinChange,
 };
-use stm32f4xx_hal::gpio::{Output, PB1, PB12, PB13, PB14, PB15, Pull, Speed};
+use stm32f4xx_hal::gpio::{Output, PB1, PB12, PB13, PB14, PB15, PinState, Pull, Speed};
 use stm32f4xx_hal::pac::{DMA1, DMA2, GPIOB, SPI2, TIM1};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};
 
@@ -116,10 +116,16 @@ fn receiver_dma() -> DMA1 {
 impl ConverterBus {
     /// Starts the bus, with both pins high. DMA 1 is clocked.
     pub(super) fn new(spi: SPI2, timer: TIM1, dma: DMA2, pins: Pins, rcc: &mut Rcc) -> Self {
-        let mut sync = pins.sync.into_push_pull_output().speed(Speed::VeryHigh);
-        sync.set_high();
-        let mut load = pins.load.into_push_pull_output().speed(Speed::VeryHigh);
-        load.set_high();
+        // High from the first moment: an output that is set afterwards is low for 40 ns, which the converter takes for a frame.
+        let high = PinState::High;
+        let sync = pins
+            .sync
+            .into_push_pull_output_in_state(high)
+            .speed(Speed::VeryHigh);
+        let load = pins
+            .load
+            .into_push_pull_output_in_state(high)
+            .speed(Speed::VeryHigh);
         let _ = pins.clock.into_alternate::<5>().speed(Speed::VeryHigh);
         let _ = pins.data.into_alternate::<5>().speed(Speed::VeryHigh);
         // A converter that is not there answers with ones.

@@ -23,6 +23,8 @@ const SENDING: usize = 512;
 const RECEIVER: usize = 5;
 const SENDER: usize = 6;
 const CHANNEL: u8 = 4;
+/// USART_SR: all bits that a zero clears, but for that of a finished transmission.
+const CLEAR_SENT: u16 = !(1 << 6);
 /// DMA_HIFCR: all five flags of stream 6 (CTCIF6 to CFEIF6).
 const CLEAR_SENDER: u32 = 0b11_1101 << 16;
 
@@ -127,6 +129,8 @@ impl hal::Serial for Serial {
         fence(Ordering::Release);
         // SAFETY: ones clear these flags, zeros leave the other streams' alone.
         self.dma.hifcr().write(|w| unsafe { w.bits(CLEAR_SENDER) });
+        // SAFETY: ones leave a flag of this register as it is. Only by this is it clear until the last of these bytes is out.
+        self.usart.sr().write(|w| unsafe { w.bits(CLEAR_SENT) });
         sender.ndtr().write(|w| w.ndt().set(count as u16));
         sender.cr().write(|w| {
             w.chsel().set(CHANNEL);
@@ -135,5 +139,10 @@ impl hal::Serial for Serial {
         });
         sender.cr().modify(|_, w| w.en().enabled());
         count
+    }
+
+    fn has_sent(&mut self) -> bool {
+        let is_sending = self.dma.st(SENDER).cr().read().en().is_enabled();
+        !is_sending && self.usart.sr().read().tc().bit_is_set()
     }
 }
