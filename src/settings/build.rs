@@ -33,8 +33,8 @@ const STIFFNESS_ERROR: f64 = 1.25;
 /// Breakaway over that of the settings that need not show as motion in open loop.
 const FRICTION_ERROR: f64 = 1.5;
 /// Range of motion that only an axis that moves goes through, mm, and in counts: more than a cable that floats shows.
-const ALIVE_MM: f64 = 0.128;
-const ALIVE_COUNTS: (f64, f64) = (64.0, 256.0);
+const ALIVE_MM: f64 = 0.064;
+const ALIVE_COUNTS: (f64, f64) = (64.0, 128.0);
 /// A range of motion in between, counts, where the line of what friction takes up changes.
 const MID_COUNTS: f64 = 12.0;
 /// Breakaway of the settings that is a load that there may be, however small the output limit is, at first and later.
@@ -50,7 +50,7 @@ const MODEL_COUNTS: f64 = 20.0;
 /// way that this output brings within it.
 const DELAY_ERROR: f64 = 0.1;
 /// The addition for friction that breaks away or is turned around: the way that its level brings within this time, s.
-const FRICTION_S: f64 = 3e-3;
+const FRICTION_S: f64 = 3.5e-3;
 /// Speed that no load explains, mm/s, and in counts per tick.
 const MODEL_VELOCITY_MM_S: f64 = 80.0;
 const MODEL_STEP_COUNTS: f64 = 8.0;

@@ -5,10 +5,10 @@
 //! output through a lag of the plant's dead time:
 //!
 //! - **No motion.** While the encoder stays within a range, the voltage may change by what friction takes up there, [`Held`].
-//!   What goes beyond moves a model, `v' = A u - B v`, from rest; when that has gone farther than a distance, less the way
-//!   that was seen along with it, the encoder is dead or the axis is blocked. Counts that go to and fro are no motion: the
+//!   What goes beyond moves a model, `v' = A u - B v`, from rest; when that has gone farther than a distance that was
+//!   not seen, the encoder is dead or the axis is blocked. Counts that go to and fro are no motion: the
 //!   change counts from the last time that the range grew, so that an encoder that flickers gains nothing once it has
-//!   shown its range, and, with a quarter more allowed, from when the range began. It begins again when it is wider than
+//!   shown its range, and, with half as much again allowed, from when the range began. It begins again when it is wider than
 //!   one that only an axis that moves goes through. Where the last motion of some way went one way and the voltage goes the
 //!   other, friction may lose what it held without a motion, as under vibration. In open loop nothing is held, so there
 //!   the voltage itself counts too, beyond what friction can hold. All of it twice: on what is shown at once, and on a
@@ -53,11 +53,14 @@ const SLOW_BITS: u32 = 4;
 const QUICK_STEP: i32 = 1 << (SPEED_FRACTION_BITS - 1);
 const SLOW_STEP: i32 = 3 << (SPEED_FRACTION_BITS - 1);
 
-/// Share of what friction takes up that is added since the range began: a quarter.
-const BASE_ERROR_SHIFT: u32 = 2;
+/// Counts that a dead line shows, with noise, 2^-8 counts.
+const DITHER: i32 = 4 << SPEED_FRACTION_BITS;
 
-/// Motion back that is a motion the other way, as a share of the range that only an axis that moves goes through: an eighth.
-const TURN_SHIFT: u32 = 3;
+/// Share of what friction takes up that is added since the range began: a half.
+const BASE_ERROR_SHIFT: u32 = 1;
+
+/// Motion back that is a motion the other way, as a share of the range that only an axis that moves goes through: a quarter.
+const TURN_SHIFT: u32 = 2;
 
 /// Comparisons, as a power of two, in which a force that lasts becomes that of the load: a load that drifts changes it while
 /// the law holds the axis where it is.
@@ -268,7 +271,7 @@ struct Standing {
     /// Sense of the last motion of some way, 1 or -1, or zero; and the farthest position of it.
     heading: i32,
     farthest: i32,
-    /// Speed of the model, and its distance less the one seen.
+    /// Speed and distance of the model.
     modelled: i32,
     distance: i32,
 }
@@ -346,6 +349,11 @@ impl Plausibility {
             count: shown.count,
             words: shown.words,
             position: shown.speed << SPEED_FILTER_BITS,
+            quick: Standing {
+                position: shown.speed << SPEED_FILTER_BITS,
+                origin: shown.speed << SPEED_FILTER_BITS,
+                ..Standing::default()
+            },
             least: speed,
             most: speed,
             ..PlausibilityState::default()
@@ -363,23 +371,23 @@ impl Plausibility {
         state.position = state
             .position
             .wrapping_add(counts.wrapping_shl(SPEED_FRACTION_BITS));
-        // Behind by as much as the filtered speed is.
-        let position = state
-            .position
-            .wrapping_sub(shown.speed << SPEED_FILTER_BITS);
         if !self.modelled {
             state.force = pushed;
             let quick = &mut state.quick;
             quick.force = pushed;
-            return !shown.open | self.stands(quick, position, QUICK_STEP, true);
+            return !shown.open | self.stands(quick, state.position, QUICK_STEP, true);
         }
         state.force += part(pushed.saturating_sub(state.force), self.lag);
         let (quick, slow) = (&mut state.quick, &mut state.slow);
         quick.force = state.force;
         slow.force += state.force.saturating_sub(slow.force) >> SLOW_BITS;
+        // As far behind as the filtered speed is.
+        let position = state
+            .position
+            .wrapping_sub(shown.speed << SPEED_FILTER_BITS);
         let mean = position.wrapping_sub(slow.position) >> SLOW_BITS;
         let mean = slow.position.wrapping_add(mean);
-        let stands = self.stands(quick, position, QUICK_STEP, shown.open)
+        let stands = self.stands(quick, state.position, QUICK_STEP, shown.open)
             & self.stands(slow, mean, SLOW_STEP, shown.open);
         let speed = shown.speed.wrapping_shl(self.shift);
         self.moves_along(state, counts, speed) & stands
@@ -416,14 +424,11 @@ impl Plausibility {
         let grows = self.widen(state, step);
         let force = state.force;
         let changed = force.saturating_sub(state.anchor);
-        let of_anchor = beyond(
-            changed,
-            self.held(
-                state.most.saturating_sub(state.least),
-                changed,
-                state.heading,
-            ),
-        );
+        let range = state.most.saturating_sub(state.least);
+        let of_anchor = beyond(changed, self.held(range, changed, state.heading));
+        // In open loop; a dead line's counts are no motion.
+        let wider = range.saturating_sub(DITHER).max(0);
+        let more = self.held(wider, 0, 0).saturating_sub(self.held(0, 0, 0));
         state.anchor += changed >> LEAK_BITS;
         let changed = force.saturating_sub(state.base);
         let range = state.high.saturating_sub(state.low).saturating_add(step);
@@ -432,7 +437,8 @@ impl Plausibility {
         state.base += changed >> LEAK_BITS;
         let mut force_left = larger(of_anchor, of_base);
         if open && force_left == 0 {
-            force_left = beyond(force, self.breakaway);
+            let more = if self.modelled { more } else { 0 };
+            force_left = beyond(force, self.breakaway.saturating_add(more));
         }
         state.modelled = if grows & (of_base == 0) {
             0
@@ -444,17 +450,15 @@ impl Plausibility {
         } else {
             force_left
         };
+        let mut ahead = state.modelled >> (DISTANCE_BITS - INTERVAL_BITS);
+        if self.modelled && (ahead != 0) & (moved ^ ahead >= 0) {
+            let seen = moved.wrapping_shl(self.shift) >> SPEED_FRACTION_BITS;
+            let left = ahead.saturating_sub(seen);
+            ahead = if left ^ ahead >= 0 { left } else { 0 };
+        }
         // Kept through motion: an encoder with gaps shows some.
         let forgotten = state.distance >> self.forget_shift;
-        state.distance = (state.distance - forgotten)
-            .saturating_add(state.modelled >> (DISTANCE_BITS - INTERVAL_BITS));
-        if self.modelled && (state.modelled != 0) & (moved ^ state.modelled >= 0) {
-            let seen = moved.wrapping_shl(self.shift) >> SPEED_FRACTION_BITS;
-            state.distance = state.distance.saturating_sub(seen);
-            if state.distance ^ state.modelled < 0 {
-                state.distance = 0;
-            }
-        }
+        state.distance = (state.distance - forgotten).saturating_add(ahead);
         state.distance.saturating_abs() <= self.distance
     }
 
