@@ -252,6 +252,10 @@ impl AxisSettings {
         let alive_counts = (ALIVE_MM / resolution_mm).clamp(ALIVE_COUNTS.0, ALIVE_COUNTS.1);
         let least_load_v = FIRST_LOAD_FRICTIONS * breakaway_v;
         let delay_s = plant.delay_s;
+        let gain = plant.gain_mm_per_v_s2;
+        let delayed_mm = DELAY_ERROR * gain * limit_v * delay_s * delay_s;
+        let breaking_mm = 0.5 * gain * breakaway_v * FRICTION_S * FRICTION_S;
+        let least_mm = MODEL_COUNTS * resolution_mm;
         let model = PlausibilityModel {
             gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
             damping_per_s: plant.damping_per_s,
@@ -266,10 +270,8 @@ impl AxisSettings {
             load_v: (LOAD_SHARE * limit_v).max(FIRST_LOAD_SHARE * limit_v + least_load_v),
             first_load_v: (FIRST_LOAD_SHARE * limit_v).max(least_load_v),
             proving_mm: PROVING_MM,
-            distance_mm: (MODEL_DISTANCE_MM
-                + DELAY_ERROR * plant.gain_mm_per_v_s2 * limit_v * delay_s * delay_s
-                + 0.5 * plant.gain_mm_per_v_s2 * breakaway_v * FRICTION_S * FRICTION_S)
-                .max(MODEL_COUNTS * resolution_mm),
+            distance_mm: (MODEL_DISTANCE_MM + delayed_mm.max(breaking_mm)).max(least_mm),
+            mean_distance_mm: (MODEL_DISTANCE_MM + delayed_mm + breaking_mm).max(least_mm),
             velocity_mm_s: MODEL_VELOCITY_MM_S.max(MODEL_STEP_COUNTS * resolution_mm / period_s),
         };
         Plausibility::new(&model, words, resolution_mm, period_s)

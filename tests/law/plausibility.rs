@@ -70,6 +70,7 @@ fn model() -> PlausibilityModel {
         first_load_v: 1.0,
         proving_mm: 1e9,
         distance_mm: 0.3,
+        mean_distance_mm: 0.3,
         velocity_mm_s: 60.0,
     }
 }

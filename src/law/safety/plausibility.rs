@@ -126,8 +126,9 @@ pub struct PlausibilityModel {
     pub first_load_v: f64,
     /// Motion after enabling that shows that the signs are right, mm.
     pub proving_mm: f64,
-    /// Distance of the model without motion of the encoder that is a fault, mm.
+    /// Distance of the model without motion of the encoder that is a fault, mm; and of the mean of what is shown.
     pub distance_mm: f64,
+    pub mean_distance_mm: f64,
     /// Gain of speed that no load explains and that is a fault, mm/s.
     pub velocity_mm_s: f64,
 }
@@ -172,6 +173,7 @@ pub struct Plausibility {
     /// Right shift from a distance to what is forgotten of it.
     forget_shift: u32,
     distance: i32,
+    mean_distance: i32,
     /// Largest load as the speed gained, at first and later.
     first_load: i32,
     load: i32,
@@ -192,6 +194,7 @@ words!([] struct Plausibility {
     drag: i32,
     forget_shift: u32,
     distance: i32,
+    mean_distance: i32,
     first_load: i32,
     load: i32,
     proving_counts: u32,
@@ -305,6 +308,9 @@ impl Plausibility {
             drag: share(model.damping_per_s * interval_s),
             forget_shift: whole_log2(FORGET_S / interval_s),
             distance: rounding::round(model.distance_mm / resolution_mm * counts_per_speed) as i32,
+            mean_distance: rounding::round(
+                model.mean_distance_mm / resolution_mm * counts_per_speed,
+            ) as i32,
             first_load: force(model.first_load_v),
             load: force(model.load_v),
             proving_counts: (model.proving_mm / resolution_mm) as u32,
@@ -375,7 +381,8 @@ impl Plausibility {
             state.force = pushed;
             let quick = &mut state.quick;
             quick.force = pushed;
-            return !shown.open | self.stands(quick, state.position, QUICK_STEP, true);
+            return !shown.open
+                | self.stands(quick, state.position, (QUICK_STEP, self.distance), true);
         }
         state.force += part(pushed.saturating_sub(state.force), self.lag);
         let (quick, slow) = (&mut state.quick, &mut state.slow);
@@ -387,8 +394,12 @@ impl Plausibility {
             .wrapping_sub(shown.speed << SPEED_FILTER_BITS);
         let mean = position.wrapping_sub(slow.position) >> SLOW_BITS;
         let mean = slow.position.wrapping_add(mean);
-        let stands = self.stands(quick, state.position, QUICK_STEP, shown.open)
-            & self.stands(slow, mean, SLOW_STEP, shown.open);
+        let stands = self.stands(
+            quick,
+            state.position,
+            (QUICK_STEP, self.distance),
+            shown.open,
+        ) & self.stands(slow, mean, (SLOW_STEP, self.mean_distance), shown.open);
         let speed = shown.speed.wrapping_shl(self.shift);
         self.moves_along(state, counts, speed) & stands
     }
@@ -416,9 +427,16 @@ impl Plausibility {
             & (speed.saturating_sub(state.most) <= self.velocity)
     }
 
-    /// False if the encoder stands though the axis must have moved. `step` is the growth of the range of motion that counts.
+    /// False if the encoder stands though the axis must have moved. `step` is the growth of the range of motion that counts,
+    /// `most` the distance of the model that is a fault.
     #[inline(always)]
-    fn stands(&self, state: &mut Standing, position: i32, step: i32, open: bool) -> bool {
+    fn stands(
+        &self,
+        state: &mut Standing,
+        position: i32,
+        (step, most): (i32, i32),
+        open: bool,
+    ) -> bool {
         let moved = position.wrapping_sub(state.position);
         state.position = position;
         let grows = self.widen(state, step);
@@ -459,7 +477,7 @@ impl Plausibility {
         // Kept through motion: an encoder with gaps shows some.
         let forgotten = state.distance >> self.forget_shift;
         state.distance = (state.distance - forgotten).saturating_add(ahead);
-        state.distance.saturating_abs() <= self.distance
+        state.distance.saturating_abs() <= most
     }
 
     /// Takes a position into the range of motion; true if that grows by it.
