@@ -126,8 +126,9 @@ pub struct PlausibilityModel {
     pub first_load_v: f64,
     /// Motion after enabling that shows that the signs are right, mm.
     pub proving_mm: f64,
-    /// Distance of the model without motion of the encoder that is a fault, mm; and of the mean of what is shown.
+    /// Distance of the model without motion of the encoder that is a fault, mm.
     pub distance_mm: f64,
+    /// The same for the mean of what is shown, mm.
     pub mean_distance_mm: f64,
     /// Gain of speed that no load explains and that is a fault, mm/s.
     pub velocity_mm_s: f64,

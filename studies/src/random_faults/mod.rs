@@ -29,9 +29,13 @@ const STOP_TICKS: u32 = 1050 + 200;
 const UNPLANNED_MM: f64 = 2.1;
 const SLOW_UNPLANNED_MM: f64 = 17.0;
 const SLOW_MM_S: f64 = 2.0;
+/// The same under a voltage that is injected in closed loop, mm: it goes to and fro, and so does what is seen of the motion.
+const INJECTED_UNPLANNED_MM: f64 = 3.5;
 /// The same, mm, where an encoder shows counts of its own; and below so many mm/s they are taken for a motion.
-const FLICKERING_UNPLANNED_MM: f64 = 12.0;
+const FLICKERING_UNPLANNED_MM: f64 = 15.0;
 const FLICKERING_MM_S: f64 = 10.0;
+/// Speed below which a motion that ends does so before such an encoder is found, mm/s.
+const FLICKERING_TO_REST_MM_S: f64 = 60.0;
 /// Speed below which an axis comes to rest, mm/s: if its encoder dies then, the voltage that it has may be that of a load.
 const COMING_TO_REST_MM_S: f64 = 30.0;
 /// The distance that an axis coasts, mm per mm/s: 1 / B of the plant; and that which the largest output adds while on its way,
@@ -191,7 +195,7 @@ impl Campaign {
             _ if self.has_load() => true,
             // Counts of its own look like those of a slow motion.
             _ if FLICKERS.contains(&death) => {
-                !goes_on && speed_mm_s.abs() < COMING_TO_REST_MM_S
+                !goes_on && speed_mm_s.abs() < FLICKERING_TO_REST_MM_S
                     || speed_mm_s.abs() < FLICKERING_MM_S
                     || matches!(self.activity, Activity::OpenLoop | Activity::ClosedLoop)
             }
@@ -200,10 +204,11 @@ impl Campaign {
     }
 }
 
-/// The largest way, mm, that is not planned after an encoder died at this speed.
-fn most_unplanned_mm(death: Option<Death>, speed_mm_s: f64) -> f64 {
+/// The largest way, mm, that is not planned in an activity after an encoder died at this speed.
+fn most_unplanned_mm(activity: Activity, death: Option<Death>, speed_mm_s: f64) -> f64 {
     match death {
         Some(death) if FLICKERS.contains(&death) => FLICKERING_UNPLANNED_MM,
+        Some(_) if activity == Activity::ClosedLoop => INJECTED_UNPLANNED_MM,
         Some(_) if speed_mm_s.abs() < SLOW_MM_S => SLOW_UNPLANNED_MM,
         _ => UNPLANNED_MM,
     }
@@ -388,7 +393,7 @@ fn run(campaign: &Campaign) -> Result<End, String> {
         tasks.step();
         watch.look(&tasks, pressed)?;
     }
-    if watch.unplanned_mm > most_unplanned_mm(died, speed_mm_s) && !unseen {
+    if watch.unplanned_mm > most_unplanned_mm(campaign.activity, died, speed_mm_s) && !unseen {
         return Err(format!(
             "{:.2} mm were not planned, dead at {speed_mm_s:.0} mm/s",
             watch.unplanned_mm
