@@ -9,6 +9,7 @@ use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
 use quadrant::motion::MotionMode;
+use quadrant::safety::oscillation::OscillationKind;
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{InjectionSettings, PlanSettings, Reason, StageSettings};
 
@@ -100,6 +101,9 @@ impl<S: Scalar> Axis<S> {
             let error = self.seen().error.to_f64(Quantity::Length);
             sum += error * error;
         }
+        // Neither what is learnt nor what shakes the axis makes the monitor take away what is added.
+        let found = self.rig.state.axes()[0].oscillation();
+        assert_eq!(found.kind, OscillationKind::Hum, "{found:?}");
         sum / ticks as f64
     }
 
