@@ -232,6 +232,11 @@ fn at_rest<S: Scalar>(volts: f64, hz: f64, noise_mm: f64) -> (Bench<S>, Error) {
     (bench, error)
 }
 
+fn hummed<S: Scalar>(volts: f64, hz: f64) -> (OscillationReading, Error) {
+    let (bench, error) = at_rest::<S>(volts, hz, 1.5e-4);
+    (bench.found(), error)
+}
+
 #[test]
 fn hum_at_rest_is_reported_once_with_its_frequency_and_amplitude() {
     for (volts, hz) in [
@@ -242,14 +247,7 @@ fn hum_at_rest_is_reported_once_with_its_frequency_and_amplitude() {
         (0.5, 259.0),
         (1.5, 300.0),
     ] {
-        for (found, error) in [
-            (|(bench, error): (Bench<f32>, Error)| (bench.found(), error))(at_rest(
-                volts, hz, 1.5e-4,
-            )),
-            (|(bench, error): (Bench<Fixed>, Error)| (bench.found(), error))(at_rest(
-                volts, hz, 1.5e-4,
-            )),
-        ] {
+        for (found, error) in [hummed::<f32>(volts, hz), hummed::<Fixed>(volts, hz)] {
             let seen_hz = found.frequency_hz();
             let seen_um = 0.5 * found.amplitude_counts();
             println!(
