@@ -20,11 +20,12 @@ use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
 use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Table, whole};
+use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
 use super::endpoint::Endpoint;
+use super::kept;
 use super::subject::{and_restored, known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
@@ -54,8 +55,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true, conflicts_with = "record")]
     travel: Option<Travel>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
-    /// Without them those of --into if it is there, else those that the machine has, and the axes that were commissioned
-    /// into the folder for results before.
+    /// Without them those of --into if it is there; else the machine's for this axis, and everything else as it is in the
+    /// folder for results, or as the machine has it.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Write the settings into this file; without it, into settings.toml in the folder for results. Everything else is
@@ -179,7 +180,16 @@ impl Arguments {
         let Self { output, .. } = self;
         output.ready()?;
         let axis = AxisName::from(self.axis);
-        let mut file = start.unwrap_or_else(|| SettingsFile::new(StageSettings::simulated()));
+        let path = match &self.into {
+            Some(path) => path.clone(),
+            None => output.file(SETTINGS)?,
+        };
+        let mut file = match start {
+            Some(file) => file,
+            None if path.exists() => SettingsFile::read(&path)?,
+            None => kept::built_in(),
+        };
+        kept::refuse_loss_beside(&path, &file.stage, axis)?;
         let base = file.stage.axes[axis as usize].clone();
         let found = Found {
             found: saved::read(folder, base.encoder.resolution_mm)?.commissioned(
@@ -190,10 +200,6 @@ impl Arguments {
             checked: None,
         };
         terminal::print(format_args!("{}", found.text()));
-        let path = match &self.into {
-            Some(path) => path.clone(),
-            None => output.file(SETTINGS)?,
-        };
         let who = format!("the {axis} axis, recorded in {}", folder.display());
         let output = &output.below(axis.as_str());
         for line in found.keep(output, &mut file, &path, axis, &who)? {
@@ -203,23 +209,22 @@ impl Arguments {
     }
 }
 
-/// The machine's settings, and those of the other axes that were commissioned into `path` before.
+/// The settings in `path` with the machine's of this axis; those of the machine where there is no such file.
 fn beside_others(
     machine: StageSettings,
     axis: AxisName,
     path: &Path,
 ) -> anyhow::Result<SettingsFile> {
-    let mut file = SettingsFile::new(machine);
-    if path.exists() {
-        file.keep_other_axes(&SettingsFile::read(path)?, axis)
-            .map_err(|other| {
-                anyhow!(
-                    "{}: the {other} axis has another encoder or amplifier there than the machine's; give another --out, or \
-                     --settings",
-                    path.display()
-                )
-            })?;
+    if !path.exists() {
+        return Ok(SettingsFile::new(machine));
     }
+    let mut file = SettingsFile::read(path)?;
+    file.exchange_axis(&machine, axis).map_err(|what| {
+        anyhow!(
+            "{}: {what} there is not that of the machine; give another --out, or --settings",
+            path.display()
+        )
+    })?;
     Ok(file)
 }
 
@@ -235,6 +240,11 @@ impl Job<'_> {
             Some(file) => file,
             None => beside_others(before.clone(), axis, &output.file(SETTINGS)?)?,
         };
+        let result = match self.into {
+            Some(path) => path.to_owned(),
+            None => output.file(SETTINGS)?,
+        };
+        kept::refuse_loss_beside(&result, &file.stage, axis)?;
         let base = file.stage.axes[axis as usize].clone();
         let folder = output.below(axis.as_str());
         folder.ready()?;
@@ -267,10 +277,10 @@ impl Job<'_> {
 
         let who = format!("the {axis} axis of {}", machine.description());
         let better = found.is_better_than_pid();
-        let path = match self.into {
-            Some(path) if better => path.to_owned(),
-            None if better => output.file(SETTINGS)?,
-            _ => folder.file(PID_ALONE)?,
+        let path = if better {
+            result
+        } else {
+            folder.file(PID_ALONE)?
         };
         let mut text = found.text();
         for line in found.keep(&folder, &mut file, &path, axis, &who)? {
@@ -446,6 +456,7 @@ impl Found {
             .iter()
             .map(|name| format!("{axis}/{name}"))
             .collect();
+        let start = file.stage.clone();
         file.stage.axes[axis as usize] = found.settings.clone();
         file.add_provenance(
             &command,
@@ -453,12 +464,12 @@ impl Found {
             records,
             &["feedback", "friction", "feedforward", "plant"],
         );
-        file.write(path, whole::write)?;
+        let mut lines = kept::write(file, &start, path)?;
         for table in self.tables() {
             output.keep_table(&table)?;
         }
         let page = commission_page(who, found, checked, provenance(&command, output.seed));
-        let mut lines = vec![format!("{}: the settings of the stage", path.display())];
+        lines.push(format!("{}: the settings of the stage", path.display()));
         lines.extend(output.keep_page(&page, "commission.html")?);
         Ok(lines)
     }

@@ -12,6 +12,7 @@ use serde_json::{Map, Value, json};
 
 use super::answer::Answer;
 use super::command::Command;
+use crate::kept;
 
 pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
     let path = whole_path(path);
@@ -84,8 +85,11 @@ pub(super) fn difference_line(difference: &Difference) -> String {
     format!("{path} {} -> {}", shown(acting), shown(other))
 }
 
-pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
+pub(super) fn dump(client: &mut Client, file: &Path, overwrite: bool) -> anyhow::Result<Answer> {
     let stage = settings::dump(client)?;
+    if !overwrite {
+        kept::refuse_other(file, &stage)?;
+    }
     let mut dumped = SettingsFile::new(stage);
     let identity = client.identity();
     dumped.provenance.push(Provenance {
