@@ -92,7 +92,12 @@ pub(super) fn refuse_other(path: &Path, machine: &StageSettings) -> anyhow::Resu
 /// # Errors
 /// The first of them, and their number.
 fn refuse(path: &Path, lost: &[Change]) -> anyhow::Result<()> {
-    let Some(Change { path: first, old, new }) = lost.first() else {
+    let Some(Change {
+        path: first,
+        old,
+        new,
+    }) = lost.first()
+    else {
         return Ok(());
     };
     bail!(

@@ -45,22 +45,30 @@ fn answers(script: &str) -> Vec<Value> {
 fn paths() -> (StageSettings, Vec<String>, Vec<String>) {
     let mut full = StageSettings::simulated();
     let mut parts = Vec::new();
-    full.list("", &mut |path| parts.extend(is_part(path).then(|| path.to_owned())))
-        .unwrap();
+    full.list("", &mut |path| {
+        parts.extend(is_part(path).then(|| path.to_owned()))
+    })
+    .unwrap();
     for part in &parts {
         full.set_json(part, b"\"present\"").unwrap();
     }
     let mut paths = Vec::new();
-    full.list("", &mut |path| paths.push(path.to_owned())).unwrap();
+    full.list("", &mut |path| paths.push(path.to_owned()))
+        .unwrap();
     (full, paths, parts)
 }
 
 #[test]
 fn every_setting_is_read_and_set_with_every_part_there() {
     let (_, paths, parts) = paths();
-    let made: String = parts.iter().map(|part| format!("set {part} present\n")).collect();
+    let made: String = parts
+        .iter()
+        .map(|part| format!("set {part} present\n"))
+        .collect();
     let gets: String = paths.iter().map(|path| format!("get {path}\n")).collect();
-    let read = answers(&format!("{made}{gets}get x/feedforward\nget y/feedforward/cancelling\ndiff\nlist\n"));
+    let read = answers(&format!(
+        "{made}{gets}get x/feedforward\nget y/feedforward/cancelling\ndiff\nlist\n"
+    ));
     for answer in &read {
         assert!(answer.get("error").is_none(), "{answer}");
     }
@@ -93,7 +101,10 @@ fn a_setting_in_a_part_that_is_left_out_says_so_and_every_other_is_read() {
         parts.any(|part| path.starts_with(&format!("{part}/")))
     };
     let (members, others): (Vec<&String>, Vec<&String>) = paths.iter().partition(in_part);
-    let gone: String = parts.iter().map(|part| format!("set {part} null\n")).collect();
+    let gone: String = parts
+        .iter()
+        .map(|part| format!("set {part} null\n"))
+        .collect();
     let mut script = gone;
     for path in &members {
         let mut json = [0; 2048];
@@ -121,4 +132,54 @@ fn a_setting_in_a_part_that_is_left_out_says_so_and_every_other_is_read() {
     for answer in &of_others[others.len()..] {
         assert!(answer.get("error").is_none(), "{answer}");
     }
+}
+
+#[test]
+fn a_path_has_one_spelling_and_one_that_there_is_not_names_the_one_that_is_meant() {
+    let script = "list\nget x/feedback\nset x/feedback/pid/kp_v_per_mm 0.9\ndiff\nrevert\n\
+                  load host-sim/data/identified-stage.toml\nset y/homing present\nset y/homing/search_mm_s -1\napply\n\
+                  get y/feedback/law/none\nset x/feedback/pid/kp 1\nlist x/feedforwad\n";
+    let output = session(&["--keep-going"], script);
+    let [printed, errors] =
+        [output.stdout, output.stderr].map(|said| String::from_utf8(said).unwrap());
+    for said in [&printed, &errors] {
+        assert!(!said.contains("/axes/"), "{said}");
+    }
+    for part in [
+        "x/feedback/law \"n-pid\"",
+        "x/feedback/pid/kp_v_per_mm 1.",
+        "rate_hz\n",
+    ] {
+        assert!(printed.contains(part), "{printed}");
+    }
+    for part in [
+        "y/homing/search_mm_s = -1 is outside",
+        "did you mean y/feedback/law?",
+        "did you mean x/feedback/pid/kp_v_per_mm?",
+        "did you mean x/feedforward",
+    ] {
+        assert!(errors.contains(part), "{part}: {errors}");
+    }
+}
+
+#[test]
+fn settings_of_a_law_that_is_off_bar_no_limit() {
+    let load = "load host-sim/data/identified-stage.toml\n";
+    let limit = "set x/amplifier/output_limit_v 0.3\napply\n";
+    let output = session(&[], &format!("{load}{limit}"));
+    assert!(
+        output.status.success(),
+        "{}",
+        String::from_utf8_lossy(&output.stderr)
+    );
+    // In force, they do.
+    let output = session(
+        &[],
+        &format!("{load}set x/feedback/law sliding-mode\n{limit}"),
+    );
+    let errors = String::from_utf8(output.stderr).unwrap();
+    assert!(
+        errors.contains("x/feedback/sliding_mode/switching_v = 1"),
+        "{errors}"
+    );
 }

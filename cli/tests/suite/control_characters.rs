@@ -12,12 +12,13 @@ use quadrant::link::message::{
 };
 use quadrant::link::server::LinkServer;
 
-/// A clipboard's content, a line that is written over, a sequence of C1, and names from right to left.
-const ACTS: [&str; 4] = [
+/// A clipboard's content, a line that is written over, a sequence of C1, names from right to left, and a line of its own.
+const ACTS: [&str; 5] = [
     "\x1b]52;c;aGk=\x07",
     "a\rb",
     "\u{9b}2J",
     "\u{202e}x\u{2066}",
+    "a\nforged",
 ];
 
 fn assert_plain(output: &Output) {
@@ -29,6 +30,10 @@ fn assert_plain(output: &Output) {
                 || ('\u{2066}'..='\u{2069}').contains(&sign)
         };
         assert!(!said.contains(acts), "{said:?}");
+        assert!(
+            !said.lines().any(|line| line.starts_with("forged")),
+            "{said:?}"
+        );
     }
 }
 

@@ -5,8 +5,8 @@ use std::path::Path;
 use crate::command::{fail, succeed};
 use quadrant::settings::StageSettings;
 use quadrant_sim::report::whole;
-use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::setting_value::{Change, changes};
+use quadrant_sim::settings_file::SettingsFile;
 
 /// Where a commissioning leaves its settings by default.
 const LEFT: &str = "quadrant-out/settings.toml";
@@ -40,7 +40,10 @@ fn assert_keeps(command: &str, meant: &[&str]) {
     assert!(!changed.is_empty(), "{command}");
     for Change { path, old, new } in changed {
         let is_meant = |prefix: &&str| path.starts_with(*prefix);
-        assert!(meant.iter().any(|prefix| is_meant(&prefix)), "{command}: {path}: {old} -> {new}");
+        assert!(
+            meant.iter().any(|prefix| is_meant(&prefix)),
+            "{command}: {path}: {old} -> {new}"
+        );
         assert!(
             said.contains(&format!("{path}: {old} -> {new}\n")),
             "{command}: {path}: {old} -> {new}\n{said}"
@@ -92,10 +95,7 @@ fn an_identification_changes_what_it_has_identified_and_nothing_else() {
         ("motion --dead-time-s 0.00135", &both),
         ("nctf --most-mm-s 100", &["x/feedback/nctf"]),
     ] {
-        assert_keeps(
-            &format!("identify {step} --axis x --into {LEFT}"),
-            meant,
-        );
+        assert_keeps(&format!("identify {step} --axis x --into {LEFT}"), meant);
     }
 }
 
@@ -121,17 +121,34 @@ fn what_another_has_measured_is_not_written_over_by_settings_of_elsewhere() {
     ] {
         let words: Vec<&str> = command.split(' ').collect();
         let said = fail(at, &words);
-        for part in ["quadrant-out/settings.toml", "would be lost", "brake/release_s"] {
+        for part in [
+            "quadrant-out/settings.toml",
+            "would be lost",
+            "brake/release_s",
+        ] {
             assert!(said.contains(part), "{command}: {said}");
         }
         let after = SettingsFile::read(&at.join(LEFT)).unwrap();
         assert_eq!(after, before, "{command}");
     }
     // A folder for it, or the word of a person.
-    succeed(at, &["design", "pid", "--settings", "other.toml", "--out", "other"]);
+    succeed(
+        at,
+        &[
+            "design",
+            "pid",
+            "--settings",
+            "other.toml",
+            "--out",
+            "other",
+        ],
+    );
     let dump = ["connect", "--simulated", "dump", LEFT, "--overwrite"];
     succeed(at, &dump);
-    assert_ne!(SettingsFile::read(&at.join(LEFT)).unwrap().stage, before.stage);
+    assert_ne!(
+        SettingsFile::read(&at.join(LEFT)).unwrap().stage,
+        before.stage
+    );
 }
 
 #[test]

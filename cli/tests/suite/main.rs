@@ -7,6 +7,7 @@ mod command;
 mod commission;
 mod connect;
 mod connect_commission;
+mod console_motion;
 mod console_settings;
 mod control_characters;
 mod design_commands;

@@ -67,6 +67,45 @@ pub fn short(path: &str) -> String {
     of_axis.unwrap_or_else(|| bare.to_owned())
 }
 
+/// The path that is meant by one that there is not, or is not above one: of all paths the most similar. `None` for one that there is.
+pub fn meant(shown: &str) -> Option<String> {
+    let mut full = StageSettings::simulated();
+    let mut paths = Vec::new();
+    // An empty prefix names all of them.
+    let _ = full.list("", &mut |path| paths.push(path.to_owned()));
+    for part in std::mem::take(&mut paths)
+        .iter()
+        .filter(|path| is_part(path))
+    {
+        // A part is made without a refusal.
+        let _ = full.set_json(part, b"\"present\"");
+    }
+    let _ = full.list("", &mut |path| paths.push(short(path)));
+    let is_there = |path: &String| {
+        let rest = path.strip_prefix(shown.trim_end_matches('/'));
+        rest.is_some_and(|rest| rest.is_empty() || rest.starts_with('/'))
+    };
+    if paths.iter().any(is_there) {
+        return None;
+    }
+    paths.into_iter().min_by_key(|path| distance(shown, path))
+}
+
+/// The number of characters by which two texts differ (Levenshtein).
+fn distance(one: &str, other: &str) -> usize {
+    let mut row: Vec<usize> = (0..=other.chars().count()).collect();
+    for (index, sign) in one.chars().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = index + 1;
+        for (place, found) in other.chars().enumerate() {
+            let replaced = diagonal + usize::from(sign != found);
+            diagonal = row[place + 1];
+            row[place + 1] = replaced.min(diagonal + 1).min(row[place] + 1);
+        }
+    }
+    row.last().copied().unwrap_or_default()
+}
+
 /// A setting that differs between two stages' settings.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Change {
@@ -142,7 +181,8 @@ mod tests {
             full.set_json(part, b"\"present\"").unwrap();
         }
         let mut paths = Vec::new();
-        full.list("", &mut |path| paths.push(path.to_owned())).unwrap();
+        full.list("", &mut |path| paths.push(path.to_owned()))
+            .unwrap();
         for path in paths {
             let value = of(&full, &path).unwrap();
             let json = to_json(&path, &value).unwrap();
@@ -162,11 +202,41 @@ mod tests {
             .map(ToString::to_string)
             .collect();
         assert_eq!(shown[0], "rate_hz: 10000.0 -> 5000.0");
-        assert!(shown.contains(&"y/plant: \"present\" -> null".to_owned()), "{shown:?}");
-        assert!(shown.iter().any(|line| line.starts_with("z/feedback/pid/kp_v_per_mm: ")));
+        assert!(
+            shown.contains(&"y/plant: \"present\" -> null".to_owned()),
+            "{shown:?}"
+        );
+        assert!(
+            shown
+                .iter()
+                .any(|line| line.starts_with("z/feedback/pid/kp_v_per_mm: "))
+        );
         assert_eq!(changes(&after, &after), []);
         let lost = lost(&after, &before, &before);
         assert_eq!(lost.len(), shown.len());
+    }
+
+    #[test]
+    fn what_is_meant_by_a_path_that_there_is_not_is_the_most_similar_one() {
+        for (shown, path) in [
+            ("x/feedback/pid/kp", "x/feedback/pid/kp_v_per_mm"),
+            ("x.feedback.law", "x/feedback/law"),
+            (
+                "y/feedforward/learning/memory",
+                "y/feedforward/learning/memory_s",
+            ),
+            ("rate", "rate_hz"),
+        ] {
+            assert_eq!(meant(shown).as_deref(), Some(path), "{shown}");
+        }
+        for shown in [
+            "rate_hz",
+            "x/feedback",
+            "z/feedforward/cancelling/teeth",
+            "x/",
+        ] {
+            assert_eq!(meant(shown), None, "{shown}");
+        }
     }
 
     #[test]

@@ -286,12 +286,18 @@ mod tests {
             file().exchange_axis(&other, AxisName::Y)
         };
         let of = |what: &str| Err(what.to_owned());
-        assert_eq!(exchanged(|stage| stage.rate_hz = 5e3), of("the control rate"));
+        assert_eq!(
+            exchanged(|stage| stage.rate_hz = 5e3),
+            of("the control rate")
+        );
         let encoder = exchanged(|stage| stage.axes[0].encoder.resolution_mm *= 2.0);
         assert_eq!(encoder, of("the encoder of x"));
         let amplifier = exchanged(|stage| stage.axes[2].amplifier.reversed = true);
         assert_eq!(amplifier, of("the amplifier of z"));
-        assert_eq!(exchanged(|stage| stage.axes[1].encoder.reversed = true), Ok(()));
+        assert_eq!(
+            exchanged(|stage| stage.axes[1].encoder.reversed = true),
+            Ok(())
+        );
     }
 
     #[test]
@@ -327,7 +333,7 @@ mod tests {
         let text = toml::to_string_pretty(&bad).unwrap();
         assert_eq!(
             parse(&text).unwrap_err().to_string(),
-            "stage.toml: y.encoder.resolution_mm = 7 is outside 0.000001 to 1"
+            "stage.toml: y/encoder/resolution_mm = 7 is outside 0.000001 to 1"
         );
     }
 
