@@ -737,6 +737,8 @@ mod tests {
             Journal::count(&folder.path().join("x").join(EXPERIMENTS)),
             kept
         );
+        // It stands as free as at the beginning.
+        machine.stage = LawStage::new(1);
         let done = commission_with(folder.path(), &mut machine, &["--resume"]).unwrap();
         assert!(!done.text.is_empty());
         let again = said(commission_with(folder.path(), &mut machine, &["--resume"]));

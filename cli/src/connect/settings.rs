@@ -50,7 +50,9 @@ fn below(client: &mut Client, path: &str) -> anyhow::Result<Vec<String>> {
 fn named(error: ClientError, command: &str, path: &str) -> anyhow::Error {
     let shown = short(path);
     match meant(&shown) {
-        Some(meant) => anyhow!("{command}: no setting is {shown}; did you mean {meant}?"),
+        Some(meant) => {
+            anyhow!("{command}: no setting is {shown}; did you mean {meant}? `list` shows all")
+        }
         None => anyhow!(error.to_string().replace(path, &shown)),
     }
 }
@@ -67,7 +69,9 @@ pub(super) fn list(client: &mut Client, prefix: &str) -> anyhow::Result<Answer> 
     if paths.is_empty() {
         let shown = short(&path);
         match meant(&shown) {
-            Some(meant) => bail!("list: no setting is at or below {shown}; did you mean {meant}?"),
+            Some(meant) => bail!(
+                "list: no setting is at or below {shown}; did you mean {meant}? `list` shows all"
+            ),
             None => bail!("list: {shown} is in a part that is left out"),
         }
     }

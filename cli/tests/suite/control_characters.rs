@@ -147,7 +147,8 @@ fn a_log_through_the_debug_probe_does_not_act_on_the_terminal() {
     let probe = folder.path().join("probe-rs");
     let elf = folder.path().join("firmware.elf");
     std::fs::write(&elf, "an image").unwrap();
-    std::fs::write(folder.path().join("log"), ACTS.join("\n")).unwrap();
+    // A line of the probe's program is a line.
+    std::fs::write(folder.path().join("log"), ACTS[..4].join("\n")).unwrap();
     std::fs::write(&probe, "#!/bin/sh\ncat \"${0%/*}/log\"\n").unwrap();
     std::fs::set_permissions(&probe, std::fs::Permissions::from_mode(0o755)).unwrap();
     let path = std::env::var("PATH").unwrap();

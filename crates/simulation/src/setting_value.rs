@@ -88,7 +88,9 @@ pub fn meant(shown: &str) -> Option<String> {
     if paths.iter().any(is_there) {
         return None;
     }
-    paths.into_iter().min_by_key(|path| distance(shown, path))
+    // One that ends too early is the beginning of what is meant.
+    let rank = |path: &String| (!path.starts_with(shown), distance(shown, path));
+    paths.into_iter().min_by_key(rank)
 }
 
 /// The number of characters by which two texts differ (Levenshtein).
