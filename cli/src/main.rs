@@ -9,6 +9,7 @@ mod connect;
 mod design;
 mod endpoint;
 mod identify;
+mod kept;
 mod plane;
 mod replay;
 mod replay_program;

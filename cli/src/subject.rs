@@ -7,10 +7,10 @@ use clap::Args;
 use quadrant::axes::AxisName;
 use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::{Machine, MachineError, TestAxis, Travel};
-use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 
 use super::endpoint::Endpoint;
+use super::kept;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::command_line;
 use quadrant_cli::{explained, say};
@@ -234,17 +234,22 @@ impl Destination {
             return Ok(());
         };
         let axis = subject.axis()?;
-        let mut file = match subject.start(Some(path))? {
-            Some(file) => file,
-            None => SettingsFile::new(machine.unwrap_or_else(StageSettings::simulated)),
+        let mut file = match (subject.start(Some(path))?, machine) {
+            (Some(file), _) => file,
+            (None, Some(machine)) => SettingsFile::new(machine),
+            (None, None) => kept::built_in(),
         };
+        let start = file.stage.clone();
         change(&mut file.stage.axes[axis.index()]);
         let records = records
             .iter()
             .map(|path| path.display().to_string())
             .collect();
         file.add_provenance(&command_line(), axis.name(), records, sets);
-        file.write(path, whole::write)?;
+        kept::refuse_loss(path, &start, &file.stage)?;
+        for line in kept::write(&file, &start, path)? {
+            say!("{line}");
+        }
         say!(
             "{}: the settings with this {} of {}",
             path.display(),

@@ -1,5 +1,6 @@
 //! Requests to move, checked against the settings before anything moves. For the slow half.
 
+use core::f64::consts::{FRAC_PI_2, PI, TAU};
 use core::fmt;
 
 use super::axis::AxisSettings;
@@ -7,7 +8,9 @@ use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
 use crate::law::axes::AxisName;
 use crate::law::decimal::Decimal;
-use crate::law::reference::{MotionScale, PointToPointSettings, StreamLimits, Velocity};
+use crate::law::reference::{
+    MotionScale, MotionSettings, PointToPointSettings, StreamLimits, Velocity,
+};
 use crate::law::units::Position;
 
 /// Reason why an axis is not moved.
@@ -75,7 +78,78 @@ impl fmt::Display for MoveError {
 
 impl core::error::Error for MoveError {}
 
+/// The lowest and the highest position of a motion, mm from its start.
+pub fn reach_mm(motion: &MotionSettings) -> (f64, f64) {
+    match motion {
+        MotionSettings::Hold => (0.0, 0.0),
+        MotionSettings::PointToPoint(to) => (to.distance_mm.min(0.0), to.distance_mm.max(0.0)),
+        MotionSettings::Harmonic(sine) => {
+            // Lead-in and lead-out turn half as far as full speed would.
+            let lead_rad = PI * sine.frequency_hz * sine.lead_s;
+            let first_rad = sine.phase_rad - lead_rad;
+            let turned_rad = match sine.cycles {
+                Some(cycles) => TAU * cycles + 2.0 * lead_rad,
+                None => TAU,
+            };
+            let (first, last) = (libm::sin(first_rad), libm::sin(first_rad + turned_rad));
+            // The sine's next extreme value, 1 at a quarter of a turn, -1 at three quarters.
+            let meets = |extreme_rad: f64| {
+                let turns = libm::ceil((first_rad - extreme_rad) / TAU);
+                extreme_rad + TAU * turns <= first_rad + turned_rad
+            };
+            let low = if meets(-FRAC_PI_2) {
+                -1.0
+            } else {
+                first.min(last)
+            };
+            let high = if meets(FRAC_PI_2) {
+                1.0
+            } else {
+                first.max(last)
+            };
+            let from_start = |sine_value: f64| sine.amplitude_mm * (sine_value - first);
+            (from_start(low), from_start(high))
+        }
+    }
+}
+
 impl StageSettings {
+    /// Checks that a motion of a homed axis from rest at `from` keeps to its travel; `reach_mm` is what [`reach_mm`] says of it.
+    ///
+    /// # Errors
+    /// The farther end of the motion, and the travel.
+    pub fn check_reach(
+        &self,
+        axis: AxisName,
+        from: Position,
+        reach_mm: (f64, f64),
+    ) -> Result<(), MoveError> {
+        let settings = self.axis(axis);
+        let Some(travel) = settings.limits.travel_mm else {
+            return Ok(());
+        };
+        // An axis that holds stays where it is, and one at the end of its travel may leave it.
+        let count_mm = settings.encoder.resolution_mm;
+        let from_mm = from.to_mm(count_mm);
+        for (end_mm, moves) in [
+            (from_mm + reach_mm.0, reach_mm.0 < -count_mm),
+            (from_mm + reach_mm.1, reach_mm.1 > count_mm),
+        ] {
+            let within =
+                end_mm >= travel.negative - count_mm && end_mm <= travel.positive + count_mm;
+            if moves && !within {
+                return Err(MoveError {
+                    axis,
+                    flaw: MoveFlaw::BeyondTravel {
+                        target_mm: end_mm,
+                        travel_mm: (travel.negative, travel.positive),
+                    },
+                });
+            }
+        }
+        Ok(())
+    }
+
     /// The settings of an axis.
     pub fn axis(&self, axis: AxisName) -> &AxisSettings {
         let [x, y, z] = &self.axes;

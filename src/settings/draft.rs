@@ -6,7 +6,7 @@
 
 use core::fmt;
 
-use super::error::SettingsError;
+use super::error::{PathOf, SettingsError};
 use super::leaves::rules::{SAFETY_OF_AN_AXIS, SAFETY_OF_THE_STAGE};
 use super::stage::StageSettings;
 use super::tree::{MAX_VALUE_BYTES, TreeError, same_in};
@@ -37,7 +37,7 @@ impl fmt::Display for ApplyError {
         match self {
             Self::Refused(error) => error.fmt(f),
             Self::RateNeedsRestart => write!(f, "rate_hz {REMEDY}"),
-            Self::EncoderNeedsRestart(axis) => write!(f, "{axis}.encoder {REMEDY}"),
+            Self::EncoderNeedsRestart(axis) => write!(f, "{axis}/encoder {REMEDY}"),
         }
     }
 }
@@ -61,13 +61,10 @@ pub struct SafetyLeaf {
 
 impl fmt::Display for SafetyLeaf {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(axis) = self.axis {
-            write!(f, "{axis}.")?;
-        }
         write!(
             f,
             "{} changes only while the outputs are off: disable them first",
-            self.field
+            PathOf(self.axis, self.field)
         )
     }
 }

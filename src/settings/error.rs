@@ -66,20 +66,36 @@ pub struct SettingsError {
     pub reason: Reason,
 }
 
+/// A field of an axis or of the stage as the path by which it is set: `x/feedback/law`.
+pub(crate) struct PathOf(pub(crate) Option<AxisName>, pub(crate) &'static str);
+
+impl fmt::Display for PathOf {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self(axis, field) = *self;
+        if let Some(axis) = axis {
+            write!(f, "{axis}/")?;
+        }
+        for (place, part) in field.split('.').enumerate() {
+            if place > 0 {
+                f.write_str("/")?;
+            }
+            f.write_str(part)?;
+        }
+        Ok(())
+    }
+}
+
 impl fmt::Display for SettingsError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        if let Some(axis) = self.axis {
-            write!(f, "{axis}.")?;
-        }
-        f.write_str(self.field)?;
+        PathOf(self.axis, self.field).fmt(f)?;
         if !matches!(self.reason, Reason::Missing | Reason::NeedsPid) {
             write!(f, " = {}", Decimal(self.value))?;
         }
         match self.reason {
             Reason::Missing => f.write_str(" is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"),
-            Reason::NeedsPid => f.write_str(" needs feedback.law = \"pd\", \"pid\" or \"n-pid\"; choose one, or leave it out"),
+            Reason::NeedsPid => f.write_str(" needs feedback/law = \"pd\", \"pid\" or \"n-pid\"; choose one, or leave it out"),
             Reason::IndexUnknown => f.write_str(
-                ": homing by the index pulse needs encoder.counts_per_index; give it, or home without the index",
+                ": homing by the index pulse needs encoder/counts_per_index; give it, or home without the index",
             ),
             Reason::Unstable => f.write_str(
                 ": the loop that the law closes at small errors is not shown to be stable on the axis' plant; \

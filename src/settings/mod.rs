@@ -26,7 +26,7 @@ mod validate;
 pub(crate) mod value;
 
 pub use axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardSettings};
-pub use destination::{MoveError, MoveFlaw};
+pub use destination::{MoveError, MoveFlaw, reach_mm};
 pub use error::{Reason, SettingsError};
 pub use feedback::FeedbackSettings;
 pub use homing::{HomeSwitch, HomingSettings};

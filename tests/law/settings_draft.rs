@@ -68,7 +68,7 @@ fn a_refused_value_refuses_the_whole() {
     set(&mut draft, "/axes/x/feedback/pid/kp_v_per_mm", "1.0");
     set(&mut draft, "/axes/z/amplifier/offset_v", "5");
     let message = draft.apply(8).expect_err("beyond its range").to_string();
-    assert_eq!(message, "z.amplifier.offset_v = 5 is outside -1 to 1");
+    assert_eq!(message, "z/amplifier/offset_v = 5 is outside -1 to 1");
     set(&mut draft, "/axes/z/amplifier/offset_v", "0.5");
     assert_eq!(draft.apply(8), Ok([true, false, true]));
 }
@@ -174,25 +174,25 @@ fn a_setting_on_which_safety_depends_is_named() {
     };
     assert_eq!(text(&|_| {}), None);
     for (path, json, said) in [
-        ("/axes/x/amplifier/reversed", "true", "x.amplifier.reversed"),
+        ("/axes/x/amplifier/reversed", "true", "x/amplifier/reversed"),
         (
             "/axes/y/amplifier/output_limit_v",
             "9.0",
-            "y.amplifier.output_limit_v",
+            "y/amplifier/output_limit_v",
         ),
         (
             "/axes/z/limits/braking_mm_s2",
             "5000",
-            "z.limits.braking_mm_s2",
+            "z/limits/braking_mm_s2",
         ),
         (
             "/axes/z/limits/travel_mm",
             "null",
-            "z.limits.travel_mm.negative",
+            "z/limits/travel_mm/negative",
         ),
-        ("/axes/y/homing/switch", "\"limit\"", "y.homing.switch"),
-        ("/axes/x/plant", "null", "x.plant.gain_mm_per_v_s2"),
-        ("/streaming/link_lost", "\"hold\"", "streaming.link_lost"),
+        ("/axes/y/homing/switch", "\"limit\"", "y/homing/switch"),
+        ("/axes/x/plant", "null", "x/plant/gain_mm_per_v_s2"),
+        ("/streaming/link_lost", "\"hold\"", "streaming/link_lost"),
     ] {
         let found = text(&|draft| set(draft, path, json)).expect(path);
         assert!(found.starts_with(said), "{found}");

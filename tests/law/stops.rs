@@ -34,12 +34,12 @@ fn settings_by_which_a_stop_would_not_end_are_refused_by_name() {
     for (said, field) in [
         (
             refused(|x| x.limits.braking_mm_s2 = 1e-3),
-            "x.limits.braking_mm_s2",
+            "x/limits/braking_mm_s2",
         ),
         // 2000 mm/s^2 are the largest acceleration.
         (
             refused(|x| x.limits.braking_mm_s2 = 1999.0),
-            "x.limits.braking_mm_s2",
+            "x/limits/braking_mm_s2",
         ),
         // A second from 250 mm/s.
         (
@@ -47,11 +47,11 @@ fn settings_by_which_a_stop_would_not_end_are_refused_by_name() {
                 x.limits.max_acceleration_mm_s2 = 1.0;
                 x.limits.braking_mm_s2 = 249.0;
             }),
-            "x.limits.braking_mm_s2",
+            "x/limits/braking_mm_s2",
         ),
         (
             refused(|x| x.limits.braking_jerk_mm_s3 = 3999.0),
-            "x.limits.braking_jerk_mm_s3",
+            "x/limits/braking_jerk_mm_s3",
         ),
     ] {
         assert!(said.starts_with(field), "{said}");

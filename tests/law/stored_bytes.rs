@@ -296,7 +296,7 @@ fn a_value_out_of_its_range_refuses_the_set() {
     };
     assert_eq!(
         error.to_string(),
-        "y.feedback.pid.kp_v_per_mm = -1 is outside 0 to 10000"
+        "y/feedback/pid/kp_v_per_mm = -1 is outside 0 to 10000"
     );
 }
 

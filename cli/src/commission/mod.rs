@@ -3,6 +3,7 @@
 mod saved;
 
 use std::fmt::Write as _;
+use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -20,11 +21,12 @@ use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
 use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
-use quadrant_sim::report::{Table, whole};
+use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
 use super::endpoint::Endpoint;
+use super::kept;
 use super::subject::{and_restored, known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
@@ -54,8 +56,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true, conflicts_with = "record")]
     travel: Option<Travel>,
     /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
-    /// Without them those of --into if it is there, else those that the machine has, and the axes that were commissioned
-    /// into the folder for results before.
+    /// Without them those of --into if it is there; else the machine's for this axis, and everything else as it is in the
+    /// folder for results, or as the machine has it.
     #[arg(long, value_name = "FILE")]
     settings: Option<PathBuf>,
     /// Write the settings into this file; without it, into settings.toml in the folder for results. Everything else is
@@ -179,7 +181,16 @@ impl Arguments {
         let Self { output, .. } = self;
         output.ready()?;
         let axis = AxisName::from(self.axis);
-        let mut file = start.unwrap_or_else(|| SettingsFile::new(StageSettings::simulated()));
+        let path = match &self.into {
+            Some(path) => path.clone(),
+            None => output.file(SETTINGS)?,
+        };
+        let mut file = match start {
+            Some(file) => file,
+            None if path.exists() => SettingsFile::read(&path)?,
+            None => kept::built_in(),
+        };
+        kept::refuse_loss_beside(&path, &file.stage, axis)?;
         let base = file.stage.axes[axis as usize].clone();
         let found = Found {
             found: saved::read(folder, base.encoder.resolution_mm)?.commissioned(
@@ -190,10 +201,6 @@ impl Arguments {
             checked: None,
         };
         terminal::print(format_args!("{}", found.text()));
-        let path = match &self.into {
-            Some(path) => path.clone(),
-            None => output.file(SETTINGS)?,
-        };
         let who = format!("the {axis} axis, recorded in {}", folder.display());
         let output = &output.below(axis.as_str());
         for line in found.keep(output, &mut file, &path, axis, &who)? {
@@ -203,24 +210,47 @@ impl Arguments {
     }
 }
 
-/// The machine's settings, and those of the other axes that were commissioned into `path` before.
+/// The settings in `path` with the machine's of this axis; those of the machine where there is no such file.
 fn beside_others(
     machine: StageSettings,
     axis: AxisName,
     path: &Path,
 ) -> anyhow::Result<SettingsFile> {
-    let mut file = SettingsFile::new(machine);
-    if path.exists() {
-        file.keep_other_axes(&SettingsFile::read(path)?, axis)
-            .map_err(|other| {
-                anyhow!(
-                    "{}: the {other} axis has another encoder or amplifier there than the machine's; give another --out, or \
-                     --settings",
-                    path.display()
-                )
-            })?;
+    if !path.exists() {
+        return Ok(SettingsFile::new(machine));
     }
+    let mut file = SettingsFile::read(path)?;
+    file.exchange_axis(&machine, axis).map_err(|what| {
+        anyhow!(
+            "{}: {what} there is not that of the machine; give another --out, or --settings",
+            path.display()
+        )
+    })?;
     Ok(file)
+}
+
+/// Checks that a folder holds experiments of the commissioning that `words` are of, and says what is adopted from there.
+fn resumed(experiments: &Path, words: &str) -> anyhow::Result<String> {
+    let folder = experiments.display();
+    let count = Journal::count(experiments);
+    if count == 0 {
+        bail!(
+            "nothing is to be resumed in {folder}: no commissioning was interrupted there. One that has ended is not begun again by \
+             --resume; leave it out to begin"
+        );
+    }
+    match Journal::request(experiments) {
+        Some(begun) if begun != words => bail!(
+            "the commissioning in {folder} was begun with {begun}, and this is {words}: resume it with the same, or leave out --resume \
+             to begin again"
+        ),
+        Some(begun) => Ok(format!(
+            "resuming with the {count} experiments in {folder}, which were begun with {begun}"
+        )),
+        None => bail!(
+            "{folder} does not say with which options it was begun: leave out --resume to begin again"
+        ),
+    }
 }
 
 impl Job<'_> {
@@ -235,14 +265,26 @@ impl Job<'_> {
             Some(file) => file,
             None => beside_others(before.clone(), axis, &output.file(SETTINGS)?)?,
         };
+        let result = match self.into {
+            Some(path) => path.to_owned(),
+            None => output.file(SETTINGS)?,
+        };
+        kept::refuse_loss_beside(&result, &file.stage, axis)?;
         let base = file.stage.axes[axis as usize].clone();
         let folder = output.below(axis.as_str());
         folder.ready()?;
         let experiments = folder.file(EXPERIMENTS)?;
+        let words = self.request.words(output.seed, self.travel, &base);
+        if self.request.resume {
+            warn!("{}", resumed(&experiments, &words)?);
+        }
         let outcome = {
             let mut test_axis = machine.test_axis(axis, travel)?;
             let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
                 .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
+            journal
+                .keep_request(&words)
+                .with_context(|| format!("cannot write into {}", experiments.display()))?;
             for path in journal.foreign() {
                 warn!("{} was not written here, and stays", path.display());
             }
@@ -252,7 +294,7 @@ impl Job<'_> {
         let found = match outcome {
             Ok(found) => found,
             Err(error) => {
-                let error = if Journal::is_empty(&experiments) {
+                let error = if Journal::count(&experiments) == 0 {
                     Journal::remove(&experiments)?;
                     error.context("the commissioning has ended before anything was measured")
                 } else {
@@ -267,10 +309,10 @@ impl Job<'_> {
 
         let who = format!("the {axis} axis of {}", machine.description());
         let better = found.is_better_than_pid();
-        let path = match self.into {
-            Some(path) if better => path.to_owned(),
-            None if better => output.file(SETTINGS)?,
-            _ => folder.file(PID_ALONE)?,
+        let path = if better {
+            result
+        } else {
+            folder.file(PID_ALONE)?
         };
         let mut text = found.text();
         for line in found.keep(&folder, &mut file, &path, axis, &who)? {
@@ -337,6 +379,33 @@ impl Request {
             }),
             ..CommissionSettings::default()
         }
+    }
+
+    /// What a commissioning can be resumed with alone: seed, options, and the settings of the axis that it starts from.
+    fn words(&self, seed: u64, travel: Option<Travel>, base: &AxisSettings) -> String {
+        let mut words = format!("--seed {seed}");
+        if let Some(travel) = travel {
+            let _ = write!(
+                words,
+                " --travel -{}..{}",
+                travel.negative_mm, travel.positive_mm
+            );
+        }
+        for (option, value) in [
+            ("--gain-margin-db", self.gain_margin_db),
+            ("--phase-margin-deg", self.phase_margin_deg),
+        ] {
+            if let Some(value) = value {
+                let _ = write!(words, " {option} {value}");
+            }
+        }
+        if self.quick {
+            words.push_str(" --quick");
+        }
+        let mut hasher = DefaultHasher::new();
+        format!("{base:?}").hash(&mut hasher);
+        let _ = write!(words, " and settings number {:08x}", hasher.finish() as u32);
+        words
     }
 
     /// Commissions the test_axis's axis, with a bar for whoever watches.
@@ -446,6 +515,7 @@ impl Found {
             .iter()
             .map(|name| format!("{axis}/{name}"))
             .collect();
+        let start = file.stage.clone();
         file.stage.axes[axis as usize] = found.settings.clone();
         file.add_provenance(
             &command,
@@ -453,12 +523,12 @@ impl Found {
             records,
             &["feedback", "friction", "feedforward", "plant"],
         );
-        file.write(path, whole::write)?;
+        let mut lines = kept::write(file, &start, path)?;
         for table in self.tables() {
             output.keep_table(&table)?;
         }
         let page = commission_page(who, found, checked, provenance(&command, output.seed));
-        let mut lines = vec![format!("{}: the settings of the stage", path.display())];
+        lines.push(format!("{}: the settings of the stage", path.display()));
         lines.extend(output.keep_page(&page, "commission.html")?);
         Ok(lines)
     }
@@ -478,11 +548,14 @@ mod tests {
         dead: bool,
         /// True if the machine takes no settings any more.
         deaf: bool,
+        /// The beginning of the name of experiments at which the line is cut.
+        cut_at: Option<&'static str>,
     }
 
     struct SpoiltAxis<'a> {
         axis: Box<dyn TestAxis + 'a>,
         dead: bool,
+        cut_at: Option<&'static str>,
     }
 
     impl Machine for Spoilt {
@@ -507,9 +580,9 @@ mod tests {
             axis: AxisName,
             travel: Travel,
         ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
-            let dead = self.dead;
+            let (dead, cut_at) = (self.dead, self.cut_at);
             let axis = self.stage.test_axis(axis, travel)?;
-            Ok(Box::new(SpoiltAxis { axis, dead }))
+            Ok(Box::new(SpoiltAxis { axis, dead, cut_at }))
         }
 
         fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
@@ -542,7 +615,8 @@ mod tests {
             experiment: &Experiment,
             progress: &mut dyn FnMut(f64),
         ) -> Result<Recording, ExperimentError> {
-            if self.dead {
+            let is_cut = |at| experiment.name.starts_with(at);
+            if self.dead || self.cut_at.is_some_and(is_cut) {
                 return Err(ExperimentError::Impossible {
                     experiment: experiment.name.clone(),
                     reason: "the line is cut".to_owned(),
@@ -568,8 +642,13 @@ mod tests {
 
     /// A quick commissioning of x into a folder.
     fn commission_into(folder: &Path, machine: &mut Spoilt) -> anyhow::Result<Done> {
+        commission_with(folder, machine, &[])
+    }
+
+    fn commission_with(folder: &Path, machine: &mut Spoilt, more: &[&str]) -> anyhow::Result<Done> {
         let words = ["", "--quick", "--out"].map(std::ffi::OsStr::new);
         let words = words.into_iter().chain([folder.as_os_str()]);
+        let words = words.chain(more.iter().map(std::ffi::OsStr::new));
         let Words { request, output } = clap::Parser::parse_from(words);
         let job = Job {
             axis: AxisName::X,
@@ -591,6 +670,7 @@ mod tests {
             stage: LawStage::new(1),
             dead: false,
             deaf: false,
+            cut_at: None,
         };
         let before = machine.settings().unwrap();
         let done = commission_into(folder.path(), &mut machine).unwrap();
@@ -611,12 +691,58 @@ mod tests {
             stage: LawStage::new(1),
             dead: true,
             deaf: false,
+            cut_at: None,
         };
         let error = commission_into(folder.path(), &mut machine).err().unwrap();
         let said = quadrant_cli::explained(&error);
         assert!(said.contains("the line is cut"), "{said}");
         assert!(!said.contains("--resume"), "{said}");
         assert!(!folder.path().join("x").join(EXPERIMENTS).exists());
+    }
+
+    #[test]
+    fn what_was_interrupted_is_resumed_with_the_same_options_alone_and_what_has_ended_is_not() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut machine = Spoilt {
+            stage: LawStage::new(1),
+            dead: false,
+            deaf: false,
+            cut_at: Some("frequency response"),
+        };
+        let said = |outcome: anyhow::Result<Done>| match outcome {
+            Ok(_) => String::new(),
+            Err(error) => quadrant_cli::explained(&error),
+        };
+        let early = said(commission_with(folder.path(), &mut machine, &["--resume"]));
+        assert!(early.contains("nothing is to be resumed"), "{early}");
+        let cut = said(commission_into(folder.path(), &mut machine));
+        assert!(cut.contains("--resume"), "{cut}");
+        machine.cut_at = None;
+        let kept = Journal::count(&folder.path().join("x").join(EXPERIMENTS));
+        for options in [
+            &["--resume", "--seed", "2"][..],
+            &[
+                "--resume",
+                "--gain-margin-db",
+                "12",
+                "--phase-margin-deg",
+                "60",
+            ],
+        ] {
+            let other = said(commission_with(folder.path(), &mut machine, options));
+            assert!(other.contains("begun with --seed 1"), "{other}");
+            assert!(other.contains(&options[1..].join(" ")), "{other}");
+        }
+        assert_eq!(
+            Journal::count(&folder.path().join("x").join(EXPERIMENTS)),
+            kept
+        );
+        // It stands as free as at the beginning.
+        machine.stage = LawStage::new(1);
+        let done = commission_with(folder.path(), &mut machine, &["--resume"]).unwrap();
+        assert!(!done.text.is_empty());
+        let again = said(commission_with(folder.path(), &mut machine, &["--resume"]));
+        assert!(again.contains("has ended is not begun again"), "{again}");
     }
 
     #[test]
@@ -627,6 +753,7 @@ mod tests {
                 stage: LawStage::new(1),
                 dead,
                 deaf: true,
+                cut_at: None,
             };
             let error = commission_into(folder.path(), &mut machine).err().unwrap();
             let said = quadrant_cli::explained(&error);
@@ -653,6 +780,7 @@ mod tests {
             stage: LawStage::new(1),
             dead: true,
             deaf: false,
+            cut_at: None,
         };
         let mut refused = || {
             let error = commission_into(&out, &mut machine).err().unwrap();

@@ -28,6 +28,9 @@ impl Answer {
     }
 }
 
+/// What has become of a machine that was restarted.
+pub(super) const RESTARTED: &str = "restarted: the outputs are off, home positions are lost";
+
 /// Checks seconds that were given, 0 to 1e6.
 pub(super) fn seconds(what: &str, seconds: f64) -> anyhow::Result<Duration> {
     const MOST_S: f64 = 1e6;

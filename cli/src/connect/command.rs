@@ -111,8 +111,11 @@ pub(super) enum Command {
     },
     /// Write all settings to a file that every other command reads.
     Dump {
-        /// The file: TOML.
+        /// The file: TOML. One that holds other settings is refused.
         file: PathBuf,
+        /// Write over a file that holds other settings.
+        #[arg(long)]
+        overwrite: bool,
     },
     /// Load all settings from a file and let them act as a whole; what the machine refuses changes nothing.
     Load {

@@ -65,7 +65,7 @@ fn answer(session: &mut Session, command: &Command) -> anyhow::Result<Answer> {
         Command::Set { path, value } => settings::set(client, path, value),
         Command::List { prefix } => settings::list(client, prefix),
         Command::Diff { file } => settings::diff(client, file.as_deref()),
-        Command::Dump { file } => settings::dump(client, file),
+        Command::Dump { file, overwrite } => settings::dump(client, file, *overwrite),
         Command::Load { file } => settings::load(client, file),
         Command::Apply => settings::apply(client),
         Command::Revert | Command::Defaults => settings::draft(client, command),

@@ -5,11 +5,12 @@ use std::fmt::Write as _;
 use anyhow::{Context, bail};
 use quadrant::axes::AxisName;
 use quadrant::link::message::{self, AxisSet, Body, Status};
+use quadrant::safety::FaultCode;
 use quadrant_sim::client::{Client, settle, with_reset};
 use quadrant_sim::machine::serial_ports;
 use serde_json::json;
 
-use super::answer::{Answer, name, seconds};
+use super::answer::{Answer, RESTARTED, name, seconds};
 use super::command::Command;
 use super::{inputs, learnt};
 use quadrant_cli::axis::Axis;
@@ -109,13 +110,18 @@ pub(super) fn axis_lines(status: &Status) -> Vec<String> {
     lines
 }
 
+/// The name of a fault, with a space before it; nothing of one of a later release.
+pub(super) fn fault_name(code: u8) -> String {
+    FaultCode::from_number(code).map_or_else(String::new, |fault| format!(" {}", fault.name()))
+}
+
 fn status_text(status: &Status, rate_hz: f64, cycle_hz: u32) -> String {
     let mut text = format!(
         "{state}{fault}, {motion}; tick {tick} ({time:.4} s)\n",
         state = status.state.as_str(),
         fault = status
             .fault
-            .map(|code| format!(" {code} (`fault` says more)"))
+            .map(|code| format!(" {code}{} (`fault` says more)", fault_name(code)))
             .unwrap_or_default(),
         motion = if status.running { "moving" } else { "at rest" },
         tick = status.tick,
@@ -202,7 +208,18 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
         other => bail!("{}: not an order", other.name()),
     };
     client.order(body)?;
-    Ok(Answer::done())
+    let text = match command {
+        Command::Reset => "the fault is cleared; the outputs are off",
+        Command::Enable => "the outputs are on; the axes hold",
+        Command::Home { .. } => "homing; `wait homed` waits for its end",
+        Command::Run => "the plan begins; `wait rest` waits for its end",
+        Command::Reboot => {
+            client.restarted()?;
+            RESTARTED
+        }
+        _ => "",
+    };
+    Ok(Answer::new(text, json!("done")))
 }
 
 fn some_or_all(axes: &[Axis]) -> AxisSet {
@@ -231,7 +248,7 @@ pub(super) fn wait(
             settle::homed(client, some_or_all(axes), timeout)?;
         }
         number => match number.parse() {
-            Ok(time_s) => client.wait(seconds("wait", time_s)?)?,
+            Ok(time_s) => settle::time(client, seconds("wait", time_s)?)?,
             Err(_) => bail!("wait {number}: give seconds, `rest` or `homed`"),
         },
     }

@@ -13,6 +13,7 @@ use serde_json::{Value, json};
 
 use super::answer::{Answer, name, seconds};
 use super::command::{ArmOptions, CaptureCommand, CrossedEdge, RecordOptions, TriggerEvent};
+use super::machine::fault_name;
 use super::session::Session;
 
 /// Time from one look at what has come to the next.
@@ -244,10 +245,14 @@ pub(super) fn line(notice: &Notice, rate_hz: f64) -> Option<(String, Value)> {
     }
 }
 
-/// An event in words.
+/// An event in words, a fault by its name.
 fn said(event: &Event) -> String {
-    match event {
-        Event::Fault { .. } => format!("{event}; `fault` says more"),
-        _ => event.to_string(),
-    }
+    let (code, more) = match event {
+        Event::Fault { code, .. } => (code, "; `fault` says more"),
+        Event::Stopping { code, .. } | Event::Held { code, .. } => (code, ""),
+        _ => return event.to_string(),
+    };
+    let number = format!("fault {code}");
+    let named = format!("{number}{}", fault_name(*code));
+    format!("{}{more}", event.to_string().replacen(&number, &named, 1))
 }

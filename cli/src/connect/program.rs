@@ -44,25 +44,64 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
         Sense::CounterClockwise
     };
     let feed_mm_s = options.feed_mm_min / 60.0;
+    let rate_hz = client.identity().rate_hz;
+    let closed = Closed::new(options, feed_mm_s, rate_hz);
     let motions = circle(
         options.plane.plane(),
         sense,
         options.radius_mm,
-        feed_mm_s,
+        closed.feed_mm_s,
         0.0,
-        options.turns,
-        options.lead_s,
+        closed.turns,
+        closed.lead_s,
     );
     client.order(Body::SetPlan(PlanSettings { motions }.into()))?;
-    let turn_s = TAU * options.radius_mm / feed_mm_s;
-    let duration_s = options.turns * turn_s + 2.0 * options.lead_s;
+    let duration_s = closed.duration_s;
     let text = format!(
-        "a circle of {} mm in {} at {feed_mm_s:.3} mm/s: {duration_s:.3} s; `run` starts it",
+        "a circle of {} mm in {} at {feed_mm_s:.3} mm/s: {duration_s:.3} s, {} from where the axes stand and back; `run` starts it",
         options.radius_mm,
-        options.plane.name()
+        options.plane.name(),
+        match closed.around {
+            1.0 => "once around".to_owned(),
+            around => format!("{around} times around"),
+        }
     );
     Ok(Answer::new(text, json!({ "duration_s": duration_s })))
 }
+
+/// A circle that ends where it began: lead-in and lead-out are parts of its last turn.
+struct Closed {
+    /// A little below what was asked for, so that it closes with a whole control tick.
+    feed_mm_s: f64,
+    /// Turns at full feed: those that were asked for, and what closes the circle.
+    turns: f64,
+    /// Turns in all.
+    around: f64,
+    lead_s: f64,
+    duration_s: f64,
+}
+
+impl Closed {
+    fn new(options: &CircleOptions, feed_mm_s: f64, rate_hz: f64) -> Self {
+        let turn_mm = TAU * options.radius_mm;
+        let lead_ticks = (options.lead_s * rate_hz).round().max(1.0);
+        let lead_s = lead_ticks / rate_hz;
+        // Lead-in and lead-out turn half as far as full feed would.
+        let least = options.turns + lead_s * feed_mm_s / turn_mm;
+        let around = (least - SLACK).ceil();
+        let ticks = (around * turn_mm / feed_mm_s * rate_hz).ceil();
+        Self {
+            feed_mm_s: around * turn_mm * rate_hz / ticks,
+            turns: around * (ticks - lead_ticks) / ticks,
+            around,
+            lead_s,
+            duration_s: (ticks + lead_ticks) / rate_hz,
+        }
+    }
+}
+
+/// Share of a turn that a circle may lack of what was asked for, rather than turn once more.
+const SLACK: f64 = 1e-6;
 
 pub(super) fn stream_program(
     client: &mut Client,

@@ -1,6 +1,7 @@
 //! Commands from standard input: a script, or a person at a prompt.
 
 use std::io::{self, BufRead, IsTerminal};
+use std::path::PathBuf;
 use std::sync::mpsc::{self, Receiver, RecvTimeoutError};
 use std::thread;
 use std::time::Duration;
@@ -123,12 +124,29 @@ impl Drop for Modes {
     }
 }
 
+/// The file of the lines that a person has typed, in `quadrant` below `XDG_STATE_HOME`, without that below `~/.local/state`; none where
+/// it cannot be made.
+fn history_file() -> Option<PathBuf> {
+    let given = |name| std::env::var_os(name).map(PathBuf::from);
+    let state = given("XDG_STATE_HOME")
+        .filter(|folder| folder.is_absolute())
+        .or_else(|| Some(given("HOME")?.join(".local/state")))?;
+    let folder = state.join("quadrant");
+    std::fs::create_dir_all(&folder).ok()?;
+    Some(folder.join("history"))
+}
+
 /// A person: errors end nothing, Ctrl-C stops the axes and what is under way, Ctrl-D ends.
 fn prompt(session: &mut Session) -> anyhow::Result<()> {
     let _modes = Modes;
     let mut editor =
         Editor::<Completion, DefaultHistory>::new().context("cannot use the terminal")?;
     editor.set_helper(Some(Completion::new()));
+    let history = history_file();
+    if let Some(file) = &history {
+        // The first session finds none.
+        let _ = editor.load_history(file);
+    }
     let (wanted, wants) = mpsc::channel();
     let (lines, read) = mpsc::channel();
     thread::spawn(move || {
@@ -136,6 +154,10 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
             let line = editor.readline("quadrant> ");
             if let Ok(line) = &line {
                 let _ = editor.add_history_entry(line.as_str());
+                if let Some(file) = &history {
+                    // A disk that is full ends no session.
+                    let _ = editor.append_history(file);
+                }
             }
             if lines.send(line).is_err() {
                 return;

@@ -2,16 +2,18 @@
 
 use std::path::Path;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, anyhow, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
-use quadrant_sim::client::Client;
 use quadrant_sim::client::settings::{self, Difference, whole_path};
+use quadrant_sim::client::{Client, ClientError};
 use quadrant_sim::report::whole;
+use quadrant_sim::setting_value::{meant, short};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
 use super::answer::Answer;
 use super::command::Command;
+use crate::kept;
 
 pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
     let path = whole_path(path);
@@ -21,12 +23,12 @@ pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
             // Perhaps a path above leaves.
             let paths = below(client, &path)?;
             if paths.is_empty() {
-                return Err(error.into());
+                return Err(named(error, "get", &path));
             }
             let mut values = Map::new();
             for path in paths {
                 let value = settings::get(client, &path)?;
-                values.insert(path, value);
+                values.insert(short(&path), value);
             }
             let lines: Vec<String> = values
                 .iter()
@@ -44,8 +46,20 @@ fn below(client: &mut Client, path: &str) -> anyhow::Result<Vec<String>> {
     Ok(paths)
 }
 
+/// An error about a setting, with the path as it is shown; where no setting has it, with the one that is meant.
+fn named(error: ClientError, command: &str, path: &str) -> anyhow::Error {
+    let shown = short(path);
+    match meant(&shown) {
+        Some(meant) => {
+            anyhow!("{command}: no setting is {shown}; did you mean {meant}? `list` shows all")
+        }
+        None => anyhow!(error.to_string().replace(path, &shown)),
+    }
+}
+
 pub(super) fn set(client: &mut Client, path: &str, value: &str) -> anyhow::Result<Answer> {
-    settings::set(client, &whole_path(path), value)?;
+    let path = whole_path(path);
+    settings::set(client, &path, value).map_err(|error| named(error, "set", &path))?;
     Ok(Answer::done())
 }
 
@@ -53,8 +67,15 @@ pub(super) fn list(client: &mut Client, prefix: &str) -> anyhow::Result<Answer> 
     let path = whole_path(prefix);
     let paths = below(client, &path)?;
     if paths.is_empty() {
-        bail!("list: no setting is at or below {path}; `list` shows all paths");
+        let shown = short(&path);
+        match meant(&shown) {
+            Some(meant) => bail!(
+                "list: no setting is at or below {shown}; did you mean {meant}? `list` shows all"
+            ),
+            None => bail!("list: {shown} is in a part that is left out"),
+        }
     }
+    let paths: Vec<String> = paths.iter().map(|path| short(path)).collect();
     Ok(Answer::new(paths.join("\n"), json!(paths)))
 }
 
@@ -84,8 +105,11 @@ pub(super) fn difference_line(difference: &Difference) -> String {
     format!("{path} {} -> {}", shown(acting), shown(other))
 }
 
-pub(super) fn dump(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
+pub(super) fn dump(client: &mut Client, file: &Path, overwrite: bool) -> anyhow::Result<Answer> {
     let stage = settings::dump(client)?;
+    if !overwrite {
+        kept::refuse_other(file, &stage)?;
+    }
     let mut dumped = SettingsFile::new(stage);
     let identity = client.identity();
     dumped.provenance.push(Provenance {
@@ -149,8 +173,12 @@ pub(super) fn draft(client: &mut Client, command: &Command) -> anyhow::Result<An
 
 pub(super) fn store(client: &mut Client, provenance: Option<&str>) -> anyhow::Result<Answer> {
     let own = format!("quadrant connect {}", env!("CARGO_PKG_VERSION"));
-    settings::store(client, provenance.unwrap_or(&own))?;
-    Ok(Answer::done())
+    let provenance = provenance.unwrap_or(&own);
+    settings::store(client, provenance)?;
+    Ok(Answer::new(
+        format!("kept for the next start: {provenance}"),
+        json!("done"),
+    ))
 }
 
 pub(super) fn provenance(client: &mut Client) -> anyhow::Result<Answer> {

@@ -6,7 +6,7 @@ use quadrant_sim::client::Client;
 use quadrant_sim::machine::simulated_io::{INPUTS, SimulatedIo, without};
 use serde_json::json;
 
-use super::answer::Answer;
+use super::answer::{Answer, RESTARTED};
 use super::command::LogOptions;
 use super::session::Session;
 
@@ -53,7 +53,8 @@ pub(super) fn power_cycle(client: &mut Client) -> anyhow::Result<Answer> {
     simulated_io(client, "power-cycle")?
         .power_cycle()
         .context("power-cycle")?;
-    Ok(Answer::done())
+    client.restarted()?;
+    Ok(Answer::new(RESTARTED, json!("done")))
 }
 
 /// Prints the lines that the firmware has logged since the last call.

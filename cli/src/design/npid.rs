@@ -51,7 +51,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if !deviations.iter().all(|share| (0.0..=1.0).contains(share)) {
         bail!("--deviation-percent: each must be 0 to 100");
     }
-    let (mut file, subject) = model.file(&arguments.output)?;
+    let (file, subject) = model.file(&arguments.output)?;
     let plant = model.plant(&file)?;
     let settings = model.axis(&file).clone();
     let gains = settings.feedback.pid;
@@ -144,6 +144,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let command = command_line();
     output.page(&page.page(provenance(&command, output.seed)), "npid.html")?;
-    file.stage.axes[model.axis.index()].feedback.nonlinear = Some(gain);
-    model.write(output, file, &command, Vec::new(), "feedback.nonlinear")
+    model.write(
+        output,
+        file,
+        &command,
+        Vec::new(),
+        "feedback.nonlinear",
+        |axis| {
+            axis.feedback.nonlinear = Some(gain);
+        },
+    )
 }

@@ -120,7 +120,7 @@ impl Arguments {
 
 pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { model, output, .. } = arguments;
-    let (mut file, subject) = model.file(output)?;
+    let (file, subject) = model.file(output)?;
     let sampled = model.sampled(&file)?;
     let filters = model.filters(&file);
     let (process, subject) = match &arguments.frf {
@@ -216,8 +216,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .iter()
         .map(|path| path.display().to_string())
         .collect();
-    file.stage.axes[model.axis.index()].feedback.pid = found.gains;
-    model.write(output, file, &command, records, "feedback.pid")
+    model.write(output, file, &command, records, "feedback.pid", |axis| {
+        axis.feedback.pid = found.gains;
+    })
 }
 
 /// The sampled form, for a table.

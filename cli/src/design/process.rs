@@ -6,18 +6,17 @@ use anyhow::{Context, bail};
 use clap::Args;
 use quadrant::control::filter::FilterSettings;
 use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant::settings::AxisSettings;
 use quadrant_cli::output::Output;
 use quadrant_sim::design::Form;
-use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
 
+use crate::kept;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::{say, warn};
 
-/// File of the settings in the folder for results, and the beginning of a command that has left it.
+/// File of the settings in the folder for results.
 const SETTINGS: &str = "settings.toml";
-const DESIGN: &str = "quadrant design";
 
 /// Options that name a model of an axis: numbers, or settings that hold one.
 #[derive(Clone, Debug, Args)]
@@ -25,8 +24,8 @@ pub(super) struct Model {
     /// The axis of the settings whose model and gains are taken.
     #[arg(long, value_enum, default_value_t = Axis::X)]
     pub(super) axis: Axis,
-    /// Settings of the stage, as `quadrant commission` writes them; without it, those that an earlier `design` has left in the
-    /// folder for results, or the built-in ones.
+    /// Settings of the stage, as `quadrant commission` writes them; without it, those in the folder for results, or the built-in
+    /// ones.
     #[arg(long, value_name = "FILE")]
     pub(super) settings: Option<PathBuf>,
     /// A, acceleration per volt, mm/(V s²), in place of the settings' model; the next three go with it.
@@ -55,32 +54,29 @@ pub(super) struct Model {
 }
 
 impl Model {
-    /// Reads the stage's settings, and says where they come from. Designs that follow each other build on each other.
+    /// Reads the stage's settings, and says where they come from: what is in the folder for results stays there, so a design goes on
+    /// from it.
     pub(super) fn file(&self, output: &Output) -> anyhow::Result<(SettingsFile, String)> {
         let of = |path: &Path| format!("The {} axis of {}", self.axis.name(), path.display());
         if let Some(path) = &self.settings {
             return Ok((SettingsFile::read(path)?, of(path)));
         }
-        if self.gain.is_some() {
-            let file = SettingsFile::new(StageSettings::simulated());
-            return Ok((file, "A model given by its parameters".to_owned()));
-        }
         let left = output.file(SETTINGS)?;
-        if left.exists() {
-            let file = SettingsFile::read(&left)?;
-            if let Some(last) = file.provenance.last()
-                && last.command.starts_with(DESIGN)
-            {
-                warn!(
-                    "starting from {}, which `{}` has left; --settings takes another file",
-                    left.display(),
-                    last.command
-                );
-                return Ok((file, of(&left)));
-            }
-        }
-        let subject = format!("The {} axis of the built-in settings", self.axis.name());
-        Ok((SettingsFile::new(StageSettings::simulated()), subject))
+        let (file, subject) = if left.exists() {
+            warn!(
+                "starting from {}; --settings takes another file, --out another folder",
+                left.display()
+            );
+            (SettingsFile::read(&left)?, of(&left))
+        } else {
+            let subject = format!("The {} axis of the built-in settings", self.axis.name());
+            (kept::built_in(), subject)
+        };
+        let subject = match self.gain {
+            Some(_) => "A model given by its parameters".to_owned(),
+            None => subject,
+        };
+        Ok((file, subject))
     }
 
     /// The axis' settings in them.
@@ -140,7 +136,7 @@ impl Model {
         })
     }
 
-    /// Writes settings with what a design changed, checked as a whole.
+    /// Writes the settings with what a design changes of the axis, checked as a whole.
     pub(super) fn write(
         &self,
         output: &Output,
@@ -148,10 +144,16 @@ impl Model {
         command: &str,
         records: Vec<String>,
         sets: &str,
+        change: impl FnOnce(&mut AxisSettings),
     ) -> anyhow::Result<()> {
+        let start = file.stage.clone();
+        change(&mut file.stage.axes[self.axis.index()]);
         file.add_provenance(command, self.axis.name(), records, &[sets]);
         let path = output.file(SETTINGS)?;
-        file.write(&path, whole::write)?;
+        kept::refuse_loss(&path, &start, &file.stage)?;
+        for line in kept::write(&file, &start, &path)? {
+            say!("{line}");
+        }
         say!(
             "{}: the settings of the stage with this {sets}",
             path.display()

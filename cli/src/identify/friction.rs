@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant::friction::FrictionSettings;
 use quadrant::settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::pages::friction::{friction_section, friction_table};
@@ -50,6 +51,14 @@ pub(crate) struct Arguments {
 const MAP: &str = "friction-map.csv";
 /// Travel of an axis of which none is known, mm.
 pub(crate) const TRAVEL_MM: f64 = 200.0;
+
+/// Puts friction that was identified into settings; how the smoothed GMS rounds it is a person's choice.
+pub(super) fn put_friction(settings: &mut AxisSettings, found: FrictionSettings) {
+    settings.friction = FrictionSettings {
+        smoothed_gms: settings.friction.smoothed_gms,
+        ..found
+    };
+}
 
 /// Moves an axis at constant velocities under the PID of `base` alone.
 pub(crate) fn run_at_velocities(
@@ -115,6 +124,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let records = arguments.record.as_slice();
     destination.write(subject, stage, records, &["friction"], |settings| {
         let gms = settings.friction.gms.clone();
-        settings.friction = with_all_models(found.models(), gms);
+        put_friction(settings, with_all_models(found.models(), gms));
     })
 }

@@ -17,6 +17,7 @@ use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Recording;
 use quadrant_sim::report::Table;
 
+use super::friction::put_friction;
 use super::recorded;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::output::{Output, command_line, share, with_bar};
@@ -154,7 +155,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &["friction", "plant"],
         |settings| {
             settings.plant = Some(chosen.model.plant());
-            settings.friction = chosen.model.friction_settings();
+            put_friction(settings, chosen.model.friction_settings());
         },
     )
 }

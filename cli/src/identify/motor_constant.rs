@@ -105,7 +105,12 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .map_or(DEFAULT_RATE_HZ, |stage| stage.rate_hz);
     // What the constant is for: a controller that homes the axis and measures the rest.
     destination.write(subject, stage, records, &["first PID"], |settings| {
-        *settings = bootstrap_settings(settings, motor.gain_mm_per_v_s2, rate_hz);
+        // A model that was measured on this axis stays.
+        let plant = settings.plant.filter(|_| settings.commissioned);
+        *settings = AxisSettings {
+            plant,
+            ..bootstrap_settings(settings, motor.gain_mm_per_v_s2, rate_hz)
+        };
     })
 }
 

@@ -12,6 +12,7 @@ use quadrant_sim::identify::virgin_curve::{Knots, VirginCurveSettings, identify,
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::record::Recording;
 
+use super::friction::put_friction;
 use super::recorded;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::output::{Output, with_bar};
@@ -150,6 +151,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let records = arguments.record.as_slice();
     destination.write(subject, stage, records, &["friction"], |settings| {
         let sliding = settings.friction.sliding;
-        settings.friction = with_all_models(sliding, found.gms.clone());
+        put_friction(settings, with_all_models(sliding, found.gms.clone()));
     })
 }

@@ -304,7 +304,7 @@ fn what_is_edited_and_does_not_act_yet_is_shown_and_what_a_file_would_change() {
     }
     assert_eq!(edited.as_array().map(Vec::len), Some(1), "{edited}");
     let only = &edited[0];
-    assert_eq!(only["path"], "/axes/0/feedback/pid/kp_v_per_mm");
+    assert_eq!(only["path"], "x/feedback/pid/kp_v_per_mm");
     assert_eq!(only["other"], 1.0);
     assert_eq!(only["acting"], 1.118);
     assert_eq!(file, edited);
@@ -320,7 +320,7 @@ fn a_test_that_would_write_over_an_edited_draft_is_refused_and_the_draft_stays()
     let results = results(&String::from_utf8(output.stdout).unwrap());
     let refused = results[1]["error"].to_string();
     assert!(
-        refused.contains("/axes/1/feedback/pid/kp_v_per_mm") && refused.contains("`revert`"),
+        refused.contains("y/feedback/pid/kp_v_per_mm") && refused.contains("`revert`"),
         "{refused}"
     );
     assert_eq!(results[2]["result"][0]["other"], 0.5, "{results:?}");

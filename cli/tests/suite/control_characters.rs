@@ -12,12 +12,13 @@ use quadrant::link::message::{
 };
 use quadrant::link::server::LinkServer;
 
-/// A clipboard's content, a line that is written over, a sequence of C1, and names from right to left.
-const ACTS: [&str; 4] = [
+/// A clipboard's content, a line that is written over, a sequence of C1, names from right to left, and a line of its own.
+const ACTS: [&str; 5] = [
     "\x1b]52;c;aGk=\x07",
     "a\rb",
     "\u{9b}2J",
     "\u{202e}x\u{2066}",
+    "a\nforged",
 ];
 
 fn assert_plain(output: &Output) {
@@ -29,6 +30,10 @@ fn assert_plain(output: &Output) {
                 || ('\u{2066}'..='\u{2069}').contains(&sign)
         };
         assert!(!said.contains(acts), "{said:?}");
+        assert!(
+            !said.lines().any(|line| line.starts_with("forged")),
+            "{said:?}"
+        );
     }
 }
 
@@ -142,7 +147,8 @@ fn a_log_through_the_debug_probe_does_not_act_on_the_terminal() {
     let probe = folder.path().join("probe-rs");
     let elf = folder.path().join("firmware.elf");
     std::fs::write(&elf, "an image").unwrap();
-    std::fs::write(folder.path().join("log"), ACTS.join("\n")).unwrap();
+    // A line of the probe's program is a line.
+    std::fs::write(folder.path().join("log"), ACTS[..4].join("\n")).unwrap();
     std::fs::write(&probe, "#!/bin/sh\ncat \"${0%/*}/log\"\n").unwrap();
     std::fs::set_permissions(&probe, std::fs::Permissions::from_mode(0o755)).unwrap();
     let path = std::env::var("PATH").unwrap();

@@ -7,10 +7,13 @@ mod command;
 mod commission;
 mod connect;
 mod connect_commission;
+mod console_motion;
+mod console_settings;
 mod control_characters;
 mod design_commands;
 mod identify_commands;
 mod interrupted;
+mod kept_settings;
 mod part_program;
 mod record_bad_input;
 #[cfg(target_os = "linux")]

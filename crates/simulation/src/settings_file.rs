@@ -123,24 +123,26 @@ impl SettingsFile {
         });
     }
 
-    /// Takes the other axes than `axis` over from an earlier file, if a command has set them.
+    /// Exchanges an axis for a machine's, with the origin of what it had; everything else stays.
     ///
     /// # Errors
-    /// The first axis whose encoder or amplifier is another one there: the file is of another machine.
-    pub fn keep_other_axes(&mut self, earlier: &Self, axis: AxisName) -> Result<(), AxisName> {
-        for other in AxisName::ALL {
-            let set = |origin: &&Provenance| origin.axis == other.as_str();
-            if other == axis || !earlier.provenance.iter().any(|origin| set(&origin)) {
-                continue;
-            }
-            let [theirs, ours] = [earlier, &*self].map(|file| &file.stage.axes[other as usize]);
-            if theirs.encoder != ours.encoder || theirs.amplifier != ours.amplifier {
-                return Err(other);
-            }
-            self.stage.axes[other as usize] = theirs.clone();
-            self.provenance
-                .extend(earlier.provenance.iter().filter(set).cloned());
+    /// What shows that the file is of another machine: the control rate, or the encoder or amplifier of another axis.
+    pub fn exchange_axis(&mut self, machine: &StageSettings, axis: AxisName) -> Result<(), String> {
+        if self.stage.rate_hz != machine.rate_hz {
+            return Err("the control rate".to_owned());
         }
+        for other in AxisName::ALL.into_iter().filter(|other| *other != axis) {
+            let [here, there] = [&self.stage, machine].map(|stage| &stage.axes[other as usize]);
+            if here.encoder != there.encoder {
+                return Err(format!("the encoder of {other}"));
+            }
+            if here.amplifier != there.amplifier {
+                return Err(format!("the amplifier of {other}"));
+            }
+        }
+        self.stage.axes[axis as usize].clone_from(&machine.axes[axis as usize]);
+        self.provenance
+            .retain(|origin| origin.axis != axis.as_str());
         Ok(())
     }
 
@@ -262,22 +264,39 @@ mod tests {
     }
 
     #[test]
-    fn other_axes_are_kept_unless_they_are_of_another_machine() {
+    fn an_axis_is_exchanged_unless_the_file_is_of_another_machine() {
         let mut earlier = file();
-        earlier.stage.axes[0].feedback.pid.kp_v_per_mm *= 1.5;
-        let mut later = SettingsFile::new(StageSettings::simulated());
-        later.keep_other_axes(&earlier, AxisName::Y).unwrap();
+        earlier.stage.brake.release_s = 0.2;
+        for axis in &mut earlier.stage.axes {
+            axis.feedback.pid.kp_v_per_mm *= 1.5;
+        }
+        let machine = StageSettings::simulated();
+        let mut later = earlier.clone();
+        later.exchange_axis(&machine, AxisName::Y).unwrap();
         assert_eq!(later.stage.axes[0], earlier.stage.axes[0]);
+        assert_eq!(later.stage.axes[1], machine.axes[1]);
+        assert_eq!(later.stage.brake, earlier.stage.brake);
         assert_eq!(later.provenance, earlier.provenance);
+        later.exchange_axis(&machine, AxisName::X).unwrap();
+        assert_eq!(later.provenance, []);
 
-        let mut again = SettingsFile::new(StageSettings::simulated());
-        again.keep_other_axes(&earlier, AxisName::X).unwrap();
-        assert_eq!(again, SettingsFile::new(StageSettings::simulated()));
-
-        earlier.stage.axes[0].encoder.resolution_mm *= 2.0;
+        let exchanged = |change: fn(&mut StageSettings)| {
+            let mut other = machine.clone();
+            change(&mut other);
+            file().exchange_axis(&other, AxisName::Y)
+        };
+        let of = |what: &str| Err(what.to_owned());
         assert_eq!(
-            again.keep_other_axes(&earlier, AxisName::Y),
-            Err(AxisName::X)
+            exchanged(|stage| stage.rate_hz = 5e3),
+            of("the control rate")
+        );
+        let encoder = exchanged(|stage| stage.axes[0].encoder.resolution_mm *= 2.0);
+        assert_eq!(encoder, of("the encoder of x"));
+        let amplifier = exchanged(|stage| stage.axes[2].amplifier.reversed = true);
+        assert_eq!(amplifier, of("the amplifier of z"));
+        assert_eq!(
+            exchanged(|stage| stage.axes[1].encoder.reversed = true),
+            Ok(())
         );
     }
 
@@ -314,7 +333,7 @@ mod tests {
         let text = toml::to_string_pretty(&bad).unwrap();
         assert_eq!(
             parse(&text).unwrap_err().to_string(),
-            "stage.toml: y.encoder.resolution_mm = 7 is outside 0.000001 to 1"
+            "stage.toml: y/encoder/resolution_mm = 7 is outside 0.000001 to 1"
         );
     }
 

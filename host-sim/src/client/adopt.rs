@@ -6,6 +6,7 @@ use serde::Serialize;
 use super::error::ClientError;
 use super::session::Client;
 use super::settings::{self, Difference, whole_path};
+use quadrant_simulation::setting_value::short;
 
 /// The gains of the friction feedforward, which the scale multiplies.
 const GAINS: [&str; 3] = ["gms", "level", "viscous"];
@@ -64,17 +65,20 @@ pub fn adopt(client: &mut Client, axis: AxisName) -> Result<Adopted, AdoptError>
         // Four digits: more is not known, and a person reads them.
         let gain = (1e4 * scale * before.unwrap_or(1.0)).round() / 1e4;
         if gain > MOST {
-            return Err(AdoptError::TooLarge { path, gain });
+            return Err(AdoptError::TooLarge {
+                path: short(&path),
+                gain,
+            });
         }
         gains.push(Difference {
-            path,
+            path: short(&path),
             acting,
             other: Some(gain.into()),
         });
     }
     for difference in &gains {
         if let Some(gain) = &difference.other {
-            settings::set(client, &difference.path, &gain.to_string())?;
+            settings::set(client, &whole_path(&difference.path), &gain.to_string())?;
         }
     }
     Ok(Adopted { scale, gains })

@@ -20,6 +20,7 @@ pub mod adopt;
 pub mod columns;
 mod connected;
 mod error;
+mod flat;
 mod interrupt;
 pub mod plot;
 pub mod samples;

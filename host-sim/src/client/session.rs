@@ -6,12 +6,14 @@ use std::time::{Duration, Instant};
 
 use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
-    Body, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice, Reply, Request,
-    Status,
+    AxisName, Body, Event, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice,
+    Reply, Request, Status,
 };
 use quadrant::link::message::{MachineState, TelemetryBlock};
+use quadrant::safety::FaultCode;
 
 use super::error::ClientError;
+use super::flat::{flatten_answer, flatten_notice};
 use super::interrupt::Interrupt;
 use super::timeout::{ANSWER, BUSY, BUSY_PAUSE, Idempotency, answer_timeout, idempotency};
 use crate::machine::{PASSED_ON, SimulatedIo, Transport, VIEWER_IDS, encoded};
@@ -30,8 +32,20 @@ const TAKING: Duration = Duration::from_millis(1);
 const STOPPING: Duration = Duration::from_secs(10);
 const STOPPING_LOOK: Duration = Duration::from_millis(20);
 
+/// Time for a restart, and pause before the machine is asked again.
+const RESTART: Duration = Duration::from_secs(10);
+const RESTART_PAUSE: Duration = Duration::from_millis(50);
+
 /// Times that a request which may be repeated is made before the machine counts as silent.
 const ATTEMPTS: u32 = 4;
+
+/// A fault that the machine has reported of its own accord.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) struct ReportedFault {
+    code: u8,
+    axis: Option<AxisName>,
+    tick: u32,
+}
 
 /// A session with a machine.
 pub struct Client {
@@ -51,6 +65,10 @@ pub struct Client {
     interrupted: Option<&'static str>,
     /// The interruption is being heeded.
     stopping: bool,
+    /// The last fault that the machine has reported, and how many there were.
+    reported: (Option<ReportedFault>, u32),
+    /// How many of them have been acted on: before the last motion began, or as the error of what was waited for.
+    acted_on: u32,
     notices: VecDeque<Notice>,
     dropped_notices: u64,
 }
@@ -72,6 +90,8 @@ impl Client {
             interrupt: Interrupt::default(),
             interrupted: None,
             stopping: false,
+            reported: (None, 0),
+            acted_on: 0,
             notices: VecDeque::new(),
             dropped_notices: 0,
         };
@@ -125,8 +145,8 @@ impl Client {
         self.interrupt.forget();
     }
 
-    /// Asks, and waits for the answer. A request that may be made twice is made again if none comes, and for two seconds if the
-    /// machine is busy. What enables the outputs or starts a motion is asked once.
+    /// Asks, and waits for the answer. A request that may be made twice is made again if none comes, and every request but one that
+    /// enables the outputs or starts a motion for two seconds if the machine is busy.
     ///
     /// # Errors
     /// No answer, a refusal, or a machine that has restarted.
@@ -142,8 +162,10 @@ impl Client {
         loop {
             match self.ask(&body)? {
                 Ok(reply) => return Ok(reply),
+                // Nothing was done. Motions are asked for by a person, each time.
                 Err(LinkError::Busy(_))
-                    if idempotency != Idempotency::NotIdempotent && self.now() < busy_until =>
+                    if !(body.may_move() && idempotency == Idempotency::NotIdempotent)
+                        && self.now() < busy_until =>
                 {
                     self.wait(BUSY_PAUSE)?;
                 }
@@ -358,16 +380,73 @@ impl Client {
             return Ok(());
         }
         match self.fault()? {
-            Some(fault) => Err(ClientError::Fault {
-                what,
-                code: fault.code,
-                name: fault.name.as_str().to_owned(),
-                axis: fault.axis.map(Into::into),
-                tick: fault.tick,
-                cause: fault.cause.as_str().to_owned(),
-                remedy: fault.remedy.as_str().to_owned(),
-            }),
+            Some(fault) => {
+                self.act_on_reported();
+                Err(ClientError::Fault {
+                    what,
+                    code: fault.code,
+                    name: fault.name.as_str().to_owned(),
+                    axis: fault.axis.map(Into::into),
+                    tick: fault.tick,
+                    cause: fault.cause.as_str().to_owned(),
+                    remedy: fault.remedy.as_str().to_owned(),
+                })
+            }
             None => Ok(()),
+        }
+    }
+
+    /// Counts the faults that the machine has reported as acted on.
+    pub(super) const fn act_on_reported(&mut self) {
+        self.acted_on = self.reported.1;
+    }
+
+    /// An error if the machine has reported a fault that nobody has acted on: latched, or after which the axes braked and hold.
+    ///
+    /// # Errors
+    /// The last of them, as what ended `what`.
+    pub(super) fn refuse_reported(&mut self, what: &'static str) -> Result<(), ClientError> {
+        match self.reported {
+            (Some(ReportedFault { code, axis, tick }), count) if count != self.acted_on => {
+                self.act_on_reported();
+                let fault = FaultCode::from_number(code);
+                Err(ClientError::Fault {
+                    what,
+                    code,
+                    name: fault
+                        .map_or("of a later release", FaultCode::name)
+                        .to_owned(),
+                    axis: axis.map(Into::into),
+                    tick,
+                    cause: fault
+                        .map_or("unknown to this program", FaultCode::cause)
+                        .to_owned(),
+                    remedy: fault
+                        .map_or("look at `fault`", FaultCode::remedy)
+                        .to_owned(),
+                })
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// Greets the machine again after its restart, when it answers.
+    ///
+    /// # Errors
+    /// A machine that is silent for 10 s, or of another release.
+    pub fn restarted(&mut self) -> Result<(), ClientError> {
+        self.moves = false;
+        let due = self.now() + RESTART;
+        self.wait(RESTART_PAUSE)?;
+        loop {
+            match self.greet() {
+                Err(ClientError::Silent { .. } | ClientError::Connection { .. })
+                    if self.now() < due =>
+                {
+                    self.wait(RESTART_PAUSE)?;
+                }
+                other => return other,
+            }
         }
     }
 
@@ -414,8 +493,12 @@ impl Client {
             | Body::Home(_)
             | Body::Move { .. }
             | Body::Stream(_)
-            | Body::Inject(_) => self.moves = true,
+            | Body::Inject(_) => {
+                self.moves = true;
+                self.act_on_reported();
+            }
             Body::Stop | Body::Disable => self.moves = false,
+            Body::ResetFault => self.act_on_reported(),
             _ => {}
         }
         let began = self.now();
@@ -504,12 +587,16 @@ impl Client {
                 continue;
             };
             match frame::decode::<Message>(payload) {
-                Ok(Message::Response(response)) if response.id == id => {
+                Ok(Message::Response(mut response)) if response.id == id => {
+                    flatten_answer(&mut response.result);
                     answer = Some(response.result);
                 }
                 // An answer to what was given up, or a second one.
                 Ok(Message::Response(_)) => {}
-                Ok(Message::Notice(notice)) => self.keep(notice),
+                Ok(Message::Notice(mut notice)) => {
+                    flatten_notice(&mut notice);
+                    self.keep(notice);
+                }
                 Err(DecodeError::Version(theirs)) => return Err(self.version(theirs)),
                 // A message that a later release of this version has added.
                 Err(DecodeError::Malformed) => {}
@@ -519,6 +606,17 @@ impl Client {
     }
 
     fn keep(&mut self, notice: Notice) {
+        if let Notice::Event {
+            tick,
+            event: Event::Fault { code, axis } | Event::Held { code, axis },
+            ..
+        } = notice
+        {
+            self.reported = (
+                Some(ReportedFault { code, axis, tick }),
+                self.reported.1.wrapping_add(1),
+            );
+        }
         if self.notices.len() == MOST_NOTICES {
             self.notices.pop_front();
             self.dropped_notices += 1;

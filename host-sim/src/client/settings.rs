@@ -4,7 +4,7 @@ use heapless::String as Bounded;
 use quadrant::link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
 use quadrant::settings::StageSettings;
 use quadrant::settings::tree::{expand, is_part};
-use quadrant_simulation::setting_value;
+use quadrant_simulation::setting_value::{self, short};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -29,7 +29,7 @@ pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
 /// The bytes of a value as JSON.
 fn decode(path: &str, value: &LeafValue) -> Result<Value, ClientError> {
     let json = setting_value::to_json(path, value).map_err(|source| ClientError::Setting {
-        path: path.to_owned(),
+        path: short(path),
         source,
     })?;
     Ok(serde_json::from_str(&json).unwrap_or_else(|_| Value::from(json)))
@@ -49,7 +49,7 @@ fn request_value(client: &mut Client, request: SettingsRequest) -> Result<LeafVa
 /// A setting of which one side has another value than the other.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Difference {
-    /// Its path.
+    /// Its path, as it is shown.
     pub path: String,
     /// The value that acts now; none where what acts lacks the part.
     pub acting: Option<Value>,
@@ -70,7 +70,7 @@ pub fn edited(client: &mut Client) -> Result<Vec<Difference>, ClientError> {
         differences.push(Difference {
             acting: acting(client, &path)?,
             other: Some(get(client, &path)?),
-            path,
+            path: short(&path),
         });
     }
     Ok(differences)
@@ -93,7 +93,7 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
         let other = decode(&path, &wanted)?;
         if acting.as_ref() != Some(&other) {
             differences.push(Difference {
-                path,
+                path: short(&path),
                 acting,
                 other: Some(other),
             });
@@ -128,7 +128,7 @@ pub fn set(client: &mut Client, path: &str, value: &str) -> Result<(), ClientErr
         Err(_) => Value::from(value).to_string(),
     };
     let value = setting_value::from_json(path, &json).map_err(|source| ClientError::Setting {
-        path: format!("{path} = {json}"),
+        path: format!("{} = {json}", short(path)),
         source,
     })?;
     set_bytes(client, path, value)
@@ -247,7 +247,10 @@ pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
         let LeafValue { kind, bytes } = get_bytes(client, &path)?;
         settings
             .set_bytes(&path, kind, &bytes)
-            .map_err(|source| ClientError::Setting { path, source })?;
+            .map_err(|source| ClientError::Setting {
+                path: short(&path),
+                source,
+            })?;
     }
     Ok(settings)
 }
@@ -284,7 +287,7 @@ fn take_acting(
         settings
             .set_bytes(path, kind, &bytes)
             .map_err(|source| ClientError::Setting {
-                path: path.clone(),
+                path: short(path),
                 source,
             })?;
     }
@@ -307,7 +310,7 @@ pub(super) fn refuse_edited(client: &mut Client) -> Result<(), ClientError> {
         more => format!(" and {more} more"),
     };
     Err(ClientError::Edited {
-        paths: format!("{first}{more}"),
+        paths: format!("{}{more}", short(first)),
     })
 }
 
@@ -367,13 +370,13 @@ fn write_draft(
     let mut left = Vec::new();
     for path in paths.iter().filter(|path| !is_part(path)) {
         if !change(client, path, wanted, &mut changed)? {
-            left.push(path.clone());
+            left.push(short(path));
         }
     }
     let mut unknown = None;
     let _ = wanted.list("", &mut |path| {
         if unknown.is_none() && !paths.iter().any(|known| known == path) {
-            unknown = Some(path.to_owned());
+            unknown = Some(short(path));
         }
     });
     match unknown {
@@ -394,7 +397,7 @@ fn change(
     };
     if get_bytes(client, path)? != value {
         set_bytes(client, path, value)?;
-        changed.push(path.to_owned());
+        changed.push(short(path));
     }
     Ok(true)
 }

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{AxisMode, AxisSet, Status};
+use quadrant::link::message::{AxisMode, AxisSet, MachineState, Status};
 
 use super::error::ClientError;
 use super::session::Client;
@@ -55,7 +55,17 @@ pub fn homed(client: &mut Client, axes: AxisSet, timeout: Duration) -> Result<St
     }
 }
 
-/// Looks at the machine until a condition holds.
+/// Lets time pass.
+///
+/// # Errors
+/// A fault that is reported meanwhile, or a connection that is broken.
+pub fn time(client: &mut Client, time: Duration) -> Result<(), ClientError> {
+    client.act_on_reported();
+    client.wait(time)?;
+    client.refuse_reported("wait")
+}
+
+/// Looks at the machine until a condition holds. Axes that brake for a fault have it latched when they stand.
 fn until(
     client: &mut Client,
     what: &'static str,
@@ -68,7 +78,8 @@ fn until(
     loop {
         let status = client.status()?;
         client.refuse_fault(what, &status)?;
-        if is_so(&status) {
+        client.refuse_reported(what)?;
+        if status.state != MachineState::Stopping && is_so(&status) {
             return Ok(status);
         }
         if client.now() >= due {

@@ -17,6 +17,8 @@ use crate::report::whole;
 
 /// Extension of a file with an experiment.
 const KEPT: &str = "json";
+/// File of the words that say what the experiments are of.
+const REQUEST: &str = "request.txt";
 
 /// A test axis whose experiments are kept in a folder. Those that are there already are not run again, as long as they are the
 /// same experiments under the same settings in the same order; settings act only once an experiment is run. One that was stopped
@@ -232,10 +234,23 @@ impl<'a> Journal<'a> {
         Ok(foreign)
     }
 
-    /// True if no experiment is kept in a folder.
-    pub fn is_empty(folder: &Path) -> bool {
-        let kept = |entry: fs::DirEntry| is_named(&entry.path());
-        fs::read_dir(folder).map_or(true, |entries| !entries.flatten().any(kept))
+    /// The number of experiments that are kept in a folder.
+    pub fn count(folder: &Path) -> usize {
+        let kept = |entry: &fs::DirEntry| is_named(&entry.path());
+        fs::read_dir(folder).map_or(0, |entries| entries.flatten().filter(kept).count())
+    }
+
+    /// Keeps the words that say what the experiments are of, for [`request`](Self::request).
+    ///
+    /// # Errors
+    /// A file that cannot be written.
+    pub fn keep_request(&self, words: &str) -> io::Result<()> {
+        whole::replace(&self.folder.join(REQUEST), words.to_owned().into_bytes())
+    }
+
+    /// The words that say what the experiments in a folder are of, if they were kept.
+    pub fn request(folder: &Path) -> Option<String> {
+        fs::read_to_string(folder.join(REQUEST)).ok()
     }
 
     fn key(&self, experiment: &Experiment) -> u64 {
@@ -315,7 +330,8 @@ fn is_named(path: &Path) -> bool {
 /// It has the name of an experiment, and is none: a journal would write over it.
 fn is_own(path: &Path, kind: FileType) -> io::Result<bool> {
     if !is_named(path) {
-        return Ok(kind.is_file() && whole::is_unfinished(path));
+        let is_request = path.file_name().is_some_and(|name| name == REQUEST);
+        return Ok(kind.is_file() && (is_request || whole::is_unfinished(path)));
     }
     let is_entry = kind.is_file() && serde_json::from_slice::<Entry>(&fs::read(path)?).is_ok();
     match is_entry {

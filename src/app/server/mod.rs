@@ -116,6 +116,8 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     buffer: &'a mut [u8; BUFFER_BYTES],
     stream: Option<OpenStream>,
     injection: Option<OpenInjection>,
+    /// The lowest and the highest position of the plan's motions, mm from their start.
+    plan_reach_mm: PerAxis<(f64, f64)>,
     heard_tick: u32,
     packer: Packer,
     generation: u8,
@@ -170,6 +172,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
             buffer: parts.buffer,
             stream: None,
             injection: None,
+            plan_reach_mm: PerAxis::splat((0.0, 0.0)),
             heard_tick: 0,
             packer: Packer::default(),
             generation: 0,

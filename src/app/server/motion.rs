@@ -12,7 +12,7 @@ use crate::law::decimal::Decimal;
 use crate::law::reference::{Motion, MotionSettings};
 use crate::law::safety::Station;
 use crate::law::scalar::Scalar;
-use crate::settings::{PlanSettings, StageSettings};
+use crate::settings::{PlanSettings, StageSettings, reach_mm};
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
@@ -78,14 +78,23 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         Ok(self.draft.in_force())
     }
 
-    /// Checks that the plan moves an axis.
+    /// Checks that the plan moves an axis, and that no homed axis would leave its travel.
     pub(super) fn check_plan(&self) -> Result<(), LinkError> {
-        if self.seen.planned {
-            return Ok(());
+        if !self.seen.planned {
+            return Err(refused(format_args!(
+                "there is no plan: send one; settings that change with the outputs off drop the one before"
+            )));
         }
-        Err(refused(format_args!(
-            "there is no plan: send one; settings that change with the outputs off drop the one before"
-        )))
+        let settings = self.in_force()?;
+        for axis in AxisName::ALL {
+            let seen = &self.seen.axes[index(axis)];
+            if self.seen.view.homed[index(axis)] {
+                settings
+                    .check_reach(axis, seen.ahead, self.plan_reach_mm[axis])
+                    .map_err(|error| invalid(format_args!("{error}")))?;
+            }
+        }
+        Ok(())
     }
 
     /// Checks that the control law would take a command, as far as the last snapshot tells.
@@ -165,17 +174,21 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     /// Lays motions that keep to their axes' limits where control takes them from when it is ordered to.
     #[inline(never)]
-    fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
+    fn hand_over(&mut self, motions: &PlanSettings) -> Result<(), LinkError> {
         let settings = self.in_force()?;
-        plan.validate(settings)
+        motions
+            .validate(settings)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let plan = PerAxis::from_fn(|axis| {
-            Motion::build(&plan.motions[index(axis)], settings.scale_of(axis))
+            Motion::build(&motions.motions[index(axis)], settings.scale_of(axis))
         });
+        let reach_mm = PerAxis::from_fn(|axis| reach_mm(&motions.motions[index(axis)]));
         self.ends.plans.enqueue(plan).map_err(|_| {
             busy(format_args!(
                 "the control law has motions waiting; ask again"
             ))
-        })
+        })?;
+        self.plan_reach_mm = reach_mm;
+        Ok(())
     }
 }

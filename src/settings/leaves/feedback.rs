@@ -3,6 +3,7 @@
 use strum::VariantNames;
 
 use super::row::{LeafInfo, UNSET, at, list, name, number, period_s, point, times};
+use super::stage::full_scale_v;
 use crate::law::control::feedback::LawKind;
 use crate::law::control::{filter, nctf, schedule};
 use crate::settings::axis::AxisSettings;
@@ -28,7 +29,7 @@ fn steepest_rate_per_mm(axis: &AxisSettings, _: f64) -> f64 {
 pub(super) const LEAVES: &[LeafInfo] = &[
     name("feedback.law", LawKind::VARIANTS,
         "Law in force; it needs its parameters."),
-    number("feedback.integral_limit_v", "V", at(1e-6), times(1.0, "output limit", output_limit_v), 2.0,
+    number("feedback.integral_limit_v", "V", at(1e-6), times(1.0, "full scale", full_scale_v), 2.0,
         "The integral of any law stays within plus and minus this."),
     number("feedback.transfer_s", "s", at(1e-3), at(10.0), 0.05,
         "Time constant with which the offset of a bumpless change of settings fades."),

@@ -228,6 +228,14 @@ pub(in crate::settings) enum Limit {
 }
 
 impl Limit {
+    /// The limit, if no other setting decides it.
+    pub(in crate::settings) const fn constant(&self) -> Option<f64> {
+        match *self {
+            Self::At(value) => Some(value),
+            Self::Times(..) | Self::AtMost(..) => None,
+        }
+    }
+
     /// The limit for an axis at a control period.
     pub(in crate::settings) fn value(&self, axis: &AxisSettings, period_s: f64) -> f64 {
         match *self {

@@ -1,7 +1,8 @@
 //! The part of the table that the firmware carries: fields and ranges of all numbers, and the fields that change only
 //! while the outputs are off.
 
-use super::row::{Exchange, LeafInfo, Limit, Place, PointNumber, Range};
+pub(in crate::settings) use super::row::Limit;
+use super::row::{Exchange, LeafInfo, Place, PointNumber, Range};
 use super::stage;
 use super::table::OF_AXIS;
 

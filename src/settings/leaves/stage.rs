@@ -7,7 +7,7 @@ use crate::law::safety::{EnabledBy, HostNeeded};
 use crate::settings::axis::AxisSettings;
 use crate::settings::operation::{EmergencyReaction, LossReaction};
 
-fn full_scale_v(axis: &AxisSettings, _: f64) -> f64 {
+pub(super) fn full_scale_v(axis: &AxisSettings, _: f64) -> f64 {
     axis.amplifier.full_scale_v
 }
 

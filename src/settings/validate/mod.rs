@@ -6,10 +6,11 @@ mod motion;
 
 use super::axis::AxisSettings;
 use super::error::{Reason, SettingsError};
-use super::leaves::rules::{OF_AN_AXIS, OF_THE_STAGE, Rule};
+use super::leaves::rules::{Limit, OF_AN_AXIS, OF_THE_STAGE, Rule};
 use super::stage::StageSettings;
 use super::tree::number_at;
 use crate::law::axes::AxisName;
+use crate::law::control::feedback::LawKind;
 
 /// The axis that a check is about, or the stage.
 #[derive(Clone, Copy)]
@@ -64,6 +65,22 @@ impl StageSettings {
     }
 }
 
+/// Settings of a law that no other law reads.
+const OF_A_LAW: [(&str, LawKind); 5] = [
+    ("feedback.nonlinear", LawKind::NPid),
+    ("feedback.schedule", LawKind::Scheduled),
+    ("feedback.cascade", LawKind::Cascade),
+    ("feedback.sliding_mode", LawKind::SlidingMode),
+    ("feedback.nctf", LawKind::Nctf),
+];
+
+/// True if a field belongs to a law that is not in force.
+fn is_of_other_law(field: &str, law: LawKind) -> bool {
+    OF_A_LAW
+        .iter()
+        .any(|(part, of)| *of != law && field.starts_with(part))
+}
+
 impl Place {
     /// Checks a number, if it is there, against its rule.
     fn check_range(
@@ -74,8 +91,17 @@ impl Place {
         number: Option<f64>,
     ) -> Result<(), SettingsError> {
         let Some(number) = number else { return Ok(()) };
-        let least = rule.least.value(axis, period_s);
-        let most = rule.most.value(axis, period_s);
+        let limits = [&rule.least, &rule.most];
+        let [least, most] = if is_of_other_law(rule.field, axis.feedback.law) {
+            // It does not act, and so bars no change of what does.
+            let [least, most] = limits.map(Limit::constant);
+            [
+                least.unwrap_or(f64::NEG_INFINITY),
+                most.unwrap_or(f64::INFINITY),
+            ]
+        } else {
+            limits.map(|limit| limit.value(axis, period_s))
+        };
         self.within(rule.field, number, least, most)
     }
 }

@@ -109,7 +109,7 @@ fn what_the_machine_refuses_is_reverted() {
     let error = settings::load(&mut client, &bad).unwrap_err();
     assert!(matches!(error, ExchangeError::Reverted(_)), "{error}");
     let text = error.to_string();
-    assert!(text.contains("z.encoder.resolution_mm = 7"), "{text}");
+    assert!(text.contains("z/encoder/resolution_mm = 7"), "{text}");
     assert!(text.contains("nothing was changed"), "{text}");
     assert_eq!(bench.borrow().in_force, StageSettings::simulated());
     assert_eq!(
