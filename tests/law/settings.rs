@@ -24,7 +24,11 @@ pub(crate) fn check_message(error: &SettingsError, axis: AxisName, field: &str) 
     assert_eq!((error.axis, error.field), (Some(axis), field));
     let text = error.to_string();
     assert!(
-        text.starts_with(&format!("{axis}.{field} = {}", Decimal(error.value))),
+        text.starts_with(&format!(
+            "{axis}/{} = {}",
+            field.replace('.', "/"),
+            Decimal(error.value)
+        )),
         "{text}"
     );
     if let Reason::OutOfRange { least, most } = error.reason {
