@@ -151,7 +151,7 @@ fn about(leaf: &LeafInfo, result: &Result<(), SettingsError>) -> Option<Reason> 
 }
 
 /// The law that alone reads a field.
-fn law_of(field: &str) -> Option<LawKind> {
+pub(crate) fn law_of(field: &str) -> Option<LawKind> {
     let laws = [
         ("feedback.nonlinear.", LawKind::NPid),
         ("feedback.schedule.", LawKind::Scheduled),
