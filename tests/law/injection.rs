@@ -273,13 +273,13 @@ fn what_is_out_of_range_is_refused_by_name() {
         outcome.unwrap_err().to_string()
     };
     for (said, field) in [
-        (refused(|r| r.limit_v = 0.0), "x.limit_v"),
-        (refused(|r| r.limit_v = 10.1), "x.limit_v"),
-        (refused(|r| r.limit_v = f64::NAN), "x.limit_v"),
-        (refused(|r| r.travel_mm = -1.0), "x.travel_mm"),
+        (refused(|r| r.limit_v = 0.0), "x/limit_v"),
+        (refused(|r| r.limit_v = 10.1), "x/limit_v"),
+        (refused(|r| r.limit_v = f64::NAN), "x/limit_v"),
+        (refused(|r| r.travel_mm = -1.0), "x/travel_mm"),
         (
             refused(|r| r.max_velocity_mm_s = 1e4),
-            "x.max_velocity_mm_s",
+            "x/max_velocity_mm_s",
         ),
     ] {
         assert!(said.starts_with(field), "{said}");

@@ -8,6 +8,7 @@ use quadrant::settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, 
 use crate::common::with_x;
 use crate::settings_fields::{FIELDS, Field};
 use crate::settings_law_fields::LAW_FIELDS;
+use crate::settings_leaves::law_of;
 
 pub(crate) const ROOM: usize = 4;
 
@@ -24,7 +25,11 @@ pub(crate) fn check_message(error: &SettingsError, axis: AxisName, field: &str) 
     assert_eq!((error.axis, error.field), (Some(axis), field));
     let text = error.to_string();
     assert!(
-        text.starts_with(&format!("{axis}.{field} = {}", Decimal(error.value))),
+        text.starts_with(&format!(
+            "{axis}/{} = {}",
+            field.replace('.', "/"),
+            Decimal(error.value)
+        )),
         "{text}"
     );
     if let Reason::OutOfRange { least, most } = error.reason {
@@ -44,6 +49,10 @@ fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
                 let mut settings = StageSettings::simulated();
                 // Below breakaway is above x's coulomb level; other axes have other levels.
                 settings.axes[index] = quadrant::settings::presets::x_axis();
+                // An end that another setting decides is that of the law in force.
+                if let Some(law) = law_of(field) {
+                    settings.axes[index].feedback.law = law;
+                }
                 *place(&mut settings.axes[index]) = value;
                 let error = refusal(&settings);
                 check_message(&error, name, field);
@@ -133,7 +142,7 @@ fn the_spacing_of_the_index_and_its_tolerance_have_ranges() {
     assert_eq!(without.validate(ROOM), Ok(()));
     let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = None));
     check_message(&error, AxisName::X, "homing.index");
-    assert!(error.to_string().contains("encoder.counts_per_index"));
+    assert!(error.to_string().contains("encoder/counts_per_index"));
 }
 
 #[test]

@@ -139,7 +139,8 @@ fn a_kind_whose_model_is_missing_is_refused_by_name() {
             axis.feedforward.kind = kind;
         });
         assert_eq!((refused, reason), (field, Reason::Missing));
-        assert!(text.starts_with(&format!("x.{field} is missing")), "{text}");
+        let path = field.replace('.', "/");
+        assert!(text.starts_with(&format!("x/{path} is missing")), "{text}");
     }
 }
 
@@ -238,7 +239,8 @@ fn a_law_without_its_parameters_is_refused_by_name() {
         let error = refusal(&bare);
         assert_eq!((error.field, error.reason), (field, Reason::Missing));
         let text = format!(
-            "x.{field} is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in"
+            "x/{} is missing, which the chosen law or kind of feedforward needs: `quadrant commission` fills it in",
+            field.replace('.', "/")
         );
         assert_eq!(error.to_string(), text);
     }

@@ -3,6 +3,7 @@
 use std::collections::BTreeSet;
 
 use quadrant::cancelling::CancellingSettings;
+use quadrant::control::feedback::LawKind;
 use quadrant::control::filter::{FilterList, FilterSettings};
 use quadrant::learning::LearningSettings;
 use quadrant::settings::leaves::{LeafInfo, Range, all, find};
@@ -149,6 +150,19 @@ fn about(leaf: &LeafInfo, result: &Result<(), SettingsError>) -> Option<Reason> 
     (error.field == leaf.field).then_some(error.reason)
 }
 
+/// The law that alone reads a field.
+pub(crate) fn law_of(field: &str) -> Option<LawKind> {
+    let laws = [
+        ("feedback.nonlinear.", LawKind::NPid),
+        ("feedback.schedule.", LawKind::Scheduled),
+        ("feedback.cascade.", LawKind::Cascade),
+        ("feedback.sliding_mode.", LawKind::SlidingMode),
+        ("feedback.nctf.", LawKind::Nctf),
+    ];
+    let found = laws.into_iter().find(|(part, _)| field.starts_with(part));
+    found.map(|(_, law)| law)
+}
+
 #[test]
 fn each_end_of_each_range_is_the_one_that_is_enforced() {
     let mut ends = 0;
@@ -156,7 +170,11 @@ fn each_end_of_each_range_is_the_one_that_is_enforced() {
         let Range::Number(least, most) = leaf.range else {
             continue;
         };
-        let settings = settings();
+        let mut settings = settings();
+        // An end that another setting decides is that of the law in force.
+        if let Some(law) = law_of(leaf.field) {
+            settings.axes[0].feedback.law = law;
+        }
         let (least, most) = (least.value(&settings, 0), most.value(&settings, 0));
         assert!(least < most, "{}", leaf.path());
         let step: f64 = if is_whole(leaf.field) { 1.0 } else { 0.0 };

@@ -737,12 +737,16 @@ mod tests {
             Journal::count(&folder.path().join("x").join(EXPERIMENTS)),
             kept
         );
-        // It stands as free as at the beginning.
-        machine.stage = LawStage::new(1);
-        let done = commission_with(folder.path(), &mut machine, &["--resume"]).unwrap();
-        assert!(!done.text.is_empty());
-        let again = said(commission_with(folder.path(), &mut machine, &["--resume"]));
-        assert!(again.contains("has ended is not begun again"), "{again}");
+        let experiments = folder.path().join("x").join(EXPERIMENTS);
+        let begun = Journal::request(&experiments).unwrap();
+        let adopted = resumed(&experiments, &begun).unwrap();
+        assert!(
+            adopted.contains(&format!("{kept} experiments in")),
+            "{adopted}"
+        );
+        Journal::remove(&experiments).unwrap();
+        let ended = said(commission_with(folder.path(), &mut machine, &["--resume"]));
+        assert!(ended.contains("has ended is not begun again"), "{ended}");
     }
 
     #[test]
