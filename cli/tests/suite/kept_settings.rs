@@ -41,7 +41,7 @@ fn assert_keeps(command: &str, meant: &[&str]) {
     for Change { path, old, new } in changed {
         let is_meant = |prefix: &&str| path.starts_with(*prefix);
         assert!(
-            meant.iter().any(|prefix| is_meant(prefix)),
+            meant.iter().any(is_meant),
             "{command}: {path}: {old} -> {new}"
         );
         assert!(
