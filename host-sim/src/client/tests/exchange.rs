@@ -61,7 +61,7 @@ fn a_test_of_an_axis_does_not_write_over_what_is_edited() {
     let travel = Travel::either_way(10.0);
     let error = client.test_axis(AxisName::X, travel).err().unwrap();
     let text = error.to_string();
-    for part in ["/axes/1/feedback/pid/kp_v_per_mm", "`apply`", "`revert`"] {
+    for part in ["y/feedback/pid/kp_v_per_mm", "`apply`", "`revert`"] {
         assert!(text.contains(part), "{text}");
     }
     assert_eq!(bench.borrow().in_force, StageSettings::simulated());
@@ -94,7 +94,7 @@ fn what_is_loaded_is_what_acts_parts_and_lists_included() {
         loaded
             .changed
             .iter()
-            .any(|path| path == "/axes/0/feedback/nonlinear")
+            .any(|path| path == "x/feedback/nonlinear")
     );
     // A second time there is nothing to do.
     let loaded = settings::load(&mut client, &StageSettings::simulated()).unwrap();
