@@ -17,7 +17,6 @@ use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
-use crate::law::safety::oscillation::Oscillation;
 use crate::law::safety::overload::Overload;
 use crate::law::safety::plausibility::{Held, HeldLine, Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
@@ -211,11 +210,6 @@ impl AxisSettings {
             ))
             .plausibility(self.build_plausibility(period_s))
             .overload(amplifier.build_overload(period_s))
-            .oscillation(Oscillation::new(
-                feedforward.kind != FeedforwardKind::None || cancelling.is_some(),
-                limits.following_error_mm / encoder.resolution_mm,
-                period_s,
-            ))
             .learning(self.build_learning(period_s))
             .cancelling(cancelling.as_ref().map(|(settings, of)| (settings, of)))
             .index_spacing(IndexSpacing::new(

@@ -60,7 +60,6 @@ mod nonlinear_gain;
 mod not_commissioned;
 mod number_types;
 mod operation;
-mod oscillation;
 mod overload;
 mod parameter_trace;
 mod pid;
