@@ -18,27 +18,22 @@ use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
 use crate::law::safety::overload::Overload;
-use crate::law::safety::plausibility::{Held, HeldLine, Plausibility, PlausibilityModel, Words};
+use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
 use crate::law::safety::{Brake, Operation};
 use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
 use crate::law::units::{DacCode, Position};
 
+/// Counts that an axis shows for certain: those of one dead line, and noise.
+const HELD_COUNTS: f64 = 5.0;
 /// Counts that a step of an axis may have however slow: noise of a count RMS makes up to six in the difference of two readings.
 const LEAST_STEP_COUNTS: i32 = 8;
-/// Friction, and the stiffness before sliding beside it, over those of the settings, at most.
-const LEVEL_ERROR: f64 = 2.0;
-const STIFFNESS_ERROR: f64 = 1.25;
-/// Breakaway over that of the settings that need not show as motion in open loop.
+/// Stiffness before sliding, and breakaway, over those of the settings, at most.
+const HELD_ERROR: f64 = 1.25;
 const FRICTION_ERROR: f64 = 1.5;
-/// Range of motion that only an axis that moves goes through, mm, and in counts: more than a cable that floats shows.
-const ALIVE_MM: f64 = 0.064;
-const ALIVE_COUNTS: (f64, f64) = (64.0, 128.0);
-/// A range of motion in between, counts, where the line of what friction takes up changes.
-const MID_COUNTS: f64 = 12.0;
-/// Breakaway of the settings that is a load that there may be, however small the output limit is, at first and later.
-const FIRST_LOAD_FRICTIONS: f64 = 3.0;
+/// Least voltage that must show as motion, as a share of the output limit.
+const HELD_SHARE: f64 = 0.01;
 /// Largest load, as a share of the output limit; and before the axis has moved so far after enabling, mm.
 const LOAD_SHARE: f64 = 0.3;
 const FIRST_LOAD_SHARE: f64 = 0.1;
@@ -49,8 +44,6 @@ const MODEL_COUNTS: f64 = 20.0;
 /// The addition to that distance for the error of the dead time, over gain times largest output times its square: a fifth of the
 /// way that this output brings within it.
 const DELAY_ERROR: f64 = 0.1;
-/// The addition for friction that breaks away or is turned around: the way that its level brings within this time, s.
-const FRICTION_S: f64 = 3.5e-3;
 /// Speed that no load explains, mm/s, and in counts per tick.
 const MODEL_VELOCITY_MM_S: f64 = 80.0;
 const MODEL_STEP_COUNTS: f64 = 8.0;
@@ -203,9 +196,7 @@ impl AxisSettings {
             ))
             .overspeed(Overspeed::new(limits.overspeed_ratio * 0.5 * largest_step))
             .signal_loss(SignalLoss::new(
-                // Below it, friction and a load may hold an axis.
-                (limits.silent_share * amplifier.output_limit_v)
-                    .max(LEVEL_ERROR * self.largest_breakaway_v()),
+                limits.silent_share * amplifier.output_limit_v,
                 rounding::round(limits.silent_s / period_s) as u32,
             ))
             .plausibility(self.build_plausibility(period_s))
@@ -248,14 +239,14 @@ impl AxisSettings {
             let breakaway_v = OPEN_SHARE * limit_v;
             return Plausibility::without_model(OPEN_BUDGET_V_S, breakaway_v, words, period_s);
         };
-        let breakaway_v = self.largest_breakaway_v();
-        let alive_counts = (ALIVE_MM / resolution_mm).clamp(ALIVE_COUNTS.0, ALIVE_COUNTS.1);
-        let least_load_v = FIRST_LOAD_FRICTIONS * breakaway_v;
+        // Where the level rises with the speed, a vibration may have hidden some of it at rest.
+        let PerDirection { positive, negative } = &self.friction.sliding;
+        let level_v = |curve: &StribeckCurve| curve.breakaway_v.max(curve.coulomb_v);
+        let breakaway_v = level_v(&positive.curve).max(level_v(&negative.curve));
+        // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
+        let seen_mm = HELD_COUNTS * resolution_mm;
+        let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
         let delay_s = plant.delay_s;
-        let gain = plant.gain_mm_per_v_s2;
-        let delayed_mm = DELAY_ERROR * gain * limit_v * delay_s * delay_s;
-        let breaking_mm = 0.5 * gain * breakaway_v * FRICTION_S * FRICTION_S;
-        let least_mm = MODEL_COUNTS * resolution_mm;
         let model = PlausibilityModel {
             gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
             damping_per_s: plant.damping_per_s,
@@ -263,52 +254,17 @@ impl AxisSettings {
             limit_v,
             // Beyond it, a step of the encoder is a jump.
             largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
-            held: self.held(breakaway_v, alive_counts),
-            alive_counts: alive_counts as u32,
-            friction_v: LEVEL_ERROR * breakaway_v,
-            breakaway_v: FRICTION_ERROR * breakaway_v,
-            load_v: (LOAD_SHARE * limit_v).max(FIRST_LOAD_SHARE * limit_v + least_load_v),
-            first_load_v: (FIRST_LOAD_SHARE * limit_v).max(least_load_v),
+            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v),
+            breakaway_v: (FRICTION_ERROR * breakaway_v).max(HELD_SHARE * limit_v),
+            load_v: LOAD_SHARE * limit_v,
+            first_load_v: FIRST_LOAD_SHARE * limit_v,
             proving_mm: PROVING_MM,
-            distance_mm: (MODEL_DISTANCE_MM + delayed_mm.max(breaking_mm)).max(least_mm),
-            mean_distance_mm: (MODEL_DISTANCE_MM + delayed_mm + breaking_mm).max(least_mm),
+            distance_mm: (MODEL_DISTANCE_MM
+                + DELAY_ERROR * plant.gain_mm_per_v_s2 * limit_v * delay_s * delay_s)
+                .max(MODEL_COUNTS * resolution_mm),
             velocity_mm_s: MODEL_VELOCITY_MM_S.max(MODEL_STEP_COUNTS * resolution_mm / period_s),
         };
         Plausibility::new(&model, words, resolution_mm, period_s)
-    }
-
-    /// The larger breakaway of both senses, V. Where the level rises with the speed, a vibration may have hidden some of it at
-    /// rest.
-    fn largest_breakaway_v(&self) -> f64 {
-        let PerDirection { positive, negative } = &self.friction.sliding;
-        let level_v = |curve: &StribeckCurve| curve.breakaway_v.max(curve.coulomb_v);
-        level_v(&positive.curve).max(level_v(&negative.curve))
-    }
-
-    /// The change of the voltage that friction takes up within a range of motion.
-    #[inline(never)]
-    fn held(&self, breakaway_v: f64, alive_counts: f64) -> Held {
-        let count_mm = self.encoder.resolution_mm;
-        // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
-        let taken_v = |counts: f64| {
-            let half_mm = 0.5 * counts * count_mm * STIFFNESS_ERROR;
-            LEVEL_ERROR * 2.0 * self.friction.gms.virgin_curve_v(half_mm, breakaway_v)
-        };
-        // A load that moves the axis is answered by the law.
-        let gains = self.feedback.linear_gains();
-        let answered_v = gains
-            .iter()
-            .map(|gains| gains.kp_v_per_mm * count_mm)
-            .fold(0.0, f64::max)
-            * self.feedback.nonlinear.map_or(1.0, |gain| gain.largest());
-        Held([0.0, MID_COUNTS, alive_counts].map(|counts| {
-            let slope_v = taken_v(counts + 1.0) - taken_v(counts);
-            HeldLine {
-                // A motion of less than a count may not show.
-                still_v: taken_v(counts + 1.0) - slope_v * counts,
-                per_count_v: slope_v + answered_v,
-            }
-        }))
     }
 
     #[inline(never)]

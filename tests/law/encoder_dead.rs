@@ -333,9 +333,10 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
         // What a load does to an axis that stands is seen by the encoder alone.
         (_, Activity::RestUnderLoad) => death != Death::Reversed,
         // It is slower than its gaps; the index pulses tell.
-        (Death::Intermittent, Activity::Jog(speed) | Activity::JogFromRest(speed)) => speed <= 10.0,
-        // A cut is a load that comes and goes in the gaps.
-        (Death::Intermittent, Activity::CutSine(..)) => true,
+        (
+            Death::Intermittent,
+            Activity::Jog(speed) | Activity::JogFromRest(speed) | Activity::CutSine(speed, _),
+        ) => speed <= 10.0,
         (Death::Intermittent, Activity::OpenLoop(volts, _) | Activity::ClosedLoop(volts, _)) => {
             volts <= 0.3
         }
@@ -412,7 +413,6 @@ fn every_death(settings: &StageSettings, activities: &[Activity]) {
             // One of the two bounds holds by itself; both do but for the slowest motion, and for one that swings to and fro.
             assert!(end.unplanned_mm < MOST_MM, "{death:?} {activity:?} {end:?}");
             let slow = matches!(activity, Activity::Jog(speed) if speed < 2.0)
-                || matches!(activity, Activity::ClosedLoop(volts, _) if volts <= 0.3)
                 || end.unplanned_mm < SWING_MM;
             assert!(
                 slow || end.unplanned_ms < MOST_MS,

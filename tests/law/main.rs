@@ -22,7 +22,6 @@ mod driver_parts;
 mod driver_tick_interval;
 mod encoder;
 mod encoder_dead;
-mod encoder_dead_by_speed;
 mod every_parameter_counts;
 mod feedback_laws;
 mod feedforward;

@@ -4,15 +4,11 @@
 //! fast. The output does not lie. Two comparisons, both on the voltage that has reached the axis, which is that of the
 //! output through a lag of the plant's dead time:
 //!
-//! - **No motion.** While the encoder stays within a range, the voltage may change by what friction takes up there, [`Held`].
-//!   What goes beyond moves a model, `v' = A u - B v`, from rest; when that has gone farther than a distance that was
-//!   not seen, the encoder is dead or the axis is blocked. Counts that go to and fro are no motion: the
-//!   change counts from the last time that the range grew, so that an encoder that flickers gains nothing once it has
-//!   shown its range, and, with half as much again allowed, from when the range began. It begins again when it is wider than
-//!   one that only an axis that moves goes through. Where the last motion of some way went one way and the voltage goes the
-//!   other, friction may lose what it held without a motion, as under vibration. In open loop nothing is held, so there
-//!   the voltage itself counts too, beyond what friction can hold. All of it twice: on what is shown at once, and on a
-//!   running mean of it, which flickers less.
+//! - **No motion.** While the encoder stands (or dithers between two counts, as with one dead line), the voltage may
+//!   change by what friction takes up before it yields visibly. What goes beyond moves a model, `v' = A u - B v`, from
+//!   rest; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
+//!   the last motion that was seen, because a load may be held at rest with any voltage. In open loop nothing is held, so
+//!   there the voltage itself counts too, beyond what friction can hold.
 //! - **Wrong motion.** The model's speed with the largest load against it, and with the largest load behind it, are the
 //!   bounds of the measured one; a bound that the axis passes goes along with it (a CUSUM test, Page 1954). An encoder or
 //!   amplifier of the wrong sign, or an encoder that dies at speed, needs more load than there can be. Until the axis has
@@ -27,7 +23,7 @@
 //!
 //! [`Overspeed`]: super::monitor::Overspeed
 
-use super::monitor::{SPEED_FILTER_BITS, SPEED_FRACTION_BITS};
+use super::monitor::{DITHER_COUNTS, SPEED_FILTER_BITS, SPEED_FRACTION_BITS};
 use crate::law::rounding;
 
 /// Ticks from one comparison of an axis to the next, as a power of two.
@@ -43,33 +39,6 @@ const FORGET_S: f64 = 0.3;
 
 /// Largest speed, and gain of speed from one comparison to the next, that there is room for.
 const ROOM: f64 = (1u32 << 28) as f64;
-
-/// Comparisons over which the slow one takes the mean, as a power of two.
-const SLOW_BITS: u32 = 4;
-
-/// Growth of the range of motion that counts, 2^-8 counts: half a count of what is shown at once, and of the mean more than
-/// the counts of noise leave in it.
-const QUICK_STEP: i32 = 1 << (SPEED_FRACTION_BITS - 1);
-const SLOW_STEP: i32 = 3 << (SPEED_FRACTION_BITS - 1);
-
-/// Counts that a dead line shows, with noise, 2^-8 counts.
-const DITHER: i32 = 4 << SPEED_FRACTION_BITS;
-
-/// Share of what friction takes up that is added since the range began: a half.
-const BASE_ERROR_SHIFT: u32 = 1;
-
-/// Motion back that is a motion the other way, as a share of the range that only an axis that moves goes through: a quarter.
-const TURN_SHIFT: u32 = 2;
-
-/// Comparisons, as a power of two, in which a force that lasts becomes that of the load: a load that drifts changes it while
-/// the law holds the axis where it is.
-const LEAK_BITS: u32 = 12;
-
-/// Largest range of motion that there is room for, counts.
-const LARGEST_RANGE: u32 = 1 << 15;
-
-/// Range of motion that only an axis that moves goes through, counts, where there is no model.
-const ALIVE_COUNTS_WITHOUT_MODEL: u32 = 64;
 
 /// Fraction bits of a speed that a distance does without.
 const DISTANCE_BITS: u32 = 8;
@@ -111,12 +80,8 @@ pub struct PlausibilityModel {
     pub limit_v: f64,
     /// Largest measured speed, mm/s.
     pub largest_mm_s: f64,
-    /// Change of the voltage that friction takes up within a range of motion.
-    pub held: Held,
-    /// Range of motion that only an axis that moves goes through, counts, at most 2^15.
-    pub alive_counts: u32,
-    /// Largest friction, V: what it may lose without a motion.
-    pub friction_v: f64,
+    /// Change of the voltage that need not show as motion, in closed loop, V.
+    pub held_v: f64,
     /// Voltage that need not show as motion, in open loop, V.
     pub breakaway_v: f64,
     /// Largest load, V at the amplifier's input.
@@ -127,28 +92,9 @@ pub struct PlausibilityModel {
     pub proving_mm: f64,
     /// Distance of the model without motion of the encoder that is a fault, mm.
     pub distance_mm: f64,
-    /// The same for the mean of what is shown, mm.
-    pub mean_distance_mm: f64,
     /// Gain of speed that no load explains and that is a fault, mm/s.
     pub velocity_mm_s: f64,
 }
-
-/// Change of the voltage that friction takes up while the axis stays within a range of motion: the least of some lines.
-/// Settings time only.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Held(pub [HeldLine; HELD_LINES]);
-
-/// One of these lines.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct HeldLine {
-    /// Change without motion, V.
-    pub still_v: f64,
-    /// Addition for each count of the range, V.
-    pub per_count_v: f64,
-}
-
-/// Lines of [`Held`].
-pub const HELD_LINES: usize = 3;
 
 /// Compares the encoder's motion with what the output must have caused; the default finds nothing.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
@@ -163,38 +109,18 @@ pub struct Plausibility {
     push: i32,
     /// Share of the way to the output that the lagging force goes, 2^-32.
     lag: i32,
-    held: [Line; HELD_LINES],
-    /// Range of motion that only an axis that moves goes through, 2^-8 counts.
-    alive: i32,
-    friction: i32,
+    held: i32,
     breakaway: i32,
     /// Share of a speed that is lost, 2^-32.
     drag: i32,
     /// Right shift from a distance to what is forgotten of it.
     forget_shift: u32,
     distance: i32,
-    mean_distance: i32,
     /// Largest load as the speed gained, at first and later.
     first_load: i32,
     load: i32,
     proving_counts: u32,
     velocity: i32,
-}
-
-/// A force that is a line over the range of motion.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Line {
-    still: i32,
-    per_count: i32,
-}
-
-impl Line {
-    /// The force at a range of motion, 2^-8 counts.
-    #[inline(always)]
-    fn at(self, range: i32) -> i32 {
-        let more = (i64::from(self.per_count) * i64::from(range)) >> SPEED_FRACTION_BITS;
-        self.still.saturating_add(more as i32)
-    }
 }
 
 /// An axis at a comparison.
@@ -218,40 +144,19 @@ pub struct PlausibilityState {
     words: i32,
     /// Force that has reached the axis.
     force: i32,
-    /// Position, 2^-8 counts; wraps.
-    position: i32,
-    /// The comparisons with what the axis shows at once, and with what it shows on average.
-    quick: Standing,
-    slow: Standing,
+    /// That force at the last motion that was seen.
+    anchor: i32,
+    /// Counts since.
+    travelled: i32,
+    /// Speed and distance of the model since.
+    modelled: i32,
+    distance: i32,
     /// Counts since enabling, and true once they have gone far enough.
     way: i32,
     proved: bool,
     /// Speeds of the model with the largest load against it, and behind it.
     least: i32,
     most: i32,
-}
-
-/// The memory of an axis that stands as far as can be told. Positions and ranges are in 2^-8 counts.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-struct Standing {
-    /// Force and position that are compared; the position wraps.
-    force: i32,
-    position: i32,
-    /// Position and force where the range of motion began, and its ends, from there.
-    origin: i32,
-    base: i32,
-    low: i32,
-    high: i32,
-    /// Force when the range last grew, and the ends of the motion since.
-    anchor: i32,
-    least: i32,
-    most: i32,
-    /// Sense of the last motion of some way, 1 or -1, or zero; and the farthest position of it.
-    heading: i32,
-    farthest: i32,
-    /// Speed and distance of the model.
-    modelled: i32,
-    distance: i32,
 }
 
 impl Plausibility {
@@ -272,20 +177,12 @@ impl Plausibility {
         Self {
             modelled: true,
             shift,
-            lag: share(interval_s / (model.delay_s + filter_s + 0e-3)),
-            held: model.held.0.map(|line| Line {
-                still: force(line.still_v),
-                per_count: force(line.per_count_v),
-            }),
-            alive: (model.alive_counts.min(LARGEST_RANGE) << SPEED_FRACTION_BITS) as i32,
+            lag: share(interval_s / (model.delay_s + filter_s)),
+            held: force(model.held_v),
             breakaway: force(model.breakaway_v),
-            friction: force(model.friction_v),
             drag: share(model.damping_per_s * interval_s),
             forget_shift: whole_log2(FORGET_S / interval_s),
             distance: rounding::round(model.distance_mm / resolution_mm * counts_per_speed) as i32,
-            mean_distance: rounding::round(
-                model.mean_distance_mm / resolution_mm * counts_per_speed,
-            ) as i32,
             first_load: force(model.first_load_v),
             load: force(model.load_v),
             proving_counts: (model.proving_mm / resolution_mm) as u32,
@@ -300,11 +197,7 @@ impl Plausibility {
         let units = |value: f64| rounding::round(value * UNITS_PER_VOLT) as i32;
         Self {
             // There is no telling what friction takes up.
-            held: [Line {
-                still: i32::MAX,
-                per_count: 0,
-            }; HELD_LINES],
-            alive: (ALIVE_COUNTS_WITHOUT_MODEL << SPEED_FRACTION_BITS) as i32,
+            held: i32::MAX,
             breakaway: units(breakaway_v),
             forget_shift: whole_log2(FORGET_S / (INTERVAL_TICKS * period_s)),
             distance: units(budget_v_s / period_s) >> DISTANCE_BITS,
@@ -329,12 +222,6 @@ impl Plausibility {
         PlausibilityState {
             count: shown.count,
             words: shown.words,
-            position: shown.speed << SPEED_FILTER_BITS,
-            quick: Standing {
-                position: shown.speed << SPEED_FILTER_BITS,
-                origin: shown.speed << SPEED_FILTER_BITS,
-                ..Standing::default()
-            },
             least: speed,
             most: speed,
             ..PlausibilityState::default()
@@ -349,34 +236,14 @@ impl Plausibility {
         (state.count, state.words) = (shown.count, shown.words);
         let pushed = words.wrapping_sub(self.offset);
         let pushed = ((i64::from(pushed) * i64::from(self.push)) >> PUSH_BITS) as i32;
-        state.position = state
-            .position
-            .wrapping_add(counts.wrapping_shl(SPEED_FRACTION_BITS));
-        if !self.modelled {
+        if self.modelled {
+            state.force += part(pushed.saturating_sub(state.force), self.lag);
+            let speed = shown.speed.wrapping_shl(self.shift);
+            self.moves_along(state, counts, speed) & self.stands(state, counts, shown.open)
+        } else {
             state.force = pushed;
-            let quick = &mut state.quick;
-            quick.force = pushed;
-            return !shown.open
-                | self.stands(quick, state.position, (QUICK_STEP, self.distance), true);
+            !shown.open | self.stands(state, counts, shown.open)
         }
-        state.force += part(pushed.saturating_sub(state.force), self.lag);
-        let (quick, slow) = (&mut state.quick, &mut state.slow);
-        quick.force = state.force;
-        slow.force += state.force.saturating_sub(slow.force) >> SLOW_BITS;
-        // As far behind as the filtered speed is.
-        let position = state
-            .position
-            .wrapping_sub(shown.speed << SPEED_FILTER_BITS);
-        let mean = position.wrapping_sub(slow.position) >> SLOW_BITS;
-        let mean = slow.position.wrapping_add(mean);
-        let stands = self.stands(
-            quick,
-            state.position,
-            (QUICK_STEP, self.distance),
-            shown.open,
-        ) & self.stands(slow, mean, (SLOW_STEP, self.mean_distance), shown.open);
-        let speed = shown.speed.wrapping_shl(self.shift);
-        self.moves_along(state, counts, speed) & stands
     }
 
     /// False if the speed changes as no load changes it.
@@ -402,100 +269,31 @@ impl Plausibility {
             & (speed.saturating_sub(state.most) <= self.velocity)
     }
 
-    /// False if the encoder stands though the axis must have moved. `step` is the growth of the range of motion that counts,
-    /// `most` the distance of the model that is a fault.
+    /// False if the encoder stands though the axis must have moved.
     #[inline(always)]
-    fn stands(
-        &self,
-        state: &mut Standing,
-        position: i32,
-        (step, most): (i32, i32),
-        open: bool,
-    ) -> bool {
-        let moved = position.wrapping_sub(state.position);
-        state.position = position;
-        let grows = self.widen(state, step);
-        let force = state.force;
-        let changed = force.saturating_sub(state.anchor);
-        let range = state.most.saturating_sub(state.least);
-        let of_anchor = beyond(changed, self.held(range, changed, state.heading));
-        // In open loop; a dead line's counts are no motion.
-        let wider = range.saturating_sub(DITHER).max(0);
-        let more = self.held(wider, 0, 0).saturating_sub(self.held(0, 0, 0));
-        state.anchor += changed >> LEAK_BITS;
-        let changed = force.saturating_sub(state.base);
-        let range = state.high.saturating_sub(state.low).saturating_add(step);
-        let held = self.held(range, changed, state.heading);
-        let of_base = beyond(changed, held.saturating_add(held >> BASE_ERROR_SHIFT));
-        state.base += changed >> LEAK_BITS;
-        let mut force_left = larger(of_anchor, of_base);
-        if open && force_left == 0 {
-            let more = if self.modelled { more } else { 0 };
-            force_left = beyond(force, self.breakaway.saturating_add(more));
-        }
-        state.modelled = if grows & (of_base == 0) {
-            0
-        } else if self.modelled {
-            let lost = part(state.modelled, self.drag);
-            state
-                .modelled
-                .saturating_add(force_left.saturating_sub(lost))
+    fn stands(&self, state: &mut PlausibilityState, counts: i32, open: bool) -> bool {
+        state.travelled = state.travelled.saturating_add(counts);
+        if state.travelled.unsigned_abs() > DITHER_COUNTS {
+            state.travelled = 0;
+            state.anchor = state.force;
+            state.modelled = 0;
         } else {
-            force_left
-        };
-        let mut ahead = state.modelled >> (DISTANCE_BITS - INTERVAL_BITS);
-        if self.modelled && (ahead != 0) & (moved ^ ahead >= 0) {
-            let seen = moved.wrapping_shl(self.shift) >> SPEED_FRACTION_BITS;
-            let left = ahead.saturating_sub(seen);
-            ahead = if left ^ ahead >= 0 { left } else { 0 };
+            let mut force = beyond(state.force.saturating_sub(state.anchor), self.held);
+            if open && force == 0 {
+                force = beyond(state.force, self.breakaway);
+            }
+            state.modelled = if self.modelled {
+                let lost = part(state.modelled, self.drag);
+                state.modelled.saturating_add(force.saturating_sub(lost))
+            } else {
+                force
+            };
         }
         // Kept through motion: an encoder with gaps shows some.
         let forgotten = state.distance >> self.forget_shift;
-        state.distance = (state.distance - forgotten).saturating_add(ahead);
-        state.distance.saturating_abs() <= most
-    }
-
-    /// Takes a position into the range of motion; true if that grows by it.
-    #[inline(always)]
-    fn widen(&self, state: &mut Standing, step: i32) -> bool {
-        let mut away = state.position.wrapping_sub(state.origin);
-        let grows =
-            (away > state.high.saturating_add(step)) | (away < state.low.saturating_sub(step));
-        if grows {
-            (state.low, state.high) = (state.low.min(away), state.high.max(away));
-            (state.least, state.most) = (away, away);
-            state.anchor = state.force;
-            if state.high.saturating_sub(state.low) > self.alive {
-                (state.origin, state.base) = (state.position, state.force);
-                state.farthest = state.farthest.saturating_sub(away);
-                (state.low, state.high) = (0, 0);
-                (state.least, state.most) = (0, 0);
-                away = 0;
-            }
-        }
-        (state.least, state.most) = (state.least.min(away), state.most.max(away));
-        let turn = self.alive >> TURN_SHIFT;
-        let back = away.saturating_sub(state.farthest);
-        if back.saturating_abs() > turn && (back ^ state.heading < 0) | (state.heading == 0) {
-            state.heading = back.signum();
-            state.farthest = away;
-        } else if back ^ state.heading >= 0 && state.heading != 0 {
-            state.farthest = away;
-        }
-        grows
-    }
-
-    /// The change of force that friction takes up within a range of motion.
-    #[inline(always)]
-    fn held(&self, range: i32, changed: i32, heading: i32) -> i32 {
-        let [first, second, third] = self.held;
-        let held = first.at(range).min(second.at(range)).min(third.at(range));
-        let unloads = (changed ^ heading < 0) & (heading != 0);
-        if unloads {
-            held.saturating_add(self.friction)
-        } else {
-            held
-        }
+        state.distance = (state.distance - forgotten)
+            .saturating_add(state.modelled >> (DISTANCE_BITS - INTERVAL_BITS));
+        state.distance.saturating_abs() <= self.distance
     }
 }
 
@@ -513,9 +311,9 @@ impl PlausibilityState {
 
     /// Begins a standstill anew: the loop is opened.
     pub fn forget_standstill(&mut self) {
-        for standing in [&mut self.quick, &mut self.slow] {
-            (standing.modelled, standing.distance) = (0, 0);
-        }
+        self.travelled = 0;
+        self.modelled = 0;
+        self.distance = 0;
     }
 }
 
@@ -534,16 +332,6 @@ fn whole_log2(value: f64) -> u32 {
 #[inline(always)]
 fn part(value: i32, share: i32) -> i32 {
     ((i64::from(value) * i64::from(share)) >> 32) as i32
-}
-
-/// The one of two values that is farther from zero.
-#[inline(always)]
-fn larger(a: i32, b: i32) -> i32 {
-    if a.saturating_abs() >= b.saturating_abs() {
-        a
-    } else {
-        b
-    }
 }
 
 /// The part of a value beyond `dead` either way.
