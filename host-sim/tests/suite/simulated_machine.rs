@@ -291,9 +291,9 @@ fn a_move_that_lasts_longer_than_the_tick_counter_is_refused() {
         velocity_mm_s,
     };
     for (velocity_mm_s, field) in [
-        (1e-4, "x.motion (duration, s) = "),
-        (3e-5, "x.motion (duration, s) = "),
-        (f64::MIN_POSITIVE, "x.motion.max_velocity_mm_s = "),
+        (1e-4, "x/motion (duration, s) = "),
+        (3e-5, "x/motion (duration, s) = "),
+        (f64::MIN_POSITIVE, "x/motion/max_velocity_mm_s = "),
     ] {
         let text = session.refused(to(100.0, velocity_mm_s));
         assert!(text.contains(field), "{text}");
