@@ -128,21 +128,21 @@ impl Path {
 
 /// An axis as it is reached.
 enum Bench<'a> {
-    Law(SimulatedTestAxis),
+    Law(Box<SimulatedTestAxis>),
     Linked(Box<dyn TestAxis + 'a>),
 }
 
 impl Bench<'_> {
     fn axis(&self) -> &dyn TestAxis {
         match self {
-            Self::Law(axis) => axis,
+            Self::Law(axis) => &**axis,
             Self::Linked(axis) => &**axis,
         }
     }
 
     fn axis_mut(&mut self) -> &mut dyn TestAxis {
         match self {
-            Self::Law(axis) => axis,
+            Self::Law(axis) => &mut **axis,
             Self::Linked(axis) => &mut **axis,
         }
     }
@@ -236,7 +236,7 @@ fn with_the_law(subject: &Subject, base: &AxisSettings) -> Tested {
     let axis = SimulatedTestAxis::new(0, subject.parameters.clone(), subject.seed);
     let mut timed = Timed {
         subject,
-        bench: Bench::Law(axis.with_travel(subject.travel)),
+        bench: Bench::Law(Box::new(axis.with_travel(subject.travel))),
         used_s: 0.0,
         tried: Vec::new(),
     };
