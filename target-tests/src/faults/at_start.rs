@@ -101,7 +101,7 @@ pub(crate) fn refused_job(image: &Image) -> Result<()> {
     );
     log_contains(
         &log,
-        "y.feedback.pid.kp_v_per_mm = NaN is not a finite number",
+        "y/feedback/pid/kp_v_per_mm = NaN is not a finite number",
     )
 }
 
