@@ -18,10 +18,10 @@ pub fn write(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     write_by(path, |out| out.write_all(content.as_ref()))
 }
 
-/// As [`write`], what `content` writes.
+/// As [`write()`], what `content` writes.
 ///
 /// # Errors
-/// As [`write`], or of `content`.
+/// As [`write()`], or of `content`.
 pub fn write_by(
     path: &Path,
     content: impl FnOnce(&mut dyn Write) -> io::Result<()>,
@@ -37,10 +37,10 @@ pub fn write_by(
     put(&target, content)
 }
 
-/// As [`write`], but in place of a link: nothing is written elsewhere.
+/// As [`write()`], but in place of a link: nothing is written elsewhere.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write()`].
 pub fn replace(path: &Path, content: impl AsRef<[u8]>) -> io::Result<()> {
     put(path, |out| out.write_all(content.as_ref()))
 }
