@@ -1,4 +1,4 @@
-//! What was checked against settings acts under those settings only: plans, streams, injections, the origin.
+//! Motions and origins act under the settings only that they were checked against: plans, streams, injections, the origin.
 
 use std::collections::BTreeMap;
 
@@ -9,6 +9,7 @@ use quadrant::link::message::{
     AxisName, AxisPoint, Body, InjectRequest, Motion, Plan, PointToPoint, Reply, SetPoint,
     SettingsRequest, StreamRequest,
 };
+use quadrant::reference::Velocity;
 use quadrant::safety::{AxisSwitches, Switches};
 use quadrant::settings::draft::Draft;
 use quadrant::settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
@@ -539,4 +540,40 @@ fn a_run_after_a_move_runs_the_plan_and_not_the_move() {
             .map(|axis| axis.measured.0);
         assert_eq!(counts, [end, end, end]);
     }
+}
+
+/// The travel is asked of the plan that runs, and not of the move between: neither does a long move bar a short plan, nor a short
+/// one let a long plan out.
+#[test]
+fn a_run_after_a_move_is_checked_by_the_reach_of_the_plan() {
+    let mut settings = marked(-0.2);
+    settings.axes[0].limits.travel_mm = Some(TravelSettings {
+        negative: -5.0,
+        positive: 5.0,
+    });
+    for (plan_mm, runs) in [(1.0, true), (8.0, false)] {
+        let mut tasks = Tasks::new(&settings, 1);
+        home_x(&mut tasks);
+        all(
+            &mut tasks,
+            &[Body::Enable, plan(plan_mm, SLOW), move_x(4.5)],
+        );
+        tasks.run(6000);
+        all(&mut tasks, &[move_x(0.0)]);
+        tasks.run(6000);
+        assert_eq!(tasks.ask(Body::Run).is_ok(), runs, "{plan_mm} mm");
+    }
+    // A plan that control refuses leaves the one before with its reach.
+    let mut tasks = Tasks::new(&settings, 1);
+    home_x(&mut tasks);
+    all(&mut tasks, &[Body::Enable, plan(8.0, SLOW)]);
+    tasks.upper.borrow_mut().operate(Command::Jog(
+        LawAxis::Y,
+        Velocity::from_mm_s(1.0, settings.motion_scale(1)),
+    ));
+    tasks.send(&[plan(1.0, SLOW)]);
+    tasks.run(400);
+    all(&mut tasks, &[Body::Stop]);
+    tasks.run(2000);
+    assert!(tasks.ask(Body::Run).is_err());
 }

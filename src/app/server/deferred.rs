@@ -1,5 +1,6 @@
 //! Requests that wait for control.
 
+use crate::law::axes::PerAxis;
 use quadrant_link::message::Provenance;
 
 /// The work of a request that waits for control.
@@ -11,8 +12,8 @@ pub(super) enum Work {
     Store(Provenance),
     /// Restart, while the outputs are kept off.
     Restart,
-    /// Only say what became of the plan.
-    Plan,
+    /// Say what became of the plan, and keep its lowest and highest positions, mm from its start, if control has taken it.
+    Plan(PerAxis<(f64, f64)>),
 }
 
 /// A request that is answered when control has taken the order that it came to.

@@ -18,7 +18,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 self.order(Order::Lock)?;
                 self.locked = true;
             }
-            Work::Plan => self.order(Order::Plan)?,
+            Work::Plan(_) => self.order(Order::Plan)?,
         }
         self.deferred = Some(Deferred { id: 0, work });
         Ok(Reply::Done)
@@ -33,8 +33,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             return false;
         };
         let result = match work {
-            Work::Plan if self.seen.plan_taken => Ok(Reply::Done),
-            Work::Plan => Err(refused(format_args!(
+            Work::Plan(reach_mm) if self.seen.plan_taken => {
+                self.plan_reach_mm = reach_mm;
+                Ok(Reply::Done)
+            }
+            Work::Plan(_) => Err(refused(format_args!(
                 "a motion is under way; stop it before the plan is exchanged"
             ))),
             _ if !self.seen.view.locked => Err(outputs_on()),

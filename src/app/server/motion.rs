@@ -34,7 +34,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             Body::Run => {
                 self.check(Command::Run)?;
                 self.check_plan()?;
-                self.command(Command::Run)?;
+                self.order(Order::Command(Command::Run))?;
             }
             Body::Home(axes) => {
                 for axis in axes.iter().map(AxisName::from) {
@@ -168,27 +168,25 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 "a motion is under way; stop it before the plan is exchanged"
             )));
         }
-        self.hand_over(&PlanSettings::from(plan))?;
-        self.defer(Work::Plan)
+        let plan = PlanSettings::from(plan);
+        self.hand_over(&plan)?;
+        let reach_mm = PerAxis::from_fn(|axis| reach_mm(&plan.motions[index(axis)]));
+        self.defer(Work::Plan(reach_mm))
     }
 
     /// Lays motions that keep to their axes' limits where control takes them from when it is ordered to.
     #[inline(never)]
-    fn hand_over(&mut self, motions: &PlanSettings) -> Result<(), LinkError> {
+    fn hand_over(&mut self, plan: &PlanSettings) -> Result<(), LinkError> {
         let settings = self.in_force()?;
-        motions
-            .validate(settings)
+        plan.validate(settings)
             .map_err(|error| invalid(format_args!("{error}")))?;
         let plan = PerAxis::from_fn(|axis| {
-            Motion::build(&motions.motions[index(axis)], settings.scale_of(axis))
+            Motion::build(&plan.motions[index(axis)], settings.scale_of(axis))
         });
-        let reach_mm = PerAxis::from_fn(|axis| reach_mm(&motions.motions[index(axis)]));
         self.ends.plans.enqueue(plan).map_err(|_| {
             busy(format_args!(
                 "the control law has motions waiting; ask again"
             ))
-        })?;
-        self.plan_reach_mm = reach_mm;
-        Ok(())
+        })
     }
 }
