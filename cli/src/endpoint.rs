@@ -135,7 +135,7 @@ fn session(transport: impl Transport + 'static, share: Option<&str>) -> anyhow::
             );
         }
         Some(token) => warn!(
-            "whoever on the network has the token may look, stop and disable; the token goes over it in the clear: quadrant connect \
+            "anyone on the network with the token may look, stop and disable; the token goes over it in the clear: quadrant connect \
              --look {address} --token {token}"
         ),
     }

@@ -24,7 +24,7 @@ macro_rules! warn {
     ($($what:tt)*) => { $crate::terminal::print_error(format_args!("{}\n", format_args!($($what)*))) };
 }
 
-/// What empties a terminal, and begins at its top.
+/// Sequence that empties a terminal and begins at its top.
 const CLEAR: &[u8] = b"\x1b[2J\x1b[H";
 
 /// Prints to standard output, unless that has failed before.

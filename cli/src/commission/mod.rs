@@ -381,7 +381,7 @@ impl Request {
         }
     }
 
-    /// What a commissioning can be resumed with alone: seed, options, and the settings of the axis that it starts from.
+    /// The only thing that a commissioning can be resumed with: seed, options, and the settings of the axis that it starts from.
     fn words(&self, seed: u64, travel: Option<Travel>, base: &AxisSettings) -> String {
         let mut words = format!("--seed {seed}");
         if let Some(travel) = travel {

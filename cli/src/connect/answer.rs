@@ -28,7 +28,7 @@ impl Answer {
     }
 }
 
-/// What has become of a machine that was restarted.
+/// State of a machine that was restarted.
 pub(super) const RESTARTED: &str = "restarted: the outputs are off, home positions are lost";
 
 /// Checks seconds that were given, 0 to 1e6.

@@ -1,9 +1,8 @@
 //! `quadrant connect` on the simulated machine: whole sessions, through the command alone.
 
 use crate::command;
-use std::io::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 
 use quadrant_sim::record::{AxisLimits, Record};
 use quadrant_sim::settings_file::SettingsFile;
@@ -18,20 +17,11 @@ const LIMITS: AxisLimits = AxisLimits {
 
 /// Gives a script to a machine that has just been switched on.
 fn session(folder: &Path, options: &[&str], script: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .args(["connect", "--simulated"])
-        .args(options)
-        .current_dir(folder)
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = child.stdin.take().unwrap();
-    // A session that fails does not read to the end.
-    let _ = input.write_all(script.as_bytes());
-    drop(input);
-    child.wait_with_output().unwrap()
+    command::play(
+        folder,
+        &[&["connect", "--simulated"], options].concat(),
+        script,
+    )
 }
 
 /// Returns the output of a session that must succeed.

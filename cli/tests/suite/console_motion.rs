@@ -1,8 +1,8 @@
 //! Motions and faults at the console of the simulated machine: what is refused before it moves, what ends a script, and where plans
 //! end.
 
-use std::io::Write;
-use std::process::{Command, Stdio};
+use crate::command;
+use std::path::Path;
 
 use serde_json::Value;
 
@@ -15,20 +15,12 @@ struct Played {
 
 /// Gives a script to a machine that has just been switched on.
 fn play(options: &[&str], script: &str) -> Played {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .args(["connect", "--simulated"])
-        .args(options)
-        .current_dir(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = child.stdin.take().unwrap();
-    // A session that fails does not read to the end.
-    let _ = input.write_all(script.as_bytes());
-    drop(input);
-    let output = child.wait_with_output().unwrap();
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    let output = command::play(
+        root,
+        &[&["connect", "--simulated"], options].concat(),
+        script,
+    );
     Played {
         printed: String::from_utf8(output.stdout).unwrap(),
         errors: String::from_utf8(output.stderr).unwrap(),

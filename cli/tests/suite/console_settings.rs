@@ -1,8 +1,8 @@
 //! Settings at the console of the simulated machine: every path, with each part that may be left out there and not.
 
-use std::io::Write;
+use crate::command;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::Output;
 
 use quadrant::settings::StageSettings;
 use quadrant::settings::tree::is_part;
@@ -10,24 +10,12 @@ use serde_json::Value;
 
 /// Gives a script to a machine that has just been switched on.
 fn session(options: &[&str], script: &str) -> Output {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .args(["connect", "--simulated"])
-        .args(options)
-        .current_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(".."))
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = child.stdin.take().unwrap();
-    let script = script.to_owned();
-    // The output of a long script fills the pipe before the script is read.
-    let writer = std::thread::spawn(move || {
-        let _ = input.write_all(script.as_bytes());
-    });
-    let output = child.wait_with_output().unwrap();
-    writer.join().unwrap();
-    output
+    let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
+    command::play(
+        root,
+        &[&["connect", "--simulated"], options].concat(),
+        script,
+    )
 }
 
 fn answers(script: &str) -> Vec<Value> {

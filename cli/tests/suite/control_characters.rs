@@ -2,7 +2,8 @@
 
 use std::io::{Read, Write};
 use std::net::TcpListener;
-use std::process::{Command, Output, Stdio};
+use std::path::Path;
+use std::process::{Command, Output};
 use std::thread;
 
 use quadrant::link::PROTOCOL_VERSION;
@@ -11,6 +12,8 @@ use quadrant::link::message::{
     Body, FaultReport, Identity, LinkError, Message, Notice, NumberType, Reply, text,
 };
 use quadrant::link::server::LinkServer;
+
+use crate::command;
 
 /// A clipboard's content, a line that is written over, a sequence of C1, names from right to left, and a line of its own.
 const ACTS: [&str; 5] = [
@@ -90,20 +93,12 @@ fn board() -> String {
 #[test]
 fn texts_of_a_board_do_not_act_on_the_terminal() {
     for options in [&["--keep-going"][..], &["--keep-going", "--json"]] {
-        let mut child = Command::new(env!("CARGO_BIN_EXE_quadrant"))
-            .args(["connect", "--tcp", &board()])
-            .args(options)
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::piped())
-            .spawn()
-            .unwrap();
-        let mut input = child.stdin.take().unwrap();
-        input
-            .write_all(b"hello\nevents\nfault\nget x/homing\n")
-            .unwrap();
-        drop(input);
-        let output = child.wait_with_output().unwrap();
+        let board = board();
+        let output = command::play(
+            Path::new("."),
+            &[&["connect", "--tcp", &board], options].concat(),
+            "hello\nevents\nfault\nget x/homing\n",
+        );
         let said = String::from_utf8_lossy(&output.stdout);
         // It is shown, by its number.
         assert!(said.contains("\\u001b]52;c;aGk=\\u0007"), "{said:?}");

@@ -8,7 +8,7 @@ use quadrant_sim::report::whole;
 use quadrant_sim::setting_value::{Change, changes};
 use quadrant_sim::settings_file::SettingsFile;
 
-/// Where a commissioning leaves its settings by default.
+/// The file in which a commissioning leaves its settings by default.
 const LEFT: &str = "quadrant-out/settings.toml";
 
 /// The settings of a commissioned stage, with values of a person's own among them, in the default folder.

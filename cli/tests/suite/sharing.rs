@@ -16,7 +16,7 @@ const PROGRAM: &str = env!("CARGO_BIN_EXE_quadrant");
 struct Holder {
     child: Child,
     input: ChildStdin,
-    /// What it says to those who look: options of theirs.
+    /// Options for those who look, as it says them.
     look: Vec<String>,
 }
 

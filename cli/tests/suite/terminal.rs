@@ -185,7 +185,7 @@ fn a_signal_ends_the_prompt_and_leaves_the_terminal_as_it_was() {
 #[test]
 fn the_third_signal_ends_at_once_and_leaves_the_terminal_as_it_was() {
     let person = Person::sits_down(|_| {});
-    // The program stands, so that nothing of them is heeded in between.
+    // The program stands, so that it acts on none of them in between.
     person.signal("-STOP");
     for name in ["-INT", "-TERM", "-HUP", "-CONT"] {
         person.signal(name);

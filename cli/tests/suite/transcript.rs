@@ -1,10 +1,9 @@
 //! A session from an empty flash to a fault and back, end to end, driven through the console alone, and what a person sees of it, to the last character: on the
 //! simulated machine, and with the firmware's image in QEMU (`cargo xtask transcript`, which also rewrites what is expected).
 
+use crate::command;
 use std::fs;
-use std::io::Write;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Stdio};
 
 const SCRIPT: &str = include_str!("../transcript/script.txt");
 const SETTINGS: &str = include_str!("../../../host-sim/data/identified-stage.toml");
@@ -21,20 +20,11 @@ struct Told {
 fn play(place: &[&str], script: &str) -> Told {
     let folder = tempfile::tempdir().unwrap();
     fs::write(folder.path().join("stage.toml"), SETTINGS).unwrap();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_quadrant"))
-        .args(["connect", "--echo"])
-        .args(place)
-        .current_dir(folder.path())
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
-    let mut input = child.stdin.take().unwrap();
-    // A session that fails does not read to the end.
-    let _ = input.write_all(script.as_bytes());
-    drop(input);
-    let output = child.wait_with_output().unwrap();
+    let output = command::play(
+        folder.path(),
+        &[&["connect", "--echo"], place].concat(),
+        script,
+    );
     let transcript = String::from_utf8(output.stdout).unwrap();
     let errors = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{errors}\n{transcript}");

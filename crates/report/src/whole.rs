@@ -1,4 +1,4 @@
-//! Files that are written whole or not at all: whoever is interrupted, or finds the disk full, leaves the old content.
+//! Files that are written whole or not at all: a write that is interrupted, or finds the disk full, leaves the old content.
 
 use std::fs::{self, File, Metadata, OpenOptions};
 use std::io::{self, BufWriter, Write};

@@ -126,7 +126,7 @@ impl SettingsFile {
     /// Exchanges an axis for a machine's, with the origin of what it had; everything else stays.
     ///
     /// # Errors
-    /// What shows that the file is of another machine: the control rate, or the encoder or amplifier of another axis.
+    /// The first sign that the file is of another machine: the control rate, or the encoder or amplifier of another axis.
     pub fn exchange_axis(&mut self, machine: &StageSettings, axis: AxisName) -> Result<(), String> {
         if self.stage.rate_hz != machine.rate_hz {
             return Err("the control rate".to_owned());

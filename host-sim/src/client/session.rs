@@ -67,7 +67,7 @@ pub struct Client {
     stopping: bool,
     /// The last fault that the machine has reported, and how many there were.
     reported: (Option<ReportedFault>, u32),
-    /// How many of them have been acted on: before the last motion began, or as the error of what was waited for.
+    /// Number of them that have been acted on: before the last motion began, or as the error of what was waited for.
     acted_on: u32,
     notices: VecDeque<Notice>,
     dropped_notices: u64,

@@ -223,7 +223,7 @@ pub fn judge_subject(subject: &Subject, path: Path) -> Line {
     judged(subject, path).line
 }
 
-/// What came of a commissioning, and how far the table was from the middle of its travel at most, mm.
+/// The result of a commissioning, and the largest distance of the table from the middle of its travel, mm.
 struct Tested {
     found: Result<Commissioned, CommissionError>,
     used_s: f64,

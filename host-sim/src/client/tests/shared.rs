@@ -16,7 +16,7 @@ fn look(address: &str) -> Client {
     Client::open(TcpTransport::look(address, None).unwrap()).unwrap()
 }
 
-/// What a viewer gets for an order, while the holder does something.
+/// The answer that a viewer gets for an order, while the holder does something.
 fn order(
     address: &str,
     body: Body,
