@@ -1,7 +1,7 @@
 //! Runs: stretches of the path that take one rise and one fall of speed, so that acceleration is carried through their joints.
 //!
 //! A long move is a run by itself: it reaches its speed, whatever comes before it. Short ones, of which curves are written, are
-//! joined as long as they are tangent. A run that is faster somewhere than a move of it allows is divided at the slowest of them,
+//! joined as long as they are tangent. A run that is faster somewhere than a move of it allows is divided about the slowest of them,
 //! until none is.
 
 use std::ops::Range;
@@ -50,7 +50,7 @@ pub(super) fn runs(limits: &Limits, moves: &[Move]) -> Vec<Run> {
             {}
             let same = before.next_if(|run| run.moves == range && run.ends_mm_s == ends_mm_s);
             let run = same.unwrap_or_else(|| bounds.run(range, ends_mm_s));
-            if let Some(slow) = bounds.too_fast(&run) {
+            for slow in bounds.too_fast(&run) {
                 divided[slow.start] = true;
                 divided[slow.end] = true;
                 complete = false;
@@ -144,28 +144,42 @@ impl<'m> Bounds<'m> {
         }
     }
 
-    /// The stretch about the slowest of those moves on which a run is too fast.
-    fn too_fast(&self, run: &Run) -> Option<Range<usize>> {
-        let speed = |index: usize| self.on[index].0;
-        let first = speed(run.moves.start);
-        if run.moves.clone().all(|index| speed(index) == first) {
-            return None;
+    /// The stretches of equal speed on which a run is too fast: the slowest of them, and those between faster ones.
+    fn too_fast(&self, run: &Run) -> Vec<Range<usize>> {
+        let speed = |range: &Range<usize>| self.on[range.start].0;
+        let stretches: Vec<Range<usize>> = self.on[run.moves.clone()]
+            .chunk_by(|one, other| one.0 == other.0)
+            .scan(run.moves.start, |start, stretch| {
+                let range = *start..*start + stretch.len();
+                *start = range.end;
+                Some(range)
+            })
+            .collect();
+        if stretches.len() == 1 {
+            return Vec::new();
         }
-        let mut along_mm = 0.0;
-        let mut slowest: Option<usize> = None;
-        for index in run.moves.clone() {
-            let end_mm = along_mm + self.moves[index].segment.length_mm();
-            let slower = slowest.is_none_or(|slowest| speed(index) < speed(slowest));
-            if slower && fastest(&run.phases, along_mm..end_mm) > speed(index) * (1.0 + ROUNDING) {
-                slowest = Some(index);
-            }
-            along_mm = end_mm;
-        }
-        let slowest = slowest?;
-        let alike = |index: &usize| speed(*index) == speed(slowest);
-        let before = (run.moves.start..slowest).rev().take_while(alike).count();
-        let after = (slowest..run.moves.end).take_while(alike).count();
-        Some(slowest - before..slowest + after)
+        let mut end_mm = 0.0;
+        let mut exceeded = |range: &Range<usize>| {
+            let begin_mm = end_mm;
+            end_mm += self.length_mm(range);
+            fastest(&run.phases, begin_mm..end_mm) > speed(range) * (1.0 + ROUNDING)
+        };
+        let exceeded: Vec<bool> = stretches.iter().map(&mut exceeded).collect();
+        let within = |index: usize| exceeded[index].then(|| speed(&stretches[index]));
+        let slowest = (0..stretches.len())
+            .filter_map(within)
+            .fold(f64::INFINITY, f64::min);
+        let faster =
+            |index: usize, than: f64| stretches.get(index).is_none_or(|range| speed(range) > than);
+        (0..stretches.len())
+            .filter(|&index| {
+                let between = |own| {
+                    own == slowest || faster(index.wrapping_sub(1), own) && faster(index + 1, own)
+                };
+                within(index).is_some_and(between)
+            })
+            .map(|index| stretches[index].clone())
+            .collect()
     }
 }
 

@@ -47,18 +47,21 @@ pub struct Rows {
 const PARTS: usize = 8;
 /// Reversals below which nothing is withheld.
 const LEAST_REVERSALS: usize = 3;
-/// Validation errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
+/// Errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
 const AS_GOOD: f64 = 1.02;
+/// The same as a share of the voltage that is left unexplained beyond the smallest: less tells nothing of a model.
+const AS_GOOD_SHARE: f64 = 1e-3;
 /// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
 const ANOTHER_OPINION: f64 = 2.0;
 
-/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done.
+/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done. What a record does not tell, or
+/// tells as a mass or a friction below zero, is no candidate.
 ///
 /// A parameter's standard error covers the record's noise, what the value becomes with parts of the trajectory withheld, and
 /// how far it lies from that of the other models which predict withheld parts at most twice as badly as the best.
 ///
 /// # Errors
-/// A record that is too short, moves one way only, or does not tell parameters apart.
+/// A record that is too short or moves one way only, or of which no structure is a candidate: then the first one's reason.
 pub fn fit_motion(
     recording: &Recording,
     settings: &MotionFitSettings,
@@ -68,7 +71,7 @@ pub fn fit_motion(
     let signals = Signals::new(recording, settings);
     let parts = parts(&signals, settings)?;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let mut candidates: Vec<Candidate> = Structure::ALL
+    let fitted: Vec<Result<Candidate, MotionFitError>> = Structure::ALL
         .into_par_iter()
         .map(|structure| {
             let candidate = candidate(&signals, settings, structure, &parts);
@@ -76,7 +79,20 @@ pub fn fit_motion(
             progress(count as f64 / Structure::ALL.len() as f64);
             candidate
         })
-        .collect::<Result<_, _>>()?;
+        .collect();
+    let mut candidates = Vec::new();
+    let mut reason = None;
+    for candidate in fitted {
+        match candidate {
+            Ok(candidate) => candidates.push(candidate),
+            Err(error) => {
+                reason.get_or_insert(error);
+            }
+        }
+    }
+    if let Some(error) = reason.filter(|_| candidates.is_empty()) {
+        return Err(error);
+    }
     heed_other_opinions(&mut candidates);
     Ok(candidates)
 }
@@ -220,7 +236,7 @@ fn candidate(
     let all: Vec<usize> = (0..regression.rows()).collect();
     let whole = Solution::find(&regression, structure, &all)?;
     let withheld = match parts {
-        Some(parts) => withheld(&regression, structure, parts)?,
+        Some(parts) => withheld(&regression, structure, parts),
         None => None,
     };
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
@@ -268,18 +284,40 @@ fn described(
     })
 }
 
-/// The model to use: the simplest of those whose error where they were not fitted (or, without validation, where they were)
-/// is within two per cent of the smallest.
+/// The model to use: the simplest of those whose error is within two per cent of the smallest, or within a thousandth of the
+/// voltage. The error is that on withheld motion; where nothing was withheld of any model, that on the record of the fit.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
-    let error = |candidate: &Candidate| {
-        candidate
-            .validation_error
-            .unwrap_or(candidate.model.relative_error)
-    };
-    let smallest = candidates.iter().map(error).fold(f64::INFINITY, f64::min);
-    candidates
+    let validated: Vec<Option<f64>> = candidates
         .iter()
-        .find(|candidate| error(candidate) <= AS_GOOD * smallest)
+        .map(|candidate| candidate.validation_error)
+        .collect();
+    if validated.iter().any(Option::is_some) {
+        return simplest(candidates, &validated);
+    }
+    let errors = candidates
+        .iter()
+        .map(|candidate| Some(candidate.model.relative_error));
+    simplest(candidates, &errors.collect::<Vec<_>>())
+}
+
+/// The same by the errors of [`validate`], which are those of the candidates in their order.
+pub fn recommended_by<'a>(candidates: &'a [Candidate], errors: &[f64]) -> Option<&'a Candidate> {
+    let errors: Vec<Option<f64>> = errors.iter().copied().map(Some).collect();
+    simplest(candidates, &errors)
+}
+
+/// The first candidate that is as good as the best; one without an error is not compared.
+fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<f64>]) -> Option<&'a Candidate> {
+    let smallest = errors
+        .iter()
+        .flatten()
+        .fold(f64::INFINITY, |least, error| least.min(*error));
+    let most = (AS_GOOD * smallest).max(smallest + AS_GOOD_SHARE);
+    let ranked = candidates.iter().zip(errors);
+    ranked
+        .filter(|(_, error)| error.is_some_and(|error| error <= most))
+        .map(|(candidate, _)| candidate)
+        .next()
 }
 
 /// Fits with one part of the trajectory withheld at a time, and what they missed there.
@@ -293,7 +331,7 @@ fn withheld(
     regression: &Regression<'_>,
     structure: Structure,
     parts: &[usize],
-) -> Result<Option<Withheld>, MotionFitError> {
+) -> Option<Withheld> {
     let (mut missed, mut total) = (0.0, 0.0);
     let mut solutions = Vec::new();
     // Summed up in their order, whatever the threads.
@@ -306,19 +344,16 @@ fn withheld(
         })
         .collect();
     for (judged, found) in found {
-        let found = match found {
-            Err(MotionFitError::Dependent { .. }) => return Ok(None),
-            found => found?,
-        };
+        let found = found.ok()?;
         missed += found.residual(regression, &judged).norm_squared();
         let voltage = regression.voltage_at(found.dead_time_s);
         total += voltage.select_rows(&judged).norm_squared();
         solutions.push(found);
     }
-    Ok(Some(Withheld {
+    Some(Withheld {
         solutions,
         error: (missed / total).sqrt(),
-    }))
+    })
 }
 
 /// Relative error of each model on another record, taken after its own, on which nothing is fitted.

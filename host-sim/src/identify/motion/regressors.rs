@@ -55,8 +55,8 @@ pub(super) enum Way {
 
 impl Term {
     /// True if a negative coefficient would be no friction.
-    fn is_level(self) -> bool {
-        matches!(self, Self::Element(_))
+    fn is_friction(self) -> bool {
+        matches!(self, Self::Element(_) | Self::Coulomb | Self::Viscous(_))
     }
 }
 
@@ -234,7 +234,7 @@ fn maxwell_slip(position_mm: &[f64], knot_mm: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Least squares over some rows, with no negative level: a term that wants one is left out.
+/// Least squares over some rows, with no negative friction: a term that asks for it is left out.
 pub(super) struct Solver<'a> {
     terms: &'a [Term],
     rows: &'a [usize],
@@ -321,7 +321,7 @@ impl<'a> Solver<'a> {
             let worst = kept
                 .iter()
                 .enumerate()
-                .filter(|&(place, &term)| self.terms[term].is_level() && solution[place] < 0.0)
+                .filter(|&(place, &term)| self.terms[term].is_friction() && solution[place] < 0.0)
                 .min_by(|a, b| solution[a.0].total_cmp(&solution[b.0]));
             match worst {
                 Some((place, _)) => {

@@ -117,20 +117,17 @@ impl Solution {
         let drop = sum(&|term| term == Term::Drop);
         let viscous =
             |way: Way| sum(&|term| term == Term::Viscous(way) || term == Term::Viscous(Way::Both));
-        let way = |way: Way| {
-            sliding(
-                coulomb,
-                drop,
-                self.stribeck_velocity_mm_s,
-                viscous(way).max(0.0),
-            )
-        };
+        let way = |way: Way| sliding(coulomb, drop, self.stribeck_velocity_mm_s, viscous(way));
         let change = |term: &dyn Fn(Part) -> Term| Change {
             level_v: sum(&|other| other == term(Part::Level)),
             offset_v: sum(&|other| other == term(Part::Offset)),
         };
-        for (name, value, unit) in [("M'", inertia, "V s²/mm"), ("Fc", coulomb, "V")] {
-            if value <= 0.0 {
+        // An axis may have no friction, and none has no mass.
+        for (name, value, unit, wrong) in [
+            ("M'", inertia, "V s²/mm", inertia <= 0.0),
+            ("Fs", coulomb + drop, "V", coulomb + drop < 0.0),
+        ] {
+            if wrong {
                 return Err(MotionFitError::Unphysical {
                     structure: structure.name(),
                     name: name.to_owned(),
