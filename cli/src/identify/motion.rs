@@ -34,6 +34,9 @@ pub(crate) struct Arguments {
     /// Another recorded motion of the same axis, taken later: every model is judged on it, and none is fitted to it.
     #[arg(long, value_name = "FILE", requires = "record")]
     validate: Option<PathBuf>,
+    /// Take time stamps that are uneven, as of a host that polls: the record is interpolated on straight lines between its rows.
+    #[arg(long, requires = "record")]
+    resample: bool,
     /// Force per volt at the amplifier's input, N/V: adds parameters in kg, N s/m and N.
     #[arg(long, value_name = "N_PER_V")]
     force_per_volt: Option<f64>,
@@ -103,15 +106,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     })?;
     bar.set_message("refining the best");
     let other = match &arguments.validate {
-        Some(path) => Some(recorded::read(path)?),
+        Some(path) => Some(recorded::read_motion(path, arguments.resample)?),
         None => None,
     };
-    let errors = match &other {
-        Some(other) => Some(validate(&candidates, other, &settings)?),
-        None => None,
-    };
-    let best = match &errors {
-        Some(errors) => recommended_by(&candidates, errors),
+    let best = match &other {
+        Some(other) => recommended_by(&candidates, other, &settings)?,
         None => recommended(&candidates),
     };
     let best = best.context("no model of the record is one of friction")?;
@@ -135,7 +134,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     // A search that found no end, or nothing better, leaves the best as it is.
     if let Ok(refined) = refined {
         let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
-        if rms(&refined) < rms(best) {
+        if refined.explains_as_well_as(best) && rms(&refined) < rms(best) {
             chosen = refined.clone();
         }
         candidates.push(refined);
@@ -143,10 +142,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let reruns: Vec<Reruns> = candidates.iter().map(rerun).collect();
     bar.finish_and_clear();
     let mut tables = vec![candidates_table(&candidates, &reruns)];
-    if let (Some(path), Some(mut errors)) = (&arguments.validate, errors) {
-        if let Some(refined) = candidates.get(errors.len()) {
-            errors.extend(on_other(refined)?);
-        }
+    if let (Some(path), Some(other)) = (&arguments.validate, &other) {
+        let errors = validate(&candidates, other, &settings)?;
         let errors: Vec<_> = candidates.iter().zip(errors).collect();
         tables.push(validation_table(&errors, &path.display().to_string()));
     }
@@ -238,7 +235,11 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option
     } = arguments;
     if let Some(path) = &arguments.record {
         let title = recorded::title(std::slice::from_ref(path));
-        return Ok((recorded::read(path)?, title, None));
+        return Ok((
+            recorded::read_motion(path, arguments.resample)?,
+            title,
+            None,
+        ));
     }
     let start = subject.start_axis(destination.into.as_deref())?;
     let measured = subject.measure(

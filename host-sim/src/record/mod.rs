@@ -18,6 +18,7 @@
 mod columns;
 mod error;
 mod force;
+mod leap;
 mod limits;
 mod lines;
 mod motion;

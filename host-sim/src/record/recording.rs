@@ -6,8 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::{self, Columns, Purpose};
 use super::error::{RecordError, UnusableSignal};
+use super::time::Grid;
 use super::trace::{TraceError, write_trace};
-use super::{plausible, time};
+use super::{leap, plausible, time};
 
 /// Largest voltage of an amplifier's input, V.
 const MOST_VOLTS: f64 = 20.0;
@@ -133,6 +134,45 @@ impl Recording {
     pub fn read_csv_with(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Experiment, progress)?;
         let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
+        Self::checked(path, columns, sample_time_s)
+    }
+
+    /// Reads and checks a recorded motion as [`read_csv_with`](Self::read_csv_with), and that its position does not leap. Uneven
+    /// steps of time are refused, or `resample` interpolates them; what was done is said in a note.
+    ///
+    /// # Errors
+    /// As [`read_csv`](Self::read_csv), and a position that leaps.
+    pub fn read_motion(
+        path: &Path,
+        resample: bool,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Self, Option<String>), RecordError> {
+        let mut columns = columns::read(path, Purpose::Experiment, progress)?;
+        let (sample_time_s, note) = if resample {
+            let grid = Grid::of(path, &columns.time, &columns.lines)?;
+            refuse_leaps(path, &columns)?;
+            resample_by(&grid, &mut columns);
+            let (shortest_s, longest_s) = grid.steps_s;
+            let note = format!(
+                "resampled: {} rows in steps of {:.3} to {:.3} ms stand for as many in steps of {:.3} ms ({:.1} Hz), on straight lines \
+                 between the rows",
+                columns.lines.rows(),
+                1e3 * shortest_s,
+                1e3 * longest_s,
+                1e3 * grid.sample_time_s,
+                1.0 / grid.sample_time_s
+            );
+            (grid.sample_time_s, Some(note))
+        } else {
+            let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
+            refuse_leaps(path, &columns)?;
+            (sample_time_s, None)
+        };
+        Ok((Self::checked(path, columns, sample_time_s)?, note))
+    }
+
+    /// The columns of an even time, if they can be identified from.
+    fn checked(path: &Path, columns: Columns, sample_time_s: f64) -> Result<Self, RecordError> {
         check(path, &columns)?;
         plausible::check_experiment(path, &columns)?;
         let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
@@ -157,6 +197,27 @@ impl Recording {
             position_mm,
             voltage_v,
         })
+    }
+}
+
+fn refuse_leaps(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    match &columns.position {
+        Some(position) => leap::refuse(path, &columns.time.values, position, &columns.lines),
+        None => Ok(()),
+    }
+}
+
+/// Puts every signal on the even times.
+fn resample_by(grid: &Grid, columns: &mut Columns) {
+    let time_s = &columns.time.values;
+    let signals = [
+        &mut columns.reference,
+        &mut columns.position,
+        &mut columns.voltage,
+        &mut columns.injection,
+    ];
+    for column in signals.into_iter().flatten() {
+        column.values = grid.resampled(time_s, &column.values);
     }
 }
 

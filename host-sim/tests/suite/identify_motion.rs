@@ -1,5 +1,6 @@
 //! Inertia and friction from ordinary motion: of a real axis whose parameters are published, and of the simulated stage.
 
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -316,4 +317,172 @@ fn records_that_tell_too_little_are_refused_with_what_they_lack() {
             ..
         })
     ));
+}
+
+/// A record of an axis of 2e-5 V s²/mm, 2e-3 V s/mm and 0.02 V of offset under PD control, with a Coulomb friction that turns at once;
+/// `step_s` gives the time from one row to the next.
+fn simulated_record(coulomb_v: f64, mut step_s: impl FnMut(usize) -> f64) -> Vec<[f64; 3]> {
+    let reference = |t: f64| {
+        let slow = 45.0 * (TAU * 0.4 * t).sin() * (TAU * 0.13 * t + 1.0).sin();
+        slow + 6.0 * (TAU * 1.7 * t).sin()
+    };
+    let (mut position, mut velocity, mut time) = (0.0, 0.0, 0.0);
+    let mut rows = Vec::new();
+    while time < 8.0 {
+        let measured = (position * 1e3_f64).round() / 1e3;
+        let ahead = (reference(time + 1e-4) - reference(time - 1e-4)) / 2e-4;
+        let wanted = 2.0 * (reference(time) - measured) + 0.012 * (ahead - velocity);
+        let voltage = (wanted + 2e-3 * ahead).clamp(-10.0, 10.0);
+        rows.push([time, measured, voltage]);
+        let step = step_s(rows.len());
+        for _ in 0..40 {
+            let force = voltage - 0.02 - 2e-3 * velocity;
+            let h = step / 40.0;
+            if f64::abs(velocity) < 1e-3 && f64::abs(force) < coulomb_v {
+                velocity = 0.0;
+            } else {
+                let way = if f64::abs(velocity) > 1e-3 {
+                    velocity
+                } else {
+                    force
+                };
+                let next = velocity + h * (force - coulomb_v.copysign(way)) / 2e-5;
+                velocity = if next * velocity < 0.0 { 0.0 } else { next };
+            }
+            position += h * velocity;
+        }
+        time += step;
+    }
+    rows
+}
+
+/// A record as it is read from a file, or why it is refused.
+fn read(rows: &[[f64; 3]], resample: bool) -> Result<(Recording, Option<String>), String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("record.csv");
+    let rows: String = rows
+        .iter()
+        .map(|[t, x, u]| format!("{t:.6},{x:.4},{u:.5}\n"))
+        .collect();
+    std::fs::write(&path, format!("t_s,position_mm,voltage_v\n{rows}")).unwrap();
+    Recording::read_motion(&path, resample, &mut |_| {}).map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_plainest_model_of_an_axis_with_coulomb_friction_or_none_is_recommended() {
+    for coulomb_v in [0.15, 0.05, 0.0] {
+        let (record, _) = read(&simulated_record(coulomb_v, |_| 2e-3), false).unwrap();
+        let candidates = fitted(&record, &MotionFitSettings::default());
+        let best = recommended(&candidates).unwrap();
+        assert!(
+            !best.model.structure.presliding && !best.model.structure.stribeck,
+            "{:?}",
+            best.model.structure
+        );
+        let MotionModel {
+            inertia_v_s2_per_mm,
+            offset_v,
+            friction,
+            ..
+        } = &best.model;
+        let friction = friction.positive;
+        assert!(
+            (inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.15,
+            "{inertia_v_s2_per_mm}"
+        );
+        assert!(
+            (friction.viscous_v_s_per_mm / 2e-3 - 1.0).abs() < 0.05,
+            "{friction:?}"
+        );
+        assert!(
+            (friction.curve.coulomb_v - coulomb_v).abs() < 0.006,
+            "{friction:?}"
+        );
+        assert!((offset_v - 0.02).abs() < 0.002, "{offset_v}");
+    }
+}
+
+#[test]
+fn no_candidate_has_a_mass_or_a_friction_below_zero() {
+    // The voltage of a negative mass: what is left of the record is none.
+    let rows: Vec<[f64; 3]> = simulated_record(0.15, |_| 2e-3);
+    let turned: Vec<[f64; 3]> = rows.iter().map(|[t, x, u]| [*t, *x, -u]).collect();
+    let (record, _) = read(&turned, false).unwrap();
+    match fit_motion(&record, &MotionFitSettings::default(), &|_| {}) {
+        Err(MotionFitError::Unphysical { .. }) => {}
+        Err(other) => panic!("{other}"),
+        Ok(candidates) => {
+            for candidate in candidates {
+                let friction = candidate.model.friction;
+                assert!(candidate.model.inertia_v_s2_per_mm > 0.0);
+                assert!(
+                    friction.positive.viscous_v_s_per_mm >= 0.0
+                        && friction.negative.viscous_v_s_per_mm >= 0.0
+                );
+                assert!(
+                    candidate.model.relative_error > 0.5,
+                    "{}",
+                    candidate.model.relative_error
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_position_that_leaps_is_refused_with_its_line() {
+    let rows = simulated_record(0.15, |_| 2e-3);
+    assert!(read(&rows, false).is_ok());
+    for (index, leap_mm, stays) in [
+        (2345, 5.0, false),
+        (2345, -0.2, false),
+        (1000, 1.0, true),
+        (3000, -0.1, true),
+    ] {
+        let mut leaping = rows.clone();
+        let last = if stays { rows.len() } else { index + 1 };
+        for row in &mut leaping[index..last] {
+            row[1] += leap_mm;
+        }
+        let refused = read(&leaping, false).unwrap_err();
+        // The header is line 1.
+        assert!(
+            refused.contains(&format!("line {}: the position leaps", index + 2)),
+            "{leap_mm}: {refused}"
+        );
+        assert!(read(&leaping, true).is_err());
+    }
+}
+
+#[test]
+fn uneven_steps_are_resampled_when_that_is_asked_for() {
+    let mut state = 4_u32;
+    let uneven = simulated_record(0.15, |_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        1.6e-3 + 1e-3 * f64::from(state >> 8) / f64::from(1 << 24)
+    });
+    let refused = read(&uneven, false).unwrap_err();
+    assert!(refused.contains("--resample"), "{refused}");
+    let (record, note) = read(&uneven, true).unwrap();
+    let note = note.unwrap();
+    assert!(
+        note.contains("in steps of 1.6") && note.contains("straight lines"),
+        "{note}"
+    );
+    let candidates = fitted(&record, &MotionFitSettings::default());
+    let model = &recommended(&candidates).unwrap().model;
+    assert!(
+        (model.inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.25,
+        "{}",
+        model.inertia_v_s2_per_mm
+    );
+    let mut paused = uneven.clone();
+    for row in &mut paused[2000..] {
+        row[0] += 0.05;
+    }
+    let refused = read(&paused, true).unwrap_err();
+    assert!(
+        refused.contains("line 2002") && refused.contains("resampling bridges"),
+        "{refused}"
+    );
 }

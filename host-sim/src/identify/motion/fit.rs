@@ -21,11 +21,26 @@ pub struct Candidate {
     /// Relative error on parts of the trajectory that were withheld from the fit, in all their repetitions, one part at a time;
     /// nothing when there are too few motions, or for a model that was [refined].
     pub validation_error: Option<f64>,
+    /// The same, on rows of sliding alone; without validation, on all of these. Models are ranked by it: about a reversal a model
+    /// without pre-sliding is wrong for the time that the axis sticks, which tells nothing of mass and friction.
+    ranked_by: f64,
     /// True if its motion was fitted, too.
     pub refined: bool,
     solution: Solution,
     /// The rows of the regression.
     pub rows: Rows,
+}
+
+impl Candidate {
+    /// True if it leaves no more of its record's voltage unexplained than another does, but for what tells nothing.
+    pub fn explains_as_well_as(&self, other: &Self) -> bool {
+        self.model.relative_error <= as_good_as(other.model.relative_error)
+    }
+}
+
+/// The largest error that is as good as another.
+fn as_good_as(error: f64) -> f64 {
+    (AS_GOOD * error).max(error + AS_GOOD_SHARE)
 }
 
 /// Voltage explained by a fit, row by row.
@@ -50,7 +65,7 @@ const LEAST_REVERSALS: usize = 3;
 /// Errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
 const AS_GOOD: f64 = 1.02;
 /// The same as a share of the voltage that is left unexplained beyond the smallest: less tells nothing of a model.
-const AS_GOOD_SHARE: f64 = 1e-3;
+const AS_GOOD_SHARE: f64 = 1.5e-3;
 /// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
 const ANOTHER_OPINION: f64 = 2.0;
 
@@ -233,15 +248,23 @@ fn candidate(
     parts: &Option<Vec<usize>>,
 ) -> Result<Candidate, MotionFitError> {
     let regression = Regression::new(signals, settings, structure, signals.span());
-    let all: Vec<usize> = (0..regression.rows()).collect();
-    let whole = Solution::find(&regression, structure, &all)?;
+    let sliding = regression.sliding_rows(signals.moving_mm_s());
+    let rows: Vec<usize> = match structure.sliding {
+        true => sliding.clone(),
+        false => (0..regression.rows()).collect(),
+    };
+    let whole = Solution::find(&regression, structure, &rows)?;
     let withheld = match parts {
-        Some(parts) => withheld(&regression, structure, parts),
+        Some(parts) => withheld(&regression, structure, parts, &sliding),
         None => None,
     };
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
     Ok(Candidate {
         validation_error: withheld.as_ref().map(|found| found.error),
+        ranked_by: match &withheld {
+            Some(withheld) => withheld.sliding_error,
+            None => whole.error_on(&regression, &sliding),
+        },
         ..described(signals, settings, structure, &regression, whole, others)?
     })
 }
@@ -268,6 +291,7 @@ fn described(
         .map(|(volts, a)| volts - model.inertia_v_s2_per_mm * a - model.offset_v);
     Ok(Candidate {
         validation_error: None,
+        ranked_by: f64::INFINITY,
         refined: false,
         rows: Rows {
             time_s: all
@@ -284,35 +308,46 @@ fn described(
     })
 }
 
-/// The model to use: the simplest of those whose error is within two per cent of the smallest, or within a thousandth of the
-/// voltage. The error is that on withheld motion; where nothing was withheld of any model, that on the record of the fit.
+/// The model to use: the simplest of those whose error while sliding is within two per cent of the smallest, or within
+/// 0.15 % of the voltage. The error is that on withheld motion; where nothing was withheld of any model, that on the record of
+/// the fit. A model of which nothing could be withheld is not compared with others.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
-    let validated: Vec<Option<f64>> = candidates
+    let validated = candidates
         .iter()
-        .map(|candidate| candidate.validation_error)
-        .collect();
-    if validated.iter().any(Option::is_some) {
-        return simplest(candidates, &validated);
-    }
-    let errors = candidates
-        .iter()
-        .map(|candidate| Some(candidate.model.relative_error));
-    simplest(candidates, &errors.collect::<Vec<_>>())
+        .any(|candidate| candidate.validation_error.is_some());
+    let error = |candidate: &Candidate| {
+        let compared = candidate.validation_error.is_some() == validated && !candidate.refined;
+        compared.then_some(candidate.ranked_by)
+    };
+    let errors: Vec<Option<f64>> = candidates.iter().map(error).collect();
+    simplest(candidates, &errors)
 }
 
-/// The same by the errors of [`validate`], which are those of the candidates in their order.
-pub fn recommended_by<'a>(candidates: &'a [Candidate], errors: &[f64]) -> Option<&'a Candidate> {
-    let errors: Vec<Option<f64>> = errors.iter().copied().map(Some).collect();
-    simplest(candidates, &errors)
+/// The same by the motion of another record, to which nothing is fitted.
+///
+/// # Errors
+/// As [`fit_motion`].
+pub fn recommended_by<'a>(
+    candidates: &'a [Candidate],
+    other: &Recording,
+    settings: &MotionFitSettings,
+) -> Result<Option<&'a Candidate>, MotionFitError> {
+    check(other, settings)?;
+    let signals = Signals::new(other, settings);
+    let error = |candidate: &Candidate| {
+        let regression = elsewhere(candidate, &signals, settings);
+        let rows = regression.sliding_rows(signals.moving_mm_s());
+        Some(candidate.solution.error_on(&regression, &rows))
+    };
+    let errors: Vec<Option<f64>> = candidates.par_iter().map(error).collect();
+    Ok(simplest(candidates, &errors))
 }
 
 /// The first candidate that is as good as the best; one without an error is not compared.
 fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<f64>]) -> Option<&'a Candidate> {
-    let smallest = errors
-        .iter()
-        .flatten()
-        .fold(f64::INFINITY, |least, error| least.min(*error));
-    let most = (AS_GOOD * smallest).max(smallest + AS_GOOD_SHARE);
+    let compared = errors.iter().flatten();
+    let smallest = compared.fold(f64::INFINITY, |least, error| least.min(*error));
+    let most = as_good_as(smallest);
     let ranked = candidates.iter().zip(errors);
     ranked
         .filter(|(_, error)| error.is_some_and(|error| error <= most))
@@ -324,6 +359,8 @@ fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<f64>]) -> Option<&
 struct Withheld {
     solutions: Vec<Solution>,
     error: f64,
+    /// The error on rows of sliding.
+    sliding_error: f64,
 }
 
 /// Withholds each part in turn; nothing if what is left tells too little.
@@ -331,8 +368,14 @@ fn withheld(
     regression: &Regression<'_>,
     structure: Structure,
     parts: &[usize],
+    sliding: &[usize],
 ) -> Option<Withheld> {
     let (mut missed, mut total) = (0.0, 0.0);
+    let (mut sliding_missed, mut sliding_total) = (0.0, 0.0);
+    let mut slides = vec![false; parts.len()];
+    for &row in sliding {
+        slides[row] = true;
+    }
     let mut solutions = Vec::new();
     // Summed up in their order, whatever the threads.
     let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = (0..PARTS)
@@ -340,19 +383,33 @@ fn withheld(
         .map(|part| {
             let (judged, fitted): (Vec<usize>, Vec<usize>) =
                 (0..parts.len()).partition(|&row| parts[row] == part);
+            let fitted: Vec<usize> = match structure.sliding {
+                true => fitted.into_iter().filter(|&row| slides[row]).collect(),
+                false => fitted,
+            };
             (judged, Solution::find(regression, structure, &fitted))
         })
         .collect();
     for (judged, found) in found {
         let found = found.ok()?;
-        missed += found.residual(regression, &judged).norm_squared();
         let voltage = regression.voltage_at(found.dead_time_s);
-        total += voltage.select_rows(&judged).norm_squared();
+        let squares = |rows: &[usize]| {
+            let missed = found.residual(regression, rows).norm_squared();
+            (missed, voltage.select_rows(rows).norm_squared())
+        };
+        let (part_missed, part_total) = squares(&judged);
+        missed += part_missed;
+        total += part_total;
+        let sliding: Vec<usize> = judged.into_iter().filter(|&row| slides[row]).collect();
+        let (part_missed, part_total) = squares(&sliding);
+        sliding_missed += part_missed;
+        sliding_total += part_total;
         solutions.push(found);
     }
     Some(Withheld {
         solutions,
         error: (missed / total).sqrt(),
+        sliding_error: (sliding_missed / sliding_total).sqrt(),
     })
 }
 
@@ -368,16 +425,23 @@ pub fn validate(
     check(other, settings)?;
     let signals = Signals::new(other, settings);
     let error = |candidate: &Candidate| {
-        let Candidate {
-            model, solution, ..
-        } = candidate;
-        let span = model.span.afterwards();
-        let regression = Regression::new(&signals, settings, model.structure, span);
+        let regression = elsewhere(candidate, &signals, settings);
         let all: Vec<usize> = (0..regression.rows()).collect();
-        let voltage = regression.voltage_at(solution.dead_time_s);
-        solution.residual(&regression, &all).norm() / voltage.norm()
+        candidate.solution.error_on(&regression, &all)
     };
     Ok(candidates.par_iter().map(error).collect())
+}
+
+/// The regression of a candidate's structure on a record that was taken after its own.
+fn elsewhere<'a>(
+    candidate: &Candidate,
+    signals: &'a Signals,
+    settings: &'a MotionFitSettings,
+) -> Regression<'a> {
+    let MotionModel {
+        structure, span, ..
+    } = candidate.model;
+    Regression::new(signals, settings, structure, span.afterwards())
 }
 
 /// Ranges of the coefficients in a refinement, over their values; of those that may be of either sign, over the Coulomb level.

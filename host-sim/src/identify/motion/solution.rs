@@ -96,6 +96,12 @@ impl Solution {
         (voltage - &*columns * &self.coefficients).select_rows(rows)
     }
 
+    /// Norm of the residual over that of the voltage, on some rows.
+    pub(super) fn error_on(&self, regression: &Regression<'_>, rows: &[usize]) -> f64 {
+        let voltage = regression.voltage_at(self.dead_time_s).select_rows(rows);
+        self.residual(regression, rows).norm() / voltage.norm()
+    }
+
     /// The model, in its own terms; `estimates` are its parameters with their standard errors.
     pub(super) fn model(
         &self,
