@@ -21,9 +21,8 @@ pub struct Candidate {
     /// Relative error on parts of the trajectory that were withheld from the fit, in all their repetitions, one part at a time;
     /// nothing when there are too few motions, or for a model that was [refined].
     pub validation_error: Option<f64>,
-    /// The same, on rows of sliding alone; without validation, on all of these. Models are ranked by it: about a reversal a model
-    /// without pre-sliding is wrong for the time that the axis sticks, which tells nothing of mass and friction.
-    ranked_by: f64,
+    /// The errors that it is ranked by: on withheld motion, or without any on that of the fit.
+    errors: Errors,
     /// True if its motion was fitted, too.
     pub refined: bool,
     solution: Solution,
@@ -41,6 +40,26 @@ impl Candidate {
 /// The largest error that is as good as another.
 fn as_good_as(error: f64) -> f64 {
     (AS_GOOD * error).max(error + AS_GOOD_SHARE)
+}
+
+/// Relative errors of a model. About a reversal one without pre-sliding is wrong for the time that the axis sticks, which tells little
+/// of mass and friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Errors {
+    /// On all rows.
+    all: f64,
+    /// On rows of sliding.
+    sliding: f64,
+}
+
+impl Errors {
+    fn of(solution: &Solution, regression: &Regression<'_>, sliding: &[usize]) -> Self {
+        let all: Vec<usize> = (0..regression.rows()).collect();
+        Self {
+            all: solution.error_on(regression, &all),
+            sliding: solution.error_on(regression, sliding),
+        }
+    }
 }
 
 /// Voltage explained by a fit, row by row.
@@ -66,6 +85,8 @@ const LEAST_REVERSALS: usize = 3;
 const AS_GOOD: f64 = 1.02;
 /// The same as a share of the voltage that is left unexplained beyond the smallest: less tells nothing of a model.
 const AS_GOOD_SHARE: f64 = 1.5e-3;
+/// Errors on all rows, over the smallest, from which on a model is contradicted by reversals.
+const CONTRADICTED: f64 = 3.0;
 /// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
 const ANOTHER_OPINION: f64 = 2.0;
 
@@ -260,10 +281,10 @@ fn candidate(
     };
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
     Ok(Candidate {
-        validation_error: withheld.as_ref().map(|found| found.error),
-        ranked_by: match &withheld {
-            Some(withheld) => withheld.sliding_error,
-            None => whole.error_on(&regression, &sliding),
+        validation_error: withheld.as_ref().map(|found| found.errors.all),
+        errors: match &withheld {
+            Some(withheld) => withheld.errors,
+            None => Errors::of(&whole, &regression, &sliding),
         },
         ..described(signals, settings, structure, &regression, whole, others)?
     })
@@ -291,7 +312,7 @@ fn described(
         .map(|(volts, a)| volts - model.inertia_v_s2_per_mm * a - model.offset_v);
     Ok(Candidate {
         validation_error: None,
-        ranked_by: f64::INFINITY,
+        errors: Errors::of(&whole, regression, &all),
         refined: false,
         rows: Rows {
             time_s: all
@@ -308,18 +329,18 @@ fn described(
     })
 }
 
-/// The model to use: the simplest of those whose error while sliding is within two per cent of the smallest, or within
-/// 0.15 % of the voltage. The error is that on withheld motion; where nothing was withheld of any model, that on the record of
-/// the fit. A model of which nothing could be withheld is not compared with others.
+/// The model to use: the simplest of those whose error while sliding is within two per cent of the smallest, or within 0.15 % of
+/// the voltage, and which also reversals do not contradict. The errors are those on withheld motion; where nothing was withheld of
+/// any model, those on the record of the fit. A model of which nothing could be withheld is not compared with others.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
     let validated = candidates
         .iter()
         .any(|candidate| candidate.validation_error.is_some());
-    let error = |candidate: &Candidate| {
+    let errors = |candidate: &Candidate| {
         let compared = candidate.validation_error.is_some() == validated && !candidate.refined;
-        compared.then_some(candidate.ranked_by)
+        compared.then_some(candidate.errors)
     };
-    let errors: Vec<Option<f64>> = candidates.iter().map(error).collect();
+    let errors: Vec<Option<Errors>> = candidates.iter().map(errors).collect();
     simplest(candidates, &errors)
 }
 
@@ -334,33 +355,36 @@ pub fn recommended_by<'a>(
 ) -> Result<Option<&'a Candidate>, MotionFitError> {
     check(other, settings)?;
     let signals = Signals::new(other, settings);
-    let error = |candidate: &Candidate| {
+    let errors = |candidate: &Candidate| {
         let regression = elsewhere(candidate, &signals, settings);
-        let rows = regression.sliding_rows(signals.moving_mm_s());
-        Some(candidate.solution.error_on(&regression, &rows))
+        let sliding = regression.sliding_rows(signals.moving_mm_s());
+        Some(Errors::of(&candidate.solution, &regression, &sliding))
     };
-    let errors: Vec<Option<f64>> = candidates.par_iter().map(error).collect();
+    let errors: Vec<Option<Errors>> = candidates.par_iter().map(errors).collect();
     Ok(simplest(candidates, &errors))
 }
 
-/// The first candidate that is as good as the best; one without an error is not compared.
-fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<f64>]) -> Option<&'a Candidate> {
-    let compared = errors.iter().flatten();
-    let smallest = compared.fold(f64::INFINITY, |least, error| least.min(*error));
-    let most = as_good_as(smallest);
-    let ranked = candidates.iter().zip(errors);
-    ranked
-        .filter(|(_, error)| error.is_some_and(|error| error <= most))
+/// The first candidate that is as good as the best; one without errors is not compared.
+fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<Errors>]) -> Option<&'a Candidate> {
+    let smallest = |of: fn(&Errors) -> f64| {
+        let compared = errors.iter().flatten().map(of);
+        compared.fold(f64::INFINITY, f64::min)
+    };
+    let most_sliding = as_good_as(smallest(|errors| errors.sliding));
+    let least = smallest(|errors| errors.all);
+    let most = (CONTRADICTED * least).max(as_good_as(least));
+    candidates
+        .iter()
+        .zip(errors)
+        .filter_map(|(candidate, errors)| Some((candidate, (*errors)?)))
+        .find(|(_, errors)| errors.sliding <= most_sliding && errors.all <= most)
         .map(|(candidate, _)| candidate)
-        .next()
 }
 
 /// Fits with one part of the trajectory withheld at a time, and what they missed there.
 struct Withheld {
     solutions: Vec<Solution>,
-    error: f64,
-    /// The error on rows of sliding.
-    sliding_error: f64,
+    errors: Errors,
 }
 
 /// Withholds each part in turn; nothing if what is left tells too little.
@@ -408,8 +432,10 @@ fn withheld(
     }
     Some(Withheld {
         solutions,
-        error: (missed / total).sqrt(),
-        sliding_error: (sliding_missed / sliding_total).sqrt(),
+        errors: Errors {
+            all: (missed / total).sqrt(),
+            sliding: (sliding_missed / sliding_total).sqrt(),
+        },
     })
 }
 
