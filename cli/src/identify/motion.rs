@@ -14,7 +14,7 @@ use quadrant_sim::identify::pages::motion::{
 };
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::record::Recording;
+use quadrant_sim::record::{ColumnNames, MotionOptions, Recording};
 
 use super::friction::put_friction;
 use super::recorded;
@@ -34,6 +34,11 @@ pub(crate) struct Arguments {
     /// Another recorded motion of the same axis, taken later: every model is judged on it, and none is fitted to it.
     #[arg(long, value_name = "FILE", requires = "record")]
     validate: Option<PathBuf>,
+    /// Columns of a record of another program, with their units: time=NAME:UNIT,position=NAME:UNIT,voltage=NAME:UNIT, and reference.
+    /// NAME is that of the header, or a number from 1. Units: s, ms, us; mm, um, m, in, rad, deg, counts, or a number of them for one,
+    /// as 0.5um; V, mV, A, N, Nm. Delimiter, decimal comma, lines before the header and a row of units are guessed, and said.
+    #[arg(long, requires = "record", value_name = "QUANTITY=NAME:UNIT,...")]
+    columns: Option<ColumnNames>,
     /// Take time stamps that are uneven, as of a host that polls: the record is interpolated on straight lines between its rows.
     #[arg(long, requires = "record")]
     resample: bool,
@@ -76,6 +81,16 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
+impl Arguments {
+    /// The way in which records are read.
+    fn reading(&self) -> MotionOptions {
+        MotionOptions {
+            columns: self.columns.clone().unwrap_or_default(),
+            resample: self.resample,
+        }
+    }
+}
+
 /// Relative error above which a model is doubtful.
 const DOUBTFUL_ERROR: f64 = 0.2;
 /// Relative error above which a model is no result.
@@ -106,7 +121,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     })?;
     bar.set_message("refining the best");
     let other = match &arguments.validate {
-        Some(path) => Some(recorded::read_motion(path, arguments.resample)?),
+        Some(path) => Some(recorded::read_motion(path, &arguments.reading())?),
         None => None,
     };
     let best = match &other {
@@ -236,7 +251,7 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option
     if let Some(path) = &arguments.record {
         let title = recorded::title(std::slice::from_ref(path));
         return Ok((
-            recorded::read_motion(path, arguments.resample)?,
+            recorded::read_motion(path, &arguments.reading())?,
             title,
             None,
         ));

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 use indicatif::ProgressDrawTarget;
 use quadrant_cli::output::share;
 use quadrant_cli::warn;
-use quadrant_sim::record::Recording;
+use quadrant_sim::record::{MotionOptions, Recording};
 
 /// Reading that is done sooner needs no bar.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -16,11 +16,11 @@ pub(super) fn read(path: &Path) -> anyhow::Result<Recording> {
     with_bar(|progress| Ok(Recording::read_csv_with(path, progress)?))
 }
 
-/// Reads a recorded motion in the same way; says how it was resampled.
-pub(super) fn read_motion(path: &Path, resample: bool) -> anyhow::Result<Recording> {
-    let (recording, note) =
-        with_bar(|progress| Ok(Recording::read_motion(path, resample, progress)?))?;
-    if let Some(note) = note {
+/// Reads a recorded motion in the same way; says what was guessed, and how it was resampled.
+pub(super) fn read_motion(path: &Path, options: &MotionOptions) -> anyhow::Result<Recording> {
+    let (recording, notes) =
+        with_bar(|progress| Ok(Recording::read_motion(path, options, progress)?))?;
+    for note in notes {
         warn!("note: {}: {note}", path.display());
     }
     Ok(recording)

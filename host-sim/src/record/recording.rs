@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::{self, Columns, Purpose};
 use super::error::{RecordError, UnusableSignal};
+use super::foreign::{self, ColumnNames};
 use super::time::Grid;
 use super::trace::{TraceError, write_trace};
 use super::{leap, plausible, time};
@@ -33,6 +34,31 @@ pub struct Recording {
     pub voltage_v: Vec<f64>,
     /// The part of it that was injected, V.
     pub injection_v: Vec<f64>,
+}
+
+/// Ways of reading a recorded motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionOptions {
+    /// The columns, where they do not have the names of ours.
+    pub columns: ColumnNames,
+    /// Uneven steps of time are interpolated.
+    pub resample: bool,
+}
+
+/// The units that columns are in, as far as their ranges tell.
+#[derive(Clone, Copy)]
+struct Believed {
+    /// Positions are lengths.
+    length: bool,
+    /// Voltages are those of an amplifier's input.
+    voltage: bool,
+}
+
+impl Believed {
+    const ALL: Self = Self {
+        length: true,
+        voltage: true,
+    };
 }
 
 impl Recording {
@@ -134,21 +160,48 @@ impl Recording {
     pub fn read_csv_with(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Experiment, progress)?;
         let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
-        Self::checked(path, columns, sample_time_s)
+        Self::checked(path, columns, sample_time_s, Believed::ALL)
     }
 
-    /// Reads and checks a recorded motion as [`read_csv_with`](Self::read_csv_with), and that its position does not leap. Uneven
-    /// steps of time are refused, or `resample` interpolates them; what was done is said in a note.
+    /// Reads and checks a recorded motion as [`read_csv_with`](Self::read_csv_with), and that its position does not leap. Files of
+    /// other programs are translated. Uneven steps of time are refused, or interpolated on request. Notes say what was guessed and
+    /// done.
     ///
     /// # Errors
-    /// As [`read_csv`](Self::read_csv), and a position that leaps.
+    /// As [`read_csv`](Self::read_csv), a column that is not there, and a position that leaps.
     pub fn read_motion(
         path: &Path,
-        resample: bool,
+        options: &MotionOptions,
         progress: &mut dyn FnMut(f64),
-    ) -> Result<(Self, Option<String>), RecordError> {
-        let mut columns = columns::read(path, Purpose::Experiment, progress)?;
-        let (sample_time_s, note) = if resample {
+    ) -> Result<(Self, Vec<String>), RecordError> {
+        let unreadable = |source| RecordError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let translated = foreign::translate(path, &bytes, &options.columns)?;
+        let (mut columns, mut notes, believed) = match translated {
+            None => (
+                columns::read_text(path, bytes, 0, Purpose::Experiment, progress)?,
+                Vec::new(),
+                Believed::ALL,
+            ),
+            Some(translated) => {
+                let believed = Believed {
+                    length: !translated.other_length,
+                    voltage: !translated.other_voltage,
+                };
+                let columns = columns::read_text(
+                    path,
+                    translated.text,
+                    translated.added_lines,
+                    Purpose::Experiment,
+                    progress,
+                )?;
+                (columns, translated.notes, believed)
+            }
+        };
+        let (sample_time_s, note) = if options.resample {
             let grid = Grid::of(path, &columns.time, &columns.lines)?;
             refuse_leaps(path, &columns)?;
             resample_by(&grid, &mut columns);
@@ -168,15 +221,29 @@ impl Recording {
             refuse_leaps(path, &columns)?;
             (sample_time_s, None)
         };
-        Ok((Self::checked(path, columns, sample_time_s)?, note))
+        notes.extend(note);
+        Ok((
+            Self::checked(path, columns, sample_time_s, believed)?,
+            notes,
+        ))
     }
 
     /// The columns of an even time, if they can be identified from.
-    fn checked(path: &Path, columns: Columns, sample_time_s: f64) -> Result<Self, RecordError> {
-        check(path, &columns)?;
+    fn checked(
+        path: &Path,
+        columns: Columns,
+        sample_time_s: f64,
+        believed: Believed,
+    ) -> Result<Self, RecordError> {
+        check_changes(path, &columns)?;
+        if believed.voltage {
+            check_amplifier(path, &columns)?;
+        }
         plausible::check_experiment(path, &columns)?;
-        let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
-        check_travel(path, "position", travel_mm)?;
+        if believed.length {
+            let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
+            check_travel(path, "position", travel_mm)?;
+        }
         // A long recording need not hold its time as well.
         drop(columns.time);
         let position_mm = columns
@@ -251,14 +318,8 @@ fn check_voltage(path: &Path, column: &'static str, values: &[f64]) -> Result<f6
     })
 }
 
-fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
-    let refuse = |column, fault| {
-        Err(RecordError::Useless {
-            path: path.to_owned(),
-            column,
-            fault,
-        })
-    };
+/// Refuses a position or a voltage that never changes.
+fn check_changes(path: &Path, columns: &Columns) -> Result<(), RecordError> {
     for (name, column) in [
         ("position", &columns.position),
         ("voltage_v", &columns.voltage),
@@ -267,9 +328,25 @@ fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
             && let Some(first) = values.first()
             && values.iter().all(|value| value == first)
         {
-            return refuse(name, UnusableSignal::Constant { value: *first });
+            return Err(RecordError::Useless {
+                path: path.to_owned(),
+                column: name,
+                fault: UnusableSignal::Constant { value: *first },
+            });
         }
     }
+    Ok(())
+}
+
+/// Refuses a voltage that is none of an amplifier's input, or is at its limit too often.
+fn check_amplifier(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    let refuse = |column, fault| {
+        Err(RecordError::Useless {
+            path: path.to_owned(),
+            column,
+            fault,
+        })
+    };
     let Some(voltage) = &columns.voltage else {
         return Ok(());
     };

@@ -23,6 +23,8 @@ pub struct Candidate {
     pub validation_error: Option<f64>,
     /// The errors that it is ranked by: on withheld motion, or without any on that of the fit.
     errors: Errors,
+    /// The errors on the record of the fit.
+    fitted: Errors,
     /// True if its motion was fitted, too.
     pub refined: bool,
     solution: Solution,
@@ -33,7 +35,8 @@ pub struct Candidate {
 impl Candidate {
     /// True if it leaves no more of its record's voltage unexplained than another does, but for what tells nothing.
     pub fn explains_as_well_as(&self, other: &Self) -> bool {
-        self.model.relative_error <= as_good_as(other.model.relative_error)
+        self.fitted.all <= as_good_as(other.fitted.all)
+            && self.fitted.sliding <= as_good_as(other.fitted.sliding)
     }
 }
 
@@ -280,13 +283,13 @@ fn candidate(
         None => None,
     };
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
+    let described = described(signals, settings, structure, &regression, whole, others)?;
     Ok(Candidate {
         validation_error: withheld.as_ref().map(|found| found.errors.all),
-        errors: match &withheld {
-            Some(withheld) => withheld.errors,
-            None => Errors::of(&whole, &regression, &sliding),
-        },
-        ..described(signals, settings, structure, &regression, whole, others)?
+        errors: withheld
+            .as_ref()
+            .map_or(described.fitted, |found| found.errors),
+        ..described
     })
 }
 
@@ -301,6 +304,8 @@ fn described(
 ) -> Result<Candidate, MotionFitError> {
     let all: Vec<usize> = (0..regression.rows()).collect();
     let residual = whole.residual(regression, &all);
+    let sliding = regression.sliding_rows(signals.moving_mm_s());
+    let fitted = Errors::of(&whole, regression, &sliding);
     let row_s = signals.sample_time_s * settings.decimation(signals.sample_time_s) as f64;
     let estimates = estimates(&whole, regression, structure, settings, &residual, withheld);
     let model = whole.model(regression, structure, settings, &residual, estimates)?;
@@ -312,7 +317,8 @@ fn described(
         .map(|(volts, a)| volts - model.inertia_v_s2_per_mm * a - model.offset_v);
     Ok(Candidate {
         validation_error: None,
-        errors: Errors::of(&whole, regression, &all),
+        errors: fitted,
+        fitted,
         refined: false,
         rows: Rows {
             time_s: all
@@ -364,7 +370,7 @@ pub fn recommended_by<'a>(
     Ok(simplest(candidates, &errors))
 }
 
-/// The first candidate that is as good as the best; one without errors is not compared.
+/// The first candidate that is as good as the best, or a better one of as many parameters; one without errors is not compared.
 fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<Errors>]) -> Option<&'a Candidate> {
     let smallest = |of: fn(&Errors) -> f64| {
         let compared = errors.iter().flatten().map(of);
@@ -373,11 +379,15 @@ fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<Errors>]) -> Optio
     let most_sliding = as_good_as(smallest(|errors| errors.sliding));
     let least = smallest(|errors| errors.all);
     let most = (CONTRADICTED * least).max(as_good_as(least));
-    candidates
+    let mut good = candidates
         .iter()
         .zip(errors)
         .filter_map(|(candidate, errors)| Some((candidate, (*errors)?)))
-        .find(|(_, errors)| errors.sliding <= most_sliding && errors.all <= most)
+        .filter(|(_, errors)| errors.sliding <= most_sliding && errors.all <= most)
+        .peekable();
+    let parameters = good.peek()?.0.model.estimates.len();
+    good.filter(|(candidate, _)| candidate.model.estimates.len() == parameters)
+        .min_by(|one, other| one.1.sliding.total_cmp(&other.1.sliding))
         .map(|(candidate, _)| candidate)
 }
 

@@ -13,7 +13,7 @@ use crate::identify::single_state::with_all_models;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Structure {
     /// Fitted while the axis slides, away from reversals: there a Coulomb friction that turns at once is wrong for the time that the
-    /// axis sticks.
+    /// axis sticks. Counts the voltage's hold.
     pub sliding: bool,
     /// A viscous friction for each sense of motion.
     pub directed_viscous: bool,

@@ -56,6 +56,8 @@ impl Solution {
             let dead_time_s = match known_s {
                 Some(known_s) => known_s,
                 None if structure.dead_time => values[0],
+                // A held voltage is late by half its hold, whatever the axis is.
+                None if structure.sliding => regression.hold_s(),
                 None => 0.0,
             };
             let velocity = values.last().copied().filter(|_| structure.stribeck);
