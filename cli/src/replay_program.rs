@@ -16,11 +16,11 @@ use quadrant_sim::replay::part_program_page::{motion_summary_table, program_page
 /// Options of `quadrant replay --gcode`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct ProgramOptions {
-    /// Part program in G-code that all three axes of the simulated stage follow: G0-G3, G17-G19, G20/G21, G90/G91,
-    /// G90.1/G91.1, I, J, K or R, F in mm/min, M2/M30.
+    /// Part program in G-code that all three axes of the simulated stage follow: G0-G4, G17-G21, G61, G64, G90, G91, I, J, K or R,
+    /// F in mm/min, M2/M30; what else a CAM system writes is ignored with a note, or refused by its name.
     #[arg(long, value_name = "FILE")]
     pub(super) gcode: Option<PathBuf>,
-    /// Largest deviation of the path at a corner, mm, 0 to 10; 0 stops at it exactly.
+    /// Largest deviation of the path at a corner, mm, 0 to 10, where the program does not say by G61 or G64 P; 0 stops at it exactly.
     #[arg(long, requires = "gcode", default_value_t = 0.0, value_name = "MM")]
     corner_deviation_mm: f64,
     /// Largest acceleration along the path, mm/s^2; without it 500.
@@ -45,8 +45,8 @@ pub(super) fn run(
     output: &Output,
 ) -> anyhow::Result<()> {
     let program = Program::read(path)?;
-    for (line, word) in &program.ignored {
-        warn!("note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools");
+    for note in program.notes() {
+        warn!("note: {note}");
     }
     let default = Limits::of(&setup.stage);
     let limits = Limits {

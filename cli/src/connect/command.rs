@@ -229,12 +229,14 @@ pub(super) struct CircleOptions {
 /// Options of the command `stream`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct StreamOptions {
-    /// The part program: G0-G3, G17-G19, G20/G21, G90/G91, I, J, K or R, F in mm/min, M2/M30.
+    /// The part program: G0-G4, G17-G21, G61, G64, G90, G91, I, J, K or R, F in mm/min, M2/M30; what else a CAM system writes is
+    /// ignored with a note, or refused by its name.
     pub(super) file: PathBuf,
     /// Control ticks from one set point to the next, 4 to 1000.
     #[arg(long, default_value_t = 50, value_name = "TICKS", value_parser = clap::value_parser!(u16).range(4..=1000))]
     pub(super) period_ticks: u16,
-    /// Largest distance of the path from a corner between straight lines, mm, 0 to 10; 0 stops at it exactly.
+    /// Largest distance of the path from a corner between straight lines, mm, 0 to 10, where the program does not say by G61 or
+    /// G64 P; 0 stops at it exactly.
     #[arg(long, default_value_t = 0.0, value_name = "MM")]
     pub(super) corner_deviation_mm: f64,
 }

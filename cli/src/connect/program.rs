@@ -109,8 +109,8 @@ pub(super) fn stream_program(
 ) -> anyhow::Result<Answer> {
     let program =
         Program::read(&options.file).with_context(|| options.file.display().to_string())?;
-    for (line, word) in &program.ignored {
-        warn!("note: line {line}: {word} is ignored; the stage has no spindle, coolant or tools");
+    for note in program.notes() {
+        warn!("note: {note}");
     }
     let stage = settings::in_force(client)?;
     let status = settle::rest(client, Duration::from_secs(60))?;

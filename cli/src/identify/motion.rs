@@ -1,26 +1,26 @@
 //! The command `quadrant identify motion`.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use quadrant::settings::StageSettings;
 use quadrant_sim::identify::motion::{
-    Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, refined,
-    replay_closed_loop, replay_open_loop, shuttle, validate,
+    Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, recommended_by,
+    refined, replay_closed_loop, replay_open_loop, shuttle, validate,
 };
 use quadrant_sim::identify::pages::motion::{
     Reruns, candidates_table, motion_page, motion_table, validation_table,
 };
 use quadrant_sim::machine::TestAxis;
 use quadrant_sim::pages::provenance;
-use quadrant_sim::record::Recording;
-use quadrant_sim::report::Table;
+use quadrant_sim::record::{ColumnNames, MotionOptions, Recording};
 
 use super::friction::put_friction;
 use super::recorded;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::output::{Output, command_line, share, with_bar};
+use quadrant_cli::{say, warn};
 
 /// Options of `quadrant identify motion`.
 #[derive(Clone, Debug, Args)]
@@ -34,6 +34,14 @@ pub(crate) struct Arguments {
     /// Another recorded motion of the same axis, taken later: every model is judged on it, and none is fitted to it.
     #[arg(long, value_name = "FILE", requires = "record")]
     validate: Option<PathBuf>,
+    /// Columns of a record of another program, with their units: time=NAME:UNIT,position=NAME:UNIT,voltage=NAME:UNIT, and reference.
+    /// NAME is that of the header, or a number from 1. Units: s, ms, us; mm, um, m, in, rad, deg, counts, or a number of them for one,
+    /// as 0.5um; V, mV, A, N, Nm. Delimiter, decimal comma, lines before the header and a row of units are guessed, and said.
+    #[arg(long, requires = "record", value_name = "QUANTITY=NAME:UNIT,...")]
+    columns: Option<ColumnNames>,
+    /// Take time stamps that are uneven, as of a host that polls: the record is interpolated on straight lines between its rows.
+    #[arg(long, requires = "record")]
+    resample: bool,
     /// Force per volt at the amplifier's input, N/V: adds parameters in kg, N s/m and N.
     #[arg(long, value_name = "N_PER_V")]
     force_per_volt: Option<f64>,
@@ -73,6 +81,20 @@ pub(crate) struct Arguments {
     output: Output,
 }
 
+impl Arguments {
+    /// The way in which records are read.
+    fn reading(&self) -> MotionOptions {
+        MotionOptions {
+            columns: self.columns.clone().unwrap_or_default(),
+            resample: self.resample,
+        }
+    }
+}
+
+/// Relative error above which a model is doubtful.
+const DOUBTFUL_ERROR: f64 = 0.2;
+/// Relative error above which a model is no result.
+const LARGEST_ERROR: f64 = 0.5;
 /// The amplifier's range in a simulated cascade, V.
 const LIMIT_V: f64 = 10.0;
 
@@ -98,13 +120,16 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.set_message("refining the best");
-    let best = recommended(&candidates).context("no model of the record is one of friction")?;
+    let other = match &arguments.validate {
+        Some(path) => Some(recorded::read_motion(path, &arguments.reading())?),
+        None => None,
+    };
+    let best = match &other {
+        Some(other) => recommended_by(&candidates, other, &settings)?,
+        None => recommended(&candidates),
+    };
+    let best = best.context("no model of the record is one of friction")?;
     let refined = refined(best, &recording, &settings);
-    let validated = arguments
-        .validate
-        .as_ref()
-        .map(|path| validation(&candidates, path, &settings))
-        .transpose()?;
     bar.set_message("running the models");
     let signals = Signals::new(&recording, &settings);
     let rerun = |candidate: &Candidate| Reruns {
@@ -114,10 +139,17 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .map(|cascade| replay_closed_loop(&candidate.model, &recording, &signals, cascade)),
     };
     let mut chosen = best.clone();
+    let on_other = |candidate: &Candidate| -> anyhow::Result<Option<f64>> {
+        let Some(other) = &other else {
+            return Ok(None);
+        };
+        let one = std::slice::from_ref(candidate);
+        Ok(validate(one, other, &settings)?.first().copied())
+    };
     // A search that found no end, or nothing better, leaves the best as it is.
     if let Ok(refined) = refined {
         let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
-        if rms(&refined) < rms(best) {
+        if refined.explains_as_well_as(best) && rms(&refined) < rms(best) {
             chosen = refined.clone();
         }
         candidates.push(refined);
@@ -125,7 +157,11 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let reruns: Vec<Reruns> = candidates.iter().map(rerun).collect();
     bar.finish_and_clear();
     let mut tables = vec![candidates_table(&candidates, &reruns)];
-    tables.extend(validated);
+    if let (Some(path), Some(other)) = (&arguments.validate, &other) {
+        let errors = validate(&candidates, other, &settings)?;
+        let errors: Vec<_> = candidates.iter().zip(errors).collect();
+        tables.push(validation_table(&errors, &path.display().to_string()));
+    }
     tables.push(motion_table(&chosen.model, arguments.force_per_volt));
     for table in &tables {
         output.table(table)?;
@@ -142,6 +178,14 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         destination,
         ..
     } = arguments;
+    let error = on_other(&chosen)?.unwrap_or(chosen.model.relative_error);
+    let explained = 100.0 * (1.0 - error).max(0.0);
+    ensure!(
+        error <= LARGEST_ERROR,
+        "no model fits: the best explains {explained:.0} % of the voltage, and less than {:.0} % is no result; is the voltage that of this \
+         axis, and does nothing else move it?",
+        100.0 * (1.0 - LARGEST_ERROR)
+    );
     let records: Vec<PathBuf> = arguments
         .record
         .iter()
@@ -157,19 +201,15 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             settings.plant = Some(chosen.model.plant());
             put_friction(settings, chosen.model.friction_settings());
         },
-    )
-}
-
-/// Every candidate on another record.
-fn validation(
-    candidates: &[Candidate],
-    path: &Path,
-    settings: &MotionFitSettings,
-) -> anyhow::Result<Table> {
-    let other = recorded::read(path)?;
-    let errors = validate(candidates, &other, settings)?;
-    let errors: Vec<_> = candidates.iter().zip(errors).collect();
-    Ok(validation_table(&errors, &path.display().to_string()))
+    )?;
+    if error > DOUBTFUL_ERROR {
+        warn!(
+            "warning: the model explains {explained:.0} % of the voltage only; what is missing in it is in no parameter"
+        );
+    } else {
+        say!("The model explains {explained:.1} % of the voltage");
+    }
+    Ok(())
 }
 
 fn cascade(arguments: &Arguments) -> anyhow::Result<Option<CascadeLoop>> {
@@ -210,7 +250,11 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option
     } = arguments;
     if let Some(path) = &arguments.record {
         let title = recorded::title(std::slice::from_ref(path));
-        return Ok((recorded::read(path)?, title, None));
+        return Ok((
+            recorded::read_motion(path, &arguments.reading())?,
+            title,
+            None,
+        ));
     }
     let start = subject.start_axis(destination.into.as_deref())?;
     let measured = subject.measure(

@@ -5,24 +5,39 @@ use std::time::{Duration, Instant};
 
 use indicatif::ProgressDrawTarget;
 use quadrant_cli::output::share;
-use quadrant_sim::record::Recording;
+use quadrant_cli::warn;
+use quadrant_sim::record::{MotionOptions, Recording};
 
 /// Reading that is done sooner needs no bar.
 const PATIENCE: Duration = Duration::from_secs(2);
 
 /// Reads a recording, with a bar if that takes long.
 pub(super) fn read(path: &Path) -> anyhow::Result<Recording> {
+    with_bar(|progress| Ok(Recording::read_csv_with(path, progress)?))
+}
+
+/// Reads a recorded motion in the same way; says what was guessed, and how it was resampled.
+pub(super) fn read_motion(path: &Path, options: &MotionOptions) -> anyhow::Result<Recording> {
+    let (recording, notes) =
+        with_bar(|progress| Ok(Recording::read_motion(path, options, progress)?))?;
+    for note in notes {
+        warn!("note: {}: {note}", path.display());
+    }
+    Ok(recording)
+}
+
+fn with_bar<T>(read: impl FnOnce(&mut dyn FnMut(f64)) -> anyhow::Result<T>) -> anyhow::Result<T> {
     let begin = Instant::now();
     let bar = share("reading the recording");
     bar.set_draw_target(ProgressDrawTarget::hidden());
-    let recording = Recording::read_csv_with(path, &mut |done| {
+    let found = read(&mut |done| {
         if bar.is_hidden() && begin.elapsed() > PATIENCE {
             bar.set_draw_target(ProgressDrawTarget::stderr());
         }
         bar.set_position((1000.0 * done) as u64);
     })?;
     bar.finish_and_clear();
-    Ok(recording)
+    Ok(found)
 }
 
 /// Returns the title of a page on saved recordings.

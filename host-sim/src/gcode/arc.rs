@@ -17,6 +17,8 @@ pub(super) struct ArcWords {
     pub(super) to: Vector,
     /// Words that give its circle.
     pub(super) circle: CircleWords,
+    /// Largest difference of its radii at start and end, mm.
+    pub(super) mismatch_mm: f64,
     pub(super) line: usize,
 }
 
@@ -29,10 +31,11 @@ pub(super) enum CircleWords {
     Radius(f64),
 }
 
-/// The largest difference between an arc's distances from its centre at its two ends, mm: ten times a program's last
-/// digit, and at most this share of the arc's length, so that the correction does not change the feed.
-const MISMATCH_MM: f64 = 5e-3;
-const MISMATCH_SHARE: f64 = 0.01;
+/// Largest difference between an arc's distances from its centre at its two ends, mm, in programs in millimetres. Source:
+/// LinuxCNC, as the next.
+pub(super) const MISMATCH_MM: f64 = 0.028;
+/// The same in programs in inches, mm.
+pub(super) const INCH_MISMATCH_MM: f64 = 0.072;
 
 /// Shortest radius, mm; smaller ones are writing errors.
 const LEAST_RADIUS_MM: f64 = 1e-3;
@@ -58,7 +61,7 @@ impl ArcWords {
         }
         let sweep_rad = self.sweep(start == end, from_centre, to_centre);
         let end_mm = to_centre[0].hypot(to_centre[1]);
-        let most_mm = MISMATCH_MM.min(MISMATCH_SHARE * radius_mm * sweep_rad);
+        let most_mm = self.mismatch_mm;
         if (end_mm - radius_mm).abs() > most_mm {
             return Err(ProgramError::ArcRadius {
                 line: self.line,
@@ -111,7 +114,7 @@ impl ArcWords {
                 "give the centre of a full circle by I, J, K",
             ));
         }
-        if length > 2.0 * radius.abs() + MISMATCH_MM {
+        if length > 2.0 * radius.abs() + self.mismatch_mm {
             return Err(self.wrong(
                 format!(
                     "of radius {:.4} mm cannot reach its end {length:.4} mm away",
@@ -150,6 +153,7 @@ mod tests {
             from: Vector::new(10.0, 0.0, 5.0),
             to: Vector::new(to[0], to[1], 5.0),
             circle,
+            mismatch_mm: MISMATCH_MM,
             line: 7,
         }
         .segment()
@@ -188,11 +192,11 @@ mod tests {
     #[test]
     fn ends_that_miss_the_circle_by_rounding_are_met_and_others_refused() {
         let centre = CircleWords::Centre([0.0, 0.0]);
-        let rounded = arc(Sense::CounterClockwise, [0.0, 10.004], centre.clone()).unwrap();
+        let rounded = arc(Sense::CounterClockwise, [0.0, 10.027], centre.clone()).unwrap();
         let end = rounded.point(rounded.length_mm());
-        assert!((end - Vector::new(0.0, 10.004, 5.0)).norm() < 1e-12);
-        assert!((rounded.tangent(3.0).norm() - 1.0).abs() < 1e-3);
-        let refused = arc(Sense::CounterClockwise, [0.0, 10.006], centre).unwrap_err();
+        assert!((end - Vector::new(0.0, 10.027, 5.0)).norm() < 1e-12);
+        assert!((rounded.tangent(3.0).norm() - 1.0).abs() < 2e-3);
+        let refused = arc(Sense::CounterClockwise, [0.0, 10.029], centre).unwrap_err();
         assert!(
             refused
                 .to_string()

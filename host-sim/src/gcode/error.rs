@@ -22,6 +22,14 @@ pub enum ProgramError {
         text: String,
         detail: String,
     },
+    /// A part of the language that a test of an axis does without.
+    #[error("line {line}: {text}: {what} are not supported; write the moves out")]
+    NotRead {
+        line: usize,
+        text: String,
+        /// Name of it, in the plural.
+        what: &'static str,
+    },
     /// G-code that this program does not know.
     #[error("line {line}: {word} is not supported; supported are {supported}")]
     Unsupported {
@@ -46,14 +54,16 @@ pub enum ProgramError {
         "line {line}: {word} has no feed; write F, in mm/min (inch/min after G20), in this line or before it"
     )]
     NoFeed { line: usize, word: &'static str },
-    /// A number beyond its limits.
-    #[error("line {line}: {word} must be within {least} and {most}")]
-    OutOfRange {
+    /// A number below its limit.
+    #[error("line {line}: {word} must be at least {least}")]
+    TooSmall {
         line: usize,
         word: String,
         least: f64,
-        most: f64,
     },
+    /// A dwell without its time.
+    #[error("line {line}: {word} has no time; write P, in seconds")]
+    NoTime { line: usize, word: String },
     /// An arc without a centre, with one in another plane, or with two.
     #[error("line {line}: the arc {what}; {remedy}")]
     Arc {

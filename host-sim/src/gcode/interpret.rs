@@ -2,10 +2,10 @@
 
 use std::path::Path;
 
-use crate::gcode::arc::{ArcWords, CircleWords};
+use crate::gcode::arc::{ArcWords, CircleWords, INCH_MISMATCH_MM, MISMATCH_MM};
 use crate::gcode::error::ProgramError;
-use crate::gcode::lexer::{Word, words};
-use crate::gcode::modal::{Effect, Modes, Motion};
+use crate::gcode::lexer::{self, Word};
+use crate::gcode::modal::{Effect, Modes, Motion, NO_SPINDLE, PathControl};
 use crate::gcode::segment::{Segment, Vector};
 
 /// A piece of the path, and how fast it is to be run.
@@ -16,6 +16,19 @@ pub struct Move {
     pub feed_mm_s: Option<f64>,
     /// The program's line that it comes from, from 1.
     pub line: usize,
+    /// The way in which its joints are passed.
+    pub path_control: PathControl,
+    /// Rest after it, s.
+    pub rest_s: f64,
+}
+
+/// Something that a program asks for and a stage does not have.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Ignored {
+    /// Its line, from 1.
+    pub line: usize,
+    pub word: String,
+    pub reason: &'static str,
 }
 
 /// A program that has been understood.
@@ -23,14 +36,16 @@ pub struct Move {
 pub struct Program {
     /// Its moves in order, the first from the origin; not empty.
     pub moves: Vec<Move>,
-    /// Codes without effect on a stage (spindle, coolant, tools), with their lines.
-    pub ignored: Vec<(usize, String)>,
+    /// Rest before the first of them, s.
+    pub rest_s: f64,
+    /// Codes without effect on a stage (spindle, coolant, tools), and lines that are left out.
+    pub ignored: Vec<Ignored>,
 }
 
 /// Largest file, bytes: a program of this length runs for hours.
 const MOST_BYTES: u64 = 16 << 20;
-/// Feeds that are understood, mm/min.
-const FEEDS_MM_MIN: (f64, f64) = (1e-3, 1e6);
+/// Lowest feed, mm/min.
+const LEAST_FEED_MM_MIN: f64 = 1e-3;
 
 impl Program {
     /// Reads a program from a file.
@@ -50,7 +65,9 @@ impl Program {
                 most: MOST_BYTES,
             });
         }
-        Self::parse(&std::fs::read_to_string(path).map_err(unreadable)?)
+        // Comments are in whatever character set the machine has.
+        let text = std::fs::read(path).map_err(unreadable)?;
+        Self::parse(&String::from_utf8_lossy(&text))
     }
 
     /// Reads a program from its text.
@@ -58,10 +75,25 @@ impl Program {
     /// # Errors
     /// The first line that is refused.
     pub fn parse(source: &str) -> Result<Self, ProgramError> {
-        let words = words(source)?;
         let mut interpreter = Interpreter::default();
-        for line in words.chunk_by(|one, other| one.line == other.line) {
-            interpreter.line(line)?;
+        let mut begun = false;
+        for (index, text) in lexer::lines(source).enumerate() {
+            let line = index + 1;
+            match lexer::line(text, line)? {
+                // The second percent sign ends the program.
+                lexer::Line::Percent if begun => break,
+                lexer::Line::Percent => begun = true,
+                lexer::Line::Deleted => interpreter.ignored.push(Ignored {
+                    line,
+                    word: "/".to_owned(),
+                    reason: "a line that begins with a slash is left out",
+                }),
+                lexer::Line::Words(words) => {
+                    begun |= !words.is_empty();
+                    interpreter.line(&words)?;
+                }
+            }
+            // What stands behind the end is not read.
             if interpreter.modes.ended {
                 break;
             }
@@ -71,8 +103,31 @@ impl Program {
         }
         Ok(Self {
             moves: interpreter.moves,
+            rest_s: interpreter.rest_s,
             ignored: interpreter.ignored,
         })
+    }
+
+    /// Notes about what is ignored, one for each word and reason, with the first line that it stands in.
+    pub fn notes(&self) -> Vec<String> {
+        let mut notes: Vec<(&Ignored, usize)> = Vec::new();
+        for ignored in &self.ignored {
+            let same = |(first, _): &&mut (&Ignored, usize)| {
+                first.word == ignored.word && first.reason == ignored.reason
+            };
+            match notes.iter_mut().find(same) {
+                Some((_, count)) => *count += 1,
+                None => notes.push((ignored, 1)),
+            }
+        }
+        let note = |(Ignored { line, word, reason }, count): (&Ignored, usize)| match count {
+            1 => format!("line {line}: {word} is ignored; {reason}"),
+            _ => format!(
+                "line {line} and {} more: {word} is ignored; {reason}",
+                count - 1
+            ),
+        };
+        notes.into_iter().map(note).collect()
     }
 }
 
@@ -82,7 +137,8 @@ struct Interpreter {
     feed_mm_s: Option<f64>,
     position: Vector,
     moves: Vec<Move>,
-    ignored: Vec<(usize, String)>,
+    rest_s: f64,
+    ignored: Vec<Ignored>,
 }
 
 /// The words of a line that are not codes.
@@ -92,9 +148,13 @@ struct Line<'w> {
     offsets: [Option<&'w Word>; 3],
     radius: Option<&'w Word>,
     feed: Option<&'w Word>,
+    /// P: a time, or a deviation.
+    amount: Option<&'w Word>,
+    /// Words that only some codes take: the number of a tool, an input or an output.
+    others: Vec<&'w Word>,
 }
 
-const WORDS: &str = "the codes G, M, T and the words X, Y, Z, I, J, K, R, F, S, N";
+const WORDS: &str = "the codes G, M, T and the words X, Y, Z, I, J, K, R, F, P, S, N";
 
 impl<'w> Line<'w> {
     fn take(&mut self, word: &'w Word) -> Result<(), ProgramError> {
@@ -107,12 +167,17 @@ impl<'w> Line<'w> {
             'K' => &mut self.offsets[2],
             'R' => &mut self.radius,
             'F' => &mut self.feed,
-            _ => {
-                return Err(ProgramError::Unsupported {
+            'P' => &mut self.amount,
+            'A' | 'B' | 'C' | 'U' | 'V' | 'W' => {
+                return Err(ProgramError::NotRead {
                     line: word.line,
-                    word: word.text.clone(),
-                    supported: WORDS,
+                    text: word.text.clone(),
+                    what: "axes other than X, Y and Z",
                 });
+            }
+            _ => {
+                self.others.push(word);
+                return Ok(());
             }
         };
         match slot.replace(word) {
@@ -125,6 +190,19 @@ impl<'w> Line<'w> {
         }
     }
 
+    /// Refuses a word that no code of the line takes.
+    fn refuse_others(&self, amount_taken: bool) -> Result<(), ProgramError> {
+        let amount = self.amount.filter(|_| !amount_taken);
+        match self.others.iter().copied().chain(amount).next() {
+            None => Ok(()),
+            Some(word) => Err(ProgramError::Unsupported {
+                line: word.line,
+                word: word.text.clone(),
+                supported: WORDS,
+            }),
+        }
+    }
+
     /// The first of the words that ask for a motion.
     fn moving(&self) -> Option<&'w Word> {
         let words = self.axes.iter().chain(&self.offsets).chain([&self.radius]);
@@ -132,38 +210,89 @@ impl<'w> Line<'w> {
     }
 }
 
+/// The number of a word, unless it is below a limit.
+fn at_least(word: &Word, least: f64) -> Result<f64, ProgramError> {
+    if word.value >= least {
+        return Ok(word.value);
+    }
+    Err(ProgramError::TooSmall {
+        line: word.line,
+        word: word.text.clone(),
+        least,
+    })
+}
+
 impl Interpreter {
     fn line(&mut self, words: &[Word]) -> Result<(), ProgramError> {
         let mut line = Line::default();
         let mut seen = Vec::new();
+        let (mut dwell, mut blend, mut ignores, mut still) = (None, false, false, false);
         for word in words {
-            match word.letter {
-                'G' | 'M' | 'T' => {
-                    if self.modes.apply(word, &mut seen)? == Effect::Ignored {
-                        self.ignored.push((word.line, word.text.clone()));
-                    }
+            let effect = match word.letter {
+                'G' | 'M' | 'T' => self.modes.apply(word, &mut seen)?,
+                'S' => Effect::Ignored(NO_SPINDLE),
+                _ => {
+                    line.take(word)?;
+                    Effect::Set
                 }
-                'S' => self.ignored.push((word.line, word.text.clone())),
-                _ => line.take(word)?,
+            };
+            match effect {
+                Effect::Set => {}
+                Effect::Dwell => dwell = Some(word),
+                Effect::Blend => blend = true,
+                Effect::Ignored(reason) | Effect::IgnoredMotion(reason) => {
+                    still |= matches!(effect, Effect::IgnoredMotion(_));
+                    ignores = true;
+                    self.ignored.push(Ignored {
+                        line: word.line,
+                        word: word.text.clone(),
+                        reason,
+                    });
+                }
             }
+        }
+        if !ignores {
+            line.refuse_others(dwell.is_some() || blend)?;
         }
         if let Some(word) = line.feed {
-            let feed_mm_min = word.value * self.modes.unit_mm();
-            let (least, most) = FEEDS_MM_MIN;
-            if !(least..=most).contains(&feed_mm_min) {
-                return Err(ProgramError::OutOfRange {
-                    line: word.line,
-                    word: word.text.clone(),
-                    least: least / self.modes.unit_mm(),
-                    most: most / self.modes.unit_mm(),
-                });
-            }
-            self.feed_mm_s = Some(feed_mm_min / 60.0);
+            self.feed(word)?;
         }
-        match line.moving() {
-            Some(first) => self.motion(&line, first),
-            None => Ok(()),
+        if let Some(word) = line.amount.filter(|_| blend) {
+            let within_mm = at_least(word, 0.0)? * self.modes.unit_mm();
+            self.modes.path_control = PathControl::Within(within_mm);
         }
+        let moving = line.moving().filter(|_| !still);
+        match (dwell, moving) {
+            (Some(dwell), None) => self.dwell(dwell, line.amount),
+            (Some(dwell), Some(word)) => Err(ProgramError::Contradiction {
+                line: word.line,
+                word: word.text.clone(),
+                other: dwell.text.clone(),
+            }),
+            (None, Some(first)) => self.motion(&line, first),
+            (None, None) => Ok(()),
+        }
+    }
+
+    fn feed(&mut self, word: &Word) -> Result<(), ProgramError> {
+        let unit_mm = self.modes.unit_mm();
+        let feed = at_least(word, LEAST_FEED_MM_MIN / unit_mm)?;
+        self.feed_mm_s = Some(feed * unit_mm / 60.0);
+        Ok(())
+    }
+
+    /// Adds a rest after the last move.
+    fn dwell(&mut self, code: &Word, time: Option<&Word>) -> Result<(), ProgramError> {
+        let time = time.ok_or_else(|| ProgramError::NoTime {
+            line: code.line,
+            word: code.text.clone(),
+        })?;
+        let rest_s = match self.moves.last_mut() {
+            Some(last) => &mut last.rest_s,
+            None => &mut self.rest_s,
+        };
+        *rest_s += at_least(time, 0.0)?;
+        Ok(())
     }
 
     fn motion(&mut self, line: &Line<'_>, first: &Word) -> Result<(), ProgramError> {
@@ -206,6 +335,11 @@ impl Interpreter {
                     from: self.position,
                     to: target,
                     circle: self.circle(line, first.line)?,
+                    mismatch_mm: if self.modes.inches {
+                        INCH_MISMATCH_MM
+                    } else {
+                        MISMATCH_MM
+                    },
                     line: first.line,
                 }
                 .segment()?,
@@ -216,6 +350,8 @@ impl Interpreter {
                 segment,
                 feed_mm_s,
                 line: first.line,
+                path_control: self.modes.path_control,
+                rest_s: 0.0,
             });
         }
         self.position = target;

@@ -1,16 +1,11 @@
-//! From text to words: the grammar is the crate `gcode`'s, whose errors and spans are used; its numbers are not, because
-//! they are `f32`, which is 4 um at 50 mm in the seventh digit.
-
-use gcode::core::{
-    BlockVisitor, CommandVisitor, ControlFlow, Diagnostics, Number, ProgramVisitor, Span,
-    TokenType, Value, parse,
-};
+//! From text to words, as RS274/NGC writes them.
 
 use crate::gcode::error::ProgramError;
 
 /// A letter with its number.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Word {
+    /// In upper case.
     pub(super) letter: char,
     pub(super) value: f64,
     /// As it is written, without spaces.
@@ -19,229 +14,177 @@ pub(super) struct Word {
     pub(super) line: usize,
 }
 
-/// The words of a program in order, without comments and line numbers.
+/// Content of a line.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Line {
+    /// Its words, without comments and line numbers; there may be none.
+    Words(Vec<Word>),
+    /// A line that a slash marks to be left out.
+    Deleted,
+    /// A percent sign, which begins and ends a program.
+    Percent,
+}
+
+/// Largest magnitude of a number other than a feed: beyond every machine's travel, in any unit.
+const LARGEST: f64 = 1e6;
+
+const PARAMETERS: &str = "parameters (#)";
+const EXPRESSIONS: &str = "expressions ([ ])";
+const O_WORDS: &str = "subprograms and loops (O-words)";
+
+/// The lines of a text: each ends with a line feed, a carriage return, or both.
+pub(super) fn lines(source: &str) -> impl Iterator<Item = &str> {
+    let mut rest = Some(source.trim_start_matches('\u{feff}'));
+    std::iter::from_fn(move || {
+        let text = rest?;
+        let Some(end) = text.find(['\r', '\n']) else {
+            return rest.take();
+        };
+        let both = text[end..].starts_with("\r\n");
+        rest = Some(&text[end + 1 + usize::from(both)..]);
+        Some(&text[..end])
+    })
+}
+
+/// Reads a line; `number` counts from 1.
 ///
 /// # Errors
-/// The first text that is not G-code.
-pub(super) fn words(source: &str) -> Result<Vec<Word>, ProgramError> {
-    refuse_bad_codes(source)?;
-    let mut reader = Reader {
-        source,
-        words: Vec::new(),
-        error: None,
-    };
-    parse(source, &mut reader);
-    match reader.error {
-        None => Ok(reader.words),
-        Some(error) => Err(error),
+/// Text that is no G-code, or a part of the language that is not supported.
+pub(super) fn line(text: &str, number: usize) -> Result<Line, ProgramError> {
+    let code = without_comments(text, number)?;
+    if code.starts_with('%') {
+        return Ok(Line::Percent);
     }
-}
-
-/// Digits of a code's number that `gcode` multiplies by ten in 32 bits without overflow.
-const CODE_DIGITS: usize = 8;
-
-/// Refuses codes that `gcode` 0.7 would drop without a word or overflow on: it reports a code's bad number by a type that
-/// it keeps private.
-fn refuse_bad_codes(source: &str) -> Result<(), ProgramError> {
-    for (index, line) in source.lines().enumerate() {
-        let line_text = without_comments(line);
-        for (place, _) in line_text.match_indices(['G', 'g', 'M', 'm', 'T', 't']) {
-            let rest = line_text[place + 1..].trim_start_matches([' ', '\t']);
-            let end = rest
-                .find(|c: char| !(c.is_ascii_digit() || c == '.'))
-                .unwrap_or(rest.len());
-            let (whole, decimals) = match rest[..end].split_once('.') {
-                None => (&rest[..end], None),
-                Some((whole, decimals)) => (whole, Some(decimals)),
-            };
-            // A code without a number is the parser's to refuse.
-            let good = whole.len() <= CODE_DIGITS
-                && decimals.is_none_or(|decimals| decimals.len() == 1 && !whole.is_empty());
-            if !good {
-                return Err(ProgramError::Syntax {
-                    line: index + 1,
-                    text: line.trim().to_owned(),
-                    detail: format!(
-                        "a code is a whole number of at most {CODE_DIGITS} digits, or has one decimal"
-                    ),
-                });
-            }
+    if code.starts_with('/') {
+        return Ok(Line::Deleted);
+    }
+    let mut reader = Reader {
+        code: &code,
+        number,
+    };
+    let mut words = Vec::new();
+    while let Some(word) = reader.word(words.is_empty())? {
+        if !matches!(word.letter, 'N' | 'O') {
+            words.push(word);
         }
     }
-    Ok(())
+    Ok(Line::Words(words))
 }
 
-/// A line without what stands in parentheses or after a semicolon.
-fn without_comments(line: &str) -> String {
-    let mut depth = 0usize;
-    let mut rest = String::new();
-    for character in line.chars() {
+/// A line without spaces, control characters and what stands in parentheses or after a semicolon.
+fn without_comments(text: &str, number: usize) -> Result<String, ProgramError> {
+    let mut depth = 0_usize;
+    let mut code = String::new();
+    for character in text.chars() {
         match (character, depth) {
             ('(', _) => depth += 1,
             (')', 1..) => depth -= 1,
             (';', 0) => break,
-            (_, 0) => rest.push(character),
+            (_, 0) if !(character.is_whitespace() || character.is_control()) => {
+                code.push(character);
+            }
             _ => {}
         }
     }
-    rest
+    if depth == 0 {
+        return Ok(code);
+    }
+    Err(ProgramError::Syntax {
+        line: number,
+        text: text.trim().to_owned(),
+        detail: "the comment is not closed in its line".to_owned(),
+    })
 }
 
-/// The largest magnitude of a word's number: beyond every machine's travel, in any unit, and every feed.
-const LARGEST: f64 = 1e6;
-
-/// Collects words, and the first error.
-struct Reader<'s> {
-    source: &'s str,
-    words: Vec<Word>,
-    error: Option<ProgramError>,
+/// The rest of a line.
+struct Reader<'t> {
+    code: &'t str,
+    number: usize,
 }
 
 impl Reader<'_> {
-    fn fail(&mut self, text: &str, span: Span, detail: String) {
-        self.error.get_or_insert_with(|| ProgramError::Syntax {
-            line: span.line + 1,
-            text: text.trim().to_owned(),
-            detail,
-        });
-    }
-
-    fn word(&mut self, letter: char, span: Span) {
-        let text: String = self.source[span.start..span.end()]
-            .chars()
-            .filter(|c| !c.is_whitespace())
-            .collect();
-        match text[letter.len_utf8()..].parse::<f64>() {
-            Ok(value) if value.abs() > LARGEST => {
-                self.fail(&text, span, format!("its number is beyond {LARGEST}"))
+    /// Takes the next word; nothing at the line's end.
+    fn word(&mut self, first: bool) -> Result<Option<Word>, ProgramError> {
+        let Some(letter) = self.code.chars().next() else {
+            return Ok(None);
+        };
+        // A colon begins a program's number as O does.
+        let letter = match letter.to_ascii_uppercase() {
+            ':' if first => 'O',
+            letter => letter,
+        };
+        match letter {
+            'A'..='Z' => {}
+            '#' => return Err(self.unsupported(self.code, PARAMETERS)),
+            '[' => return Err(self.unsupported(self.code, EXPRESSIONS)),
+            _ => return Err(self.syntax(self.code, "it is no word of G-code")),
+        }
+        let rest = &self.code[1..];
+        let signed = usize::from(rest.starts_with(['+', '-']));
+        let length = rest[signed..]
+            .find(|sign: char| !(sign.is_ascii_digit() || sign == '.'))
+            .map_or(rest.len(), |end| signed + end);
+        let (text, after) = self.code.split_at(1 + length);
+        let value = text[1..]
+            .parse()
+            .ok()
+            .filter(|value: &f64| value.is_finite());
+        if letter == 'O' {
+            let keyword = after
+                .starts_with(|sign: char| sign.is_ascii_alphabetic() && !"GMTNgmtn".contains(sign));
+            if value.is_none() || keyword {
+                return Err(self.unsupported(self.code, O_WORDS));
             }
-            Ok(value) => self.words.push(Word {
-                letter: letter.to_ascii_uppercase(),
-                value,
-                text,
-                line: span.line + 1,
-            }),
-            Err(_) => self.fail(&text, span, "a number should follow the letter".to_owned()),
         }
-    }
-
-    fn code(&mut self, letter: char, number: Number) {
-        let minor = number.minor().map_or(0, std::num::NonZero::get);
-        self.words.push(Word {
+        let Some(value) = value else {
+            return Err(if after.starts_with('#') {
+                self.unsupported(self.code, PARAMETERS)
+            } else if self.code.contains('[') {
+                self.unsupported(self.code, EXPRESSIONS)
+            } else {
+                self.syntax(text, "a number should follow the letter")
+            });
+        };
+        if after.starts_with(',') {
+            return Err(self.syntax(self.code, "a number has a decimal point, no comma"));
+        }
+        self.check(letter, text, value)?;
+        self.code = after;
+        Ok(Some(Word {
             letter,
-            value: f64::from(number.major()) + 0.1 * f64::from(minor),
-            text: format!("{letter}{number}"),
-            // Known when the command ends.
-            line: 0,
-        });
-    }
-}
-
-impl Diagnostics for Reader<'_> {
-    fn emit_unknown_content(&mut self, text: &str, span: Span) {
-        self.fail(text, span, "it is no word of G-code".to_owned());
-    }
-
-    fn emit_unexpected(&mut self, actual: &str, expected: &[TokenType], span: Span) {
-        let expected: Vec<&str> = expected.iter().map(|kind| kind.as_str()).collect();
-        self.fail(
-            actual,
-            span,
-            format!("expected here: {}", expected.join(" or ")),
-        );
-    }
-
-    fn emit_parse_int_error(&mut self, value: &str, _: std::num::ParseIntError, span: Span) {
-        self.fail(
             value,
-            span,
-            "a line or program number is a whole number below 2^32".to_owned(),
-        );
-    }
-}
-
-impl ProgramVisitor for Reader<'_> {
-    fn start_block(&mut self) -> ControlFlow<impl BlockVisitor + '_> {
-        ControlFlow::Continue(Part {
-            reader: self,
-            code: None,
-        })
-    }
-}
-
-/// A block, or a command with its arguments.
-struct Part<'r, 's> {
-    reader: &'r mut Reader<'s>,
-    /// Index of the command's code among the words.
-    code: Option<usize>,
-}
-
-impl<'s> Part<'_, 's> {
-    fn command(&mut self, letter: char, number: Number) -> ControlFlow<Part<'_, 's>> {
-        let code = Some(self.reader.words.len());
-        self.reader.code(letter, number);
-        ControlFlow::Continue(Part {
-            reader: self.reader,
-            code,
-        })
-    }
-}
-
-impl Diagnostics for Part<'_, '_> {
-    fn emit_unknown_content(&mut self, text: &str, span: Span) {
-        self.reader.emit_unknown_content(text, span);
+            text: text.to_owned(),
+            line: self.number,
+        }))
     }
 
-    fn emit_unexpected(&mut self, actual: &str, expected: &[TokenType], span: Span) {
-        self.reader.emit_unexpected(actual, expected, span);
+    /// Refuses numbers that the letter does not take.
+    fn check(&self, letter: char, text: &str, value: f64) -> Result<(), ProgramError> {
+        let code = matches!(letter, 'G' | 'M' | 'T');
+        let decimals = text.split_once('.').map(|(_, decimals)| decimals.len());
+        if code && (value < 0.0 || decimals.is_some_and(|count| count != 1)) {
+            return Err(self.syntax(text, "a code is a whole number, or has one decimal"));
+        }
+        // A line's number counts nothing, and a feed ends at what the axes can do.
+        if !matches!(letter, 'N' | 'O' | 'F') && value.abs() > LARGEST {
+            return Err(self.syntax(text, &format!("its number is beyond {LARGEST}")));
+        }
+        Ok(())
     }
 
-    fn emit_parse_int_error(&mut self, value: &str, error: std::num::ParseIntError, span: Span) {
-        self.reader.emit_parse_int_error(value, error, span);
-    }
-}
-
-impl BlockVisitor for Part<'_, '_> {
-    fn comment(&mut self, value: &str, span: Span) {
-        // An open comment would swallow the rest of the program.
-        if value.starts_with('(') && (!value.ends_with(')') || value.contains('\n')) {
-            let line = value.lines().next().unwrap_or_default();
-            self.reader.fail(
-                line,
-                span,
-                "the comment is not closed in its line".to_owned(),
-            );
+    fn syntax(&self, text: &str, detail: &str) -> ProgramError {
+        ProgramError::Syntax {
+            line: self.number,
+            text: text.to_owned(),
+            detail: detail.to_owned(),
         }
     }
 
-    fn word_address(&mut self, letter: char, _: Value<'_>, span: Span) {
-        self.reader.word(letter, span);
-    }
-
-    fn start_general_code(&mut self, number: Number) -> ControlFlow<impl CommandVisitor + '_> {
-        self.command('G', number)
-    }
-
-    fn start_miscellaneous_code(
-        &mut self,
-        number: Number,
-    ) -> ControlFlow<impl CommandVisitor + '_> {
-        self.command('M', number)
-    }
-
-    fn start_tool_change_code(&mut self, number: Number) -> ControlFlow<impl CommandVisitor + '_> {
-        self.command('T', number)
-    }
-}
-
-impl CommandVisitor for Part<'_, '_> {
-    fn argument(&mut self, letter: char, _: Value<'_>, span: Span) {
-        self.reader.word(letter, span);
-    }
-
-    fn end_command(self, span: Span) {
-        if let Some(code) = self.code.and_then(|index| self.reader.words.get_mut(index)) {
-            code.line = span.line + 1;
+    fn unsupported(&self, text: &str, what: &'static str) -> ProgramError {
+        ProgramError::NotRead {
+            line: self.number,
+            text: text.to_owned(),
+            what,
         }
     }
 }
@@ -250,19 +193,22 @@ impl CommandVisitor for Part<'_, '_> {
 mod tests {
     use super::*;
 
-    fn texts(source: &str) -> Vec<(String, usize)> {
-        let words = words(source).unwrap();
-        words
-            .into_iter()
-            .map(|word| (word.text, word.line))
-            .collect()
+    /// The words of a text with their lines.
+    fn texts(source: &str) -> Result<Vec<(String, usize)>, ProgramError> {
+        let mut texts = Vec::new();
+        for (index, text) in lines(source).enumerate() {
+            if let Line::Words(words) = line(text, index + 1)? {
+                texts.extend(words.into_iter().map(|word| (word.text, word.line)));
+            }
+        }
+        Ok(texts)
     }
 
     #[test]
     fn words_come_with_their_lines_and_without_comments() {
-        let source = "%\nO100 (a G9999999999 program)\nN10 g21 G90.1\nG1x-1.5 Y + 2 F300 ; feed\n\nX.5\nM30\n%\n";
+        let source = "%\nO100 (a G9999999999 program)\nN10 g21 G90.1\nG1x-1.5 Y + 2 F300 ; feed\n\nX.5\nN20000000000 M30\n%\n";
         let expected = [
-            ("G21", 3),
+            ("g21", 3),
             ("G90.1", 3),
             ("G1", 4),
             ("x-1.5", 4),
@@ -272,14 +218,26 @@ mod tests {
             ("M30", 7),
         ];
         assert_eq!(
-            texts(source),
+            texts(source).unwrap(),
             expected.map(|(text, line)| (text.to_owned(), line))
         );
     }
 
     #[test]
+    fn a_carriage_return_ends_a_line_as_a_line_feed_does() {
+        for end in ["\n", "\r", "\r\n"] {
+            let source = ["G1", "; a comment", "", "X5 (two)", "Y6"].join(end);
+            let expected = [("G1", 1), ("X5", 4), ("Y6", 5)];
+            let expected = expected.map(|(text, line)| (text.to_owned(), line));
+            assert_eq!(texts(&source).unwrap(), expected, "{end:?}");
+        }
+    }
+
+    #[test]
     fn numbers_are_read_in_full() {
-        let words = words("G1 X123.456789012 F1").unwrap();
+        let Line::Words(words) = line("G1 X123.456789012 F1", 1).unwrap() else {
+            panic!("no words");
+        };
         assert_eq!(words[1].value, 123.456_789_012);
     }
 
@@ -287,22 +245,49 @@ mod tests {
     fn what_is_no_g_code_is_refused_with_its_line() {
         for (source, line) in [
             ("G21\nG1 X", 2),
-            ("G1 X1 #5", 1),
             ("hello", 1),
             ("\n\nG1 (open\nX5 F1", 3),
             ("G91.12", 1),
             ("X1\nG91. X5", 2),
             ("G99999999999 X1", 1),
-            ("N99999999999 G1", 1),
-            ("/G1 X1", 1),
+            ("G-1 X1", 1),
             ("G1 X1 = 2", 1),
             ("G1 X1\nX99999999999", 2),
+            ("G1 X1,5", 1),
+            ("G1 X1.2.3", 1),
+            ("G1 X1 % 5", 1),
+            ("G1 X1 /Y5", 1),
+            ("G1 é", 1),
             ("G\nX1", 1),
         ] {
-            match words(source) {
+            match texts(source) {
                 Err(ProgramError::Syntax { line: found, .. }) => {
                     assert_eq!(found, line, "{source}")
                 }
+                other => panic!("{source:?} gives {other:?}"),
+            }
+        }
+    }
+
+    #[test]
+    fn a_language_within_the_language_is_refused_by_its_name() {
+        for (source, name) in [
+            ("G1 X1 #5", PARAMETERS),
+            ("#1=5", PARAMETERS),
+            ("#<depth> = 2", PARAMETERS),
+            ("G1 X#1", PARAMETERS),
+            ("G1 X-#<depth>", PARAMETERS),
+            ("G1 X[1+2]", EXPRESSIONS),
+            ("G1 X-[1+2]", EXPRESSIONS),
+            ("G1 Xsin[30]", EXPRESSIONS),
+            ("o100 sub", O_WORDS),
+            ("O<pocket> call [5]", O_WORDS),
+            ("N5 o100 while [#1 lt 5]", O_WORDS),
+            ("o100 endif", O_WORDS),
+            ("o100 repeat [5]", O_WORDS),
+        ] {
+            match texts(source) {
+                Err(ProgramError::NotRead { what, .. }) => assert_eq!(what, name, "{source}"),
                 other => panic!("{source:?} gives {other:?}"),
             }
         }

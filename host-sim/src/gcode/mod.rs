@@ -4,10 +4,9 @@
 //!   text --lexer--> blocks --interpret--> moves --blending--> moves --speeds, velocity_profile--> trajectory --> tables
 //! ```
 //!
-//! The crate `gcode` reads the words; what they mean is decided here. A move is a straight line or a circular or helical
-//! arc, with its feed. The speed along the path is limited in jerk and acceleration, holds the feed where the axes' limits
-//! allow it, runs through joints that are tangent and stops at those that are not; [`Limits`] says how each axis' limits are
-//! kept. The firmware follows the result as recorded tables, a sample a control period.
+//! A move is a straight line or a circular or helical arc, with its feed. The speed along the path is limited in jerk and
+//! acceleration, holds the feed where the axes' limits allow it, runs through joints that are tangent and stops at those that
+//! are not; [`Limits`] says how each axis' limits are kept. The firmware follows the result as recorded tables, a sample a control period.
 
 mod arc;
 mod blending;
@@ -15,13 +14,15 @@ mod error;
 mod interpret;
 mod lexer;
 mod modal;
+mod runs;
 mod segment;
 mod speeds;
 mod trajectory;
 mod velocity_profile;
 
 pub use error::ProgramError;
-pub use interpret::{Move, Program};
+pub use interpret::{Ignored, Move, Program};
+pub use modal::PathControl;
 pub use segment::{Segment, Vector};
 pub use speeds::Limits;
 pub use trajectory::{Place, Trajectory};

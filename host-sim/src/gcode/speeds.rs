@@ -4,6 +4,7 @@ use quadrant::settings::StageSettings;
 
 use crate::gcode::error::ProgramError;
 use crate::gcode::interpret::Move;
+use crate::gcode::modal::PathControl;
 use crate::gcode::velocity_profile::Pace;
 
 /// Limits of the motion along a path, of the axes and of the path.
@@ -21,7 +22,8 @@ pub struct Limits {
     pub path_acceleration_mm_s2: f64,
     /// Largest jerk along the path, mm/s^3; 10 to 1e9.
     pub path_jerk_mm_s3: f64,
-    /// Largest deviation of the path at a corner between straight lines, mm; zero stops there exactly. 0 to 10.
+    /// Largest deviation of the path at a corner between straight lines, mm, where the program does not say by G61 or G64 P;
+    /// zero stops there exactly. 0 to 10.
     pub corner_deviation_mm: f64,
     /// Travel of each axis, mm from the program's origin, its lower and upper end.
     pub travel_mm: [(f64, f64); 3],
@@ -35,7 +37,7 @@ const JOINT_SHARE: f64 = 0.1;
 /// Of an arc's part, the share for changes of speed; what is left for the curve makes a right angle with it.
 const ARC_TANGENTIAL_SHARE: f64 = 0.5;
 /// The largest change of direction that still counts as tangent, rad: one degree.
-pub(super) const TANGENT_RAD: f64 = std::f64::consts::PI / 180.0;
+const TANGENT_RAD: f64 = std::f64::consts::PI / 180.0;
 /// Acceleration along the path, mm/s^2; chosen: with the jerk below, of a mid-sized machining centre.
 const PATH_ACCELERATION_MM_S2: f64 = 500.0;
 /// Jerk along the path, mm/s^3; chosen.
@@ -143,7 +145,11 @@ impl Limits {
     }
 
     /// The largest speed through the joint of two moves, mm/s.
-    fn through(&self, before: &Move, after: &Move) -> f64 {
+    pub(super) fn through(&self, before: &Move, after: &Move) -> f64 {
+        let stops = |step: &Move| step.path_control == PathControl::ExactStop;
+        if before.rest_s > 0.0 || stops(before) || stops(after) {
+            return 0.0;
+        }
         let arrives = before.segment.tangent(before.segment.length_mm());
         let corner = after.segment.tangent(0.0) - arrives;
         if corner.norm() > TANGENT_RAD {
@@ -155,32 +161,5 @@ impl Limits {
                 JOINT_SHARE * self.acceleration_mm_s2[axis] / (self.rate_hz * corner[axis].abs())
             })
             .fold(f64::INFINITY, f64::min)
-    }
-
-    /// The largest speed (mm/s) and the pace on every move, and the speeds (mm/s) at all joints, the two ends at rest
-    /// included: the highest from which every later joint can be met.
-    pub(super) fn speeds(&self, moves: &[Move]) -> (Vec<(f64, Pace)>, Vec<f64>) {
-        let on: Vec<(f64, Pace)> = moves.iter().map(|step| self.on(step)).collect();
-        let mut joints = vec![0.0; moves.len() + 1];
-        for (index, pair) in moves.windows(2).enumerate() {
-            let allowed = on[index].0.min(on[index + 1].0);
-            joints[index + 1] = allowed.min(self.through(&pair[0], &pair[1]));
-        }
-        // Backwards, so that every joint can be braked for; then forwards, so that it can be reached.
-        for index in (0..moves.len()).rev() {
-            let length = moves[index].segment.length_mm();
-            let reach = on[index]
-                .1
-                .reach_mm_s(joints[index + 1], joints[index], length);
-            joints[index] = joints[index].min(reach);
-        }
-        for index in 0..moves.len() {
-            let length = moves[index].segment.length_mm();
-            let reach = on[index]
-                .1
-                .reach_mm_s(joints[index], joints[index + 1], length);
-            joints[index + 1] = joints[index + 1].min(reach);
-        }
-        (on, joints)
     }
 }

@@ -3,25 +3,31 @@
 use crate::gcode::blending::round;
 use crate::gcode::error::ProgramError;
 use crate::gcode::interpret::{Move, Program};
-use crate::gcode::segment::Vector;
+use crate::gcode::runs::runs;
+use crate::gcode::segment::{Segment, Vector};
 use crate::gcode::speeds::Limits;
 use crate::gcode::velocity_profile::Phase;
 
 /// Longest program, s: its samples for three axes and two controllers take half a gigabyte.
 const MOST_S: f64 = 600.0;
-/// Moves before and after the present one on which the nearest point is looked for.
-const NEIGHBOURS: usize = 2;
+/// Length of the path, either way, on which the nearest point is looked for, over the distance from the present one: the nearest
+/// point is at most twice as far from that, and a path about a corner is longer than its chord.
+const SEARCHED: f64 = 4.0;
 
 #[derive(Clone, Debug)]
 pub struct Trajectory {
     moves: Vec<Move>,
+    /// Start of each move in its run, mm.
+    starts_mm: Vec<f64>,
     phases: Vec<TimedPhase>,
     duration_s: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
 struct TimedPhase {
-    index: usize,
+    /// First and last move of its run.
+    first: usize,
+    last: usize,
     start_s: f64,
     phase: Phase,
 }
@@ -47,33 +53,55 @@ impl Trajectory {
         for step in &program.moves {
             limits.check_travel(step)?;
         }
-        let moves = round(program.moves.clone(), limits.corner_deviation_mm);
-        let (on, joints) = limits.speeds(&moves);
-        let mut phases = Vec::new();
-        let mut start_s = 0.0;
-        for (index, step) in moves.iter().enumerate() {
-            let (most, pace) = on[index];
-            let ends = [joints[index], joints[index + 1]];
-            for phase in pace.phases(ends, most, step.segment.length_mm()) {
-                phases.push(TimedPhase {
-                    index,
-                    start_s,
-                    phase,
-                });
-                start_s += phase.duration_s;
+        let moves = round(&program.moves, limits.corner_deviation_mm);
+        let mut planned = Self {
+            starts_mm: Vec::with_capacity(moves.len()),
+            phases: Vec::new(),
+            duration_s: 0.0,
+            moves,
+        };
+        planned.rest(0, 0.0, program.rest_s);
+        for run in runs(limits, &planned.moves) {
+            let (first, last) = (run.moves.start, run.moves.end - 1);
+            let mut end_mm = 0.0;
+            for step in &planned.moves[run.moves] {
+                planned.starts_mm.push(end_mm);
+                end_mm += step.segment.length_mm();
             }
+            for phase in run.phases {
+                planned.append(first, last, phase);
+            }
+            planned.rest(
+                last,
+                planned.moves[last].segment.length_mm(),
+                planned.moves[last].rest_s,
+            );
         }
-        if start_s > MOST_S {
+        if planned.duration_s > MOST_S {
             return Err(ProgramError::TooLong {
-                duration_s: start_s,
+                duration_s: planned.duration_s,
                 most_s: MOST_S,
             });
         }
-        Ok(Self {
-            moves,
-            phases,
-            duration_s: start_s,
-        })
+        Ok(planned)
+    }
+
+    fn append(&mut self, first: usize, last: usize, phase: Phase) {
+        self.phases.push(TimedPhase {
+            first,
+            last,
+            start_s: self.duration_s,
+            phase,
+        });
+        self.duration_s += phase.duration_s;
+    }
+
+    /// Adds a rest on a move.
+    fn rest(&mut self, index: usize, along_mm: f64, duration_s: f64) {
+        if duration_s > 0.0 {
+            let start_mm = self.starts_mm.get(index).copied().unwrap_or(0.0);
+            self.append(index, index, Phase::rest(start_mm + along_mm, duration_s));
+        }
     }
 
     /// The moves of the path, rounded corners among them.
@@ -104,23 +132,29 @@ impl Trajectory {
             {
                 current += 1;
             }
-            self.phases.get(current).map_or(
-                Place {
+            match self.phases.get(current) {
+                Some(timed) => self.place(timed, time_s),
+                None => Place {
                     index: 0,
                     along_mm: 0.0,
                     speed_mm_s: 0.0,
                 },
-                |timed| {
-                    let since = (time_s - timed.start_s).min(timed.phase.duration_s);
-                    let (along, speed_mm_s) = timed.phase.at(since);
-                    Place {
-                        index: timed.index,
-                        along_mm: along.clamp(0.0, self.moves[timed.index].segment.length_mm()),
-                        speed_mm_s,
-                    }
-                },
-            )
+            }
         })
+    }
+
+    fn place(&self, timed: &TimedPhase, time_s: f64) -> Place {
+        let since = (time_s - timed.start_s).min(timed.phase.duration_s);
+        let (along_mm, speed_mm_s) = timed.phase.at(since);
+        let starts = &self.starts_mm[timed.first..=timed.last];
+        let begun = starts.partition_point(|start_mm| *start_mm <= along_mm);
+        let index = timed.first + begun.saturating_sub(1);
+        let along_mm = along_mm - self.starts_mm[index];
+        Place {
+            index,
+            along_mm: along_mm.clamp(0.0, self.moves[index].segment.length_mm()),
+            speed_mm_s,
+        }
     }
 
     /// The point at a place, mm.
@@ -130,20 +164,31 @@ impl Trajectory {
 
     /// The vector from the path to a point, mm: from the nearest point of the path about a place.
     pub fn deviation(&self, place: &Place, point: &Vector) -> Vector {
-        let first = place.index.saturating_sub(NEIGHBOURS);
-        let last = (place.index + NEIGHBOURS).min(self.moves.len() - 1);
         let mut nearest = point - self.point(place);
-        for index in first..=last {
-            let segment = &self.moves[index].segment;
-            let from_mm = match index.cmp(&place.index) {
-                std::cmp::Ordering::Less => segment.length_mm(),
-                std::cmp::Ordering::Equal => place.along_mm,
-                std::cmp::Ordering::Greater => 0.0,
-            };
+        let searched_mm = SEARCHED * nearest.norm();
+        let mut consider = |segment: &Segment, from_mm: f64| {
             let deviation = point - segment.point(segment.nearest(point, from_mm));
             if deviation.norm_squared() < nearest.norm_squared() {
                 nearest = deviation;
             }
+        };
+        let present = &self.moves[place.index].segment;
+        consider(present, place.along_mm);
+        let mut before_mm = place.along_mm;
+        for step in self.moves[..place.index].iter().rev() {
+            if before_mm > searched_mm {
+                break;
+            }
+            consider(&step.segment, step.segment.length_mm());
+            before_mm += step.segment.length_mm();
+        }
+        let mut ahead_mm = present.length_mm() - place.along_mm;
+        for step in &self.moves[place.index + 1..] {
+            if ahead_mm > searched_mm {
+                break;
+            }
+            consider(&step.segment, 0.0);
+            ahead_mm += step.segment.length_mm();
         }
         nearest
     }

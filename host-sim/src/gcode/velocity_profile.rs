@@ -5,6 +5,8 @@
 //! The acceleration is zero at both ends, so segments can follow one another without a jump of it. Source: Biagiotti and
 //! Melchiorri, *Trajectory Planning for Automatic Machines and Robots*, Springer 2008, section 3.4.
 
+use std::ops::Range;
+
 /// Halvings of an interval of speeds; 60 leave less than a double resolves.
 const HALVINGS: usize = 60;
 
@@ -32,6 +34,17 @@ pub(super) struct Phase {
 }
 
 impl Phase {
+    /// A rest.
+    pub(super) const fn rest(along_mm: f64, duration_s: f64) -> Self {
+        Self {
+            along_mm,
+            speed_mm_s: 0.0,
+            acceleration_mm_s2: 0.0,
+            jerk_mm_s3: 0.0,
+            duration_s,
+        }
+    }
+
     /// Place, mm along the segment, and speed, mm/s, at a time from its beginning.
     pub(super) fn at(&self, time_s: f64) -> (f64, f64) {
         let half_jerk = 0.5 * self.jerk_mm_s3;
@@ -40,6 +53,28 @@ impl Phase {
             self.speed_mm_s + time_s * (0.5 * self.acceleration_mm_s2 + time_s * half_jerk / 3.0);
         (self.along_mm + time_s * mean, speed)
     }
+
+    /// Speed at a place within it, mm/s.
+    fn speed_at(&self, along_mm: f64) -> f64 {
+        let time_s = largest(0.0, self.duration_s, along_mm, |time_s| self.at(time_s).0);
+        self.at(time_s).1
+    }
+}
+
+/// The largest speed between two places of a motion that speeds up, runs and slows down.
+pub(super) fn fastest(phases: &[Phase], between_mm: Range<f64>) -> f64 {
+    let within = |mm: &f64| (between_mm.start..=between_mm.end).contains(mm);
+    let reached = phases.iter().enumerate().flat_map(|(index, phase)| {
+        let (end_mm, end_mm_s) = phase.at(phase.duration_s);
+        let last = index + 1 == phases.len();
+        let at = |mm: f64| {
+            let inside = phase.along_mm <= mm && (mm < end_mm || last);
+            inside.then(|| phase.speed_at(mm))
+        };
+        let end = Some(end_mm_s).filter(|_| within(&end_mm));
+        [at(between_mm.start), at(between_mm.end), end]
+    });
+    reached.flatten().fold(0.0, f64::max)
 }
 
 /// The largest value within bounds at which a rising function stays within `most`; the lower bound if none does.
@@ -72,7 +107,7 @@ impl Pace {
     }
 
     /// Distance in which the speed changes, mm.
-    fn change_mm(&self, from_mm_s: f64, to_mm_s: f64) -> f64 {
+    pub(super) fn change_mm(&self, from_mm_s: f64, to_mm_s: f64) -> f64 {
         let (jerk_s, level_s) = self.change_s(to_mm_s - from_mm_s);
         0.5 * (from_mm_s + to_mm_s) * (2.0 * jerk_s + level_s)
     }
@@ -84,7 +119,7 @@ impl Pace {
         })
     }
 
-    /// The phases over an segment of `length_mm` that is entered and left at two speeds within reach of each other, at
+    /// The phases over a segment of `length_mm` that is entered and left at two speeds within reach of each other, at
     /// no more than `most_mm_s`.
     pub(super) fn phases(
         &self,

@@ -109,7 +109,30 @@ fn read_at_most(
     sizes: Sizes,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Columns, RecordError> {
-    let (source, header) = Source::open(path, sizes)?;
+    let opened = Source::open(path, sizes)?;
+    fill(opened, purpose, most_rows, progress)
+}
+
+/// Reads a text that stands for a file's, and begins with lines that the file does not have.
+pub(super) fn read_text(
+    path: &Path,
+    text: Vec<u8>,
+    added_lines: u64,
+    purpose: Purpose,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Columns, RecordError> {
+    let bytes = text.len() as u64;
+    let (mut source, header) = Source::of(path, SIZES, Box::new(Cursor::new(text)), bytes)?;
+    source.line -= added_lines;
+    fill((source, header), purpose, MOST_ROWS, progress)
+}
+
+fn fill(
+    (source, header): (Source<'_>, Header<'_>),
+    purpose: Purpose,
+    most_rows: usize,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Columns, RecordError> {
     let mut time = header.required("t_s", TIME)?;
     let mut reference = header.optional("reference", REFERENCE)?;
     let mut position = header.optional("position", POSITION)?;
@@ -192,7 +215,7 @@ fn printable(text: &str) -> String {
 struct Source<'a> {
     path: &'a Path,
     sizes: Sizes,
-    file: File,
+    file: Box<dyn Read + Send>,
     /// Length of the file, bytes; zero where it is not known beforehand.
     bytes: u64,
     /// Cells of a row.
@@ -229,10 +252,20 @@ struct PartPlace {
 impl<'a> Source<'a> {
     fn open(path: &'a Path, sizes: Sizes) -> Result<(Self, Header<'a>), RecordError> {
         let file = File::open(path).map_err(|error| refuse(path, error.into()))?;
+        let bytes = file.metadata().map_or(0, |file| file.len());
+        Self::of(path, sizes, Box::new(file), bytes)
+    }
+
+    fn of(
+        path: &'a Path,
+        sizes: Sizes,
+        file: Box<dyn Read + Send>,
+        bytes: u64,
+    ) -> Result<(Self, Header<'a>), RecordError> {
         let mut source = Self {
             path,
             sizes,
-            bytes: file.metadata().map_or(0, |file| file.len()),
+            bytes,
             file,
             cells: 0,
             read: 0,
@@ -710,6 +743,9 @@ impl Header<'_> {
     fn hint(&self) -> &'static str {
         match self.names.as_slice() {
             [only] if only.contains([';', '\t']) => ". Cells must be separated by commas",
+            names if names.len() >= 2 && names.iter().all(|name| name.parse::<f64>().is_err()) => {
+                ". `identify motion --columns time=...,position=...,voltage=...` takes other names"
+            }
             names if !names.is_empty() && names.iter().all(|name| name.parse::<f64>().is_ok()) => {
                 ". The first line must name the columns"
             }

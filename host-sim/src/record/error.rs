@@ -116,6 +116,24 @@ pub enum RecordError {
         /// Description of the fault.
         fault: TimeFault,
     },
+    /// The position leaps.
+    #[error(
+        "{}, line {line}: the position leaps from {from_mm} mm to {to_mm} mm, and neither the rows before nor those after move so fast{}; \
+         are counts lost, or is the row wrong? Correct it, or keep the part before or after it",
+        path.display(), Others(*others)
+    )]
+    Leap {
+        /// Path of the file.
+        path: PathBuf,
+        /// Line number; the header is 1.
+        line: u64,
+        /// Position in the row before, mm.
+        from_mm: f64,
+        /// Position in that row, mm.
+        to_mm: f64,
+        /// Further leaps of the record.
+        others: usize,
+    },
     /// The sample rate is not one that anything is controlled at.
     #[error(
         "{}, column t_s: the sample time is {} s ({} Hz); {} Hz to 100 kHz are allowed{hint}",
@@ -246,6 +264,13 @@ pub enum TimeFault {
         /// Time in the row before, s.
         previous: f64,
     },
+    /// A pause that is too long to be interpolated.
+    Pause {
+        /// Time since the row before, s.
+        step: f64,
+        /// The longest that is allowed, s.
+        most: f64,
+    },
     /// A step unlike the others.
     Step {
         /// Time since the row before, s.
@@ -268,9 +293,16 @@ impl fmt::Display for TimeFault {
                     "comes after {previous} s; time must increase by the sample time in every row"
                 )
             }
+            Self::Pause { step, most } => write!(
+                f,
+                "is {} s after the row before; resampling bridges {} s at most: keep the part before or after it",
+                Brief(*step),
+                Brief(*most)
+            ),
             Self::Step { step, median } => write!(
                 f,
-                "is {} s after the row before, the sample time is {} s; steps must be equal within 1 %{}",
+                "is {} s after the row before, the sample time is {} s; steps must be equal within 1 %{}. `identify motion --resample` \
+                 takes uneven steps",
                 Brief(*step),
                 Brief(*median),
                 if *step > 1.5 * median {
@@ -389,6 +421,18 @@ impl fmt::Display for RecordWarning {
                 "the position runs {} ms ahead of the reference; are the two columns swapped?",
                 Brief(lead_s * 1e3)
             ),
+        }
+    }
+}
+
+/// The number of further faults of a kind, where there are any.
+struct Others(usize);
+
+impl fmt::Display for Others {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.0 {
+            0 => Ok(()),
+            others => write!(f, " (and {others} more)"),
         }
     }
 }

@@ -18,6 +18,8 @@
 mod columns;
 mod error;
 mod force;
+mod foreign;
+mod leap;
 mod limits;
 mod lines;
 mod motion;
@@ -28,7 +30,8 @@ mod trace;
 
 pub use error::{RecordError, RecordWarning, TimeFault, UnitFault, UnusableSignal};
 pub use force::ForceRecord;
+pub use foreign::ColumnNames;
 pub use limits::AxisLimits;
 pub use motion::Record;
-pub use recording::Recording;
+pub use recording::{MotionOptions, Recording};
 pub use trace::{TraceError, write_trace};

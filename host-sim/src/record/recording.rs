@@ -6,8 +6,10 @@ use serde::{Deserialize, Serialize};
 
 use super::columns::{self, Columns, Purpose};
 use super::error::{RecordError, UnusableSignal};
+use super::foreign::{self, ColumnNames};
+use super::time::Grid;
 use super::trace::{TraceError, write_trace};
-use super::{plausible, time};
+use super::{leap, plausible, time};
 
 /// Largest voltage of an amplifier's input, V.
 const MOST_VOLTS: f64 = 20.0;
@@ -32,6 +34,31 @@ pub struct Recording {
     pub voltage_v: Vec<f64>,
     /// The part of it that was injected, V.
     pub injection_v: Vec<f64>,
+}
+
+/// Ways of reading a recorded motion.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct MotionOptions {
+    /// The columns, where they do not have the names of ours.
+    pub columns: ColumnNames,
+    /// Uneven steps of time are interpolated.
+    pub resample: bool,
+}
+
+/// The units that columns are in, as far as their ranges tell.
+#[derive(Clone, Copy)]
+struct Believed {
+    /// Positions are lengths.
+    length: bool,
+    /// Voltages are those of an amplifier's input.
+    voltage: bool,
+}
+
+impl Believed {
+    const ALL: Self = Self {
+        length: true,
+        voltage: true,
+    };
 }
 
 impl Recording {
@@ -133,10 +160,90 @@ impl Recording {
     pub fn read_csv_with(path: &Path, progress: &mut dyn FnMut(f64)) -> Result<Self, RecordError> {
         let columns = columns::read(path, Purpose::Experiment, progress)?;
         let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
-        check(path, &columns)?;
+        Self::checked(path, columns, sample_time_s, Believed::ALL)
+    }
+
+    /// Reads and checks a recorded motion as [`read_csv_with`](Self::read_csv_with), and that its position does not leap. Files of
+    /// other programs are translated. Uneven steps of time are refused, or interpolated on request. Notes say what was guessed and
+    /// done.
+    ///
+    /// # Errors
+    /// As [`read_csv`](Self::read_csv), a column that is not there, and a position that leaps.
+    pub fn read_motion(
+        path: &Path,
+        options: &MotionOptions,
+        progress: &mut dyn FnMut(f64),
+    ) -> Result<(Self, Vec<String>), RecordError> {
+        let unreadable = |source| RecordError::Read {
+            path: path.to_owned(),
+            source,
+        };
+        let bytes = std::fs::read(path).map_err(unreadable)?;
+        let translated = foreign::translate(path, &bytes, &options.columns)?;
+        let (mut columns, mut notes, believed) = match translated {
+            None => (
+                columns::read_text(path, bytes, 0, Purpose::Experiment, progress)?,
+                Vec::new(),
+                Believed::ALL,
+            ),
+            Some(translated) => {
+                let believed = Believed {
+                    length: !translated.other_length,
+                    voltage: !translated.other_voltage,
+                };
+                let columns = columns::read_text(
+                    path,
+                    translated.text,
+                    translated.added_lines,
+                    Purpose::Experiment,
+                    progress,
+                )?;
+                (columns, translated.notes, believed)
+            }
+        };
+        let (sample_time_s, note) = if options.resample {
+            let grid = Grid::of(path, &columns.time, &columns.lines)?;
+            refuse_leaps(path, &columns)?;
+            resample_by(&grid, &mut columns);
+            let (shortest_s, longest_s) = grid.steps_s;
+            let note = format!(
+                "resampled: {} rows in steps of {:.3} to {:.3} ms stand for as many in steps of {:.3} ms ({:.1} Hz), on straight lines \
+                 between the rows",
+                columns.lines.rows(),
+                1e3 * shortest_s,
+                1e3 * longest_s,
+                1e3 * grid.sample_time_s,
+                1.0 / grid.sample_time_s
+            );
+            (grid.sample_time_s, Some(note))
+        } else {
+            let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
+            refuse_leaps(path, &columns)?;
+            (sample_time_s, None)
+        };
+        notes.extend(note);
+        Ok((
+            Self::checked(path, columns, sample_time_s, believed)?,
+            notes,
+        ))
+    }
+
+    /// The columns of an even time, if they can be identified from.
+    fn checked(
+        path: &Path,
+        columns: Columns,
+        sample_time_s: f64,
+        believed: Believed,
+    ) -> Result<Self, RecordError> {
+        check_changes(path, &columns)?;
+        if believed.voltage {
+            check_amplifier(path, &columns)?;
+        }
         plausible::check_experiment(path, &columns)?;
-        let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
-        check_travel(path, "position", travel_mm)?;
+        if believed.length {
+            let travel_mm = columns.position.as_ref().map_or(0.0, plausible::travel_mm);
+            check_travel(path, "position", travel_mm)?;
+        }
         // A long recording need not hold its time as well.
         drop(columns.time);
         let position_mm = columns
@@ -157,6 +264,27 @@ impl Recording {
             position_mm,
             voltage_v,
         })
+    }
+}
+
+fn refuse_leaps(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    match &columns.position {
+        Some(position) => leap::refuse(path, &columns.time.values, position, &columns.lines),
+        None => Ok(()),
+    }
+}
+
+/// Puts every signal on the even times.
+fn resample_by(grid: &Grid, columns: &mut Columns) {
+    let time_s = &columns.time.values;
+    let signals = [
+        &mut columns.reference,
+        &mut columns.position,
+        &mut columns.voltage,
+        &mut columns.injection,
+    ];
+    for column in signals.into_iter().flatten() {
+        column.values = grid.resampled(time_s, &column.values);
     }
 }
 
@@ -190,14 +318,8 @@ fn check_voltage(path: &Path, column: &'static str, values: &[f64]) -> Result<f6
     })
 }
 
-fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
-    let refuse = |column, fault| {
-        Err(RecordError::Useless {
-            path: path.to_owned(),
-            column,
-            fault,
-        })
-    };
+/// Refuses a position or a voltage that never changes.
+fn check_changes(path: &Path, columns: &Columns) -> Result<(), RecordError> {
     for (name, column) in [
         ("position", &columns.position),
         ("voltage_v", &columns.voltage),
@@ -206,9 +328,25 @@ fn check(path: &Path, columns: &Columns) -> Result<(), RecordError> {
             && let Some(first) = values.first()
             && values.iter().all(|value| value == first)
         {
-            return refuse(name, UnusableSignal::Constant { value: *first });
+            return Err(RecordError::Useless {
+                path: path.to_owned(),
+                column: name,
+                fault: UnusableSignal::Constant { value: *first },
+            });
         }
     }
+    Ok(())
+}
+
+/// Refuses a voltage that is none of an amplifier's input, or is at its limit too often.
+fn check_amplifier(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+    let refuse = |column, fault| {
+        Err(RecordError::Useless {
+            path: path.to_owned(),
+            column,
+            fault,
+        })
+    };
     let Some(voltage) = &columns.voltage else {
         return Ok(());
     };

@@ -22,6 +22,64 @@ pub(super) fn check(path: &Path, time: &Column, lines: &Lines) -> Result<f64, Re
     Ok((values[last] - values[0]) / last as f64)
 }
 
+/// Longest step that is interpolated, over the median step.
+const LONGEST_STEP: f64 = 5.0;
+
+/// An even time, and the steps of the uneven one that it stands for.
+pub(super) struct Grid {
+    pub(super) sample_time_s: f64,
+    /// Shortest and longest step of the record, s.
+    pub(super) steps_s: (f64, f64),
+}
+
+impl Grid {
+    /// As many samples as the record has, from its first time to its last.
+    ///
+    /// # Errors
+    /// Time that does not increase, or pauses for longer than may be interpolated.
+    pub(super) fn of(path: &Path, time: &Column, lines: &Lines) -> Result<Self, RecordError> {
+        let values = &time.values;
+        let steps = steps(path, values, lines)?;
+        let median = median(steps.clone());
+        check_rate(path, median, 1)?;
+        let most = LONGEST_STEP * median;
+        if let Some(index) = steps.iter().position(|step| *step > most) {
+            return Err(RecordError::Time {
+                path: path.to_owned(),
+                line: lines.line(index + 1),
+                value: values[index + 1],
+                fault: TimeFault::Pause {
+                    step: steps[index],
+                    most,
+                },
+            });
+        }
+        let ends = (f64::INFINITY, f64::NEG_INFINITY);
+        let last = values.len() - 1;
+        Ok(Self {
+            sample_time_s: (values[last] - values[0]) / last as f64,
+            steps_s: steps
+                .iter()
+                .fold(ends, |(low, high), step| (low.min(*step), high.max(*step))),
+        })
+    }
+
+    /// A signal at the even times, on the straight line between the rows about each.
+    pub(super) fn resampled(&self, time_s: &[f64], signal: &[f64]) -> Vec<f64> {
+        let mut row = 0;
+        (0..signal.len())
+            .map(|sample| {
+                let at = time_s[0] + sample as f64 * self.sample_time_s;
+                while row + 2 < signal.len() && time_s[row + 1] <= at {
+                    row += 1;
+                }
+                let share = (at - time_s[row]) / (time_s[row + 1] - time_s[row]);
+                signal[row] + share.clamp(0.0, 1.0) * (signal[row + 1] - signal[row])
+            })
+            .collect()
+    }
+}
+
 /// True if the shortest and the longest step alone show that no step can be refused, wherever the median lies between them.
 fn is_even(values: &[f64]) -> bool {
     let (shortest, longest) = values
@@ -69,6 +127,25 @@ pub(super) fn check_rate(
     })
 }
 
+/// The steps of a time that increases.
+fn steps(path: &Path, values: &[f64], lines: &Lines) -> Result<Vec<f64>, RecordError> {
+    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
+    let Some(index) = steps.iter().position(|step| *step <= 0.0) else {
+        return Ok(steps);
+    };
+    Err(RecordError::Time {
+        path: path.to_owned(),
+        line: lines.line(index + 1),
+        value: values[index + 1],
+        fault: match steps[index] {
+            0.0 => TimeFault::Repeated,
+            _ => TimeFault::Backwards {
+                previous: values[index],
+            },
+        },
+    })
+}
+
 /// Looks for the first step that is refused.
 fn check_steps(path: &Path, values: &[f64], lines: &Lines) -> Result<(), RecordError> {
     let fault = |index: usize, fault| RecordError::Time {
@@ -77,17 +154,7 @@ fn check_steps(path: &Path, values: &[f64], lines: &Lines) -> Result<(), RecordE
         value: values[index],
         fault,
     };
-    let steps: Vec<f64> = values.windows(2).map(|pair| pair[1] - pair[0]).collect();
-    if let Some(i) = steps.iter().position(|step| *step <= 0.0) {
-        let kind = if steps[i] == 0.0 {
-            TimeFault::Repeated
-        } else {
-            TimeFault::Backwards {
-                previous: values[i],
-            }
-        };
-        return Err(fault(i + 1, kind));
-    }
+    let steps = steps(path, values, lines)?;
     // The median is the sample time even where some rows are missing.
     let median = median(steps.clone());
     check_rate(path, median, 1)?;

@@ -1,5 +1,6 @@
 //! Inertia and friction from ordinary motion: of a real axis whose parameters are published, and of the simulated stage.
 
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -10,7 +11,7 @@ use quadrant_sim::identify::motion::{
 use quadrant_sim::identify::setting::SettingError;
 use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
-use quadrant_sim::record::Recording;
+use quadrant_sim::record::{MotionOptions, Recording};
 
 /// Of the EMPS drive (see the record's own description).
 const FORCE_N_PER_V: f64 = 35.150_651_882_485_47;
@@ -316,4 +317,339 @@ fn records_that_tell_too_little_are_refused_with_what_they_lack() {
             ..
         })
     ));
+}
+
+/// A record of an axis of 2e-5 V s²/mm, 2e-3 V s/mm and 0.02 V of offset under PD control, with a Coulomb friction that turns at once;
+/// `step_s` gives the time from one row to the next.
+fn simulated_record(coulomb_v: f64, mut step_s: impl FnMut(usize) -> f64) -> Vec<[f64; 3]> {
+    let reference = |t: f64| {
+        let slow = 45.0 * (TAU * 0.4 * t).sin() * (TAU * 0.13 * t + 1.0).sin();
+        slow + 6.0 * (TAU * 1.7 * t).sin()
+    };
+    let (mut position, mut velocity, mut time) = (0.0, 0.0, 0.0);
+    let mut rows = Vec::new();
+    while time < 8.0 {
+        let measured = (position * 1e3_f64).round() / 1e3;
+        let ahead = (reference(time + 1e-4) - reference(time - 1e-4)) / 2e-4;
+        let wanted = 2.0 * (reference(time) - measured) + 0.012 * (ahead - velocity);
+        let voltage = (wanted + 2e-3 * ahead).clamp(-10.0, 10.0);
+        rows.push([time, measured, voltage]);
+        let step = step_s(rows.len());
+        for _ in 0..40 {
+            let force = voltage - 0.02 - 2e-3 * velocity;
+            let h = step / 40.0;
+            if f64::abs(velocity) < 1e-3 && f64::abs(force) < coulomb_v {
+                velocity = 0.0;
+            } else {
+                let way = if f64::abs(velocity) > 1e-3 {
+                    velocity
+                } else {
+                    force
+                };
+                let next = velocity + h * (force - coulomb_v.copysign(way)) / 2e-5;
+                velocity = if next * velocity < 0.0 { 0.0 } else { next };
+            }
+            position += h * velocity;
+        }
+        time += step;
+    }
+    rows
+}
+
+/// A record as it is read from a file, or why it is refused.
+fn read(rows: &[[f64; 3]], resample: bool) -> Result<(Recording, Vec<String>), String> {
+    let row = |[t, x, u]: &[f64; 3]| format!("{t:.6},{x:.4},{u:.5}\n");
+    let rows: String = rows.iter().map(row).collect();
+    let options = MotionOptions {
+        resample,
+        ..MotionOptions::default()
+    };
+    read_text(&format!("t_s,position_mm,voltage_v\n{rows}"), &options)
+}
+
+fn read_text(text: &str, options: &MotionOptions) -> Result<(Recording, Vec<String>), String> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("record.csv");
+    std::fs::write(&path, text).unwrap();
+    Recording::read_motion(&path, options, &mut |_| {}).map_err(|error| error.to_string())
+}
+
+#[test]
+fn the_plainest_model_of_an_axis_with_coulomb_friction_or_none_is_recommended() {
+    for coulomb_v in [0.15, 0.05, 0.0] {
+        let (record, _) = read(&simulated_record(coulomb_v, |_| 2e-3), false).unwrap();
+        let candidates = fitted(&record, &MotionFitSettings::default());
+        let best = recommended(&candidates).unwrap();
+        assert!(
+            !best.model.structure.presliding && !best.model.structure.stribeck,
+            "{:?}",
+            best.model.structure
+        );
+        let MotionModel {
+            inertia_v_s2_per_mm,
+            offset_v,
+            friction,
+            ..
+        } = &best.model;
+        let friction = friction.positive;
+        assert!(
+            (inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.05,
+            "{inertia_v_s2_per_mm}"
+        );
+        assert!(
+            (friction.viscous_v_s_per_mm / 2e-3 - 1.0).abs() < 0.05,
+            "{friction:?}"
+        );
+        assert!(
+            (friction.curve.coulomb_v - coulomb_v).abs() < 0.006,
+            "{friction:?}"
+        );
+        assert!((offset_v - 0.02).abs() < 0.002, "{offset_v}");
+    }
+}
+
+#[test]
+fn no_candidate_has_a_mass_or_a_friction_below_zero() {
+    // The voltage of a negative mass: what is left of the record is none.
+    let rows: Vec<[f64; 3]> = simulated_record(0.15, |_| 2e-3);
+    let turned: Vec<[f64; 3]> = rows.iter().map(|[t, x, u]| [*t, *x, -u]).collect();
+    let (record, _) = read(&turned, false).unwrap();
+    match fit_motion(&record, &MotionFitSettings::default(), &|_| {}) {
+        Err(MotionFitError::Unphysical { .. }) => {}
+        Err(other) => panic!("{other}"),
+        Ok(candidates) => {
+            for candidate in candidates {
+                let friction = candidate.model.friction;
+                assert!(candidate.model.inertia_v_s2_per_mm > 0.0);
+                assert!(
+                    friction.positive.viscous_v_s_per_mm >= 0.0
+                        && friction.negative.viscous_v_s_per_mm >= 0.0
+                );
+                assert!(
+                    candidate.model.relative_error > 0.5,
+                    "{}",
+                    candidate.model.relative_error
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_position_that_leaps_is_refused_with_its_line() {
+    let rows = simulated_record(0.15, |_| 2e-3);
+    assert!(read(&rows, false).is_ok());
+    for (index, leap_mm, stays) in [
+        (2345, 5.0, false),
+        (2345, -0.2, false),
+        (1000, 1.0, true),
+        (3000, -0.1, true),
+    ] {
+        let mut leaping = rows.clone();
+        let last = if stays { rows.len() } else { index + 1 };
+        for row in &mut leaping[index..last] {
+            row[1] += leap_mm;
+        }
+        let refused = read(&leaping, false).unwrap_err();
+        // The header is line 1.
+        assert!(
+            refused.contains(&format!("line {}: the position leaps", index + 2)),
+            "{leap_mm}: {refused}"
+        );
+        assert!(read(&leaping, true).is_err());
+    }
+}
+
+#[test]
+fn uneven_steps_are_resampled_when_that_is_asked_for() {
+    let mut state = 4_u32;
+    let uneven = simulated_record(0.15, |_| {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        1.6e-3 + 1e-3 * f64::from(state >> 8) / f64::from(1 << 24)
+    });
+    let refused = read(&uneven, false).unwrap_err();
+    assert!(refused.contains("--resample"), "{refused}");
+    let (record, note) = read(&uneven, true).unwrap();
+    let note = note.join("; ");
+    assert!(
+        note.contains("in steps of 1.6") && note.contains("straight lines"),
+        "{note}"
+    );
+    let candidates = fitted(&record, &MotionFitSettings::default());
+    let model = &recommended(&candidates).unwrap().model;
+    assert!(
+        (model.inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.25,
+        "{}",
+        model.inertia_v_s2_per_mm
+    );
+    let mut paused = uneven.clone();
+    for row in &mut paused[2000..] {
+        row[0] += 0.05;
+    }
+    let refused = read(&paused, true).unwrap_err();
+    assert!(
+        refused.contains("line 2002") && refused.contains("resampling bridges"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn records_of_other_programs_are_read_as_they_are() {
+    let rows: Vec<[f64; 3]> = (0..200)
+        .map(|k| {
+            let t = f64::from(k) * 2e-3;
+            [t, 10.0 * (TAU * t).sin(), 0.5 * (TAU * t).cos()]
+        })
+        .collect();
+    let comma = |text: String| text.replace('.', ",");
+    let table = |row: &dyn Fn(&[f64; 3]) -> String| rows.iter().map(row).collect::<String>();
+    let cases: [(&str, String, &str, &[&str]); 9] = [
+        (
+            "semicolons, decimal commas, our names",
+            "t_s;position_mm;voltage_v\n".to_owned()
+                + &comma(table(&|[t, x, u]| format!("{t:.4};{x:.6};{u:.6}\n"))),
+            "",
+            &["semicolons", "decimal comma"],
+        ),
+        (
+            "tabs, lines before, a row of units",
+            "Scope 3.1\nDrive: X\n\nZeit\tIst\tMoment\nms\tum\tV\n".to_owned()
+                + &table(&|[t, x, u]| format!("{:.1}\t{:.3}\t{u:.6}\n", 1e3 * t, 1e3 * x)),
+            "time=Zeit,position=Ist,voltage=Moment",
+            &[
+                "tabs",
+                "3 lines before the header",
+                "units in line 5",
+                "time taken in ms",
+            ],
+        ),
+        (
+            "units in brackets",
+            "Time [ms],Position (m),Command [mV],state\n".to_owned()
+                + &table(&|[t, x, u]| {
+                    format!("{:.1},{:.9},{:.3},ok\n", 1e3 * t, 1e-3 * x, 1e3 * u)
+                }),
+            "time=time,position=position,voltage=command",
+            &["position taken in m"],
+        ),
+        (
+            "units that are given",
+            "a,b,c\n".to_owned()
+                + &table(&|[t, x, u]| format!("{:.1},{:.3},{u:.6}\n", 1e6 * t, 2e3 * x)),
+            "time=a:us,position=b:0.5um,voltage=c:V",
+            &[],
+        ),
+        (
+            "columns by number, spaces, no header",
+            table(&|[t, x, u]| format!("  {t:.4}   {x:.6}  {u:.6}\n")),
+            "time=1:s,position=2:mm,voltage=3:V",
+            &["spaces", "no header"],
+        ),
+        (
+            "a column of ours that is another",
+            "t_s,clock,position_mm,voltage_v\n".to_owned()
+                + &table(&|[t, x, u]| format!("7,{t:.4},{x:.6},{u:.6}\n")),
+            "time=clock:s",
+            &[],
+        ),
+        (
+            "quotation marks and CRLF",
+            "\"t\";\"x\";\"u\"\r\n".to_owned()
+                + &comma(table(&|[t, x, u]| {
+                    format!("\"{t:.4}\";\"{x:.6}\";\"{u:.6}\"\r\n")
+                })),
+            "time=t:s,position=x:mm,voltage=u:V",
+            &["semicolons"],
+        ),
+        (
+            "angles and torques",
+            "t,phi,torque\n".to_owned() + &table(&|[t, x, u]| format!("{t:.4},{x:.6},{u:.6}\n")),
+            "time=t:s,position=phi:rad,voltage=torque:Nm",
+            &["where mm stands in what follows, read rad", "read Nm"],
+        ),
+        (
+            "ours",
+            "t_s,position_mm,voltage_v\n".to_owned()
+                + &table(&|[t, x, u]| format!("{t:.4},{x:.6},{u:.6}\n")),
+            "",
+            &[],
+        ),
+    ];
+    for (name, text, columns, said) in cases {
+        let options = MotionOptions {
+            columns: if columns.is_empty() {
+                Default::default()
+            } else {
+                columns.parse().unwrap()
+            },
+            ..MotionOptions::default()
+        };
+        let (record, notes) =
+            read_text(&text, &options).unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(record.len(), rows.len(), "{name}");
+        assert!((record.sample_time_s - 2e-3).abs() < 1e-9, "{name}");
+        for (index, [_, x, u]) in rows.iter().enumerate() {
+            assert!(
+                (record.position_mm[index] - x).abs() < 2e-6,
+                "{name}, row {index}"
+            );
+            assert!(
+                (record.voltage_v[index] - u).abs() < 2e-6,
+                "{name}, row {index}"
+            );
+        }
+        let notes = notes.join("; ");
+        assert!(
+            said.iter().all(|part| notes.contains(part)),
+            "{name}: {notes}"
+        );
+        assert!(!said.is_empty() || notes.is_empty(), "{name}: {notes}");
+    }
+}
+
+#[test]
+fn a_record_of_another_program_is_refused_with_its_own_line_and_names() {
+    let rows: String = (0..50)
+        .map(|k| format!("{};{};{}\n", 2 * k, k % 7, k % 5))
+        .collect();
+    let spoilt = rows.replace("\n20;3;0\n", "\n20;off;0\n");
+    let options = |columns: &str| MotionOptions {
+        columns: columns.parse().unwrap(),
+        ..MotionOptions::default()
+    };
+    let refused = read_text(
+        &format!("drive 7\nt;x;u\n{spoilt}"),
+        &options("time=t:ms,position=x,voltage=u"),
+    )
+    .unwrap_err();
+    assert!(
+        refused.contains("line 13") && refused.contains("off"),
+        "{refused}"
+    );
+    let refused = read_text(
+        &format!("t;x;u\n{rows}"),
+        &options("time=t:ms,position=y,voltage=u"),
+    )
+    .unwrap_err();
+    assert!(
+        refused.contains("\"y\" for the position") && refused.contains("t, x, u"),
+        "{refused}"
+    );
+    let refused = read_text(
+        "clock,place,drive\n1,2,3\n2,3,4\n3,4,5\n",
+        &MotionOptions::default(),
+    )
+    .unwrap_err();
+    assert!(refused.contains("--columns"), "{refused}");
+    for (text, part) in [
+        ("time=t:h", "no unit of time"),
+        ("speed=v", "none of time, position"),
+        ("time", "not QUANTITY=COLUMN"),
+        ("time=a,time=b", "stands twice"),
+    ] {
+        let error = text
+            .parse::<quadrant_sim::record::ColumnNames>()
+            .unwrap_err();
+        assert!(error.contains(part), "{text}: {error}");
+    }
 }

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
-use proptest::test_runner::RngSeed;
+use proptest::test_runner::{RngSeed, TestCaseError};
 use quadrant::settings::StageSettings;
 use quadrant_sim::gcode::{Limits, Program, ProgramError, Trajectory, Vector};
 
@@ -144,7 +144,7 @@ fn refusals_name_line_word_and_limit() {
         ("G2 X10 I5 K1 F100", &["line 1", "K1", "G18"]),
         (
             "G21\nG3 X10 I5.1 F100",
-            &["line 2", "5.1000", "4.9000", "0.0050"],
+            &["line 2", "5.1000", "4.9000", "0.0280"],
         ),
         ("G0 X200.1", &["line 1", "x to 200.100 mm", "-200 to 200"]),
         ("G3 X0 Y0 I150 F100", &["line 1", "x to 300.000"]),
@@ -171,10 +171,246 @@ fn what_the_stage_does_not_have_is_noted_and_the_end_ends() {
     let ignored: Vec<&str> = program
         .ignored
         .iter()
-        .map(|(_, word)| word.as_str())
+        .map(|ignored| ignored.word.as_str())
         .collect();
     assert_eq!(ignored, ["M3", "S1000"]);
     assert_eq!(Program::parse("G0 X1\nM2\nX5").unwrap().moves.len(), 1);
+}
+
+#[test]
+fn what_cam_writes_around_its_moves_is_read_or_noted() {
+    for (source, moves, length_mm, notes) in [
+        // Line ends of old machines.
+        (
+            "G21 G90\rG1 X10 F600\r; up, and back\rY10\rX0\rM2\r",
+            3,
+            30.0,
+            0,
+        ),
+        ("G21 G90\rG1 X10 F600\rY10\rM2\r", 2, 20.0, 0),
+        (
+            "G1 X10 F600\nM30\nSETUP: clamp left, zero on top face\n",
+            1,
+            10.0,
+            0,
+        ),
+        ("%\nG1 X10 F600\n%\nleft over from the tape", 1, 10.0, 0),
+        ("G1 X10 F600\n/G1 Y5\n/N30 G1 X0\nG1 X20\nM2", 2, 20.0, 1),
+        (
+            "%\nO0042 (BRACKET)\nN10 G0 G17 G21 G40 G49 G80 G90\nT1 M6\nG54 X0. Y0. S4000 M3\nG1 Z-1. F200.\nX20.\nM5\nM30\n%",
+            2,
+            21.0,
+            5,
+        ),
+        (
+            "G21 G90 G17\nG54 G0 X0. Y0. S4000 M3\nG43 H1 Z10. M8\nX20.\nM9 M5\nG91 G28 Z0.\nG90 M30",
+            2,
+            30.0,
+            7,
+        ),
+        ("G0 X5\nG53 G0 Z0\nG28 X0 Y0\nG30\nX10\nM30", 2, 10.0, 3),
+        ("G50 G69 G15 G0 X1\nM62 P3\nM66 P0 L3 Q5\nM0\nM1", 1, 1.0, 4),
+        ("G55 G0 X1\nG59.3 G98 X2", 2, 2.0, 3),
+        ("G1 X10 F9999999", 1, 10.0, 0),
+        (":1234\nG1 X10 F600 (\u{fffd})", 1, 10.0, 0),
+    ] {
+        let program = match Program::parse(source) {
+            Ok(program) => program,
+            Err(error) => panic!("{source:?}: {error}"),
+        };
+        let path: f64 = program
+            .moves
+            .iter()
+            .map(|step| step.segment.length_mm())
+            .sum();
+        assert_eq!(program.moves.len(), moves, "{source:?}");
+        assert!((path - length_mm).abs() < 1e-9, "{source:?}: {path} mm");
+        assert_eq!(
+            program.notes().len(),
+            notes,
+            "{source:?}: {:?}",
+            program.notes()
+        );
+    }
+}
+
+#[test]
+fn a_note_counts_the_lines_that_it_is_about() {
+    let program = Program::parse("G0 X1 M8\nX2 M8\nX3 M8 M9").unwrap();
+    let notes = program.notes();
+    assert!(
+        notes[0].starts_with("line 1 and 2 more: M8 is ignored"),
+        "{notes:?}"
+    );
+    assert!(notes[1].starts_with("line 3: M9 is ignored"), "{notes:?}");
+}
+
+#[test]
+fn what_is_not_read_is_refused_by_its_name() {
+    for (line, name) in [
+        ("o100 sub", "subprograms and loops (O-words)"),
+        ("#1 = 5", "parameters (#)"),
+        ("G1 X[2 * 3]", "expressions ([ ])"),
+        ("G96 D2000 S200", "constant surface speeds (G96)"),
+        ("G81 X1 Y1 Z-1 R2", "canned cycles"),
+        ("G98 G83 X1 Z-1 R2 Q1", "canned cycles"),
+        ("G73 Z-1", "canned cycles"),
+        ("G10 L2 P1 X0", "offsets set by the program (G10)"),
+        ("M98 P100", "subprograms (M97 to M99)"),
+        ("M99", "subprograms (M97 to M99)"),
+        ("G65 P9000", "macros"),
+        ("G41 D1", "tool radius compensations"),
+        ("G92 X0", "shifts of the origin"),
+        ("G93", "inverse-time feeds"),
+        ("G95", "feeds a revolution"),
+        ("G5 I0 J3 P0 Q-3 X1 Y1", "splines"),
+        ("G33 Z-1 K1", "threads"),
+        ("G38.2 Z-1", "probing moves"),
+        ("G68 R45", "turned coordinates"),
+        ("G51 X2", "scaled coordinates"),
+        ("G16", "polar coordinates"),
+        ("G1 X1 A90", "axes other than X, Y and Z"),
+    ] {
+        let text = refusal(&format!("G21 G90 F600\n{line}"));
+        let found =
+            text.starts_with("line 2: ") && text.contains(name) && text.contains("not supported");
+        assert!(found, "{line:?}: {text}");
+    }
+}
+
+#[test]
+fn a_dwell_is_a_rest_of_its_seconds() {
+    let without = plan("G1 X10 F600\nX20").duration_s();
+    for (source, moving_s, rest_s) in [
+        (
+            "G1 X10 F600\nG4 P0.5\nG1 X20",
+            plan("G61.1 G1 X10 F600\nX20").duration_s(),
+            0.5,
+        ),
+        ("G4 P1\nG1 X10 F600\nX20\nG04 P0.25", without, 1.25),
+    ] {
+        let trajectory = plan(source);
+        let expected_s = moving_s + rest_s;
+        assert!(
+            (trajectory.duration_s() - expected_s).abs() < 1e-9,
+            "{source:?}"
+        );
+        let resting = trajectory
+            .places(1000.0)
+            .filter(|place| place.speed_mm_s == 0.0);
+        assert!(resting.count() as f64 >= 1000.0 * rest_s, "{source:?}");
+    }
+    for (line, part) in [
+        ("G4", "no time"),
+        ("G4 P-1", "at least 0"),
+        ("G4 P1 X5", "X5 contradicts G4"),
+    ] {
+        let text = refusal(&format!("G1 X1 F600\n{line}"));
+        assert!(
+            text.contains("line 2") && text.contains(part),
+            "{line:?}: {text}"
+        );
+    }
+}
+
+#[test]
+fn a_program_says_itself_how_its_corners_are_passed() {
+    let corner = Vector::new(10.0, 0.0, 0.0);
+    let closest_mm = |source: &str, corner_deviation_mm| {
+        let limits = Limits {
+            corner_deviation_mm,
+            ..limits()
+        };
+        let trajectory = Trajectory::plan(&Program::parse(source).unwrap(), &limits).unwrap();
+        let distances = trajectory
+            .places(limits.rate_hz)
+            .map(|place| (trajectory.point(&place) - corner).norm());
+        distances.fold(f64::MAX, f64::min)
+    };
+    for (code, asked_mm, left_mm) in [
+        ("G64 P0.05", 0.0, 0.05),
+        ("G64 P0.05", 0.2, 0.05),
+        ("G20 G64 P0.002 G21", 0.0, 0.0508),
+        ("G64", 0.02, 0.02),
+        ("G64", 0.0, 0.0),
+        ("G61", 0.02, 0.0),
+        ("G61.1", 0.02, 0.0),
+    ] {
+        let code = code.replace(" G21", "\nG21");
+        let found = closest_mm(&format!("{code}\nG1 X10 F600\nY10"), asked_mm);
+        assert!((found - left_mm).abs() < 1e-4, "{code} {asked_mm}: {found}");
+    }
+}
+
+#[test]
+fn an_arc_may_end_as_far_beside_its_circle_as_linuxcnc_allows() {
+    for source in [
+        "G20 G90 G17\nG0 X0.4869 Y0.6926\nG3 X0.4864 Y0.6965 I-0.5651 J-0.0821 F25",
+        "G21 G90 G17\nG0 X34.445 Y-19.525\nG3 X34.461 Y-19.477 I-8.803 J2.850 F600",
+        "G21\nG3 X10.027 Y0 I5 F600",
+        "G20\nG3 X1.0027 Y0 I.5 F60",
+    ] {
+        let trajectory = plan(source);
+        let arc = trajectory.moves().last().unwrap();
+        let end = arc.segment.point(arc.segment.length_mm());
+        let programmed = Program::parse(source).unwrap().moves.pop().unwrap().segment;
+        assert!(
+            (end - programmed.point(programmed.length_mm())).norm() < 1e-9,
+            "{source}"
+        );
+    }
+    for (source, most) in [
+        ("G21\nG3 X10.029 Y0 I5 F600", "0.0280"),
+        ("G20\nG3 X1.0029 Y0 I.5 F60", "0.0720"),
+    ] {
+        let text = refusal(source);
+        assert!(text.contains(most), "{text}");
+    }
+}
+
+/// A circle of 10 mm radius about the origin in straight pieces, from (10, 0), at a feed in mm/min.
+fn circle_in_pieces(pieces: u32, feed: f64) -> String {
+    let mut text = format!("G21 G90 G17\nG0 X10 Y0\nF{feed}\n");
+    for piece in 1..=pieces {
+        let (sin, cos) = (TAU * f64::from(piece) / f64::from(pieces)).sin_cos();
+        text += &format!("G1 X{:.4} Y{:.4}\n", 10.0 * cos, 10.0 * sin);
+    }
+    text + "M2\n"
+}
+
+#[test]
+fn a_circle_in_pieces_takes_what_the_arc_takes() {
+    for feed in [600.0, 3000.0, 9000.0] {
+        let arc_s = plan(&format!("G0 X10 Y0\nG3 X10 Y0 I-10 F{feed}")).duration_s();
+        for pieces in [72, 100, 180, 360, 720] {
+            let found_s = plan(&circle_in_pieces(pieces, feed)).duration_s();
+            assert!(
+                (found_s / arc_s - 1.0).abs() < 0.05,
+                "{pieces} pieces, F{feed}: {found_s} s, the arc {arc_s} s"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_curve_in_pieces_is_left_by_hundredths_of_a_millimetre_at_most() {
+    let trajectory = plan(&circle_in_pieces(72, 600.0));
+    for place in trajectory.places(1000.0).filter(|place| place.index > 0) {
+        let radius = trajectory.point(&place).norm();
+        assert!((10.0 - radius).abs() < 0.02, "{radius}");
+    }
+}
+
+#[test]
+fn the_deviation_is_from_the_path_however_short_its_pieces_are() {
+    let trajectory = plan(&circle_in_pieces(3600, 600.0));
+    let places: Vec<_> = trajectory.places(200.0).collect();
+    // 0.5 mm late on pieces of 0.017 mm, and 0.002 mm outside.
+    for pair in places.windows(11).filter(|pair| pair[0].index > 1) {
+        let late = trajectory.point(&pair[0]);
+        let found = trajectory.deviation(&pair[10], &(late * 1.0002)).norm();
+        assert!((found - 0.002).abs() < 2e-4, "{found}");
+    }
 }
 
 #[test]
@@ -251,6 +487,67 @@ fn text(steps: &[Step]) -> String {
     text
 }
 
+/// A smooth curve in straight pieces of many lengths: speeds up, slows down, and turns now this way and now that.
+fn curve() -> impl Strategy<Value = String> {
+    let piece = (0.01..3.0f64, -0.3..0.3f64, -0.05..0.05f64);
+    let bend = (prop::collection::vec(piece, 1..6), 1..40_usize);
+    (prop::collection::vec(bend, 1..4), 600.0..12_000.0f64).prop_map(|(bends, feed)| {
+        let (mut at, mut heading) = ([0.0, 0.0, 0.0], 0.0_f64);
+        let mut text = format!("G21 G90 F{feed:.0}\n");
+        for (pieces, repeats) in bends {
+            for (length, turn, rise) in pieces.iter().cycle().take(repeats) {
+                heading += turn;
+                at[0] += length * heading.cos();
+                at[1] += length * heading.sin();
+                at[2] += rise;
+                text += &format!("G1 X{:.4} Y{:.4} Z{:.4}\n", at[0], at[1], at[2]);
+            }
+        }
+        text
+    })
+}
+
+/// Checks that no sample of a program's motion exceeds a limit, and that it ends where the program does.
+fn keeps_limits(source: &str, limits: &Limits) -> Result<(), TestCaseError> {
+    let program = Program::parse(source).unwrap();
+    let trajectory = Trajectory::plan(&program, limits).unwrap();
+    let places: Vec<_> = trajectory.places(limits.rate_hz).collect();
+    let points: Vec<Vector> = places.iter().map(|place| trajectory.point(place)).collect();
+    let last = program.moves.last().unwrap();
+    prop_assert!(points[0].norm() < 1e-9);
+    let end = last.segment.point(last.segment.length_mm());
+    prop_assert!((points[points.len() - 1] - end).norm() < 1e-6);
+    let rate = limits.rate_hz;
+    for three in points.windows(3) {
+        let velocity = (three[1] - three[0]) * rate;
+        let acceleration = (three[2] - three[1] * 2.0 + three[0]) * (rate * rate);
+        for axis in 0..3 {
+            prop_assert!(velocity[axis].abs() <= limits.velocity_mm_s[axis] * (1.0 + 1e-6));
+            // Positions of 100 mm resolve 1e-14 mm, a second difference of them 1e-5 mm/s^2.
+            prop_assert!(
+                acceleration[axis].abs() <= limits.acceleration_mm_s2[axis] + 1e-3,
+                "{acceleration}"
+            );
+        }
+    }
+    for three in places.windows(3) {
+        let [one, two, last] = [0, 1, 2].map(|k| three[k].speed_mm_s);
+        prop_assert!((two - one).abs() * rate <= limits.path_acceleration_mm_s2 * (1.0 + 1e-6));
+        let jerk = (last - 2.0 * two + one) * rate * rate;
+        prop_assert!(
+            jerk.abs() <= limits.path_jerk_mm_s3 * (1.0 + 1e-6) + 1e-2,
+            "{jerk}"
+        );
+    }
+    for place in &places {
+        let feed = trajectory.moves()[place.index]
+            .feed_mm_s
+            .unwrap_or(f64::INFINITY);
+        prop_assert!(place.speed_mm_s <= feed * (1.0 + 1e-9) && place.speed_mm_s >= -1e-9);
+    }
+    Ok(())
+}
+
 proptest! {
     #![proptest_config(ProptestConfig {
         cases: 300,
@@ -265,36 +562,11 @@ proptest! {
         corner in prop_oneof![Just(0.0), 0.001..0.5f64],
     ) {
         let limits = Limits { corner_deviation_mm: corner, travel_mm: [(-1e3, 1e3); 3], ..limits() };
-        let program = Program::parse(&text(&steps)).unwrap();
-        let trajectory = Trajectory::plan(&program, &limits).unwrap();
-        let places: Vec<_> = trajectory.places(limits.rate_hz).collect();
-        let points: Vec<Vector> = places.iter().map(|place| trajectory.point(place)).collect();
-        let last = program.moves.last().unwrap();
-        prop_assert!(points[0].norm() < 1e-9);
-        let end = last.segment.point(last.segment.length_mm());
-        prop_assert!((points[points.len() - 1] - end).norm() < 1e-6);
-        let rate = limits.rate_hz;
-        for three in points.windows(3) {
-            let velocity = (three[1] - three[0]) * rate;
-            let acceleration = (three[2] - three[1] * 2.0 + three[0]) * (rate * rate);
-            for axis in 0..3 {
-                prop_assert!(velocity[axis].abs() <= limits.velocity_mm_s[axis] * (1.0 + 1e-6));
-                // Positions of 100 mm resolve 1e-14 mm, a second difference of them 1e-5 mm/s^2.
-                prop_assert!(
-                    acceleration[axis].abs() <= limits.acceleration_mm_s2[axis] + 1e-3,
-                    "{acceleration}"
-                );
-            }
-        }
-        for three in places.windows(3) {
-            let [one, two, last] = [0, 1, 2].map(|k| three[k].speed_mm_s);
-            prop_assert!((two - one).abs() * rate <= limits.path_acceleration_mm_s2 * (1.0 + 1e-6));
-            let jerk = (last - 2.0 * two + one) * rate * rate;
-            prop_assert!(jerk.abs() <= limits.path_jerk_mm_s3 * (1.0 + 1e-6) + 1e-2, "{jerk}");
-        }
-        for place in &places {
-            let feed = trajectory.moves()[place.index].feed_mm_s.unwrap_or(f64::INFINITY);
-            prop_assert!(place.speed_mm_s <= feed * (1.0 + 1e-9) && place.speed_mm_s >= -1e-9);
-        }
+        keeps_limits(&text(&steps), &limits)?;
+    }
+
+    #[test]
+    fn no_curve_in_pieces_exceeds_the_limits(source in curve()) {
+        keeps_limits(&source, &Limits { travel_mm: [(-1e3, 1e3); 3], ..limits() })?;
     }
 }

@@ -26,7 +26,7 @@ pub enum MotionFitError {
     Dependent { structure: String },
     /// The fit makes no sense of mass or friction.
     #[error(
-        "the fit of \"{structure}\" gives {name} = {value:.4} {unit}: are position and voltage of the same axis, and the voltage positive \
+        "the fit of \"{structure}\" gives {name} = {value:.3e} {unit}, and so does every other: are position and voltage of the same axis, and the voltage positive \
          towards larger positions?"
     )]
     Unphysical {

@@ -21,11 +21,48 @@ pub struct Candidate {
     /// Relative error on parts of the trajectory that were withheld from the fit, in all their repetitions, one part at a time;
     /// nothing when there are too few motions, or for a model that was [refined].
     pub validation_error: Option<f64>,
+    /// The errors that it is ranked by: on withheld motion, or without any on that of the fit.
+    errors: Errors,
+    /// The errors on the record of the fit.
+    fitted: Errors,
     /// True if its motion was fitted, too.
     pub refined: bool,
     solution: Solution,
     /// The rows of the regression.
     pub rows: Rows,
+}
+
+impl Candidate {
+    /// True if it leaves no more of its record's voltage unexplained than another does, but for what tells nothing.
+    pub fn explains_as_well_as(&self, other: &Self) -> bool {
+        self.fitted.all <= as_good_as(other.fitted.all)
+            && self.fitted.sliding <= as_good_as(other.fitted.sliding)
+    }
+}
+
+/// The largest error that is as good as another.
+fn as_good_as(error: f64) -> f64 {
+    (AS_GOOD * error).max(error + AS_GOOD_SHARE)
+}
+
+/// Relative errors of a model. About a reversal one without pre-sliding is wrong for the time that the axis sticks, which tells little
+/// of mass and friction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Errors {
+    /// On all rows.
+    all: f64,
+    /// On rows of sliding.
+    sliding: f64,
+}
+
+impl Errors {
+    fn of(solution: &Solution, regression: &Regression<'_>, sliding: &[usize]) -> Self {
+        let all: Vec<usize> = (0..regression.rows()).collect();
+        Self {
+            all: solution.error_on(regression, &all),
+            sliding: solution.error_on(regression, sliding),
+        }
+    }
 }
 
 /// Voltage explained by a fit, row by row.
@@ -47,18 +84,23 @@ pub struct Rows {
 const PARTS: usize = 8;
 /// Reversals below which nothing is withheld.
 const LEAST_REVERSALS: usize = 3;
-/// Validation errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
+/// Errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
 const AS_GOOD: f64 = 1.02;
+/// The same as a share of the voltage that is left unexplained beyond the smallest: less tells nothing of a model.
+const AS_GOOD_SHARE: f64 = 1.5e-3;
+/// Errors on all rows, over the smallest, from which on a model is contradicted by reversals.
+const CONTRADICTED: f64 = 3.0;
 /// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
 const ANOTHER_OPINION: f64 = 2.0;
 
-/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done.
+/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done. What a record does not tell, or
+/// tells as a mass or a friction below zero, is no candidate.
 ///
 /// A parameter's standard error covers the record's noise, what the value becomes with parts of the trajectory withheld, and
 /// how far it lies from that of the other models which predict withheld parts at most twice as badly as the best.
 ///
 /// # Errors
-/// A record that is too short, moves one way only, or does not tell parameters apart.
+/// A record that is too short or moves one way only, or of which no structure is a candidate: then the first one's reason.
 pub fn fit_motion(
     recording: &Recording,
     settings: &MotionFitSettings,
@@ -68,7 +110,7 @@ pub fn fit_motion(
     let signals = Signals::new(recording, settings);
     let parts = parts(&signals, settings)?;
     let done = std::sync::atomic::AtomicUsize::new(0);
-    let mut candidates: Vec<Candidate> = Structure::ALL
+    let fitted: Vec<Result<Candidate, MotionFitError>> = Structure::ALL
         .into_par_iter()
         .map(|structure| {
             let candidate = candidate(&signals, settings, structure, &parts);
@@ -76,7 +118,20 @@ pub fn fit_motion(
             progress(count as f64 / Structure::ALL.len() as f64);
             candidate
         })
-        .collect::<Result<_, _>>()?;
+        .collect();
+    let mut candidates = Vec::new();
+    let mut reason = None;
+    for candidate in fitted {
+        match candidate {
+            Ok(candidate) => candidates.push(candidate),
+            Err(error) => {
+                reason.get_or_insert(error);
+            }
+        }
+    }
+    if let Some(error) = reason.filter(|_| candidates.is_empty()) {
+        return Err(error);
+    }
     heed_other_opinions(&mut candidates);
     Ok(candidates)
 }
@@ -217,16 +272,24 @@ fn candidate(
     parts: &Option<Vec<usize>>,
 ) -> Result<Candidate, MotionFitError> {
     let regression = Regression::new(signals, settings, structure, signals.span());
-    let all: Vec<usize> = (0..regression.rows()).collect();
-    let whole = Solution::find(&regression, structure, &all)?;
+    let sliding = regression.sliding_rows(signals.moving_mm_s());
+    let rows: Vec<usize> = match structure.sliding {
+        true => sliding.clone(),
+        false => (0..regression.rows()).collect(),
+    };
+    let whole = Solution::find(&regression, structure, &rows)?;
     let withheld = match parts {
-        Some(parts) => withheld(&regression, structure, parts)?,
+        Some(parts) => withheld(&regression, structure, parts, &sliding),
         None => None,
     };
     let others = withheld.as_ref().map_or(&[][..], |found| &found.solutions);
+    let described = described(signals, settings, structure, &regression, whole, others)?;
     Ok(Candidate {
-        validation_error: withheld.as_ref().map(|found| found.error),
-        ..described(signals, settings, structure, &regression, whole, others)?
+        validation_error: withheld.as_ref().map(|found| found.errors.all),
+        errors: withheld
+            .as_ref()
+            .map_or(described.fitted, |found| found.errors),
+        ..described
     })
 }
 
@@ -241,6 +304,8 @@ fn described(
 ) -> Result<Candidate, MotionFitError> {
     let all: Vec<usize> = (0..regression.rows()).collect();
     let residual = whole.residual(regression, &all);
+    let sliding = regression.sliding_rows(signals.moving_mm_s());
+    let fitted = Errors::of(&whole, regression, &sliding);
     let row_s = signals.sample_time_s * settings.decimation(signals.sample_time_s) as f64;
     let estimates = estimates(&whole, regression, structure, settings, &residual, withheld);
     let model = whole.model(regression, structure, settings, &residual, estimates)?;
@@ -252,6 +317,8 @@ fn described(
         .map(|(volts, a)| volts - model.inertia_v_s2_per_mm * a - model.offset_v);
     Ok(Candidate {
         validation_error: None,
+        errors: fitted,
+        fitted,
         refined: false,
         rows: Rows {
             time_s: all
@@ -268,24 +335,66 @@ fn described(
     })
 }
 
-/// The model to use: the simplest of those whose error where they were not fitted (or, without validation, where they were)
-/// is within two per cent of the smallest.
+/// The model to use: the simplest of those whose error while sliding is within two per cent of the smallest, or within 0.15 % of
+/// the voltage, and which also reversals do not contradict. The errors are those on withheld motion; where nothing was withheld of
+/// any model, those on the record of the fit. A model of which nothing could be withheld is not compared with others.
 pub fn recommended(candidates: &[Candidate]) -> Option<&Candidate> {
-    let error = |candidate: &Candidate| {
-        candidate
-            .validation_error
-            .unwrap_or(candidate.model.relative_error)
-    };
-    let smallest = candidates.iter().map(error).fold(f64::INFINITY, f64::min);
-    candidates
+    let validated = candidates
         .iter()
-        .find(|candidate| error(candidate) <= AS_GOOD * smallest)
+        .any(|candidate| candidate.validation_error.is_some());
+    let errors = |candidate: &Candidate| {
+        let compared = candidate.validation_error.is_some() == validated && !candidate.refined;
+        compared.then_some(candidate.errors)
+    };
+    let errors: Vec<Option<Errors>> = candidates.iter().map(errors).collect();
+    simplest(candidates, &errors)
+}
+
+/// The same by the motion of another record, to which nothing is fitted.
+///
+/// # Errors
+/// As [`fit_motion`].
+pub fn recommended_by<'a>(
+    candidates: &'a [Candidate],
+    other: &Recording,
+    settings: &MotionFitSettings,
+) -> Result<Option<&'a Candidate>, MotionFitError> {
+    check(other, settings)?;
+    let signals = Signals::new(other, settings);
+    let errors = |candidate: &Candidate| {
+        let regression = elsewhere(candidate, &signals, settings);
+        let sliding = regression.sliding_rows(signals.moving_mm_s());
+        Some(Errors::of(&candidate.solution, &regression, &sliding))
+    };
+    let errors: Vec<Option<Errors>> = candidates.par_iter().map(errors).collect();
+    Ok(simplest(candidates, &errors))
+}
+
+/// The first candidate that is as good as the best, or a better one of as many parameters; one without errors is not compared.
+fn simplest<'a>(candidates: &'a [Candidate], errors: &[Option<Errors>]) -> Option<&'a Candidate> {
+    let smallest = |of: fn(&Errors) -> f64| {
+        let compared = errors.iter().flatten().map(of);
+        compared.fold(f64::INFINITY, f64::min)
+    };
+    let most_sliding = as_good_as(smallest(|errors| errors.sliding));
+    let least = smallest(|errors| errors.all);
+    let most = (CONTRADICTED * least).max(as_good_as(least));
+    let mut good = candidates
+        .iter()
+        .zip(errors)
+        .filter_map(|(candidate, errors)| Some((candidate, (*errors)?)))
+        .filter(|(_, errors)| errors.sliding <= most_sliding && errors.all <= most)
+        .peekable();
+    let parameters = good.peek()?.0.model.estimates.len();
+    good.filter(|(candidate, _)| candidate.model.estimates.len() == parameters)
+        .min_by(|one, other| one.1.sliding.total_cmp(&other.1.sliding))
+        .map(|(candidate, _)| candidate)
 }
 
 /// Fits with one part of the trajectory withheld at a time, and what they missed there.
 struct Withheld {
     solutions: Vec<Solution>,
-    error: f64,
+    errors: Errors,
 }
 
 /// Withholds each part in turn; nothing if what is left tells too little.
@@ -293,8 +402,14 @@ fn withheld(
     regression: &Regression<'_>,
     structure: Structure,
     parts: &[usize],
-) -> Result<Option<Withheld>, MotionFitError> {
+    sliding: &[usize],
+) -> Option<Withheld> {
     let (mut missed, mut total) = (0.0, 0.0);
+    let (mut sliding_missed, mut sliding_total) = (0.0, 0.0);
+    let mut slides = vec![false; parts.len()];
+    for &row in sliding {
+        slides[row] = true;
+    }
     let mut solutions = Vec::new();
     // Summed up in their order, whatever the threads.
     let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = (0..PARTS)
@@ -302,23 +417,36 @@ fn withheld(
         .map(|part| {
             let (judged, fitted): (Vec<usize>, Vec<usize>) =
                 (0..parts.len()).partition(|&row| parts[row] == part);
+            let fitted: Vec<usize> = match structure.sliding {
+                true => fitted.into_iter().filter(|&row| slides[row]).collect(),
+                false => fitted,
+            };
             (judged, Solution::find(regression, structure, &fitted))
         })
         .collect();
     for (judged, found) in found {
-        let found = match found {
-            Err(MotionFitError::Dependent { .. }) => return Ok(None),
-            found => found?,
-        };
-        missed += found.residual(regression, &judged).norm_squared();
+        let found = found.ok()?;
         let voltage = regression.voltage_at(found.dead_time_s);
-        total += voltage.select_rows(&judged).norm_squared();
+        let squares = |rows: &[usize]| {
+            let missed = found.residual(regression, rows).norm_squared();
+            (missed, voltage.select_rows(rows).norm_squared())
+        };
+        let (part_missed, part_total) = squares(&judged);
+        missed += part_missed;
+        total += part_total;
+        let sliding: Vec<usize> = judged.into_iter().filter(|&row| slides[row]).collect();
+        let (part_missed, part_total) = squares(&sliding);
+        sliding_missed += part_missed;
+        sliding_total += part_total;
         solutions.push(found);
     }
-    Ok(Some(Withheld {
+    Some(Withheld {
         solutions,
-        error: (missed / total).sqrt(),
-    }))
+        errors: Errors {
+            all: (missed / total).sqrt(),
+            sliding: (sliding_missed / sliding_total).sqrt(),
+        },
+    })
 }
 
 /// Relative error of each model on another record, taken after its own, on which nothing is fitted.
@@ -333,16 +461,23 @@ pub fn validate(
     check(other, settings)?;
     let signals = Signals::new(other, settings);
     let error = |candidate: &Candidate| {
-        let Candidate {
-            model, solution, ..
-        } = candidate;
-        let span = model.span.afterwards();
-        let regression = Regression::new(&signals, settings, model.structure, span);
+        let regression = elsewhere(candidate, &signals, settings);
         let all: Vec<usize> = (0..regression.rows()).collect();
-        let voltage = regression.voltage_at(solution.dead_time_s);
-        solution.residual(&regression, &all).norm() / voltage.norm()
+        candidate.solution.error_on(&regression, &all)
     };
     Ok(candidates.par_iter().map(error).collect())
+}
+
+/// The regression of a candidate's structure on a record that was taken after its own.
+fn elsewhere<'a>(
+    candidate: &Candidate,
+    signals: &'a Signals,
+    settings: &'a MotionFitSettings,
+) -> Regression<'a> {
+    let MotionModel {
+        structure, span, ..
+    } = candidate.model;
+    Regression::new(signals, settings, structure, span.afterwards())
 }
 
 /// Ranges of the coefficients in a refinement, over their values; of those that may be of either sign, over the Coulomb level.

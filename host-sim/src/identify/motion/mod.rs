@@ -30,7 +30,7 @@ mod uncertainty;
 mod zero_phase;
 
 pub use error::MotionFitError;
-pub use fit::{Candidate, Rows, fit_motion, recommended, refined, validate};
+pub use fit::{Candidate, Rows, fit_motion, recommended, recommended_by, refined, validate};
 pub use model::{Change, Estimate, MotionModel, Span, Structure};
 pub use shuttle::shuttle;
 pub use signals::{MotionFitSettings, Signals};

@@ -12,6 +12,9 @@ use crate::identify::single_state::with_all_models;
 /// Structure of a model: its terms beside mass, viscous friction, Coulomb friction and offset.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Structure {
+    /// Fitted while the axis slides, away from reversals: there a Coulomb friction that turns at once is wrong for the time that the
+    /// axis sticks. Counts the voltage's hold.
+    pub sliding: bool,
     /// A viscous friction for each sense of motion.
     pub directed_viscous: bool,
     /// A dead time between voltage and force.
@@ -27,16 +30,21 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// The models that are compared, each with one more part than the one before; the first has the four parameters
-    /// that are usual (and published for EMPS).
-    pub const ALL: [Self; 7] = {
+    /// The models that are compared. The first has the four parameters that are usual (and published for EMPS); the second is the
+    /// same, fitted while sliding; from the third on each has one more part than the one before, and the third than the first.
+    pub const ALL: [Self; 8] = {
         let four = Self {
+            sliding: false,
             directed_viscous: false,
             dead_time: false,
             presliding: false,
             stribeck: false,
             drift: false,
             along_travel: false,
+        };
+        let sliding = Self {
+            sliding: true,
+            ..four
         };
         let directed = Self {
             directed_viscous: true,
@@ -64,6 +72,7 @@ impl Structure {
         };
         [
             four,
+            sliding,
             directed,
             delayed,
             presliding,
@@ -84,6 +93,7 @@ impl Structure {
     pub fn name(&self) -> String {
         let mut name = "mass, viscous, Coulomb, offset".to_owned();
         for (holds, part) in [
+            (self.sliding, "fitted while sliding"),
             (self.directed_viscous, "viscous per direction"),
             (self.dead_time, "dead time"),
             (self.presliding, "pre-sliding"),

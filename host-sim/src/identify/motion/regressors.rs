@@ -55,8 +55,8 @@ pub(super) enum Way {
 
 impl Term {
     /// True if a negative coefficient would be no friction.
-    fn is_level(self) -> bool {
-        matches!(self, Self::Element(_))
+    fn is_friction(self) -> bool {
+        matches!(self, Self::Element(_) | Self::Coulomb | Self::Viscous(_))
     }
 }
 
@@ -182,6 +182,23 @@ impl<'a> Regression<'a> {
         self.columns.nrows()
     }
 
+    /// The rows about which the axis slides one way, faster than `moving_mm_s`; all rows where these are few.
+    pub(super) fn sliding_rows(&self, moving_mm_s: f64) -> Vec<usize> {
+        let velocity = &self.velocity_mm_s;
+        let slides = |row: &usize| {
+            let begin = row.saturating_sub(ABOUT_ROWS);
+            let about = &velocity[begin..velocity.len().min(row + ABOUT_ROWS + 1)];
+            about
+                .iter()
+                .all(|v| v * velocity[*row].signum() > moving_mm_s)
+        };
+        let sliding: Vec<usize> = (0..self.rows()).filter(slides).collect();
+        if 4 * sliding.len() < self.rows() {
+            return (0..self.rows()).collect();
+        }
+        sliding
+    }
+
     /// The columns at a Stribeck velocity.
     pub(super) fn columns_at(&self, stribeck_velocity_mm_s: f64) -> Arc<DMatrix<f64>> {
         let Some(index) = self.terms.iter().position(|term| *term == Term::Drop) else {
@@ -220,6 +237,9 @@ impl<'a> Regression<'a> {
     }
 }
 
+/// Rows either side of one that the decimation's filter mixes with it.
+const ABOUT_ROWS: usize = 3;
+
 /// The force of an element of unit level that slips at `knot_mm`, driven by a position, -1 to 1.
 fn maxwell_slip(position_mm: &[f64], knot_mm: f64) -> Vec<f64> {
     let mut stretch = 0.0;
@@ -234,7 +254,7 @@ fn maxwell_slip(position_mm: &[f64], knot_mm: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Least squares over some rows, with no negative level: a term that wants one is left out.
+/// Least squares over some rows, with no negative friction: a term that asks for it is left out.
 pub(super) struct Solver<'a> {
     terms: &'a [Term],
     rows: &'a [usize],
@@ -321,7 +341,7 @@ impl<'a> Solver<'a> {
             let worst = kept
                 .iter()
                 .enumerate()
-                .filter(|&(place, &term)| self.terms[term].is_level() && solution[place] < 0.0)
+                .filter(|&(place, &term)| self.terms[term].is_friction() && solution[place] < 0.0)
                 .min_by(|a, b| solution[a.0].total_cmp(&solution[b.0]));
             match worst {
                 Some((place, _)) => {

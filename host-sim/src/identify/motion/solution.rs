@@ -56,6 +56,8 @@ impl Solution {
             let dead_time_s = match known_s {
                 Some(known_s) => known_s,
                 None if structure.dead_time => values[0],
+                // A held voltage is late by half its hold, whatever the axis is.
+                None if structure.sliding => regression.hold_s(),
                 None => 0.0,
             };
             let velocity = values.last().copied().filter(|_| structure.stribeck);
@@ -96,6 +98,12 @@ impl Solution {
         (voltage - &*columns * &self.coefficients).select_rows(rows)
     }
 
+    /// Norm of the residual over that of the voltage, on some rows.
+    pub(super) fn error_on(&self, regression: &Regression<'_>, rows: &[usize]) -> f64 {
+        let voltage = regression.voltage_at(self.dead_time_s).select_rows(rows);
+        self.residual(regression, rows).norm() / voltage.norm()
+    }
+
     /// The model, in its own terms; `estimates` are its parameters with their standard errors.
     pub(super) fn model(
         &self,
@@ -117,20 +125,17 @@ impl Solution {
         let drop = sum(&|term| term == Term::Drop);
         let viscous =
             |way: Way| sum(&|term| term == Term::Viscous(way) || term == Term::Viscous(Way::Both));
-        let way = |way: Way| {
-            sliding(
-                coulomb,
-                drop,
-                self.stribeck_velocity_mm_s,
-                viscous(way).max(0.0),
-            )
-        };
+        let way = |way: Way| sliding(coulomb, drop, self.stribeck_velocity_mm_s, viscous(way));
         let change = |term: &dyn Fn(Part) -> Term| Change {
             level_v: sum(&|other| other == term(Part::Level)),
             offset_v: sum(&|other| other == term(Part::Offset)),
         };
-        for (name, value, unit) in [("M'", inertia, "V s²/mm"), ("Fc", coulomb, "V")] {
-            if value <= 0.0 {
+        // An axis may have no friction, and none has no mass.
+        for (name, value, unit, wrong) in [
+            ("M'", inertia, "V s²/mm", inertia <= 0.0),
+            ("Fs", coulomb + drop, "V", coulomb + drop < 0.0),
+        ] {
+            if wrong {
                 return Err(MotionFitError::Unphysical {
                     structure: structure.name(),
                     name: name.to_owned(),
