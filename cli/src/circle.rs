@@ -1,5 +1,6 @@
 //! `quadrant circle`.
 
+use crate::numbers::{self, Numbers};
 use crate::plane::PlaneName;
 use anyhow::{Context, ensure};
 use clap::Args;
@@ -19,12 +20,12 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["xy", "yz", "zx"], value_name = "PLANES")]
     plane: Vec<PlaneName>,
     /// Radii, mm, separated by commas.
-    #[arg(long, value_delimiter = ',', default_values_t = [5.0, 15.0, 30.0, 50.0], value_name = "MM")]
-    radius_mm: Vec<f64>,
+    #[arg(long, default_values_t = [Numbers(vec![5.0, 15.0, 30.0, 50.0])], value_name = "MM,...")]
+    radius_mm: Vec<Numbers>,
     /// Feeds along the path, mm/min, separated by commas.
-    #[arg(long, value_delimiter = ',', default_values_t = [300.0, 1000.0, 3000.0], value_name = "MM/MIN")]
-    feed_mm_min: Vec<f64>,
-    /// Run all eight configurations, not only PID alone and N-PID with static and GMS feedforward.
+    #[arg(long, default_values_t = [Numbers(vec![300.0, 1000.0, 3000.0])], value_name = "MM/MIN,...")]
+    feed_mm_min: Vec<Numbers>,
+    /// Run the thesis' eight configurations beside the best PID, not only its PID alone and N-PID with static and GMS feedforward.
     #[arg(long)]
     all: bool,
     /// Number of noise seeds, from --seed on, 1 to 100; with several, tables give means and spreads over them.
@@ -39,10 +40,9 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     output.ready()?;
-    for (option, values) in [
-        ("--radius-mm", &arguments.radius_mm),
-        ("--feed-mm-min", &arguments.feed_mm_min),
-    ] {
+    let radii_mm = numbers::all(&arguments.radius_mm);
+    let feeds_mm_min = numbers::all(&arguments.feed_mm_min);
+    for (option, values) in [("--radius-mm", &radii_mm), ("--feed-mm-min", &feeds_mm_min)] {
         for value in values {
             ensure!(
                 *value > 0.0 && value.is_finite(),
@@ -51,18 +51,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     }
     let stage = arguments.settings.read()?.stage;
-    let setup = RunConfiguration::identified(stage);
+    let setup = RunConfiguration::identified(stage).with_best_pid()?;
     let last_seed = output.seed.checked_add(arguments.seeds - 1);
     let last_seed =
         last_seed.context("--seed plus --seeds is beyond 2^64; choose a smaller one")?;
     let request = CircleRequest {
         planes: arguments.plane.iter().map(|name| name.plane()).collect(),
-        radii_mm: arguments.radius_mm.clone(),
-        feeds_mm_min: arguments.feed_mm_min.clone(),
+        radii_mm,
+        feeds_mm_min,
         configurations: if arguments.all {
-            Configuration::all()
+            Configuration::with_best_pid()
         } else {
-            Configuration::EXTREMES.to_vec()
+            Configuration::USUAL.to_vec()
         },
         seeds: (output.seed..=last_seed).collect(),
     };

@@ -3,16 +3,18 @@
 use clap::Args;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, share};
-use quadrant_cli::say;
+use quadrant_cli::{say, terminal};
 use quadrant_sim::circle::run_circles;
+use quadrant_sim::client::plot;
 use quadrant_sim::compare::comparison::{Comparison, Request};
-use quadrant_sim::compare::honest::{self, with_best_pid};
+use quadrant_sim::compare::glance::Glance;
 use quadrant_sim::compare::page::{comparison_page, comparison_tables};
 use quadrant_sim::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::write_trace;
+use quadrant_sim::report::wrapped;
 
 /// Options of `quadrant compare`.
 #[derive(Clone, Debug, Args)]
@@ -21,9 +23,12 @@ use quadrant_sim::record::write_trace;
 pub(super) struct Arguments {
     #[command(flatten)]
     settings: LawSettings,
-    /// Noise seeds of the runs with the identified model, from --seed on, 1 to 100; tables give means over them.
+    /// Noise seeds of the runs whose friction was identified from experiments, from --seed on, 1 to 100; tables give means over them.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
+    /// Print every table, not only the result.
+    #[arg(long)]
+    tables: bool,
     #[command(flatten)]
     output: Output,
 }
@@ -39,37 +44,34 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let Arguments { output, seeds, .. } = arguments;
     output.ready()?;
     let settings = arguments.settings.read()?;
-    let setups = RunConfiguration::both(&settings.stage);
-    let configurations = Configuration::all();
+    let [exact, identified] = RunConfiguration::both(&settings.stage);
+    let setups = [exact.with_best_pid()?, identified.with_best_pid()?];
+    let configurations = Configuration::with_best_pid();
     let bar = share("comparing on the simulated stage");
     bar.set_length(STEPS);
-    let best = RunConfiguration::both(&with_best_pid(&settings.stage)?);
-    let request = |setups, configurations| Request {
-        setups,
-        configurations,
+    let request = Request {
+        setups: &setups,
+        configurations: &configurations,
         amplitudes_mm: &[AMPLITUDE_MM],
         seed: output.seed,
         seeds: *seeds,
     };
-    let requests = [
-        request(&setups, &configurations),
-        request(&best, &honest::CONFIGURATIONS),
-    ];
-    let whole_s: f64 = requests.iter().map(Request::expected_s).sum();
-    let [comparison, honest] = requests.each_ref().map(|request| {
-        let share = request.expected_s() / whole_s;
-        request.run(&|done| bar.inc((done * share * STEPS as f64) as u64))
-    });
-    let (comparison, honest) = (comparison?, honest?);
+    let comparison = request.run(&|done| bar.inc((done * STEPS as f64) as u64))?;
     let [_, identified] = &setups;
     let circles = run_circles(&configurations, identified, output.seed)?;
     bar.finish_and_clear();
-    say!(
-        "Simulated, not measured. x axis, sine of 30 mm; 10 kHz, f32; seed {}\n",
-        output.seed
-    );
-    for table in comparison_tables(&comparison, &honest, &circles) {
-        output.table(&table)?;
+    let own = match arguments.settings.path {
+        None => "thesis'",
+        Some(_) => "settings'",
+    };
+    let glance = Glance::of(&comparison, own);
+    show(&glance, output)?;
+    for table in comparison_tables(&comparison, &circles) {
+        if arguments.tables {
+            output.table(&table)?;
+        } else {
+            output.keep_table(&table)?;
+        }
     }
     for knowledge in ModelKnowledge::ALL {
         for velocity in VELOCITIES_MM_S {
@@ -83,11 +85,53 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     }
     let page = comparison_page(
         &comparison,
-        &honest,
+        &glance,
         &circles,
         provenance(&command, output.seed),
     );
-    output.page(&page, "comparison.html")
+    output.page(&page, "comparison.html")?;
+    if !arguments.tables {
+        say!("`quadrant compare --tables` prints every table");
+    }
+    Ok(())
+}
+
+/// Lines of the reversal's plot.
+const PLOT_LINES: usize = 6;
+/// Most characters of its width.
+const PLOT_WIDTH: usize = 80;
+
+/// Prints the result: a sentence, a table, a reversal.
+fn show(glance: &Glance, output: &Output) -> anyhow::Result<()> {
+    let width = terminal::output_width();
+    say!("{}\n", wrapped(&glance.sentence, width).join("\n"));
+    output.table(&glance.table)?;
+    let Some((_, first)) = glance.reversals.first() else {
+        return Ok(());
+    };
+    let caption = format!(
+        "One reversal at {} mm/s: error in um over {:.2} s",
+        VELOCITIES_MM_S[0],
+        first.duration_s()
+    );
+    say!("{caption}");
+    let width = width.min(PLOT_WIDTH);
+    let curves: Vec<&[f64]> = glance
+        .reversals
+        .iter()
+        .map(|(_, reversal)| reversal.error_um.as_slice())
+        .collect();
+    let mut names = String::new();
+    for (index, (name, _)) in glance.reversals.iter().enumerate() {
+        let place = plot::place(index, curves.len(), width);
+        names = format!("{names:<place$}{name}");
+    }
+    say!("{names}");
+    for line in plot::beside(&curves, width, PLOT_LINES) {
+        say!("{line}");
+    }
+    say!();
+    Ok(())
 }
 
 /// Writes the errors of all configurations over the last cycle at one velocity.
@@ -103,7 +147,7 @@ fn write_errors(
         thinned.map(|mm| (1e6 * mm).round() / 1e6).collect()
     };
     let mut columns: Vec<(String, Vec<f64>)> = Vec::new();
-    for configuration in Configuration::all() {
+    for configuration in Configuration::with_best_pid() {
         let Some(entry) = comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)
         else {
             continue;

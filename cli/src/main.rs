@@ -8,8 +8,10 @@ mod completions;
 mod connect;
 mod design;
 mod endpoint;
+mod grammar;
 mod identify;
 mod kept;
+mod numbers;
 mod plane;
 mod replay;
 mod replay_program;
@@ -18,7 +20,8 @@ mod subject;
 
 use std::process::ExitCode;
 
-use clap::{CommandFactory, Parser, Subcommand};
+use clap::error::ErrorKind;
+use clap::{CommandFactory, FromArgMatches, Parser, Subcommand};
 use quadrant_cli::{explained, terminal, warn};
 
 /// Servo control that removes friction's quadrant glitches: identify, design, commission, test and talk to a machine.
@@ -64,9 +67,22 @@ enum Command {
     Settings(settings::Arguments),
 }
 
+/// Reads the command line, or ends with what is wrong with it.
+fn arguments() -> Arguments {
+    let matches = grammar::with_negative_numbers(Arguments::command()).try_get_matches();
+    match matches.and_then(|matches| Arguments::from_arg_matches(&matches)) {
+        Ok(arguments) => arguments,
+        Err(error) if error.kind() == ErrorKind::ValueValidation => {
+            warn!("{}", grammar::message(&error).trim_end());
+            std::process::exit(error.exit_code())
+        }
+        Err(error) => error.exit(),
+    }
+}
+
 /// Does what the command line asks for.
 fn run() -> anyhow::Result<()> {
-    let Arguments { command, compare } = Arguments::parse();
+    let Arguments { command, compare } = arguments();
     match command {
         None => compare::run(&compare),
         Some(Command::Circle(arguments)) => circle::run(&arguments),
@@ -87,6 +103,70 @@ fn main() -> ExitCode {
         Err(error) => {
             warn!("error: {}", explained(&error));
             ExitCode::FAILURE
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use clap::{Command, CommandFactory};
+
+    use super::Arguments;
+
+    /// Every help text of a grammar, with the way to it, and every option.
+    fn texts(
+        grammar: &Command,
+        way: &str,
+        texts: &mut Vec<(String, String)>,
+        options: &mut BTreeSet<String>,
+    ) {
+        let way = format!("{way} {}", grammar.get_name());
+        let mut take = |of: &str, text: Option<&clap::builder::StyledStr>| {
+            if let Some(text) = text {
+                texts.push((of.to_owned(), text.to_string()));
+            }
+        };
+        take(&way, grammar.get_about());
+        take(&way, grammar.get_long_about());
+        for argument in grammar.get_arguments() {
+            let of = format!("{way} {}", argument.get_id());
+            take(&of, argument.get_help());
+            take(&of, argument.get_long_help());
+            options.extend(argument.get_long().map(|long| format!("--{long}")));
+        }
+        for command in grammar.get_subcommands() {
+            self::texts(command, &way, texts, options);
+        }
+    }
+
+    #[test]
+    fn help_is_whole_sentences_and_names_options_that_there_are() {
+        let (mut all, mut options) = (Vec::new(), BTreeSet::new());
+        texts(&Arguments::command(), "", &mut all, &mut options);
+        assert!(all.len() > 200);
+        // Of cargo and of the studies.
+        options.extend(["--board".to_owned(), "--release".to_owned()]);
+        for (of, text) in &all {
+            let mut after = text.split(". ").skip(1);
+            assert!(
+                after.all(|next| !next.starts_with(|first: char| first.is_ascii_lowercase())),
+                "{of}: {text}"
+            );
+            assert!(!text.ends_with([',', ';', ':']), "{of}: {text}");
+            let is_name = |sign: char| sign.is_ascii_alphanumeric() || sign == '-';
+            for (at, _) in text.match_indices("--") {
+                let name: String = text[at..]
+                    .chars()
+                    .take_while(|sign| is_name(*sign))
+                    .collect();
+                let name = name.trim_end_matches('-');
+                assert!(
+                    name.is_empty() || options.contains(name),
+                    "{of}: {name}: {text}"
+                );
+            }
         }
     }
 }

@@ -6,7 +6,7 @@ use anyhow::{Context, bail};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use crate::say;
+use crate::{say, terminal};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Block, FIGURES, Format, Page, Section, Table};
 
@@ -101,7 +101,7 @@ impl Output {
     /// Writes a table where CSV is wanted, and prints it.
     pub fn table(&self, table: &Table) -> anyhow::Result<()> {
         self.keep_table(table)?;
-        say!("{}\n", table.to_text());
+        say!("{}\n", table.to_text(terminal::output_width()));
         Ok(())
     }
 

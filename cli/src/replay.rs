@@ -34,8 +34,8 @@ pub(super) struct Arguments {
     axis: Option<RecordedAxis>,
     #[command(flatten)]
     program: ProgramOptions,
-    /// Model that the law has of the simulated stage: as identified, on a stage with noise, offset and ripple, or exact, on
-    /// one without. The controllers are the same.
+    /// Friction that the law knows of the simulated stage: as identified from experiments, on a stage with noise, offset and ripple,
+    /// or exactly, on one without. The controllers are the same.
     #[arg(long, value_enum, default_value = "identified")]
     model: ModelKnowledge,
     #[command(flatten)]
@@ -59,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
     );
     let stage = settings.read()?.stage;
-    let setup = RunConfiguration::new(*model, stage);
+    let setup = RunConfiguration::new(*model, stage).with_best_pid()?;
     if let Some(path) = &program.gcode {
         return replay_program::run(path, program, &setup, output);
     }
@@ -76,12 +76,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     bar.finish_and_clear();
     output.table(&recorded_table(&outcomes, *axis))?;
     let settings = settings.option();
-    let model = match model {
+    let shown = match model {
         ModelKnowledge::Identified => "",
         ModelKnowledge::Exact => " --model exact",
     };
     let command = format!(
-        "quadrant replay --reference {} --axis {}{model}{settings} --seed {}",
+        "quadrant replay --reference {} --axis {}{shown}{settings} --seed {}",
         reference
             .file_name()
             .unwrap_or(reference.as_os_str())
@@ -90,6 +90,6 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .map_or_else(String::new, |value| value.get_name().to_owned()),
         output.seed
     );
-    let page = recorded_page(&outcomes, *axis, provenance(&command, output.seed));
+    let page = recorded_page(&outcomes, *axis, *model, provenance(&command, output.seed));
     output.page(&page, "replay.html")
 }

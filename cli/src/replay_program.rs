@@ -29,7 +29,7 @@ pub(super) struct ProgramOptions {
     /// Largest jerk along the path, mm/s^3; without it 20000.
     #[arg(long, requires = "gcode", value_name = "MM/S^3")]
     jerk_mm_s3: Option<f64>,
-    /// Run all eight configurations on the program, not only PID alone and N-PID with static and GMS feedforward.
+    /// Run the thesis' eight configurations beside the best PID, not only its PID alone and N-PID with static and GMS feedforward.
     #[arg(long, requires = "gcode")]
     all: bool,
 }
@@ -60,9 +60,9 @@ pub(super) fn run(
     let trajectory = Trajectory::plan(&program, &limits)?;
     let tables = ProgramTables::sample(&trajectory, &setup.stage);
     let configurations = if options.all {
-        Configuration::all()
+        Configuration::with_best_pid()
     } else {
-        Configuration::EXTREMES.to_vec()
+        Configuration::USUAL.to_vec()
     };
     let bar = progress(configurations.len() as u64, "following the program");
     let outcomes = run_program(

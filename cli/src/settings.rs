@@ -7,11 +7,11 @@ use quadrant_sim::settings_reference::{markdown, rows};
 /// Options of `quadrant settings`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
-    /// Only the settings whose path contains this.
-    #[arg(value_name = "PART", default_value = "")]
-    part: String,
+    /// Only the settings whose path, unit or meaning contains each of these words; capitals or not.
+    #[arg(value_name = "WORD")]
+    words: Vec<String>,
     /// Print the whole reference as the page `docs/settings.md` instead.
-    #[arg(long, conflicts_with = "part")]
+    #[arg(long, conflicts_with = "words")]
     markdown: bool,
 }
 
@@ -20,11 +20,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         terminal::print(format_args!("{}", markdown()));
         return Ok(());
     }
-    let rows = rows(&arguments.part);
+    let asked = arguments.words.join(" ");
+    let rows = rows(&asked);
     anyhow::ensure!(
         !rows.is_empty(),
-        "no setting's path contains \"{}\": `quadrant settings` shows them all",
-        arguments.part
+        "no setting has \"{asked}\" in its path or meaning: `quadrant settings` shows them all"
     );
     for row in rows {
         let unit = if row.unit.is_empty() { "" } else { " " };

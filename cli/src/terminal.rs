@@ -27,6 +27,29 @@ macro_rules! warn {
 /// Sequence that empties a terminal and begins at its top.
 const CLEAR: &[u8] = b"\x1b[2J\x1b[H";
 
+/// Characters of a line where nobody says how wide it is: a file, another program.
+const WIDTH: usize = 80;
+
+/// Returns the characters of a line of the terminal that standard output is; 80 of what is no terminal.
+pub fn output_width() -> usize {
+    width(&io::stdout())
+}
+
+/// Returns the characters of a line of the terminal that standard error is; 80 of what is no terminal.
+pub fn error_width() -> usize {
+    width(&io::stderr())
+}
+
+#[cfg(unix)]
+fn width(of: &impl std::os::fd::AsFd) -> usize {
+    terminal_size::terminal_size_of(of).map_or(WIDTH, |(width, _)| width.0.into())
+}
+
+#[cfg(windows)]
+fn width(of: &impl std::os::windows::io::AsHandle) -> usize {
+    terminal_size::terminal_size_of(of).map_or(WIDTH, |(width, _)| width.0.into())
+}
+
 /// Prints to standard output, unless that has failed before.
 pub fn print(what: Arguments<'_>) {
     to_output(|out| write_plain(out, what));

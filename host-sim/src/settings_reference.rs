@@ -25,12 +25,17 @@ pub struct Row {
     pub meaning: &'static str,
 }
 
-/// Every setting whose path contains `part`, in the order of the table.
-pub fn rows(part: &str) -> Vec<Row> {
+/// Every setting whose path, unit or meaning contains each word of `asked`, in the order of the table; capitals or not.
+pub fn rows(asked: &str) -> Vec<Row> {
     let settings = with_every_part();
+    let asked = asked.to_lowercase();
+    let is_asked = |leaf: &LeafInfo, path: &str| {
+        let text = format!("{path} {} {}", leaf.unit, leaf.meaning).to_lowercase();
+        asked.split_whitespace().all(|word| text.contains(word))
+    };
     all()
         .map(|leaf| (leaf, leaf.path().as_str().to_owned()))
-        .filter(|(_, path)| path.contains(part))
+        .filter(|(leaf, path)| is_asked(leaf, path))
         .map(|(leaf, path)| Row {
             unit: leaf.unit,
             range: range(leaf),
@@ -232,6 +237,14 @@ mod tests {
 
     #[test]
     fn a_row_says_what_the_table_and_the_defaults_say() {
+        // Words of the meaning, and capitals, find it, too.
+        let by_meaning = rows("Proportional GAIN pid");
+        assert!(
+            by_meaning
+                .iter()
+                .any(|row| row.path.ends_with("/pid/kp_v_per_mm"))
+        );
+        assert!(rows("proportional nonsense").is_empty());
         let found = rows("kp_v_per_mm");
         assert_eq!(found.len(), 1);
         assert_eq!(found[0].range, "0 to 10000");

@@ -418,7 +418,10 @@ impl Request {
         let request = self.settings();
         let info = test_axis.info();
         // Before anything moves, and not among the results.
-        warn!("{}\n", plan_table(&info, &plan(&info, &request)).to_text());
+        warn!(
+            "{}\n",
+            plan_table(&info, &plan(&info, &request)).to_text(terminal::error_width())
+        );
         let bar = share("commissioning");
         let mut report = |step, done: f64| {
             bar.set_message(step);
@@ -476,7 +479,7 @@ impl Found {
     fn text(&self) -> String {
         let mut text = String::new();
         for table in self.tables() {
-            let _ = writeln!(text, "{}\n", table.to_text());
+            let _ = writeln!(text, "{}\n", table.to_text(terminal::output_width()));
         }
         let mut notes = self.found.notes();
         // What was found is not lost for a check that could not be made.

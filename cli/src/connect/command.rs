@@ -124,13 +124,16 @@ pub(super) enum Command {
     },
     /// Let the edited settings act, checked as a whole, without a bump.
     Apply,
+    /// Take the last `apply` or `load` of this session back: what acted before acts again.
+    Undo,
     /// Forget what was edited: the draft is what acts again.
     Revert,
     /// Make the draft the defaults; `apply` lets them act.
     Defaults,
     /// Keep the settings for the next start; the outputs must be off.
     Store {
-        /// Their origin, at most 200 bytes; without it, the program and its version.
+        /// Their origin, at most 200 bytes; without it, the file that was loaded, or the origin that was stored before, and whether
+        /// they were edited since.
         #[arg(value_name = "TEXT")]
         provenance: Option<String>,
     },
@@ -149,7 +152,7 @@ pub(super) enum Command {
     /// Capture channels at the full control rate, around a trigger.
     #[command(subcommand)]
     Capture(CaptureCommand),
-    /// Draw channels in the terminal while they are sampled; with --svg, --png or --csv, keep what was drawn.
+    /// Draw channels in the terminal while they are sampled; with --svg or --csv, keep what was drawn.
     Scope(ScopeOptions),
     /// Watch the machine live in the terminal: states, inputs, strip charts of channels, gains that are nudged meanwhile. `?` shows
     /// the keys.
@@ -500,6 +503,7 @@ impl Command {
             Self::Dump { .. } => "dump",
             Self::Load { .. } => "load",
             Self::Apply => "apply",
+            Self::Undo => "undo",
             Self::Revert => "revert",
             Self::Defaults => "defaults",
             Self::Store { .. } => "store",

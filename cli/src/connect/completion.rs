@@ -2,9 +2,11 @@
 
 use std::collections::BTreeSet;
 
-use clap::{Command as Grammar, Subcommand};
+use clap::{Arg, ArgAction, Command as Grammar, Subcommand};
 use quadrant::link::message::{AxisName, Channel};
-use quadrant::settings::leaves;
+use quadrant::settings::leaves::{self, Range};
+use quadrant::settings::tree::is_part;
+use quadrant_sim::client::settings::whole_path;
 use rustyline::completion::{Completer, FilenameCompleter, Pair};
 use rustyline::highlight::Highlighter;
 use rustyline::hint::Hinter;
@@ -33,6 +35,11 @@ impl Completion {
 
     /// The words that may stand where `start` is typed, behind `before`; `None` if a file may.
     fn words(&self, before: &[&str], start: &str) -> Option<BTreeSet<String>> {
+        // `help` is followed by what is asked about.
+        let before = match before {
+            ["help", asked @ ..] => asked,
+            all => all,
+        };
         let mut grammar = &self.grammar;
         let mut depth = 0;
         for word in before {
@@ -50,36 +57,68 @@ impl Completion {
             words.extend(["help", "quit"].map(str::to_owned));
             return Some(words);
         }
-        let option = before.last().and_then(|word| word.strip_prefix("--"));
-        let asked = grammar
-            .get_arguments()
-            .find(|argument| argument.get_long().is_some() && argument.get_long() == option);
-        let places: Vec<_> = match asked {
-            Some(argument) => vec![argument],
-            None => grammar.get_positionals().collect(),
-        };
         if start.starts_with('-') {
             let longs = grammar
                 .get_arguments()
                 .filter_map(|argument| argument.get_long());
             words.extend(longs.map(|long| format!("--{long}")));
+            return Some(words);
         }
-        let mut takes_file = false;
-        for place in places {
-            words.extend(
-                place
-                    .get_possible_values()
-                    .iter()
-                    .map(|value| value.get_name().to_owned()),
-            );
-            match place.get_id().as_str() {
-                "path" | "prefix" | "gain" => words.extend(self.settings.iter().cloned()),
-                "channels" | "channel" => words.extend(self.channels.iter().cloned()),
-                "file" | "out" | "csv" | "svg" | "png" | "elf" => takes_file = true,
-                _ => {}
-            }
+        let given = &before[depth..];
+        let Some(place) = place(grammar, given) else {
+            return Some(words);
+        };
+        let possible = place.get_possible_values();
+        words.extend(possible.iter().map(|value| value.get_name().to_owned()));
+        match place.get_id().as_str() {
+            "path" | "prefix" | "gain" => words.extend(self.settings.iter().cloned()),
+            "channels" | "channel" => words.extend(self.channels.iter().cloned()),
+            "value" => words.extend(given.last().into_iter().flat_map(|path| values(path))),
+            "what" => words.extend(["homed", "rest"].map(str::to_owned)),
+            "file" | "out" | "csv" | "svg" | "elf" => return None,
+            _ => {}
         }
-        (!takes_file || start.starts_with('-')).then_some(words)
+        Some(words)
+    }
+}
+
+/// The argument that stands behind the words that a command has already: the value of an option, or the next of those without a name.
+fn place<'a>(grammar: &'a Grammar, given: &[&str]) -> Option<&'a Arg> {
+    let option = |word: &str| {
+        let long = word.strip_prefix("--")?;
+        let all = grammar.get_arguments();
+        let mut same = all.filter(|argument| argument.get_long() == Some(long));
+        same.find(|argument| argument.get_action().takes_values())
+    };
+    if let Some(argument) = given.last().and_then(|word| option(word)) {
+        return Some(argument);
+    }
+    let mut count = 0;
+    let mut is_value = false;
+    for word in given {
+        if !is_value && !word.starts_with("--") {
+            count += 1;
+        }
+        is_value = option(word).is_some();
+    }
+    let positionals: Vec<&Arg> = grammar.get_positionals().collect();
+    let several = |argument: &&Arg| matches!(argument.get_action(), ArgAction::Append);
+    positionals
+        .get(count)
+        .or_else(|| positionals.last().filter(|last| several(last)))
+        .copied()
+}
+
+/// The values that a setting takes, if they are names; what a part that may be left out takes.
+fn values(path: &str) -> Vec<String> {
+    let path = whole_path(path);
+    if is_part(&path) {
+        return ["null", "present"].map(str::to_owned).to_vec();
+    }
+    match leaves::find(&path).map(|leaf| leaf.range) {
+        Some(Range::Name(names)) => names.iter().map(|name| (*name).to_owned()).collect(),
+        Some(Range::Flag) => ["false", "true"].map(str::to_owned).to_vec(),
+        _ => Vec::new(),
     }
 }
 
@@ -188,6 +227,29 @@ mod tests {
             (14, vec!["y.reference".to_owned()])
         );
         assert_eq!(complete("move x 1 --v").1, ["--velocity"]);
+    }
+
+    #[test]
+    fn values_are_completed_where_a_value_belongs() {
+        assert_eq!(
+            complete("set operation/enabled_by ").1,
+            ["any", "host", "operator"]
+        );
+        assert_eq!(complete("set x/feedback/law n-").1, ["n-pid"]);
+        assert_eq!(complete("set y/commissioned ").1, ["false", "true"]);
+        assert_eq!(
+            complete("set z/feedforward/learning ").1,
+            ["null", "present"]
+        );
+        // A number may be any.
+        assert!(complete("set x/feedback/pid/kp_v_per_mm ").1.is_empty());
+        // What an argument is not for is not offered for it.
+        assert!(complete("move x ").1.is_empty());
+        assert_eq!(complete("move --velocity 5 ").1, ["x", "y", "z"]);
+        assert_eq!(complete("capture arm --edge r").1, ["rising"]);
+        assert_eq!(complete("wait ho").1, ["homed"]);
+        assert_eq!(complete("wait homed ").1, ["x", "y", "z"]);
+        assert_eq!(complete("help capt").1, ["capture"]);
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The list of the console's commands, by what they are for.
 
 use clap::Command;
+use quadrant_sim::report::wrapped;
 
 /// The groups, and the names of their commands.
 pub(super) const GROUPS: [(&str, &[&str]); 6] = [
@@ -26,6 +27,7 @@ pub(super) const GROUPS: [(&str, &[&str]); 6] = [
             "diff",
             "adopt",
             "apply",
+            "undo",
             "revert",
             "defaults",
             "load",
@@ -45,10 +47,11 @@ pub(super) const GROUPS: [(&str, &[&str]); 6] = [
     ),
 ];
 
-/// Characters of a line that are left for what a command does.
+/// Characters of a line before what a command does, and those that are left for it.
+const INDENT: usize = 15;
 const ROOM: usize = 64;
 
-/// The list for a grammar of lines: each command with the beginning of what it does.
+/// The list for a grammar of lines: each command with the first clause of what it does.
 pub(super) fn text(grammar: &Command) -> String {
     let mut text = String::new();
     for (title, names) in GROUPS {
@@ -59,7 +62,9 @@ pub(super) fn text(grammar: &Command) -> String {
                 .and_then(|command| command.get_about())
                 .map(ToString::to_string)
                 .unwrap_or_default();
-            text.push_str(&format!("  {name:<12} {}\n", beginning(&about)));
+            let lines = wrapped(first_clause(&about), ROOM);
+            let lines = lines.join(&format!("\n{:INDENT$}", ""));
+            text.push_str(&format!("  {name:<12} {lines}\n"));
         }
         text.push('\n');
     }
@@ -67,21 +72,12 @@ pub(super) fn text(grammar: &Command) -> String {
     text
 }
 
-/// As much of a text as a line of a terminal has room for: its first clause, or whole words of it.
-fn beginning(text: &str) -> String {
+/// The first clause of a text, whole.
+fn first_clause(text: &str) -> &str {
     let end = [". ", ": ", "; "]
         .iter()
         .filter_map(|end| text.find(end))
         .min()
         .unwrap_or(text.len());
-    let clause = text[..end].trim_end_matches('.');
-    if clause.len() <= ROOM {
-        return clause.to_owned();
-    }
-    let within = &clause[..=clause.floor_char_boundary(ROOM - 2)];
-    match (within.rfind(", "), within.rfind(' ')) {
-        (Some(comma), _) => within[..comma].to_owned(),
-        (None, Some(space)) => format!("{} ...", &within[..space]),
-        (None, None) => within.to_owned(),
-    }
+    text[..end].trim_end_matches('.')
 }

@@ -3,6 +3,7 @@
 use anyhow::Context;
 use quadrant::axes::AxisName;
 use quadrant::settings::AxisSettings;
+use quadrant_cli::terminal;
 use quadrant_sim::client::Client;
 use quadrant_sim::identify::frf::FrfSettings;
 use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended};
@@ -42,7 +43,7 @@ pub(super) fn run(client: &mut Client, command: &IdentifyCommand) -> anyhow::Res
     })?;
     let text = format!(
         "{}\n{}: the recording",
-        table.to_text(),
+        table.to_text(terminal::output_width()),
         options.out.display()
     );
     Ok(Answer::new(

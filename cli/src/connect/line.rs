@@ -1,10 +1,11 @@
 //! One line of a script, or what a person types at the prompt.
 
 use clap::error::ErrorKind;
-use clap::{CommandFactory, Parser};
+use clap::{CommandFactory, FromArgMatches, Parser};
 
 use super::command::Command;
 use super::help;
+use crate::grammar;
 
 /// Grammar of a line.
 #[derive(Debug, Parser)]
@@ -38,7 +39,9 @@ pub(super) fn parse(line: &str) -> Result<Said, String> {
     if words.is_empty() {
         return Ok(Said::Nothing);
     }
-    match Line::try_parse_from(words) {
+    let name = words.first().cloned().unwrap_or_default();
+    let matches = grammar::with_negative_numbers(Line::command()).try_get_matches_from(words);
+    match matches.and_then(|matches| Line::from_arg_matches(&matches)) {
         Ok(Line {
             command: Command::Script | Command::Flash(_),
         }) => Err("this command is for the shell, not for a script".to_owned()),
@@ -48,13 +51,20 @@ pub(super) fn parse(line: &str) -> Result<Said, String> {
                 Ok(Said::Show(error.to_string()))
             }
             _ => {
-                let text = error.to_string();
+                let text = grammar::message(&error);
                 let text = text.strip_prefix("error: ").unwrap_or(&text);
                 // The first paragraph and a tip; a script's reader wants no usage.
                 let mut paragraphs = text.split("\n\n").map(str::trim);
                 let what = paragraphs.next().unwrap_or(text);
                 let tip = paragraphs.find_map(|paragraph| paragraph.strip_prefix("tip: "));
-                Err(tip.map_or(what.to_owned(), |tip| format!("{what}; {tip}")))
+                Err(match tip {
+                    // It guesses that an option is meant for a value.
+                    Some(guess) if guess.contains("as a value") => {
+                        format!("{what}; `help {name}` lists the options")
+                    }
+                    Some(tip) => format!("{what}; {tip}"),
+                    None => what.to_owned(),
+                })
             }
         },
     }
@@ -86,6 +96,15 @@ mod tests {
             matches!(*command, Command::Move { target_mm, velocity, .. } if (target_mm, velocity) == (-12.5, 20.0))
         );
         assert!(matches!(parse("jog z -2"), Ok(Said::Ask(_))));
+        // A range refuses it, not the grammar.
+        for line in [
+            "circle --radius-mm -5 --feed-mm-min 100",
+            "move x 1 --velocity -2",
+            "scope --seconds -1",
+            "wait rest --timeout -1",
+        ] {
+            assert!(matches!(parse(line), Ok(Said::Ask(_))), "{line}");
+        }
         assert!(matches!(
             parse("set x/limits/travel_mm/negative -3"),
             Ok(Said::Ask(_))
@@ -101,6 +120,11 @@ mod tests {
             ("move x", "TARGET_MM"),
             ("get 'x", "quotation"),
             ("record --channels w.error --out a.csv", "w.error"),
+            ("circle --radius-mm 5,5 --feed-mm-min 100", "5.5"),
+            ("jog x 5,5", "5.5"),
+            ("scope --png a.png", "`help scope`"),
+            ("scope --windw 1", "'--window'"),
+            ("stream a.ngc --period-ticks -5", "-5 is not in"),
         ] {
             let Err(error) = parse(line) else {
                 panic!("{line} was understood");
@@ -133,6 +157,25 @@ mod tests {
             .collect();
         known.sort_unstable();
         assert_eq!(grouped, known);
+    }
+
+    #[test]
+    fn the_help_is_cut_nowhere_but_at_the_end_of_a_clause() {
+        let grammar = Line::command();
+        let shown: String = help::text(&grammar).split_whitespace().collect();
+        for (_, names) in help::GROUPS {
+            for name in names {
+                let command = grammar.find_subcommand(name).unwrap();
+                let about = command.get_about().unwrap().to_string();
+                let clause = about.split([';', ':']).next().unwrap();
+                let clause = clause.split(". ").next().unwrap().trim_end_matches('.');
+                let clause: String = clause.split_whitespace().collect();
+                assert!(
+                    shown.contains(&format!("{name}{clause}")),
+                    "{name}: {about}"
+                );
+            }
+        }
     }
 
     #[test]

@@ -8,6 +8,7 @@ use quadrant::link::message::{self, AxisSet, Body, Status};
 use quadrant::safety::FaultCode;
 use quadrant_sim::client::{Client, settle, with_reset};
 use quadrant_sim::machine::serial_ports;
+use quadrant_sim::report::fixed;
 use serde_json::json;
 
 use super::answer::{Answer, RESTARTED, name, seconds};
@@ -92,7 +93,7 @@ pub(super) fn axis_lines(status: &Status) -> Vec<String> {
     ];
     for (axis, seen) in AxisName::ALL.into_iter().zip(&status.axes) {
         lines.push(format!(
-            "{axis:<4}  {homed:<5}  {mode:<8}  {position:>11.4}  {error:>9.2}  {output:>8.4}  {limit:<12}  {mark:>9.3}",
+            "{axis:<4}  {homed:<5}  {mode:<8}  {position:>11}  {error:>9}  {output:>8}  {limit:<12}  {mark:>9.3}",
             axis = axis.as_str(),
             homed = if status.homed.contains(axis.into()) {
                 "yes"
@@ -100,9 +101,9 @@ pub(super) fn axis_lines(status: &Status) -> Vec<String> {
                 "no"
             },
             mode = name(&seen.mode),
-            position = seen.position_mm,
-            error = 1e3 * seen.error_mm,
-            output = seen.output_v,
+            position = fixed(seen.position_mm, 4),
+            error = fixed(f64::from(1e3 * seen.error_mm), 2),
+            output = fixed(f64::from(seen.output_v), 4),
             limit = name(&seen.limited_by),
             mark = seen.high_mark,
         ));

@@ -84,8 +84,8 @@ struct MachineOptions {
     /// A machine that another program holds and shares: look at it, stop it, and no more.
     #[arg(long, value_name = "HOST:PORT")]
     look: Option<String>,
-    /// The firmware's own code on the simulated stage, in this process. Its time passes as fast as it can, only while it is
-    /// waited for.
+    /// The firmware's own code on the simulated stage, in this process. Its time passes as fast as it can while it is waited for,
+    /// as the clock's while the prompt waits for a command, and not at all while a script is read.
     #[arg(long)]
     simulated: bool,
     /// The firmware's image in QEMU on the simulated stage, the same way; without a path, the one that `cargo xtask build

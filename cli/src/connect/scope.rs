@@ -8,7 +8,7 @@ use anyhow::{Context, bail};
 use quadrant::link::message::Channel;
 use quadrant_sim::client::samples::{Samples, TelemetryRecorder, least_decimation};
 use quadrant_sim::client::{columns, plot, settings};
-use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, stacked_svg, whole};
+use quadrant_sim::report::{Figure, Lines, Plot, Series, Style, fixed, stacked_svg, whole};
 use serde_json::json;
 
 use super::answer::{Answer, seconds};
@@ -119,8 +119,9 @@ fn heading(channel: Channel, values: &[f64]) -> String {
     let rms = (values.iter().map(|value| value * value).sum::<f64>() / count).sqrt();
     let last = values.last().copied().unwrap_or(f64::NAN);
     format!(
-        "{channel}, {unit}: now {last:.5}, RMS {rms:.5}\n",
-        unit = channel.physical_unit()
+        "{channel}, {unit}: now {last}, RMS {rms:.5}\n",
+        unit = channel.physical_unit(),
+        last = fixed(last, 5)
     )
 }
 

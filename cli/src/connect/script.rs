@@ -8,10 +8,11 @@ use std::time::Duration;
 
 use anyhow::Context;
 use quadrant::link::message::Body;
-use quadrant_sim::client::{Client, settle};
-use rustyline::Editor;
+use quadrant_sim::client::{Client, ClientError, settle};
+use rustyline::config::Configurer;
 use rustyline::error::ReadlineError;
 use rustyline::history::DefaultHistory;
+use rustyline::{CompletionType, Editor};
 
 use super::command::Command;
 use super::completion::Completion;
@@ -40,7 +41,8 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
         }
     });
     for index in 0.. {
-        let Some(line) = attended(session, &read, Client::is_interrupted) else {
+        let Some(line) = attended(session, &read, Client::keep_alive, Client::is_interrupted)
+        else {
             break;
         };
         let line = line.context("cannot read standard input")?;
@@ -71,11 +73,12 @@ fn one(session: &mut Session, line: &str, source: &str) -> bool {
     }
 }
 
-/// The next of what another thread reads, or nothing when that or the session has ended; meanwhile the machine knows that its host
-/// is there.
+/// The next of what another thread reads, or nothing when that or the session has ended; `meanwhile` lets the machine know that its
+/// host is there.
 fn attended<T>(
     session: &mut Session,
     read: &Receiver<T>,
+    meanwhile: fn(&mut Client) -> Result<(), ClientError>,
     has_ended: fn(&Client) -> bool,
 ) -> Option<T> {
     loop {
@@ -84,12 +87,21 @@ fn attended<T>(
             Err(RecvTimeoutError::Disconnected) => return None,
             // A connection that is broken shows with the next command.
             Err(RecvTimeoutError::Timeout) => {
-                let _ = session.client.keep_alive();
+                let _ = meanwhile(&mut session.client);
                 if has_ended(&session.client) {
                     return None;
                 }
             }
         }
+    }
+}
+
+/// Lets a machine know that its host is there; the time of a simulated one passes as the clock's.
+fn let_time_pass(client: &mut Client) -> Result<(), ClientError> {
+    if client.simulated_io().is_some() {
+        client.wait(ATTENTION)
+    } else {
+        client.keep_alive()
     }
 }
 
@@ -142,6 +154,8 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
     let mut editor =
         Editor::<Completion, DefaultHistory>::new().context("cannot use the terminal")?;
     editor.set_helper(Some(Completion::new()));
+    // What all have in common first, then the list of them.
+    editor.set_completion_type(CompletionType::List);
     let history = history_file();
     if let Some(file) = &history {
         // The first session finds none.
@@ -171,7 +185,9 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
     let mut interrupts = 0;
     loop {
         let line = match wanted.send(()) {
-            Ok(()) => attended(session, &read, |client| client.interrupt().ends()),
+            Ok(()) => attended(session, &read, let_time_pass, |client| {
+                client.interrupt().ends()
+            }),
             Err(_) => None,
         };
         match line {

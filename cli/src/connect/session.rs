@@ -2,6 +2,7 @@
 
 use quadrant::safety::Switches;
 use quadrant_sim::client::Client;
+use quadrant_sim::client::settings::Before;
 
 use super::printer::Printer;
 
@@ -11,6 +12,19 @@ pub(super) struct Session {
     pub(super) printer: Printer,
     /// Inputs that `press` holds.
     pub(super) pressed: Switches,
+    /// What acted before each `apply` and `load`, the newest last.
+    pub(super) undo: Vec<Before>,
+    /// The origin of the settings that act, as far as this session knows it.
+    pub(super) origin: Origin,
+}
+
+/// The origin of the settings that act.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Origin {
+    /// The file that was loaded last, and what wrote it.
+    pub(super) loaded: Option<String>,
+    /// Settings were edited since.
+    pub(super) edited: bool,
 }
 
 impl Session {
@@ -19,6 +33,11 @@ impl Session {
             client,
             printer,
             pressed: Switches::NONE,
+            undo: Vec::new(),
+            origin: Origin {
+                loaded: None,
+                edited: false,
+            },
         }
     }
 

@@ -13,6 +13,7 @@ use serde_json::{Map, Value, json};
 
 use super::answer::Answer;
 use super::command::Command;
+use super::session::{Origin, Session};
 use crate::kept;
 
 pub(super) fn get(client: &mut Client, path: &str) -> anyhow::Result<Answer> {
@@ -111,7 +112,17 @@ pub(super) fn dump(client: &mut Client, file: &Path, overwrite: bool) -> anyhow:
         kept::refuse_other(file, &stage)?;
     }
     let mut dumped = SettingsFile::new(stage);
+    let stored = settings::provenance(client)?;
     let identity = client.identity();
+    if !stored.is_empty() {
+        dumped.provenance.push(Provenance {
+            command: format!("stored in the machine: {stored}"),
+            version: identity.firmware.as_str().to_owned(),
+            axis: "all".to_owned(),
+            records: Vec::new(),
+            sets: Vec::new(),
+        });
+    }
     dumped.provenance.push(Provenance {
         command: format!("quadrant connect dump, from {}", client.endpoint()),
         version: identity.firmware.as_str().to_owned(),
@@ -124,10 +135,16 @@ pub(super) fn dump(client: &mut Client, file: &Path, overwrite: bool) -> anyhow:
     Ok(Answer::new(text, json!({ "file": file })))
 }
 
-pub(super) fn load(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
+pub(super) fn load(session: &mut Session, file: &Path) -> anyhow::Result<Answer> {
+    let client = &mut session.client;
     let read = SettingsFile::read(file)?;
-    let loaded = settings::load(client, &read.stage)
+    let (loaded, before) = settings::load_undoably(client, &read.stage)
         .with_context(|| format!("{} was not loaded", file.display()))?;
+    session.undo.push(before);
+    session.origin = Origin {
+        loaded: Some(origin_of(file, &read)),
+        edited: false,
+    };
     let mut text = format!(
         "{} settings changed; {}",
         loaded.changed.len(),
@@ -148,9 +165,40 @@ pub(super) fn load(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
     Ok(Answer::new(text, data))
 }
 
-pub(super) fn apply(client: &mut Client) -> anyhow::Result<Answer> {
+/// Says where a file's settings come from: its name, and the last command that had a hand in them.
+fn origin_of(file: &Path, read: &SettingsFile) -> String {
+    let name = file.file_name().unwrap_or(file.as_os_str()).display();
+    match read.provenance.last() {
+        Some(Provenance { command, .. }) => format!("{name} ({command})"),
+        None => name.to_string(),
+    }
+}
+
+pub(super) fn apply(session: &mut Session) -> anyhow::Result<Answer> {
+    let client = &mut session.client;
+    let before = settings::before(client)?;
     let applied = settings::apply(client)?;
+    if !applied.changed.is_empty() {
+        session.undo.push(before);
+        session.origin.edited = true;
+    }
     Ok(Answer::new(applied_text(&applied), json!(applied)))
+}
+
+pub(super) fn undo(session: &mut Session) -> anyhow::Result<Answer> {
+    let Some(before) = session.undo.last() else {
+        bail!("undo: this session has applied nothing that is not undone");
+    };
+    let client = &mut session.client;
+    let (count, applied) =
+        settings::take_back(client, before).context("what acted before cannot act again")?;
+    session.undo.pop();
+    session.origin.edited = true;
+    let text = format!(
+        "{count} settings are what they were; {}",
+        applied_text(&applied)
+    );
+    Ok(Answer::new(text, json!(applied)))
 }
 
 fn applied_text(applied: &Applied) -> String {
@@ -171,13 +219,39 @@ pub(super) fn draft(client: &mut Client, command: &Command) -> anyhow::Result<An
     Ok(Answer::done())
 }
 
-pub(super) fn store(client: &mut Client, provenance: Option<&str>) -> anyhow::Result<Answer> {
-    let own = format!("quadrant connect {}", env!("CARGO_PKG_VERSION"));
-    let provenance = provenance.unwrap_or(&own);
-    settings::store(client, provenance)?;
+pub(super) fn store(session: &mut Session, provenance: Option<&str>) -> anyhow::Result<Answer> {
+    let provenance = match provenance {
+        Some(given) => given.to_owned(),
+        None => known_origin(session)?,
+    };
+    settings::store(&mut session.client, &provenance)?;
     Ok(Answer::new(
         format!("kept for the next start: {provenance}"),
         json!("done"),
+    ))
+}
+
+/// Most bytes of a stored origin.
+const MOST_ORIGIN: usize = 200;
+
+/// Returns the origin of the settings that act: the file that was loaded, or the origin that was stored before, and whether they were
+/// edited since.
+fn known_origin(session: &mut Session) -> Result<String, ClientError> {
+    let own = format!("quadrant connect {}", env!("CARGO_PKG_VERSION"));
+    let before = match &session.origin.loaded {
+        Some(loaded) => loaded.clone(),
+        None => settings::provenance(&mut session.client)?,
+    };
+    let edit = format!("; edited by {own}");
+    let before = before.strip_suffix(&edit).unwrap_or(&before);
+    if before.is_empty() || before == own {
+        return Ok(own);
+    }
+    let edit = if session.origin.edited { &edit } else { "" };
+    let room = MOST_ORIGIN.saturating_sub(edit.len());
+    Ok(format!(
+        "{}{edit}",
+        &before[..before.floor_char_boundary(room)]
     ))
 }
 

@@ -11,6 +11,7 @@ use quadrant_sim::identify::frf::{
 };
 use quadrant_sim::identify::pages::linear::response_section;
 use quadrant_sim::machine::TestAxis;
+use quadrant_sim::report::Brief;
 
 use super::recorded;
 use crate::subject::{Measured, Subject};
@@ -189,7 +190,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         points.len(),
         points.first().map_or(f64::NAN, |point| point.frequency_hz),
         points.last().map_or(f64::NAN, |point| point.frequency_hz),
-        found.estimate.resolution_hz,
+        Brief(found.estimate.resolution_hz),
         found.estimate.blocks,
         if found.closed_loop { "closed" } else { "open" }
     );

@@ -18,6 +18,7 @@ use quadrant_sim::record::{ColumnNames, MotionOptions, Recording};
 
 use super::friction::put_friction;
 use super::recorded;
+use crate::numbers::Numbers;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::output::{Output, command_line, share, with_bar};
 use quadrant_cli::{say, warn};
@@ -55,8 +56,8 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 0.05, value_name = "S")]
     edge_s: f64,
     /// Displacements at which pre-sliding elements may slip, um; at most 8.
-    #[arg(long, value_delimiter = ',', default_values_t = [2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0], value_name = "UM,...")]
-    knots_um: Vec<f64>,
+    #[arg(long, default_value_t = Numbers(vec![2.0, 5.0, 10.0, 15.0, 20.0, 30.0, 50.0]), value_name = "UM,...")]
+    knots_um: Numbers,
     /// Dead time from voltage to force, s, if it is known, from a frequency response for instance: gentle motions hardly tell it
     /// from inertia.
     #[arg(long, value_name = "S")]
@@ -112,7 +113,7 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         cutoff_hz: arguments.cutoff_hz,
         edge_s: arguments.edge_s,
         row_rate_hz: arguments.row_rate_hz,
-        knots_mm: arguments.knots_um.iter().map(|um| 1e-3 * um).collect(),
+        knots_mm: arguments.knots_um.0.iter().map(|um| 1e-3 * um).collect(),
         dead_time_s: arguments.dead_time_s,
     };
     let bar = share("fitting models");

@@ -17,6 +17,7 @@ use quadrant_sim::pages::provenance;
 
 use super::recorded;
 use crate::endpoint::Endpoint;
+use crate::numbers::Numbers;
 use crate::subject::Subject;
 use quadrant_cli::axis::Axis;
 
@@ -33,8 +34,8 @@ pub(crate) struct Arguments {
     #[arg(long, default_value_t = 0.4, value_name = "V")]
     amplitude_v: f64,
     /// Further amplitudes, V: how the response depends on them, measured and predicted.
-    #[arg(long, value_delimiter = ',', default_values_t = [0.2, 0.6], value_name = "V,...")]
-    further_v: Vec<f64>,
+    #[arg(long, default_value_t = Numbers(vec![0.2, 0.6]), value_name = "V,...")]
+    further_v: Numbers,
     /// Blocks that are averaged.
     #[arg(long, default_value_t = 12)]
     averages: usize,
@@ -112,7 +113,7 @@ type Measured = (Vec<AtRest>, AxisSettings, String);
 impl Arguments {
     fn amplitudes_v(&self) -> Vec<f64> {
         let mut amplitudes_v = vec![self.amplitude_v];
-        amplitudes_v.extend(&self.further_v);
+        amplitudes_v.extend(&self.further_v.0);
         amplitudes_v
     }
 

@@ -14,6 +14,7 @@ use quadrant_sim::record::Recording;
 
 use super::friction::put_friction;
 use super::recorded;
+use crate::numbers::Numbers;
 use crate::subject::{Destination, Subject};
 use quadrant_cli::output::{Output, with_bar};
 use quadrant_cli::say;
@@ -33,15 +34,15 @@ pub(crate) struct Arguments {
     /// Frequency of the sine, Hz.
     #[arg(long, default_value_t = 0.1, value_name = "HZ")]
     frequency_hz: f64,
-    /// Cycles of the sine. that are run.
+    /// Cycles of the sine that are run.
     #[arg(long, default_value_t = 3.0)]
     cycles: f64,
     /// Slip-blocks, their knots picked automatically.
     #[arg(long, default_value_t = 4)]
     blocks: usize,
     /// Knots, um, instead of automatic ones: 1,4,10,30.
-    #[arg(long, value_delimiter = ',', value_name = "UM,...")]
-    knots_um: Vec<f64>,
+    #[arg(long, value_name = "UM,...")]
+    knots_um: Option<Numbers>,
     #[command(flatten)]
     destination: Destination,
     #[command(flatten)]
@@ -128,10 +129,9 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         }
     };
     let known = start.map(|settings| settings.friction.sliding);
-    let knots = if arguments.knots_um.is_empty() {
-        Knots::Automatic(arguments.blocks)
-    } else {
-        Knots::At(arguments.knots_um.iter().map(|um| 1e-3 * um).collect())
+    let knots = match &arguments.knots_um {
+        None => Knots::Automatic(arguments.blocks),
+        Some(Numbers(knots_um)) => Knots::At(knots_um.iter().map(|um| 1e-3 * um).collect()),
     };
     let found = identify(&recording, known.as_ref(), &knots)?;
     output.table(&gms_table(&found))?;

@@ -32,6 +32,6 @@ fn the_command_writes_tables_and_a_page() {
     }
     let page = std::fs::read_to_string(at.join("x/circle.html")).unwrap();
     assert!(page.contains("circle-polar-zx") && !page.contains("circle-polar-xy"));
-    let refused = command::fail(at, &["circle", "--radius-mm", "5,0"]);
+    let refused = command::fail(at, &["circle", "--radius-mm", "5.0,0"]);
     assert!(refused.contains("--radius-mm 0 must be"), "{refused}");
 }

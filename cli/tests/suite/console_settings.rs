@@ -171,3 +171,124 @@ fn settings_of_a_law_that_is_off_bar_no_limit() {
         "{errors}"
     );
 }
+
+/// Settings that are commissioned.
+const STAGE: &str = "host-sim/data/identified-stage.toml";
+
+fn result(answer: &Value) -> &Value {
+    assert!(answer["error"].is_null(), "{answer}");
+    &answer["result"]
+}
+
+#[test]
+fn what_was_applied_is_undone_step_by_step() {
+    let read = answers(&format!(
+        "load {STAGE}\nset x/feedback/pid/kp_v_per_mm 0.9\napply\n\
+         set x/homing null\nset y/feedforward/learning present\napply\n\
+         undo\nget x/homing\nget y/feedforward/learning\nget x/feedback/pid/kp_v_per_mm\nlist x/homing\n\
+         undo\nget x/feedback/pid/kp_v_per_mm\ndiff\ndiff {STAGE}\nundo\nundo\n"
+    ));
+    for answer in &read[..read.len() - 1] {
+        result(answer);
+    }
+    assert_eq!(read[7]["result"], "present");
+    assert_eq!(read[8]["result"], Value::Null);
+    assert_eq!(read[9]["result"], 0.9);
+    assert!(read[10]["result"].as_array().unwrap().len() > 1);
+    assert_ne!(read[12]["result"], 0.9);
+    assert_eq!(
+        read[13]["result"],
+        serde_json::json!([]),
+        "the draft is what acts"
+    );
+    assert_eq!(
+        read[14]["result"],
+        serde_json::json!([]),
+        "the file acts again"
+    );
+    let refused = read.last().unwrap()["error"].as_str().unwrap();
+    assert!(refused.contains("nothing that is not undone"), "{refused}");
+}
+
+#[test]
+fn whatever_follows_an_apply_finds_that_it_acts() {
+    let change = |gain: &str| {
+        format!(
+            "set x/feedback/pid/kp_v_per_mm {gain}\nset z/feedback/pid/kp_v_per_mm {gain}\napply\n"
+        )
+    };
+    let script = format!(
+        "load {STAGE}\nenable\n{}{}apply\njog x 1\n{}jog x 0\nwait rest\n{}disable\n{}store\n{}events\n",
+        change("0.9"),
+        change("1.0"),
+        change("1.1"),
+        change("0.9"),
+        change("1.0"),
+        change("1.1"),
+    );
+    let output = session(&[], &script);
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{errors}");
+    let said = String::from_utf8(output.stdout).unwrap();
+    // The file's, and one for each change.
+    assert_eq!(said.matches("settings act").count(), 7, "{said}");
+}
+
+#[test]
+fn outputs_are_enabled_after_the_restart_that_a_script_has_asked_for() {
+    let read = answers(&format!(
+        "load {STAGE}\nstore\nenable\ndisable\nreboot\nenable\nstatus\n"
+    ));
+    for answer in &read {
+        result(answer);
+    }
+    assert_eq!(read[6]["result"]["state"], "enabled");
+}
+
+#[test]
+fn the_origin_of_stored_settings_names_the_file_and_the_edits() {
+    let read = answers(&format!(
+        "load {STAGE}\nstore\nprovenance\nset x/feedback/pid/kp_v_per_mm 0.9\napply\nstore\nprovenance\n\
+         reboot\nset x/feedback/pid/kp_v_per_mm 0.8\napply\nstore\nprovenance\nstore 'by hand'\nprovenance\n"
+    ));
+    let at = |index: usize| result(&read[index]).as_str().unwrap().to_owned();
+    let (loaded, edited, again) = (at(2), at(6), at(11));
+    assert!(
+        loaded.starts_with("identified-stage.toml (quadrant commission"),
+        "{loaded}"
+    );
+    assert!(!loaded.contains("edited"), "{loaded}");
+    let by = edited.strip_prefix(&loaded);
+    assert!(
+        by.is_some_and(|by| by.starts_with("; edited by quadrant connect")),
+        "{edited}"
+    );
+    assert_eq!(again, edited, "once is enough");
+    assert_eq!(at(13), "by hand");
+}
+
+#[test]
+fn a_law_that_is_off_bars_no_limit() {
+    let read = answers(
+        "get x/feedback/law\nget x/feedback/sliding_mode/switching_v\nset x/amplifier/output_limit_v 0.3\napply\n\
+         set x/feedback/law sliding-mode\napply\n",
+    );
+    assert_ne!(result(&read[0]), "sliding-mode");
+    assert!(result(&read[1]).as_f64().unwrap() > 0.3);
+    result(&read[3]);
+    let refused = read[5]["error"].as_str().unwrap();
+    assert!(refused.contains("switching_v"), "{refused}");
+}
+
+#[test]
+fn no_zero_has_a_sign() {
+    let output = session(&[], "status\n");
+    let said = String::from_utf8(output.stdout).unwrap();
+    for word in said.split_whitespace() {
+        let digits = word.strip_prefix('-').unwrap_or("1");
+        assert!(
+            digits.chars().any(|sign| sign != '0' && sign != '.'),
+            "{word}: {said}"
+        );
+    }
+}

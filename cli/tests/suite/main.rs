@@ -11,6 +11,7 @@ mod console_motion;
 mod console_settings;
 mod control_characters;
 mod design_commands;
+mod first_screen;
 mod identify_commands;
 mod interrupted;
 mod kept_settings;

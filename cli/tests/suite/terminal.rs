@@ -75,11 +75,17 @@ impl Person {
 
     /// Waits until the text is on the screen, and forgets what came before its end.
     fn sees(&mut self, text: &str) {
+        self.reads_until(text);
+    }
+
+    /// What is on the screen from here to the text.
+    fn reads_until(&mut self, text: &str) -> String {
         let due = Instant::now() + SAID;
         loop {
             if let Some(at) = self.seen.find(text) {
+                let read = self.seen[..at].to_owned();
                 self.seen.drain(..at + text.len());
-                return;
+                return read;
             }
             let left = due.saturating_duration_since(Instant::now());
             match self.screen.recv_timeout(left) {
@@ -191,4 +197,38 @@ fn the_third_signal_ends_at_once_and_leaves_the_terminal_as_it_was() {
         person.signal(name);
     }
     person.gives_back();
+}
+
+#[test]
+fn a_motion_that_was_ordered_arrives_while_the_prompt_waits() {
+    let mut person = Person::sits_down(|_| {});
+    for line in ["enable\r", "jog x 1\r"] {
+        person.types(line);
+        person.sees("quadrant> ");
+    }
+    thread::sleep(Duration::from_secs(2));
+    person.types("status\r");
+    person.sees("no     jog");
+    let position = person.reads_until("\n");
+    let position: f64 = position.split_whitespace().next().unwrap().parse().unwrap();
+    assert!((0.5..10.0).contains(&position), "{position} mm");
+    person.types("stop\r");
+    person.sees("quadrant> ");
+    thread::sleep(Duration::from_millis(500));
+    person.types("status\r");
+    person.sees("enabled, at rest");
+    person.sees("quadrant> ");
+    person.types("\x04");
+    assert_eq!(person.gives_back(), Some(0));
+}
+
+#[test]
+fn a_tab_completes_what_all_that_is_possible_begins_with() {
+    let mut person = Person::sits_down(|_| {});
+    person.types("get x/feedba\tpid/kp\t\r");
+    person.sees("pid/kp_v_per_mm");
+    let answer = person.reads_until("quadrant> ");
+    assert!(!answer.contains("error"), "{answer}");
+    person.types("\x04");
+    assert_eq!(person.gives_back(), Some(0));
 }

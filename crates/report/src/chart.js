@@ -164,7 +164,11 @@ const chart = (() => {
       const zero = isZero(figure.x, at), x = px(toX(at));
       if (zero || (figure.x.grid && label !== null)) group.append(make("path", { class: zero ? "rule" : "grid", d: `M${x} ${frame.top}V${frame.bottom}` }));
       group.append(make("path", { class: "rule", d: `M${x} ${frame.bottom}v${label === null ? 2 : 4}` }));
-      if (label !== null) drawText(toX(at), frame.bottom + 17, "middle", label);
+      if (label === null) continue;
+      // A label at the very end of the axis ends with the drawing: beyond it, it would be cut.
+      const edge = frame.right + RIGHT;
+      const isCut = toX(at) + 0.7 * LETTER * label.length > edge;
+      drawText(isCut ? edge : toX(at), frame.bottom + 17, isCut ? "end" : "middle", label);
     }
     for (const { at, label } of ticks(figure.y, view.y, size.y, 45)) {
       const zero = isZero(figure.y, at);

@@ -2,6 +2,7 @@
 
 use super::drawing::{Axis, Curve, Drawing, Shape};
 use super::mark::Mark;
+use super::wrap::wrapped;
 use super::{Colour, ReportError, Scale};
 use serde::{Deserialize, Serialize};
 
@@ -122,21 +123,6 @@ impl Dots {
             .chain(zero)
     }
 
-    /// A category's name in lines that fit beside the drawing.
-    fn name_lines(category: &str) -> Vec<String> {
-        let mut lines: Vec<String> = Vec::new();
-        for word in category.split_whitespace() {
-            match lines.last_mut() {
-                Some(line) if line.chars().count() + 1 + word.chars().count() <= NAME_WIDTH => {
-                    line.push(' ');
-                    line.push_str(word);
-                }
-                _ => lines.push(word.to_owned()),
-            }
-        }
-        lines
-    }
-
     pub(super) fn drawing(&self) -> Drawing {
         let step = 1e-6 * self.scale.span(self.extent());
         let curves = self.series.iter().enumerate().map(|(index, series)| {
@@ -163,7 +149,7 @@ impl Dots {
         let y = Axis {
             range: Some((0.5 - self.categories.len() as f64, 0.5)),
             ticks: names
-                .map(|(i, name)| (-(i as f64), Self::name_lines(name).join("\n")))
+                .map(|(i, name)| (-(i as f64), wrapped(name, NAME_WIDTH).join("\n")))
                 .collect(),
             zero: false,
             ..Axis::new("", Scale::Linear)

@@ -231,10 +231,14 @@ fn whole_words(text: &str) -> Markup {
     }
 }
 
+/// Columns of a table that stand closer.
+const MANY: usize = 9;
+
 fn table_markup(table: &Table) -> Markup {
     let class = |column| table.is_numeric(column).then_some("number");
+    let many = (table.columns.len() >= MANY).then_some("many");
     html! {
-        table {
+        table class=[many] {
             thead {
                 tr {
                     @for (i, column) in table.columns.iter().enumerate() {

@@ -118,8 +118,8 @@ impl PolarDeviation {
             ..
         } = self.magnification();
         format!(
-            "Radial deviation magnified {factor} times, {division_um}\u{a0}µm per division; dashed: the nominal circle, \
-             radius {}\u{a0}mm.",
+            "Radial deviation magnified {factor} times, {division_um}\u{a0}µm per division; the darkest of the circles is the \
+             nominal one, radius {}\u{a0}mm.",
             self.radius_mm
         )
     }

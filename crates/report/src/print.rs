@@ -1,7 +1,6 @@
 //! Figures as SVG files for print, drawn by `plotters`, always in light colours.
 
 use std::error::Error;
-use std::f64::consts::TAU;
 use std::ops::Range;
 
 use plotters::coord::Shift;
@@ -14,6 +13,7 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::drawing::{Axis, Curve, Drawing, Shape};
 use super::mark::Mark;
+use super::shown::fixed;
 use super::{Figure, Plot, ReportError};
 
 /// Width of an image, px: at 96 px to the inch that of a printed page's text.
@@ -161,7 +161,7 @@ fn label(axis: &Axis, value: f64, span: f64) -> String {
     } else if (1e-3..1e5).contains(&magnitude) {
         let decimals = if axis.log { magnitude } else { span / 6.0 };
         let decimals = (-decimals.log10().floor()).max(0.0) as usize;
-        format!("{value:.decimals$}")
+        fixed(value, decimals)
     } else {
         format!("{value:.1e}").replace(".0e", "e")
     };
@@ -290,12 +290,8 @@ fn draw_circles(chart: &Chart<'_, '_>, drawing: &Drawing) -> Result<(), Box<dyn 
         let centre = area.map_coordinate(&(0.0, 0.0));
         let radius = area.map_coordinate(&(circle.radius, 0.0)).0 - centre.0;
         if circle.nominal {
-            let turn = (0..=720).map(|i| (f64::from(i) * TAU / 720.0).sin_cos());
-            let path: Vec<(f64, f64)> = turn
-                .map(|(y, x)| (circle.radius * x, circle.radius * y))
-                .collect();
             let style = INK.stroke_width(STEPS as u32);
-            area.draw(&DashedPathElement::new(path, steps(6.0), steps(4.0), style))?;
+            area.draw(&Circle::new((0.0, 0.0), radius, style))?;
         } else {
             let style = RULE.stroke_width((0.8 * STEPS) as u32);
             area.draw(&Circle::new((0.0, 0.0), radius, style))?;

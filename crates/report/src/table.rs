@@ -1,7 +1,9 @@
 //! Tables: one value, three readers (page, terminal, spreadsheet).
 
 use super::ReportError;
-use comfy_table::{CellAlignment, ContentArrangement, LineStyle, TableStyle};
+use super::shown::fixed;
+use super::wrap::wrapped;
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, LineStyle, TableStyle};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 
@@ -14,6 +16,10 @@ const RULE: LineStyle = LineStyle::new('─', '─', '─', '─');
 
 /// Characters in one line of a head in the terminal, unless a word is longer.
 const HEAD_WIDTH: usize = 12;
+/// Least width of a column of words in the terminal, characters, unless they or one of them take less or more.
+const WRAPPED_WIDTH: usize = 24;
+/// Characters between two columns; one more stands before the first.
+const SPACE: usize = 3;
 
 /// A table of results.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -56,16 +62,7 @@ impl Column {
 
     /// The head as several short lines, the unit on the last, so that the numbers set a column's width.
     fn stacked(&self) -> String {
-        let mut lines: Vec<String> = Vec::new();
-        for word in self.heading.split_whitespace() {
-            match lines.last_mut() {
-                Some(line) if line.chars().count() + 1 + word.chars().count() <= HEAD_WIDTH => {
-                    line.push(' ');
-                    line.push_str(word);
-                }
-                _ => lines.push(word.to_owned()),
-            }
-        }
+        let mut lines = wrapped(&self.heading, HEAD_WIDTH);
         lines.extend(self.unit.as_ref().map(|unit| format!("({unit})")));
         lines.join("\n")
     }
@@ -126,14 +123,9 @@ impl Cell {
     }
 }
 
-/// Rounds, with a proper minus sign, and without one where nothing but zeros would follow it.
+/// Rounds, with a proper minus sign.
 fn shown_number(value: f64, decimals: usize) -> String {
-    let text = format!("{value:.decimals$}");
-    match text.strip_prefix('-') {
-        Some(digits) if digits.bytes().all(|b| b == b'0' || b == b'.') => digits.to_owned(),
-        Some(digits) => format!("\u{2212}{digits}"),
-        None => text,
-    }
+    fixed(value, decimals).replacen('-', "\u{2212}", 1)
 }
 
 impl Table {
@@ -182,22 +174,86 @@ impl Table {
         })
     }
 
-    /// The table as aligned plain text, caption first, for a terminal.
+    /// The table as aligned plain text of at most `width` characters, caption first, for a terminal. Where its columns do not fit,
+    /// words are wrapped; where that does not do, the columns stand in several parts, one below the other, each with those that
+    /// name its rows.
     #[must_use]
-    pub fn to_text(&self) -> String {
+    pub fn to_text(&self, width: usize) -> String {
+        let mut text = wrapped(&self.caption, width).join("\n");
+        text.push('\n');
+        for part in self.parts(width) {
+            text.push_str(&self.part_text(&part, width));
+            text.push('\n');
+        }
+        text
+    }
+
+    /// The columns of each part that fits into `width` characters: all of them in one, if that goes.
+    fn parts(&self, width: usize) -> Vec<Vec<usize>> {
+        let all: Vec<usize> = (0..self.columns.len()).collect();
+        if self.least_width(&all) <= width {
+            return vec![all];
+        }
+        // A row is named by its columns up to the last one of words.
+        let names = all
+            .iter()
+            .rposition(|&column| !self.is_numeric(column) && column + 1 < all.len())
+            .map_or(0, |last| last + 1);
+        let (names, values) = all.split_at(names);
+        let mut parts: Vec<Vec<usize>> = Vec::new();
+        for &value in values {
+            if let Some(part) = parts.last_mut() {
+                part.push(value);
+                if self.least_width(part) <= width {
+                    continue;
+                }
+                part.pop();
+            }
+            parts.push(names.iter().copied().chain([value]).collect());
+        }
+        parts
+    }
+
+    /// The least width of some columns, characters: numbers and heads as they are, words wrapped.
+    fn least_width(&self, columns: &[usize]) -> usize {
+        let least = |&column: &usize| SPACE + self.least_column_width(column);
+        1 + columns.iter().map(least).sum::<usize>()
+    }
+
+    fn least_column_width(&self, column: usize) -> usize {
+        let head = self.columns[column].stacked();
+        let cells = self.rows.iter().map(|row| row[column].shown());
+        let lines = cells.flat_map(|cell| {
+            if self.is_numeric(column) {
+                vec![cell]
+            } else {
+                wrapped(&cell, WRAPPED_WIDTH)
+            }
+        });
+        let heads = head.lines().map(str::to_owned);
+        lines
+            .chain(heads)
+            .map(|line| line.chars().count())
+            .max()
+            .unwrap_or(0)
+    }
+
+    fn part_text(&self, columns: &[usize], width: usize) -> String {
         let mut text = comfy_table::Table::new();
         text.load_style(RULED)
-            .set_content_arrangement(ContentArrangement::Disabled)
-            .set_header(self.columns.iter().map(Column::stacked));
+            .set_content_arrangement(ContentArrangement::Dynamic)
+            .set_width(u16::try_from(width).unwrap_or(u16::MAX))
+            .set_header(columns.iter().map(|&column| self.columns[column].stacked()));
         for row in &self.rows {
-            text.add_row(row.iter().map(Cell::shown));
+            text.add_row(columns.iter().map(|&column| row[column].shown()));
         }
-        for (i, column) in text.column_iter_mut().enumerate() {
-            if self.is_numeric(i) {
-                column.set_cell_alignment(CellAlignment::Right);
+        for (&column, shown) in columns.iter().zip(text.column_iter_mut()) {
+            if self.is_numeric(column) {
+                shown.set_cell_alignment(CellAlignment::Right);
+                shown.set_constraint(ColumnConstraint::ContentWidth);
             }
         }
-        format!("{}\n{}\n", self.caption, text.trim_fmt())
+        text.trim_fmt()
     }
 }
 
@@ -233,7 +289,7 @@ mod tests {
 
     #[test]
     fn text_aligns_numbers_to_the_right() {
-        let text = table().to_text();
+        let text = table().to_text(80);
         let lines: Vec<&str> = text.lines().collect();
         assert_eq!(lines[0], "Tracking error");
         let end = |needle: &str| {
@@ -246,6 +302,53 @@ mod tests {
             end("GMS"),
             "a missing number is set where numbers are"
         );
+    }
+
+    fn widest(text: &str) -> usize {
+        text.lines().map(|line| line.chars().count()).max().unwrap()
+    }
+
+    #[test]
+    fn columns_that_do_not_fit_stand_below_each_other_beside_the_names_of_their_rows() {
+        let mut wide = table();
+        wide.caption = "Tracking error of two laws ".repeat(6);
+        for number in 0..12 {
+            wide.columns
+                .push(Column::with_unit(format!("Error at {number} mm/s"), "µm"));
+            for row in &mut wide.rows {
+                row.push(Cell::number(f64::from(number) - 1234.5, 1));
+            }
+        }
+        let full = wide.to_text(200);
+        assert!(widest(&full) > 80);
+        for width in [40, 60, 80, 99] {
+            let narrow = wide.to_text(width);
+            assert!(widest(&narrow) <= width, "{width}:\n{narrow}");
+            let names = narrow.matches("static").count();
+            assert!(names > 1, "{width}:\n{narrow}");
+            for number in 0..12 {
+                let shown = Cell::number(f64::from(number) - 1234.5, 1).shown();
+                assert_eq!(
+                    narrow.matches(&shown).count(),
+                    wide.rows.len(),
+                    "{width}:\n{narrow}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn words_are_wrapped_before_columns_are_parted() {
+        let mut wordy = table();
+        wordy.columns.push(Column::new("Reason"));
+        for row in &mut wordy.rows {
+            row.push(Cell::text(
+                "the path leaves the travel of an axis ".repeat(3),
+            ));
+        }
+        let narrow = wordy.to_text(60);
+        assert!(widest(&narrow) <= 60, "{narrow}");
+        assert_eq!(narrow.matches("static").count(), 1, "{narrow}");
     }
 
     #[test]

@@ -6,6 +6,7 @@ use crate::circle::cases::{
     Circle, axes_of, configurations, deviation_mm, plane_name, planes, sense_name,
 };
 use crate::circle::request::CircleTest;
+use crate::experiment::configuration::{Configuration, Gains};
 use crate::pages::UM_PER_MM;
 use crate::report::{Dash, DeviationTrace, Figure, Lines, Plot, PolarDeviation, Series, Style};
 
@@ -22,12 +23,29 @@ fn middle(values: &[f64]) -> Option<f64> {
     values.get(values.len() / 2).copied()
 }
 
-/// One for each plane, at its middle radius and feed: every configuration, both senses.
+/// The configurations that are drawn: the best PID, alone and with feedforward, beside whose errors the others' would hide them; all
+/// where it was not run.
+fn drawn<'a>(circles: &[Circle<'a>]) -> Vec<Configuration> {
+    let all = configurations(circles);
+    let best = |configuration: &Configuration| configuration.gains == Gains::BestPid;
+    if all.iter().any(best) {
+        all.into_iter().filter(best).collect()
+    } else {
+        all
+    }
+}
+
+/// One for each plane, at its middle radius and feed: every configuration that is drawn, both senses.
 pub(super) fn polar_figures(circles: &[Circle<'_>]) -> Vec<Figure> {
+    let drawn = drawn(circles);
     planes(circles)
         .into_iter()
         .filter_map(|plane| {
-            let own = || circles.iter().filter(|circle| circle.case.plane == plane);
+            let own = || {
+                circles.iter().filter(|circle| {
+                    circle.case.plane == plane && drawn.contains(&circle.case.configuration)
+                })
+            };
             let radius_mm = middle(&distinct(own().map(|circle| circle.case.radius_mm)))?;
             let at_radius = || own().filter(|circle| circle.case.radius_mm == radius_mm);
             let feed = middle(&distinct(at_radius().map(|circle| circle.case.feed_mm_min)))?;
@@ -78,7 +96,7 @@ fn traces(circle: &Circle<'_>, index: usize) -> [DeviationTrace; 2] {
     })
 }
 
-/// Circular deviation and spikes against the feed, the largest of the planes.
+/// Circular deviation and spikes against the feed, the largest of the planes; nothing of a single feed.
 pub(super) fn feed_figures(circles: &[Circle<'_>]) -> Vec<Figure> {
     let figure = |id: &str, what: &str, y_label: &str, length: fn(&CircleTest) -> f64| Figure {
         id: id.to_owned(),
@@ -90,6 +108,10 @@ pub(super) fn feed_figures(circles: &[Circle<'_>]) -> Vec<Figure> {
             ..Lines::default()
         }),
     };
+    // Of one feed nothing can be drawn against it.
+    if distinct(circles.iter().map(|circle| circle.case.feed_mm_min)).len() < 2 {
+        return Vec::new();
+    }
     vec![
         figure(
             "circle-deviation-feed",
@@ -111,7 +133,7 @@ fn feed_series(circles: &[Circle<'_>], length: fn(&CircleTest) -> f64) -> Vec<Se
     let radii = distinct(circles.iter().map(|circle| circle.case.radius_mm));
     let dashes = [Dash::Solid, Dash::Dashed, Dash::Dotted];
     let mut series = Vec::new();
-    for (nth, configuration) in configurations(circles).into_iter().enumerate() {
+    for (nth, configuration) in drawn(circles).into_iter().enumerate() {
         for (index, &radius_mm) in radii.iter().enumerate() {
             let own = || {
                 circles.iter().filter(move |circle| {

@@ -12,7 +12,7 @@ pub fn circle_table(circles: &[CircleOutcome]) -> Table {
     Table {
         id: "circle-test".to_owned(),
         caption: format!(
-            "Circle of {RADIUS_MM} mm radius at {FEED_MM_S} mm/s in XY, counter-clockwise, identified model: circular \
+            "Circle of {RADIUS_MM} mm radius at {FEED_MM_S} mm/s in XY, counter-clockwise, friction identified from experiments: circular \
              deviation G (radial range about the least-squares centre, ISO 230-4), and mean radial height of the \
              spikes at the four reversals"
         ),

@@ -86,8 +86,7 @@ pub fn run_path(
     if turn_s.is_nan() || turn_s > MOST_TURN_S {
         return Err(CircleRefusal::TooSlow { turn_s });
     }
-    let mut stage = setup.stage.clone();
-    configuration.apply(&mut stage);
+    let stage = setup.stage_of(configuration);
     let rate_hz = stage.rate_hz;
     let turns = 1.0 + 2.0 * RUN_IN_TURNS;
     let job = Job {

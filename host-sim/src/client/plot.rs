@@ -1,5 +1,7 @@
 //! Curves in a terminal, in braille: two dots across and four down in a character.
 
+use crate::report::fixed;
+
 /// The first braille pattern.
 const BLANK: u32 = 0x2800;
 
@@ -12,13 +14,58 @@ const LABEL: usize = 11;
 /// A curve over equally spaced samples, `width` by `height` characters with its labels; each column of dots spans from the
 /// lowest to the highest of its samples, so that no spike is lost. Values that are not finite are gaps.
 pub fn curve(values: &[f64], width: usize, height: usize) -> Vec<String> {
-    let columns = 2 * width.saturating_sub(LABEL + 1).max(1);
-    let rows = 4 * height.max(1);
-    let finite = values.iter().copied().filter(|value| value.is_finite());
-    let (low, high) = finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+    beside(&[values], width, height)
+}
+
+/// Several curves on one scale, one beside the other, `width` by `height` characters together.
+pub fn beside(curves: &[&[f64]], width: usize, height: usize) -> Vec<String> {
+    let (low, high) = span(curves.iter().copied().flatten());
+    let room = width.saturating_sub(LABEL) / curves.len().max(1);
+    let drawn: Vec<Vec<String>> = curves
+        .iter()
+        .map(|values| {
+            draw(
+                values,
+                (low, high),
+                room.saturating_sub(1).max(1),
+                height.max(1),
+            )
+        })
+        .collect();
+    (0..height.max(1))
+        .map(|line| {
+            let label = match line {
+                0 if high.is_finite() => number(high),
+                _ if line + 1 == height && low.is_finite() => number(low),
+                _ => String::new(),
+            };
+            drawn
+                .iter()
+                .fold(format!("{label:>LABEL$}"), |text, curve| {
+                    text + " " + &curve[line]
+                })
+        })
+        .collect()
+}
+
+/// Returns the place of the `index`th of `count` curves of [`beside`], characters from the left.
+pub fn place(index: usize, count: usize, width: usize) -> usize {
+    LABEL + 1 + index * (width.saturating_sub(LABEL) / count.max(1))
+}
+
+/// Returns the lowest and the highest of some values; infinite ends if there are none.
+fn span<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
+    let finite = values.copied().filter(|value| value.is_finite());
+    finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(value), high.max(value))
-    });
-    let mut cells = vec![vec![BLANK; columns / 2]; rows / 4];
+    })
+}
+
+/// Draws a curve in `width` by `height` characters.
+fn draw(values: &[f64], (low, high): (f64, f64), width: usize, height: usize) -> Vec<String> {
+    let columns = 2 * width;
+    let rows = 4 * height;
+    let mut cells = vec![vec![BLANK; width]; height];
     // A constant is drawn in the middle.
     let span = if high > low { high - low } else { 1.0 };
     let middle = if high > low { low } else { low - 0.5 };
@@ -56,22 +103,13 @@ pub fn curve(values: &[f64], width: usize, height: usize) -> Vec<String> {
         }
         last = Some((top, bottom));
     }
-    cells
-        .iter()
-        .enumerate()
-        .map(|(index, cells)| {
-            let label = match index {
-                0 if high.is_finite() => number(high),
-                _ if index + 1 == rows / 4 && low.is_finite() => number(low),
-                _ => String::new(),
-            };
-            let drawn: String = cells
-                .iter()
-                .filter_map(|&cell| char::from_u32(cell))
-                .collect();
-            format!("{label:>LABEL$} {drawn}")
-        })
-        .collect()
+    let text = |cells: &Vec<u32>| {
+        cells
+            .iter()
+            .filter_map(|&cell| char::from_u32(cell))
+            .collect()
+    };
+    cells.iter().map(text).collect()
 }
 
 /// A number in few characters.
@@ -79,7 +117,7 @@ fn number(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 || (1e-3..1e6).contains(&magnitude) {
         let digits = (4 - magnitude.max(1e-3).log10().floor() as i32).clamp(0, 6);
-        format!("{value:.*}", digits as usize)
+        fixed(value, digits as usize)
     } else {
         format!("{value:.3e}")
     }
@@ -87,7 +125,7 @@ fn number(value: f64) -> String {
 
 #[cfg(test)]
 mod tests {
-    use super::curve;
+    use super::{beside, curve};
 
     fn dots(line: &str) -> u32 {
         line.chars()
@@ -116,6 +154,21 @@ mod tests {
         let last = |line: &str| line.chars().last().unwrap();
         assert_ne!(last(&lines[0]), '\u{2800}');
         assert_eq!(last(&lines[5]), '\u{2800}');
+    }
+
+    #[test]
+    fn curves_beside_each_other_have_one_scale() {
+        let (large, small) = (vec![0.0, 10.0, 0.0], vec![0.0, 1.0, 0.0]);
+        let lines = beside(&[&large, &small], 72, 8);
+        let half = super::place(1, 2, 72);
+        let right = |line: &str| line.chars().skip(half).collect::<String>();
+        assert!(
+            lines.iter().all(|line| line.chars().count() <= 72),
+            "{lines:#?}"
+        );
+        assert!(dots(&lines[0]) > 0);
+        assert_eq!(dots(&right(&lines[0])), 0, "{lines:#?}");
+        assert!(dots(&right(&lines[7])) > 0, "{lines:#?}");
     }
 
     #[test]

@@ -331,14 +331,45 @@ pub struct Loaded {
 /// # Errors
 /// A setting that the machine refuses, or a connection that is broken.
 pub fn load(client: &mut Client, settings: &StageSettings) -> Result<Loaded, ExchangeError> {
+    let (loaded, ()) = exchange(client, settings, |_| Ok(()))?;
+    Ok(loaded)
+}
+
+/// The same, with what acted before.
+///
+/// # Errors
+/// As [`load`].
+pub fn load_undoably(
+    client: &mut Client,
+    settings: &StageSettings,
+) -> Result<(Loaded, Before), ExchangeError> {
+    exchange(client, settings, before)
+}
+
+/// Makes the draft what is wanted, looks at it, and lets it act.
+fn exchange<T>(
+    client: &mut Client,
+    settings: &StageSettings,
+    look: impl FnOnce(&mut Client) -> Result<T, ClientError>,
+) -> Result<(Loaded, T), ExchangeError> {
     let outcome = write_draft(client, settings).and_then(|(changed, left)| {
+        let seen = look(client)?;
         let applied = apply(client)?;
-        Ok(Loaded {
+        let loaded = Loaded {
             changed,
             left,
             applied,
-        })
+        };
+        Ok((loaded, seen))
     });
+    or_reverted(client, outcome)
+}
+
+/// Makes the draft what acts again where the machine has refused what is in it.
+fn or_reverted<T>(
+    client: &mut Client,
+    outcome: Result<T, ExchangeError>,
+) -> Result<T, ExchangeError> {
     match outcome {
         Err(ExchangeError::Client(error @ ClientError::Refused { .. })) => {
             client.order(Body::Settings(SettingsRequest::Revert))?;
@@ -350,6 +381,68 @@ pub fn load(client: &mut Client, settings: &StageSettings) -> Result<Loaded, Exc
         }
         other => other,
     }
+}
+
+/// The settings that acted before others were applied: paths and values, parts before their leaves.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Before(Vec<(String, Value)>);
+
+/// Reads what acts wherever the draft differs.
+///
+/// # Errors
+/// A connection that is broken.
+pub fn before(client: &mut Client) -> Result<Before, ClientError> {
+    let edited = paths(client, "edited", |cursor| SettingsRequest::Edited {
+        cursor,
+    })?;
+    let mut values = Vec::new();
+    for path in edited {
+        // Leaves of a part that does not act go with it.
+        let Some(value) = acting(client, &path)? else {
+            continue;
+        };
+        let removed = is_part(&path) && !value.is_null();
+        values.push((path.clone(), value));
+        if removed {
+            for leaf in leaves_of(&path) {
+                values.extend(acting(client, &leaf)?.map(|value| (leaf, value)));
+            }
+        }
+    }
+    values.sort_by_key(|(path, _)| !is_part(path));
+    Ok(Before(values))
+}
+
+/// The paths of what a part has.
+fn leaves_of(part: &str) -> Vec<String> {
+    let mut settings = StageSettings::simulated();
+    // Every part can be made.
+    let made = settings.set_json(part, b"\"present\"");
+    debug_assert!(made.is_ok());
+    let mut leaves = Vec::new();
+    let _ = settings.list(part, &mut |path| {
+        if path.len() > part.len() {
+            leaves.push(path.to_owned());
+        }
+    });
+    leaves
+}
+
+/// Lets what acted before act again, as a whole; gives the number of settings, and what was applied. Edits that do not act are
+/// forgotten.
+///
+/// # Errors
+/// A value that the machine refuses by now, or a connection that is broken.
+pub fn take_back(client: &mut Client, before: &Before) -> Result<(usize, Applied), ExchangeError> {
+    client.order(Body::Settings(SettingsRequest::Revert))?;
+    let write = |client: &mut Client| {
+        for (path, value) in &before.0 {
+            set(client, path, &value.to_string())?;
+        }
+        apply(client)
+    };
+    let outcome = write(client).map_err(ExchangeError::from);
+    or_reverted(client, outcome).map(|applied| (before.0.len(), applied))
 }
 
 /// Makes the draft what is wanted; gives the paths that changed, and those that are not in `wanted`.

@@ -212,25 +212,11 @@ impl Comparison {
         [from, to]: [Configuration; 2],
         velocities_mm_s: &[f64],
     ) -> Option<Statistic> {
-        self.changes_percent_from(self, knowledge, metric, [from, to], velocities_mm_s)
-    }
-
-    /// As [`Self::changes_percent`], from a configuration of a comparison that was run with the same seeds on other settings.
-    pub fn changes_percent_from(
-        &self,
-        baseline: &Self,
-        knowledge: ModelKnowledge,
-        metric: Metric,
-        [from, to]: [Configuration; 2],
-        velocities_mm_s: &[f64],
-    ) -> Option<Statistic> {
         let mut of_seeds: Vec<f64> = Vec::new();
         for &velocity in velocities_mm_s {
-            let find = |of: &'_ Self, configuration| {
-                of.place(configuration, knowledge, AMPLITUDES_MM[0], velocity)
-            };
-            let before = &baseline.entries[find(baseline, from)?];
-            let after = &self.entries[find(self, to)?];
+            let find =
+                |configuration| self.find(configuration, knowledge, AMPLITUDES_MM[0], velocity);
+            let (before, after) = (find(from)?, find(to)?);
             of_seeds.resize(before.scores.len(), 0.0);
             for ((sum, before), after) in of_seeds.iter_mut().zip(&before.scores).zip(&after.scores)
             {
@@ -241,6 +227,11 @@ impl Comparison {
             *sum /= velocities_mm_s.len() as f64;
         }
         (!of_seeds.is_empty()).then(|| Statistic::of(&of_seeds))
+    }
+
+    /// Takes in what was run besides.
+    pub fn join(&mut self, other: Self) {
+        self.entries.extend(other.entries);
     }
 
     /// Everything that was run.

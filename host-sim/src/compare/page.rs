@@ -1,21 +1,18 @@
 //! The comparison's tables and page.
 
-use quadrant::control::feedback::LawKind;
-
 use crate::circle::CircleOutcome;
 use crate::circle::single_page::{circle_figures, circle_table, polar_figure};
 use crate::compare::comparison::Comparison;
+use crate::compare::glance::Glance;
 use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
-use crate::compare::honest::{error_columns, honest_table};
+use crate::compare::reversal::Reversal;
 use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
+use crate::design::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 use crate::experiment::configuration::Configuration;
-use crate::experiment::metrics::{GLITCH_WINDOW, Metric};
+use crate::experiment::metrics::{GLITCH_WINDOW, Metric, change_percent};
 use crate::experiment::run_configuration::ModelKnowledge;
-use crate::pages::{UM_PER_MM, error_curve};
-use crate::report::{Block, Cell, Figure, Lines, Page, Plot, Provenance, Section, Style, Table};
-
-/// Control period of the outcomes' traces, s.
-const PERIOD_S: f64 = 1e-4;
+use crate::pages::{UM_PER_MM, lines, series};
+use crate::report::{Block, Cell, Column, Figure, Page, Provenance, Section, Style, Table};
 
 /// Names of the tables of [`Metric::ALL`].
 const IDS: [&str; 3] = [
@@ -24,19 +21,12 @@ const IDS: [&str; 3] = [
     "quadrant-glitch",
 ];
 
-/// The comparison's tables: that against the best PID, one for each score, the headlines, the circles.
-pub fn comparison_tables(
-    comparison: &Comparison,
-    honest: &Comparison,
-    circles: &[CircleOutcome],
-) -> Vec<Table> {
-    let scores = IDS
-        .into_iter()
+/// The comparison's tables: one for each score, the headlines, the circles.
+pub fn comparison_tables(comparison: &Comparison, circles: &[CircleOutcome]) -> Vec<Table> {
+    IDS.into_iter()
         .zip(Metric::ALL)
-        .map(|(id, metric)| score_table(id, metric, comparison));
-    std::iter::once(honest_table(comparison, honest))
-        .chain(scores)
-        .chain([headline_table(comparison, honest), circle_table(circles)])
+        .map(|(id, metric)| score_table(id, metric, comparison))
+        .chain([headline_table(comparison), circle_table(circles)])
         .collect()
 }
 
@@ -46,7 +36,7 @@ fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
             .find(configuration, knowledge, AMPLITUDE_MM, velocity)
             .map(|entry| entry.statistic(metric.read).mean * UM_PER_MM)
     };
-    let rows = Configuration::all()
+    let rows = Configuration::with_best_pid()
         .into_iter()
         .map(|configuration| {
             let mut row = vec![Cell::text(configuration.name())];
@@ -54,15 +44,13 @@ fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
                 let mut changes = Vec::new();
                 for velocity in VELOCITIES_MM_S {
                     let own = value(configuration, knowledge, velocity);
-                    let baseline = value(Configuration::PID, knowledge, velocity);
+                    let baseline = value(Configuration::BEST_PID, knowledge, velocity);
                     row.push(own.map_or(Cell::Missing, |um| Cell::number(um, 2)));
-                    changes.extend(
-                        own.zip(baseline)
-                            .map(|(own, from)| (own / from - 1.0) * 100.0),
-                    );
+                    let pair = baseline.zip(own);
+                    changes.extend(pair.map(|(from, own)| change_percent(from, own)));
                 }
                 row.push(
-                    if configuration == Configuration::PID || changes.is_empty() {
+                    if configuration == Configuration::BEST_PID || changes.is_empty() {
                         Cell::Missing
                     } else {
                         Cell::number(changes.iter().sum::<f64>() / changes.len() as f64, 1)
@@ -74,20 +62,37 @@ fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
         .collect();
     Table {
         id: id.to_owned(),
-        caption: format!("{} over two cycles; change against PID alone", metric.title),
-        columns: error_columns("Configuration"),
+        caption: format!(
+            "{} over two cycles; change against the best PID",
+            metric.title
+        ),
+        columns: score_columns(),
         rows,
     }
+}
+
+/// Heads of the errors with each knowledge at each velocity, and of their mean change, beside the configurations.
+fn score_columns() -> Vec<Column> {
+    let mut columns = vec![Column::new("Configuration")];
+    for knowledge in ModelKnowledge::ALL {
+        for velocity in VELOCITIES_MM_S {
+            let heading = format!("{}, {velocity} mm/s", knowledge.short());
+            columns.push(Column::with_unit(heading, "um"));
+        }
+        let heading = format!("{}, mean change", knowledge.short());
+        columns.push(Column::with_unit(heading, "%"));
+    }
+    columns
 }
 
 /// The comparison's page.
 pub fn comparison_page(
     comparison: &Comparison,
-    honest: &Comparison,
+    glance: &Glance,
     circles: &[CircleOutcome],
     provenance: Provenance,
 ) -> Page {
-    let mut tables = comparison_tables(comparison, honest, circles).into_iter();
+    let mut tables = comparison_tables(comparison, circles).into_iter();
     let mut next_tables = |count| {
         tables
             .by_ref()
@@ -95,19 +100,31 @@ pub fn comparison_page(
             .map(Block::Table)
             .collect::<Vec<_>>()
     };
-    let against_best = next_tables(1);
     let scores = next_tables(IDS.len());
     let headlines = next_tables(1);
     let circle_tables = next_tables(1);
     let errors = |knowledge: ModelKnowledge| {
         VELOCITIES_MM_S
             .iter()
-            .map(|&velocity| Block::Figure(error_figure(comparison, knowledge, velocity)))
+            .map(|&velocity| {
+                let configurations = Configuration::with_best_pid();
+                let id = format!("error-{}-{velocity}", knowledge.name().replace(' ', "-"));
+                let figure = reversal_figure(id, comparison, &configurations, knowledge, velocity);
+                Block::Figure(figure)
+            })
             .collect::<Vec<_>>()
     };
+    let first_reversal = reversal_figure(
+        "reversal".to_owned(),
+        comparison,
+        &SHOWN,
+        ModelKnowledge::Identified,
+        VELOCITIES_MM_S[0],
+    );
     Page {
         title: "Friction compensation on the simulated stage".to_owned(),
-        subtitle: "PID and N-PID, each with no, static, GMS and combined feedforward; simulated, not measured"
+        subtitle: "The best PID with and without feedforward of friction, and the thesis' PID and N-PID, each with no, static, GMS \
+                   and combined feedforward; simulated, not measured"
             .to_owned(),
         provenance,
         sections: vec![
@@ -115,20 +132,14 @@ pub fn comparison_page(
                 provenance: None,
                 id: "glance".to_owned(),
                 heading: "At a glance".to_owned(),
-                prose: vec![glance_prose(circles)],
-                blocks: std::iter::once(polar_figure("circle-glance", circles, |configuration| {
-                    Configuration::EXTREMES.contains(&configuration)
-                }))
-                .chain(reversal_figure(comparison))
-                .map(Block::Figure)
-                .collect(),
-            },
-            Section {
-                provenance: None,
-                id: "against-best-pid".to_owned(),
-                heading: "Against the best PID".to_owned(),
-                prose: vec![BEST_PID_PROSE.to_owned()],
-                blocks: against_best,
+                prose: vec![glance.sentence.clone(), glance_prose(circles), best_pid_prose()],
+                blocks: vec![
+                    Block::Table(glance.table.clone()),
+                    Block::Figure(polar_figure("circle-glance", circles, |configuration| {
+                        SHOWN.contains(&configuration)
+                    })),
+                    Block::Figure(first_reversal),
+                ],
             },
             Section {
                 provenance: None,
@@ -147,14 +158,14 @@ pub fn comparison_page(
             Section {
                 provenance: None,
                 id: "exact-model".to_owned(),
-                heading: "Error over time, exact model".to_owned(),
+                heading: "A reversal, friction known exactly".to_owned(),
                 prose: vec![],
                 blocks: errors(ModelKnowledge::Exact),
             },
             Section {
                 provenance: None,
                 id: "identified-model".to_owned(),
-                heading: "Error over time, identified model".to_owned(),
+                heading: "A reversal, friction identified from experiments".to_owned(),
                 prose: vec![],
                 blocks: errors(ModelKnowledge::Identified),
             },
@@ -172,17 +183,8 @@ pub fn comparison_page(
     }
 }
 
-/// Part of the cycle before and after the reversal that is shown.
-const REVERSAL: (f64, f64) = (0.003, 0.022);
-/// The laws whose reversal is shown.
-const SHOWN: [Configuration; 3] = [
-    Configuration::PID,
-    Configuration {
-        controller: LawKind::NPid,
-        ..Configuration::PID
-    },
-    Configuration::BEST,
-];
+/// The laws whose circle and reversal are shown at first.
+const SHOWN: [Configuration; 2] = [Configuration::BEST_PID, Configuration::BEST_PID_FED];
 
 fn glance_prose(circles: &[CircleOutcome]) -> String {
     let deviation_um = |configuration| {
@@ -191,59 +193,26 @@ fn glance_prose(circles: &[CircleOutcome]) -> String {
             .find(|circle| circle.configuration == configuration);
         found.map_or(f64::NAN, |circle| circle.circular_deviation_mm * UM_PER_MM)
     };
-    let [pid, full] = Configuration::EXTREMES;
+    let [alone, fed] = SHOWN;
     format!(
         "A circle of the simulated XY stage, and one reversal of its x axis at {velocity} mm/s. Where an axis reverses, friction \
-         holds it, and the error of {pid_name} rises until it breaks away: the quadrant glitch. {full_name} puts the friction's \
-         voltage out before it is missed. Circular deviation: {pid_um:.1} um and {full_um:.1} um. The N-PID alone trembles while \
-         it waits for the break-away: its gain is largest where its error is, and little margin is left there. With \
-         feedforward the error stays small, and so does the gain.",
+         holds it, and the error rises until it breaks away: the quadrant glitch. Feedforward puts the friction's voltage out \
+         before it is missed. Circular deviation: {alone_um:.1} um with the {alone_name}, {fed_um:.1} um with {fed_name}.",
         velocity = VELOCITIES_MM_S[0],
-        pid_name = pid.name(),
-        full_name = full.name(),
-        pid_um = deviation_um(pid),
-        full_um = deviation_um(full),
+        alone_name = alone.name(),
+        fed_name = fed.name(),
+        alone_um = deviation_um(alone),
+        fed_um = deviation_um(fed),
     )
 }
 
-/// The error about a reversal in the middle of the cycle, every tick of it.
-fn reversal_figure(comparison: &Comparison) -> Option<Figure> {
-    let velocity_mm_s = VELOCITIES_MM_S[0];
-    let mut series = Vec::new();
-    for (index, configuration) in SHOWN.into_iter().enumerate() {
-        let knowledge = ModelKnowledge::Identified;
-        let entry = comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)?;
-        let cycle = &entry.last_cycle;
-        let count = cycle.reference_mm.len();
-        let quarter = count / 4..count - count / 4;
-        let extreme = |index: &usize| cycle.reference_mm[*index].abs();
-        let at = quarter.max_by(|one, other| extreme(one).total_cmp(&extreme(other)))?;
-        let part = |share: f64| (share * count as f64) as usize;
-        let (from, to) = (at.saturating_sub(part(REVERSAL.0)), at + part(REVERSAL.1));
-        let error_mm = cycle.error_mm.get(from..to)?;
-        let mut curve = error_curve(configuration.name(), error_mm, PERIOD_S, Style::nth(index));
-        let before_s = (at - from) as f64 * PERIOD_S;
-        curve.x.iter_mut().for_each(|time_s| *time_s -= before_s);
-        series.push(curve);
-    }
-    Some(Figure {
-        id: "reversal".to_owned(),
-        caption: format!(
-            "Tracking error about one reversal at {velocity_mm_s} mm/s, every control period, identified model"
-        ),
-        plot: Plot::Lines(Lines {
-            x_label: "time from the reversal (s)".to_owned(),
-            y_label: "tracking error (um)".to_owned(),
-            series,
-            ..Lines::default()
-        }),
-    })
+fn best_pid_prose() -> String {
+    format!(
+        "The best PID is the one that commissioning designs: the least error after a step of the load, with |S| up to \
+         {SENSITIVITY_PEAK} and |T| up to {COMPLEMENTARY_PEAK} on the sampled loop. The PID of the settings has the thesis' margins, \
+         which leave its integral weak; what friction's feedforward is worth on a well-tuned axis is the change against the best PID."
+    )
 }
-
-/// Said with the table against the best PID.
-const BEST_PID_PROSE: &str = "The PID of the settings has the thesis' margins, which leave its integral weak. The best PID is the one that \
-     commissioning designs: as much is asked of its loop as of any, and the rest of its freedom goes into a small error. What friction's \
-     feedforward is worth on a well-tuned axis is the change against it.";
 
 fn experiment_prose() -> String {
     format!(
@@ -262,35 +231,35 @@ fn metric_prose() -> String {
     )
 }
 
-fn error_figure(comparison: &Comparison, knowledge: ModelKnowledge, velocity_mm_s: f64) -> Figure {
-    let series = Configuration::all()
-        .into_iter()
+/// The error of some configurations about one reversal, every tick of it.
+fn reversal_figure(
+    id: String,
+    comparison: &Comparison,
+    configurations: &[Configuration],
+    knowledge: ModelKnowledge,
+    velocity_mm_s: f64,
+) -> Figure {
+    let find = |&configuration: &Configuration| {
+        comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)
+    };
+    let series = configurations
+        .iter()
+        .filter_map(find)
         .enumerate()
-        .filter_map(|(index, configuration)| {
-            let entry = comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)?;
-            let error = &entry.last_cycle.error_mm;
-            Some(error_curve(
-                configuration.name(),
-                error,
-                PERIOD_S,
-                Style::nth(index),
-            ))
+        .filter_map(|(index, entry)| {
+            let Reversal { time_s, error_um } = Reversal::of(&entry.last_cycle)?;
+            let name = entry.configuration.name();
+            Some(series(&name, time_s, error_um, Style::nth(index)))
         })
         .collect();
-    Figure {
-        id: format!(
-            "error-{}-{velocity_mm_s}",
-            knowledge.name().replace(' ', "-")
-        ),
-        caption: format!(
-            "Tracking error over the last cycle at {velocity_mm_s} mm/s, {}",
-            knowledge.name()
-        ),
-        plot: Plot::Lines(Lines {
-            x_label: "time (s)".to_owned(),
-            y_label: "tracking error (um)".to_owned(),
-            series,
-            ..Lines::default()
-        }),
-    }
+    let caption = format!(
+        "Tracking error about one reversal at {velocity_mm_s} mm/s, every control period, {}",
+        knowledge.friction()
+    );
+    lines(
+        &id,
+        &caption,
+        ("time from the reversal (s)", "tracking error (um)"),
+        series,
+    )
 }

@@ -39,10 +39,9 @@ pub struct Outcome {
 
 /// The x axis three times, one for each velocity, and the sines they run.
 fn job(configuration: Configuration, setup: &RunConfiguration, amplitude_mm: f64) -> Job {
-    let mut stage = setup.stage.clone();
+    let mut stage = setup.stage_of(configuration);
     let x = stage.axes[0].clone();
     stage.axes = [x.clone(), x.clone(), x];
-    configuration.apply(&mut stage);
     Job {
         stage,
         plan: PlanSettings {

@@ -13,6 +13,9 @@ use std::path::Path;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
 
+use crate::design::DesignError;
+use crate::design::best::with_best_pid;
+use crate::experiment::configuration::{Configuration, Gains};
 use crate::identify::single_state::with_all_models;
 use crate::plant::{AxisParameters, StageParameters};
 use crate::settings_file::{SettingsFile, SettingsFileError};
@@ -45,12 +48,20 @@ impl ModelKnowledge {
     /// Its name in a column's head.
     pub const fn short(self) -> &'static str {
         match self {
-            Self::Exact => "exact",
-            Self::Identified => "identified",
+            Self::Exact => "friction known",
+            Self::Identified => "friction identified",
         }
     }
 
-    /// Its name in tables.
+    /// What the law knows, in words that need no definition.
+    pub const fn friction(self) -> &'static str {
+        match self {
+            Self::Exact => "friction known exactly",
+            Self::Identified => "friction identified from experiments",
+        }
+    }
+
+    /// Its name in files and identifiers.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Exact => "exact model",
@@ -66,6 +77,8 @@ pub struct RunConfiguration {
     pub knowledge: ModelKnowledge,
     /// The settings.
     pub stage: StageSettings,
+    /// The same with the best PID on each axis, once it was designed.
+    best: Option<StageSettings>,
     pub truth: StageParameters,
 }
 
@@ -77,6 +90,7 @@ impl RunConfiguration {
         Self {
             knowledge: ModelKnowledge::Exact,
             stage,
+            best: None,
             truth,
         }
     }
@@ -86,6 +100,7 @@ impl RunConfiguration {
         Self {
             knowledge: ModelKnowledge::Identified,
             stage,
+            best: None,
             truth: StageParameters::real(),
         }
     }
@@ -101,6 +116,27 @@ impl RunConfiguration {
             ModelKnowledge::Exact => Self::exact(stage),
             ModelKnowledge::Identified => Self::identified(stage),
         }
+    }
+
+    /// Designs the best PID of each axis.
+    ///
+    /// # Errors
+    /// A model that no PID keeps the bounds on.
+    pub fn with_best_pid(mut self) -> Result<Self, DesignError> {
+        self.best = Some(with_best_pid(&self.stage)?);
+        Ok(self)
+    }
+
+    /// Returns the settings of a configuration. Gains of the best PID need [`Self::with_best_pid`].
+    pub fn stage_of(&self, configuration: Configuration) -> StageSettings {
+        let stage = match (configuration.gains, &self.best) {
+            (Gains::BestPid, Some(best)) => best,
+            (Gains::BestPid, None) => panic!("no best PID was designed"),
+            (Gains::Settings, _) => &self.stage,
+        };
+        let mut stage = stage.clone();
+        configuration.apply(&mut stage);
+        stage
     }
 
     /// Gives the law the plant's own friction.

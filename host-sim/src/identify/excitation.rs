@@ -10,6 +10,8 @@ use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 use rustfft::FftPlanner;
 
+use crate::report::Brief;
+
 /// The kinds of excitation.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "clap", derive(clap::ValueEnum))]
@@ -54,7 +56,7 @@ pub struct Excitation {
 #[error(
     "the band of {} to {} Hz holds no line of the excitation, which has one every {} Hz, the inverse of its period of {period_s} s: \
      widen the band, or lengthen the period",
-    .band_hz.0, .band_hz.1, 1.0 / .period_s
+    .band_hz.0, .band_hz.1, Brief(1.0 / .period_s)
 )]
 pub struct NoLine {
     /// Lowest and highest frequency, Hz.

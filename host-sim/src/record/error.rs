@@ -1,6 +1,7 @@
 //! Reasons why a record is refused, in words that lead to the fault.
 
 use super::limits::MIN_ROWS;
+use crate::report::Brief;
 use std::fmt;
 use std::path::PathBuf;
 
@@ -433,18 +434,6 @@ impl fmt::Display for Others {
         match self.0 {
             0 => Ok(()),
             others => write!(f, " (and {others} more)"),
-        }
-    }
-}
-
-/// A number with four significant digits, and no more of them than it needs.
-struct Brief(f64);
-
-impl fmt::Display for Brief {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match format!("{:.3e}", self.0).parse::<f64>() {
-            Ok(rounded) => write!(f, "{rounded}"),
-            Err(_) => write!(f, "{}", self.0),
         }
     }
 }

@@ -106,8 +106,7 @@ fn run_one(
     setup: &RunConfiguration,
     seed: u64,
 ) -> Result<ProgramOutcome, RunError> {
-    let mut stage = setup.stage.clone();
-    configuration.apply(&mut stage);
+    let stage = setup.stage_of(configuration);
     let motions = std::array::from_fn(|axis| {
         Motion::Recorded(RecordedTable::new(
             tables.positions[axis],

@@ -14,8 +14,9 @@ use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant::units::Position;
 use rayon::prelude::*;
 
-use crate::design::{Form, Process, ShapingError, shape_to_margins};
-use crate::experiment::configuration::{Configuration, ELEMENTS};
+use crate::design::best::set_best_pid;
+use crate::design::{DesignError, Form, Process, ShapingError, shape_to_margins};
+use crate::experiment::configuration::{Configuration, ELEMENTS, Gains};
 use crate::experiment::metrics::{largest, rms};
 use crate::experiment::run::{RunError, run};
 use crate::experiment::run_configuration::RunConfiguration;
@@ -84,13 +85,16 @@ const INTEGRAL_RATIO_PER_S: f64 = 0.66;
 /// Axis under test: law and plant.
 pub struct Axis {
     pub settings: AxisSettings,
+    /// The same with the best PID.
+    pub best: AxisSettings,
     pub truth: AxisParameters,
 }
 
 impl RecordedAxis {
-    fn build(self, setup: &RunConfiguration) -> Result<Axis, ShapingError> {
+    fn build(self, setup: &RunConfiguration) -> Result<Axis, ReplayError> {
         let simulated = |index: usize| Axis {
             settings: setup.stage.axes[index].clone(),
+            best: setup.stage_of(Configuration::BEST_PID).axes[index].clone(),
             truth: setup.truth.axes[index].clone(),
         };
         Ok(match self {
@@ -119,8 +123,8 @@ impl RecordedAxis {
 /// Makes the EMPS axis of its published model, with a PID designed on it.
 ///
 /// # Errors
-/// No PID has the margins.
-pub fn emps_axis() -> Result<Axis, ShapingError> {
+/// No PID has the margins, or keeps the bounds of the best one.
+pub fn emps_axis() -> Result<Axis, ReplayError> {
     let per_newton = 1.0 / emps::FORCE_N_PER_V;
     let gain = emps::FORCE_N_PER_V / emps::MASS_KG * 1e3;
     let friction = PerDirection::both(StaticFriction {
@@ -188,7 +192,13 @@ pub fn emps_axis() -> Result<Axis, ShapingError> {
         },
         drive: Drive::BallScrew,
     };
-    Ok(Axis { settings, truth })
+    let mut best = settings.clone();
+    set_best_pid(&mut best, StageSettings::simulated().rate_hz)?;
+    Ok(Axis {
+        settings,
+        best,
+        truth,
+    })
 }
 
 /// Time from the start of the record that is not scored, s: a record may begin in the middle of a motion.
@@ -223,6 +233,9 @@ pub enum ReplayError {
     /// No PID has the margins.
     #[error("no PID for the axis: {0}")]
     Design(#[from] ShapingError),
+    /// No PID keeps the bounds of the best one.
+    #[error("no best PID for the axis: {0}")]
+    Best(#[from] DesignError),
     /// The record's sample time is no multiple of the control period.
     #[error(
         "the record's sample time, {sample_time_s} s, is not a whole number of control periods of {period_s} s; \
@@ -267,7 +280,7 @@ pub fn recorded_motion(
 }
 
 /// Number of runs in [`replay`].
-pub const RUNS: u64 = 8;
+pub const RUNS: u64 = 10;
 
 /// Runs all configurations over the record's reference, in parallel, and scores them beside the recorded machine.
 /// An axis of the simulated stage is that of `setup`.
@@ -306,7 +319,7 @@ pub fn replay(
             period_s: record.sample_time_s,
         }
     });
-    let ours: Result<Vec<_>, ReplayError> = Configuration::all()
+    let ours: Result<Vec<_>, ReplayError> = Configuration::with_best_pid()
         .into_par_iter()
         .map(|configuration| {
             let outcome = run_record(configuration, &axis, &table, most_ticks, seed);
@@ -325,7 +338,10 @@ fn run_record(
     seed: u64,
 ) -> Result<RecordedOutcome, ReplayError> {
     let mut settings = StageSettings::simulated();
-    settings.axes[0] = axis.settings.clone();
+    settings.axes[0] = match configuration.gains {
+        Gains::Settings => axis.settings.clone(),
+        Gains::BestPid => axis.best.clone(),
+    };
     configuration.apply(&mut settings);
     let mut truth = StageParameters::ideal();
     truth.axes[0] = axis.truth.clone();

@@ -1,6 +1,8 @@
 //! The table and page of a replayed record.
 
+use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::change_percent;
+use crate::experiment::run_configuration::ModelKnowledge;
 use crate::pages::{UM_PER_MM, error_curve};
 use crate::replay::recorded::{RecordedAxis, RecordedOutcome, SETTLING_S};
 use crate::report::{
@@ -25,14 +27,21 @@ impl RecordedOutcome {
 
 /// Tracking errors of our configurations beside the recorded machine's own.
 pub fn recorded_table(outcomes: &[RecordedOutcome], axis: RecordedAxis) -> Table {
-    let recorded = outcomes
-        .iter()
-        .find(|outcome| outcome.configuration.is_none());
+    let find = |configuration| {
+        outcomes
+            .iter()
+            .find(|outcome| outcome.configuration == configuration)
+    };
+    let recorded = find(None);
+    let baseline = recorded.or_else(|| find(Some(Configuration::BEST_PID)));
+    let against = match recorded {
+        Some(_) => "the recorded machine's own",
+        None => "that of the best PID",
+    };
     Table {
         id: "recorded-reference".to_owned(),
         caption: format!(
-            "Tracking error over the recorded reference on {axis}, from {SETTLING_S} s after its start; change against \
-             the recorded machine's own"
+            "Tracking error over the recorded reference on {axis}, from {SETTLING_S} s after its start; change against {against}"
         ),
         columns: vec![
             Column::new("Controller"),
@@ -44,8 +53,8 @@ pub fn recorded_table(outcomes: &[RecordedOutcome], axis: RecordedAxis) -> Table
         rows: outcomes
             .iter()
             .map(|outcome| {
-                let change = recorded
-                    .filter(|_| outcome.configuration.is_some())
+                let change = baseline
+                    .filter(|baseline| baseline.configuration != outcome.configuration)
                     .map(|from| change_percent(from.rms_mm, outcome.rms_mm));
                 vec![
                     Cell::text(outcome.name()),
@@ -63,8 +72,18 @@ pub fn recorded_table(outcomes: &[RecordedOutcome], axis: RecordedAxis) -> Table
 pub fn recorded_page(
     outcomes: &[RecordedOutcome],
     axis: RecordedAxis,
+    knowledge: ModelKnowledge,
     provenance: Provenance,
 ) -> Page {
+    let known = match (axis, knowledge) {
+        (RecordedAxis::Emps, _) | (_, ModelKnowledge::Exact) => {
+            "The law knows the friction of the axis exactly, so these errors are what the method can reach on this reference, not \
+             what the machine would show."
+        }
+        (_, ModelKnowledge::Identified) => {
+            "The law knows no more of the friction than commissioning the simulated axis found."
+        }
+    };
     let curves = |ours: bool| {
         outcomes
             .iter()
@@ -110,17 +129,17 @@ pub fn recorded_page(
     }
     Page {
         title: "Our controllers over a recorded reference".to_owned(),
-        subtitle: format!("{axis}, simulated; the recorded machine's own error, measured, beside it"),
+        subtitle: format!(
+            "{axis}, simulated; the recorded machine's own error, measured, beside it"
+        ),
         provenance,
         sections: vec![Section {
             provenance: None,
             id: "result".to_owned(),
             heading: "Tracking error".to_owned(),
-            prose: vec![
-                "The law has the axis' exact model, so these errors are what the method can reach on \
-                 this reference, not what the machine would show. Errors are drawn from the end of the settling time."
-                    .to_owned(),
-            ],
+            prose: vec![format!(
+                "{known} Errors are drawn from the end of the settling time."
+            )],
             blocks,
         }],
     }

@@ -1,7 +1,5 @@
 //! The committed settings are what commissioning its axes gives, and as good as the truth.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
 use quadrant::friction::gms::{GmsElement, GmsParameters};
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
@@ -38,10 +36,7 @@ fn commissioning_the_axes_again_gives_the_committed_settings() {
 /// N-PID with the combined feedforward on the x axis with the identified model: largest and RMS tracking error, and glitch, mean over
 /// three velocities and three seeds, mm.
 fn performance(stage: &StageSettings) -> [f64; 3] {
-    let best = Configuration {
-        controller: LawKind::NPid,
-        feedforward: FeedforwardKind::Combined,
-    };
+    let best = Configuration::BEST;
     let setup = RunConfiguration::identified(stage.clone());
     let outcomes: Vec<_> = [1, 2, 3]
         .into_par_iter()

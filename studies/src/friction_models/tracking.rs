@@ -92,6 +92,7 @@ pub fn track(
             let configuration = Configuration {
                 controller: LawKind::NPid,
                 feedforward: kind,
+                ..Configuration::BEST
             };
             let outcomes = run_configuration::<f32>(configuration, &setup, seed)?;
             bar.inc(1);

@@ -79,6 +79,7 @@ fn score(
     let configuration = Configuration {
         controller: LawKind::Pid,
         feedforward: stage.axes[0].feedforward.kind,
+        ..Configuration::PID
     };
     let mut setup = RunConfiguration::identified(stage);
     setup.truth = truth;

@@ -40,13 +40,10 @@ pub(super) fn headline(context: &Context, progress: &Progress) -> anyhow::Result
         context.seeds.min(STUDY_SEEDS),
         &|done| progress.advance((1.0 - share) * done),
     )?;
-    Ok(vec![
-        headline_section(comparison, context.honest()?),
-        study_section(&findings),
-    ])
+    Ok(vec![headline_section(comparison), study_section(&findings)])
 }
 
 pub(super) fn chapter5(context: &Context, progress: &Progress) -> anyhow::Result<Vec<Section>> {
     let comparison = context.comparison(&|done| progress.advance(done))?;
-    Ok(chapter5_sections(comparison, context.honest()?))
+    Ok(chapter5_sections(comparison))
 }

@@ -5,7 +5,6 @@ use std::sync::OnceLock;
 
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
-use quadrant_sim::compare::honest::with_best_pid;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::pages::provenance;
@@ -24,8 +23,6 @@ pub struct Context {
     pub settings_path: Option<PathBuf>,
     /// The runs of chapter 5, once a part has needed them.
     comparison: OnceLock<Comparison>,
-    /// The runs with the best PID, once a part has needed them.
-    honest: OnceLock<Comparison>,
 }
 
 impl Context {
@@ -41,7 +38,6 @@ impl Context {
             settings,
             settings_path: law_settings.path,
             comparison: OnceLock::new(),
-            honest: OnceLock::new(),
         })
     }
 
@@ -51,10 +47,11 @@ impl Context {
         RunConfiguration::both(&self.settings.stage)
     }
 
-    /// Runs the comparison of chapter 5, unless a part before did. `advance` is told shares of the whole.
+    /// Runs the comparison of chapter 5, and the best PID on the same sines of the first amplitude, unless a part before did.
+    /// `advance` is told shares of the whole.
     ///
     /// # Errors
-    /// A refused setting or a fault.
+    /// A model that no PID keeps the bounds on, a refused setting or a fault.
     pub fn comparison(&self, advance: &(dyn Fn(f64) + Sync)) -> anyhow::Result<&Comparison> {
         if let Some(comparison) = self.comparison.get() {
             advance(1.0);
@@ -62,25 +59,15 @@ impl Context {
         }
         let setups = self.setups();
         let configurations = Configuration::all();
-        let comparison = self.request(&setups, &configurations).run(advance)?;
-        Ok(self.comparison.get_or_init(|| comparison))
-    }
-
-    /// Runs the best PID alone on the same sines of the first amplitude, unless a part before did.
-    ///
-    /// # Errors
-    /// A model that no PID keeps the bounds on, a refused setting, or a fault.
-    pub fn honest(&self) -> anyhow::Result<&Comparison> {
-        if let Some(honest) = self.honest.get() {
-            return Ok(honest);
-        }
-        let setups = RunConfiguration::both(&with_best_pid(&self.settings.stage)?);
-        let request = Request {
+        let mut comparison = self.request(&setups, &configurations).run(advance)?;
+        let [exact, identified] = setups.map(RunConfiguration::with_best_pid);
+        let setups = [exact?, identified?];
+        let best = Request {
             amplitudes_mm: &AMPLITUDES_MM[..1],
-            ..self.request(&setups, &[Configuration::PID])
+            ..self.request(&setups, &[Configuration::BEST_PID])
         };
-        let honest = request.run(&|_| {})?;
-        Ok(self.honest.get_or_init(|| honest))
+        comparison.join(best.run(&|_| {})?);
+        Ok(self.comparison.get_or_init(|| comparison))
     }
 
     /// About how long that takes on two cores, s; nothing once it was done.

@@ -90,6 +90,7 @@ pub fn usual_competitors(stage: &StageSettings) -> Vec<(String, StageSettings)> 
             let configuration = Configuration {
                 controller,
                 feedforward,
+                ..Configuration::PID
             };
             let mut settings = stage.clone();
             configuration.apply(&mut settings);

@@ -20,15 +20,15 @@ const BEST_MEASURES: [(Metric, f64); 3] = [
     (Metric::GLITCH, -50.0),
 ];
 
-/// The headlines, and the best configuration by velocity. `honest` are the runs with the best PID.
-pub fn headline_section(comparison: &Comparison, honest: &Comparison) -> Section {
+/// The headlines, and the best configuration by velocity.
+pub fn headline_section(comparison: &Comparison) -> Section {
     Section {
         id: "headline".to_owned(),
         heading: "The thesis' headlines".to_owned(),
         provenance: None,
         prose: vec![HEADLINE_PROSE.to_owned()],
         blocks: vec![
-            Block::Table(headline_table(comparison, honest)),
+            Block::Table(headline_table(comparison)),
             Block::Table(best_table(comparison)),
         ],
     }

@@ -94,6 +94,11 @@ mod tests {
         going
     }
 
+    fn twice(client: &mut Client, watch: &mut Watch, key: char) -> Going {
+        press(client, watch, KeyCode::Char(key));
+        press(client, watch, KeyCode::Char(key))
+    }
+
     fn picture(watch: &Watch) -> String {
         let mut terminal = Terminal::new(TestBackend::new(80, 24)).unwrap();
         terminal.draw(|frame| view::draw(watch, frame)).unwrap();
@@ -103,7 +108,7 @@ mod tests {
     #[test]
     fn eighty_columns_show_state_axes_inputs_gain_and_three_charts() {
         let (mut client, mut watch) = watched(&[]);
-        press(&mut client, &mut watch, KeyCode::Char('e'));
+        twice(&mut client, &mut watch, 'e');
         let seen = picture(&watch);
         for part in [
             "enabled",
@@ -125,7 +130,7 @@ mod tests {
         let path = quadrant_sim::client::settings::whole_path("z/feedforward/learning");
         quadrant_sim::client::settings::set(&mut client, &path, "present").unwrap();
         quadrant_sim::client::settings::apply(&mut client).unwrap();
-        press(&mut client, &mut watch, KeyCode::Char('e'));
+        twice(&mut client, &mut watch, 'e');
         let seen = picture(&watch);
         assert!(seen.contains("friction of z x 1.000; frozen: "), "{seen}");
         assert!(seen.contains("z.error, um"), "{seen}");
@@ -147,9 +152,29 @@ mod tests {
     }
 
     #[test]
+    fn nothing_is_enabled_or_moves_before_its_key_is_pressed_again() {
+        let (mut client, mut watch) = watched(&[]);
+        let state = |client: &mut Client| client.status().unwrap().state;
+        press(&mut client, &mut watch, KeyCode::Char('e'));
+        assert_eq!(state(&mut client), MachineState::Disabled);
+        assert!(watch.message.contains("once more"), "{}", watch.message);
+        // Another key in between begins again.
+        press(&mut client, &mut watch, KeyCode::Up);
+        press(&mut client, &mut watch, KeyCode::Char('e'));
+        assert_eq!(state(&mut client), MachineState::Disabled);
+        press(&mut client, &mut watch, KeyCode::Char('e'));
+        assert_eq!(state(&mut client), MachineState::Enabled);
+        press(&mut client, &mut watch, KeyCode::Char('g'));
+        assert!(watch.message.contains("once more"), "{}", watch.message);
+        // Off goes at once.
+        press(&mut client, &mut watch, KeyCode::Char('d'));
+        assert_eq!(state(&mut client), MachineState::Disabled);
+    }
+
+    #[test]
     fn what_is_refused_is_said_and_ends_nothing() {
         let (mut client, mut watch) = watched(&[]);
-        let going = press(&mut client, &mut watch, KeyCode::Char('g'));
+        let going = twice(&mut client, &mut watch, 'g');
         assert_eq!(going, Going::On);
         assert!(watch.message.contains("enable"), "{}", watch.message);
     }
@@ -157,7 +182,7 @@ mod tests {
     #[test]
     fn outputs_are_left_on_only_by_asking_twice() {
         let (mut client, mut watch) = watched(&[]);
-        press(&mut client, &mut watch, KeyCode::Char('e'));
+        twice(&mut client, &mut watch, 'e');
         assert_eq!(
             press(&mut client, &mut watch, KeyCode::Char('q')),
             Going::On
@@ -188,7 +213,7 @@ mod tests {
             "--window",
             "0.5",
         ]);
-        press(&mut client, &mut watch, KeyCode::Char('e'));
+        twice(&mut client, &mut watch, 'e');
         press(&mut client, &mut watch, KeyCode::Char('c'));
         assert!(watch.capturing);
         let mut plan = PlanSettings::default();
@@ -199,7 +224,7 @@ mod tests {
             max_jerk_mm_s3: 1e5,
         });
         client.order(Body::SetPlan(plan.into())).unwrap();
-        press(&mut client, &mut watch, KeyCode::Char('g'));
+        twice(&mut client, &mut watch, 'g');
         for _ in 0..200 {
             watch.look(&mut client, PICTURE).unwrap();
         }

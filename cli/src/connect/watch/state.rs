@@ -75,6 +75,8 @@ pub(super) struct Watch {
     pub(super) help: bool,
     /// The person was told that the outputs are on.
     warned: bool,
+    /// The key that was pressed once, and that is to be pressed again for what it starts.
+    asked: Option<char>,
     csv: PathBuf,
     written: Vec<PathBuf>,
 }
@@ -119,6 +121,7 @@ impl Watch {
             message: "? shows the keys".to_owned(),
             help: false,
             warned: false,
+            asked: None,
             csv: options.csv.clone(),
             written: Vec::new(),
         })
@@ -181,6 +184,7 @@ impl Watch {
         if !matches!(key.code, KeyCode::Char('q') | KeyCode::Esc) {
             self.warned = false;
         }
+        let asked = self.asked.take();
         match key.code {
             KeyCode::Char('c') if key.modifiers.contains(KeyModifiers::CONTROL) => {
                 // The first stops, a second disables.
@@ -203,6 +207,7 @@ impl Watch {
             KeyCode::Char('u') => self.nudge(client, |gain| gain.original)?,
             KeyCode::Char('s') => self.order(client, Body::Stop)?,
             KeyCode::Char('d') => self.order(client, Body::Disable)?,
+            KeyCode::Char(key @ ('e' | 'g')) if asked != Some(key) => self.ask(key),
             KeyCode::Char('e') => self.order(client, Body::Enable)?,
             KeyCode::Char('r') => self.order(client, Body::ResetFault)?,
             KeyCode::Char('g') => self.order(client, Body::Run)?,
@@ -228,6 +233,16 @@ impl Watch {
         "the outputs are on: d switches them off, q once more leaves them on"
             .clone_into(&mut self.message);
         Going::On
+    }
+
+    /// Asks for a key once more before anything is enabled or moves.
+    fn ask(&mut self, key: char) {
+        self.asked = Some(key);
+        self.message = match key {
+            'e' => "e once more switches the outputs on",
+            _ => "g once more starts the plan: the axes move",
+        }
+        .to_owned();
     }
 
     fn freeze(&mut self) {

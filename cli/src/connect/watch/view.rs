@@ -3,6 +3,7 @@
 use quadrant::link::message::{Channel, MachineState};
 use quadrant_cli::terminal::plain;
 use quadrant_sim::client::{columns, with_reset};
+use quadrant_sim::report::fixed;
 use ratatui::Frame;
 use ratatui::layout::{Constraint, Layout, Rect};
 use ratatui::style::{Color, Modifier, Style};
@@ -20,8 +21,8 @@ const KEYS: [(&str, &str); 12] = [
     ("[  ]", "half or twice the time across"),
     ("up, down", "choose a gain"),
     ("+  -  u", "nudge it by 5 %, or undo"),
-    ("e  d", "enable, disable"),
-    ("g  s", "run the plan, stop"),
+    ("e  d", "enable, if pressed twice; disable"),
+    ("g  s", "run the plan, if pressed twice; stop"),
     ("r", "reset the fault"),
     (
         "c  f",
@@ -202,11 +203,10 @@ fn draw_chart(watch: &Watch, index: usize, frame: &mut Frame, area: Rect) {
     let chart = Chart::new(datasets)
         .block(Block::new().title(title(watch, channel, unit, &points, cursor_s)))
         .x_axis(Axis::default().bounds([-window_s, 0.0]))
-        .y_axis(
-            Axis::default()
-                .bounds([low, high])
-                .labels([format!("{low:>9.3}"), format!("{high:>9.3}")]),
-        );
+        .y_axis(Axis::default().bounds([low, high]).labels([
+            format!("{:>9}", fixed(low, 3)),
+            format!("{:>9}", fixed(high, 3)),
+        ]));
     frame.render_widget(chart, area);
 }
 
@@ -230,8 +230,10 @@ fn title(
         points.last()
     };
     let now = match at {
-        Some((time_s, value)) if watch.is_frozen() => format!("{value:.3} at {time_s:.4} s"),
-        Some((_, value)) => format!("now {value:.3}"),
+        Some((time_s, value)) if watch.is_frozen() => {
+            format!("{} at {} s", fixed(*value, 3), fixed(*time_s, 4))
+        }
+        Some((_, value)) => format!("now {}", fixed(*value, 3)),
         None => "no sample yet".to_owned(),
     };
     format!(

@@ -6,7 +6,7 @@ use std::time::{Duration, Instant};
 
 use crate::sample::{full, lines, page, table};
 use quadrant_chromium::Browser;
-use quadrant_report::{Block, Page};
+use quadrant_report::{Block, Cell, Column, Page};
 use serde_json::{Value, json};
 
 /// A phone, a tablet, a screen wide enough for the contents at the side; CSS pixels.
@@ -40,6 +40,9 @@ impl Opened {
         for figure in found["figures"].as_array().unwrap() {
             if figure["traces"] != figure["curves"] || figure["curves"] == 0 {
                 faults.push(format!("figure not drawn: {figure}"));
+            }
+            if figure["cut"] != json!([]) {
+                faults.push(format!("label cut: {}", figure["cut"]));
             }
         }
         for hash in found["dangling"].as_array().unwrap() {
@@ -92,6 +95,56 @@ fn the_page_is_whole_in_every_window_in_light_and_dark() {
             assert!(faults.is_empty(), "{window:?}, dark {is_dark}: {faults:#?}");
         }
     }
+}
+
+#[test]
+fn a_label_at_the_end_of_an_axis_is_not_cut() {
+    let Some(mut opened) = Opened::new() else {
+        return;
+    };
+    // A single point is drawn in the middle of an axis that ends at round numbers.
+    let mut figure = lines("error", 1, 1);
+    if let quadrant_report::Plot::Lines(lines) = &mut figure.plot {
+        for series in &mut lines.series {
+            series.x = vec![1000.0];
+            series.y = vec![1.0];
+            series.style = quadrant_report::Style::points(quadrant_report::Colour::Blue);
+        }
+    }
+    let path = opened.write(&page(vec![Block::Figure(figure)]).to_html().unwrap());
+    for window in WINDOWS {
+        let faults = opened.faults(&path, window, false);
+        let cut = faults.iter().find(|fault| fault.starts_with("label cut"));
+        assert_eq!(cut, None, "{window:?}");
+    }
+}
+
+#[test]
+fn a_table_of_thirteen_columns_does_not_scroll_on_a_screen_of_1100_pixels() {
+    let Some(mut opened) = Opened::new() else {
+        return;
+    };
+    let mut wide = table("wide");
+    wide.columns = ["Plane", "Radius", "Feed", "Configuration"]
+        .map(Column::new)
+        .to_vec();
+    let names = ["G(CW)", "G(CCW)", "G(b)", "H", "Fmax", "Fmin", "D"];
+    let spikes = ["Spike mean", "Spike largest"];
+    let values = names.iter().chain(&spikes);
+    wide.columns
+        .extend(values.map(|name| Column::with_unit(*name, "um")));
+    let mut row = vec![
+        Cell::text("XY"),
+        Cell::number(30.0, 1),
+        Cell::number(1000.0, 0),
+        Cell::text("best PID + static + GMS"),
+    ];
+    row.extend((0..9).map(|_| Cell::number(-168.99, 2)));
+    wide.rows = vec![row];
+    let path = opened.write(&page(vec![Block::Table(wide)]).to_html().unwrap());
+    opened.browser.open(&path, (1100, 900), false);
+    let hidden = "(() => { const t = document.querySelector('.scroll'); return t.scrollWidth - t.clientWidth; })()";
+    assert_eq!(opened.browser.evaluate(hidden), json!(0));
 }
 
 #[test]

@@ -12,6 +12,10 @@
       curves: drawing.parentElement.querySelectorAll(".legend button").length,
       traces: traces.filter((trace) => [...trace.querySelectorAll("path")].some((path) => path.getAttribute("d")?.length > 8)).length,
       labels: [...drawing.querySelectorAll(".x-label, .y-label")].map((label) => label.textContent),
+      cut: [...drawing.querySelectorAll("svg.chart text")].filter((text) => {
+        const [own, whole] = [text, text.closest("svg")].map((element) => element.getBoundingClientRect());
+        return own.left < whole.left - 1 || own.right > whole.right + 1;
+      }).map((text) => text.textContent),
       ink: getComputedStyle(drawing.querySelector(".x-label") ?? drawing).fill,
     });
   }

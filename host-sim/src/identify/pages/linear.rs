@@ -8,7 +8,7 @@ use crate::identify::pages::bode::{Curve, bode_figures};
 use crate::identify::plant::PlantFit;
 use crate::identify::response::{FrequencyResponse, ResponsePoint};
 use crate::pages::{columns, lines, series};
-use crate::report::{Block, Cell, Colour, Figure, Plot, Scale, Section, Style, Table};
+use crate::report::{Block, Brief, Cell, Colour, Figure, Plot, Scale, Section, Style, Table};
 
 /// The motor constant (thesis, Fig 3.7); k_f if the moving mass is known.
 pub fn motor_constant_table(motor: &MotorConstant, moving_mass_kg: Option<f64>) -> Table {
@@ -72,7 +72,8 @@ pub fn response_section(measurement: &FrfMeasurement, model: Option<&PlantFit>) 
         heading: "Frequency response".to_owned(),
         prose: vec![format!(
             "{} blocks averaged, resolution {} Hz. {estimator}; the hold of the converter is divided out.",
-            measurement.estimate.blocks, measurement.estimate.resolution_hz
+            measurement.estimate.blocks,
+            Brief(measurement.estimate.resolution_hz)
         )],
         blocks,
     }

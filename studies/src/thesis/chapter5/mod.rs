@@ -19,8 +19,6 @@ const CONTROLLERS: [LawKind; 2] = [LawKind::Pid, LawKind::NPid];
 /// Data of the tables and figures.
 struct Chapter<'a> {
     comparison: &'a Comparison,
-    /// Runs with the best PID.
-    honest: &'a Comparison,
 }
 
 impl<'a> Chapter<'a> {
@@ -51,6 +49,7 @@ impl<'a> Chapter<'a> {
         let configuration = Configuration {
             controller,
             feedforward,
+            ..Configuration::PID
         };
         self.comparison
             .find(configuration, knowledge, amplitude_mm, velocity_mm_s)
@@ -65,9 +64,9 @@ const fn knowledge_name(knowledge: ModelKnowledge) -> &'static str {
     }
 }
 
-/// Tables 5.1 to 5.22 and Figures 5.1 to 5.18; beside PID with each feedforward the best PID alone, of the runs `honest`.
-pub fn chapter5_sections(comparison: &Comparison, honest: &Comparison) -> Vec<Section> {
-    let chapter = Chapter { comparison, honest };
+/// Tables 5.1 to 5.22 and Figures 5.1 to 5.18; beside PID with each feedforward the best PID alone.
+pub fn chapter5_sections(comparison: &Comparison) -> Vec<Section> {
+    let chapter = Chapter { comparison };
     let section = |id: &str, heading: &str, prose: Vec<String>, blocks| Section {
         id: format!("chapter-5-{id}"),
         heading: heading.to_owned(),

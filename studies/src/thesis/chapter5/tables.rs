@@ -239,9 +239,12 @@ impl Chapter<'_> {
                 rows.push(cells);
             }
             if controller == LawKind::Pid {
-                let best =
-                    self.honest
-                        .find(Configuration::PID, knowledge, AMPLITUDES_MM[0], velocity);
+                let best = self.comparison.find(
+                    Configuration::BEST_PID,
+                    knowledge,
+                    AMPLITUDES_MM[0],
+                    velocity,
+                );
                 let mut cells = vec![velocity_cell(velocity), Cell::text(BEST_PID)];
                 for measure in measures {
                     cells.extend(side.cells(best, measure));
