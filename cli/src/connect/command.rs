@@ -336,9 +336,9 @@ pub(super) struct ScopeOptions {
     /// Time across the screen, s.
     #[arg(long, default_value_t = 2.0, value_name = "S")]
     pub(super) window: f64,
-    /// Width, characters; height of each channel, lines.
-    #[arg(long, num_args = 2, default_values_t = [100, 6], value_names = ["WIDTH", "HEIGHT"])]
-    pub(super) size: Vec<usize>,
+    /// Width, characters; height of each channel, lines. Without it the terminal's width, and 6 lines.
+    #[arg(long, num_args = 2, value_names = ["WIDTH", "HEIGHT"])]
+    pub(super) size: Option<Vec<usize>>,
     /// Write what was sampled as a figure for print.
     #[arg(long, value_name = "FILE")]
     pub(super) svg: Option<PathBuf>,

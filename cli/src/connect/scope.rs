@@ -20,16 +20,25 @@ use quadrant_cli::terminal;
 const PICTURE: Duration = Duration::from_millis(100);
 /// Most characters of a line and lines of a channel.
 const MOST_SIZE: usize = 1000;
+/// Fewest characters of a line.
+const LEAST_WIDTH: usize = 20;
+/// Lines of a channel, unless asked for otherwise.
+const HEIGHT: usize = 6;
 
 pub(super) fn run(session: &mut Session, options: &ScopeOptions) -> anyhow::Result<Answer> {
     let duration = seconds("--seconds", options.seconds)?;
     let window = seconds("--window", options.window)?;
-    let [width, height] = options.size[..] else {
-        bail!("--size: give width and height");
+    let [width, height] = match options.size.as_deref() {
+        None => [
+            terminal::output_width().clamp(LEAST_WIDTH, MOST_SIZE),
+            HEIGHT,
+        ],
+        Some(&[width, height]) => [width, height],
+        Some(_) => bail!("--size: give width and height"),
     };
-    if !(20..=MOST_SIZE).contains(&width) || !(1..=MOST_SIZE).contains(&height) {
+    if !(LEAST_WIDTH..=MOST_SIZE).contains(&width) || !(1..=MOST_SIZE).contains(&height) {
         bail!(
-            "--size {width} {height}: give 20 to {MOST_SIZE} characters and 1 to {MOST_SIZE} lines"
+            "--size {width} {height}: give {LEAST_WIDTH} to {MOST_SIZE} characters and 1 to {MOST_SIZE} lines"
         );
     }
     let live = stdout().is_terminal() && !session.printer.json;

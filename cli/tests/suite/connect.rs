@@ -373,6 +373,8 @@ fn a_scope_draws_and_keeps_what_it_drew() {
     assert!(said.contains("x.error, mm"), "{said}");
     let braille = |c: char| ('\u{2801}'..='\u{28ff}').contains(&c);
     assert!(said.contains(braille), "{said}");
+    let widest = said.lines().map(|line| line.chars().count()).max();
+    assert!(widest <= Some(80), "{said}");
     let svg = std::fs::read_to_string(folder.path().join("scope.svg")).unwrap();
     assert!(svg.contains("<svg") && svg.contains("x.error"));
     assert!(folder.path().join("scope-x.csv").is_file());
