@@ -17,8 +17,11 @@
 //! **Change.** What the last seconds say is held against all that is remembered. Where their scales differ by more than
 //! a tenth while nothing vibrates, the axis has changed, and the rest is forgotten: one reversal then counts for all.
 //!
+//! **Load.** The scale leaves 1 only for another that takes more than a share of the error's energy away: a load is not the image of the
+//! reversals, and swings the slope to and fro.
+//!
 //! **Guard.** The mean squares of `e` and of `e0` over the last seconds are compared. When the error with feedforward is the
-//! larger one, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
+//! larger one, then and over all that is remembered, the scale falls at a fixed rate towards zero, and what was learnt before is forgotten.
 
 mod closed_loop;
 mod vibration;
@@ -85,6 +88,9 @@ const MOST_INFORMATION: f64 = 0.02;
 /// need to say so, as a share of all that is remembered.
 const DIFFERS: f64 = 0.1;
 const TELLING: f64 = 0.25;
+
+/// Share of the error's energy that another scale has to take away, for the scale to leave 1.
+const EXPLAINED: f64 = 0.05;
 
 /// Rate of the scale down the slope, 1/s, per unit of information.
 const RATE: f64 = 300.0;
@@ -182,6 +188,9 @@ struct Estimate<S: Scalar> {
     guard_least: S,
     differs: S::Gain,
     telling: S::Gain,
+    /// One over the most information, and the share of the error's energy that another scale has to take away.
+    per_information: S::Gain,
+    explained: S::Gain,
     /// The gate less 1 below which the axis is shaken.
     shaken: S,
 }
@@ -214,6 +223,8 @@ pub struct LearningState<S: Scalar> {
     sums: Sums<S>,
     /// The sums of the last seconds alone.
     lately: Fit<S>,
+    /// The forgetting sums without a bound, which say what a load has of the error.
+    long: Fit<S>,
 }
 
 /// What was learnt in one state of the gate: the scale less 1, and the sums that it was learnt from.
@@ -230,6 +241,8 @@ struct Fit<S> {
     information: S,
     /// `e0 psi`.
     correlation: S,
+    /// `e0^2`.
+    energy: S,
 }
 
 /// Sums of products, in units.
@@ -238,7 +251,7 @@ struct Sums<S> {
     fit: Fit<S>,
     /// `e^2`.
     with: S,
-    /// `e0^2`.
+    /// `e0^2`, forgotten as `e^2` is.
     without: S,
 }
 
@@ -332,6 +345,8 @@ impl<S: Scalar> Learning<S> {
                 guard_share: share(GUARD_SHARE),
                 differs: share(DIFFERS),
                 telling: share(TELLING),
+                per_information: share(1.0 / MOST_INFORMATION),
+                explained: share(EXPLAINED),
                 guard_least: number(GUARD_S * count * count),
                 shaken: number(SHAKEN - 1.0),
             },
@@ -378,6 +393,7 @@ impl<S: Scalar> Learning<S> {
             settling,
             block,
             lately,
+            long: _,
         } = state;
         *friction = S::ZERO;
         *presliding = S::ZERO;
@@ -389,6 +405,11 @@ impl<S: Scalar> Learning<S> {
         *settling = 0;
         *block = Sums::default();
         *lately = Fit::default();
+    }
+
+    /// Learns nothing for a while: what the axis does now is not what the model does.
+    pub(crate) fn unsettle(&self, state: &mut LearningState<S>) {
+        state.settling = self.settling_steps;
     }
 
     /// A voltage over the scale, V: what the friction has to grow by, so that the output grows by as much.
@@ -481,8 +502,8 @@ impl<S: Scalar> Learning<S> {
         let fit = &mut block.fit;
         fit.information = fit.information + product(psi, psi);
         fit.correlation = fit.correlation + product(without, psi);
+        fit.energy = fit.energy + product(without, without);
         block.with = block.with + product(with, with);
-        block.without = block.without + product(without, without);
         state.steps += 1;
         if state.steps < self.block_steps {
             return gained;
@@ -514,6 +535,7 @@ impl<S: Scalar> Learning<S> {
             let falls = !shaken && now.deviation < before.deviation;
             state.deviation = if falls { now } else { before }.deviation;
             state.sums.fit = before.fit;
+            state.long = before.fit;
         }
         state.shaken = shaken;
         state.lasting = 0;
@@ -542,9 +564,10 @@ impl<S: Scalar> Learning<S> {
             sum.times(keep, Quantity::Fraction) + block.scale(estimate.step)
         };
         sums.with = add(sums.with, estimate.guard_keep, block.with);
-        sums.without = add(sums.without, estimate.guard_keep, block.without);
+        sums.without = add(sums.without, estimate.guard_keep, block.fit.energy);
         let allowed = sums.without + sums.without.scale(estimate.guard_share);
-        let worse = sums.with > allowed + estimate.guard_least;
+        let worse = (sums.with > allowed + estimate.guard_least)
+            && state.long.harms(scale, estimate.guard_share);
         let keep = if worse {
             estimate.guard_keep
         } else {
@@ -553,26 +576,37 @@ impl<S: Scalar> Learning<S> {
         let add_fit = |fit: Fit<S>, keep: S| Fit {
             information: add(fit.information, keep, block.fit.information),
             correlation: add(fit.correlation, keep, block.fit.correlation),
+            energy: add(fit.energy, keep, block.fit.energy),
         };
         let lately = add_fit(state.lately, estimate.guard_keep);
+        state.long = add_fit(state.long, keep);
         state.lately = lately;
         let fit = &mut sums.fit;
         *fit = add_fit(*fit, keep);
         let telling = lately.information > fit.information.scale(estimate.telling);
         let differs = lately.slope(scale).magnitude() > lately.information.scale(estimate.differs);
-        if telling & differs & !state.shaken {
+        if telling & differs & !state.shaken && lately.explains(scale, estimate) {
             *fit = lately;
+            state.long = lately;
         }
         if fit.information > estimate.most_information {
             fit.information = fit.information.scale(estimate.half);
             fit.correlation = fit.correlation.scale(estimate.half);
+            fit.energy = fit.energy.scale(estimate.half);
         }
         let change = if worse {
             state.status = LearningStatus::Fading;
             -estimate.fade
         } else {
             state.status = LearningStatus::Learning;
-            let slope = fit.slope(scale) - state.deviation.scale(estimate.pull);
+            let slope = fit.slope(scale);
+            let returns = (slope > S::ZERO) == (state.deviation < S::ZERO);
+            let known = if returns || state.long.explains(scale, estimate) {
+                slope
+            } else {
+                S::ZERO
+            };
+            let slope = known - state.deviation.scale(estimate.pull);
             slope.scale(estimate.rate).within(estimate.most_change)
         };
         state.deviation = (scale + change).limit(S::ZERO, self.most) - self.one;
@@ -585,6 +619,34 @@ impl<S: Scalar> Fit<S> {
     #[inline(always)]
     fn slope(self, scale: S) -> S {
         self.correlation - self.information.times(scale, Quantity::Multiplier)
+    }
+}
+
+impl<S: Scalar> Fit<S> {
+    /// True if another scale would take enough of the error's energy away: what a load brings about is not the friction's.
+    ///
+    /// At the scale of least error the energy is less by `slope^2 / P`; no division is needed to compare it with a share of what there is.
+    #[inline(always)]
+    fn explains(self, scale: S, estimate: &Estimate<S>) -> bool {
+        let [slope, error, information] = [self.slope(scale), self.error(scale), self.information]
+            .map(|sum| sum.scale(estimate.per_information));
+        let share = error.times(information, Quantity::Multiplier);
+        slope.times(slope, Quantity::Multiplier) > share.scale(estimate.explained)
+    }
+}
+
+impl<S: Scalar> Fit<S> {
+    /// The energy of the error with the scale.
+    #[inline(always)]
+    fn error(self, scale: S) -> S {
+        let explained = (self.correlation + self.slope(scale)).times(scale, Quantity::Multiplier);
+        self.energy - explained
+    }
+
+    /// True if the energy of the error is more with the scale than without by a share.
+    #[inline(always)]
+    fn harms(self, scale: S, share: S::Gain) -> bool {
+        self.error(scale) > self.energy + self.energy.scale(share)
     }
 }
 
