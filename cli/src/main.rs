@@ -10,6 +10,7 @@ mod design;
 mod endpoint;
 mod identify;
 mod kept;
+mod own_stage;
 mod plane;
 mod replay;
 mod replay_program;
