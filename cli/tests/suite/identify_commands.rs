@@ -277,36 +277,3 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
     let cascade = ["motion", "--axis", "x", "--cascade-kp", "160"];
     assert!(fail(at, &cascade).contains("--cascade-kv"));
 }
-
-#[test]
-fn a_motion_record_says_at_the_end_how_much_a_model_explains() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    // The part of the voltage that moves a mass of 2e-5 V s²/mm with 0.005 V s/mm, and one of something else.
-    let record = |name: &str, other_v: f64| {
-        let rows: String = (0..4000)
-            .map(|row| {
-                let t = 2e-3 * f64::from(row);
-                let (sin, cos) = (4.0 * t).sin_cos();
-                let voltage = 0.005 * 80.0 * cos - 2e-5 * 320.0 * sin + other_v * (9.7 * t).sin();
-                format!("{t:.3},{:.4},{voltage:.5}\n", 20.0 * sin)
-            })
-            .collect();
-        std::fs::write(at.join(name), format!("t_s,position_mm,voltage_v\n{rows}")).unwrap();
-    };
-    record("good.csv", 0.0);
-    record("doubtful.csv", 0.15);
-    record("bad.csv", 2.0);
-    let identify = |name| ["motion", "--record", name];
-    let shown = succeed(at, &identify("good.csv"));
-    assert!(shown.contains("The model explains"), "{shown}");
-    let run = command::play(at, &["identify", "motion", "--record", "doubtful.csv"], "");
-    assert!(run.status.success());
-    let said = String::from_utf8_lossy(&run.stderr).into_owned();
-    assert!(said.trim_end().ends_with("in no parameter"), "{said}");
-    let refused = fail(at, &identify("bad.csv"));
-    assert!(
-        refused.contains("no model fits: the best explains"),
-        "{refused}"
-    );
-}
