@@ -1,4 +1,4 @@
-//! What all command lines and lines of the console have in common.
+//! The common part of all command lines and lines of the console.
 
 use clap::Command;
 use clap::error::{ContextKind, ErrorKind};

@@ -39,7 +39,7 @@ pub(super) fn parse(line: &str) -> Result<Said, String> {
     if words.is_empty() {
         return Ok(Said::Nothing);
     }
-    let name = words.first().cloned().unwrap_or_default();
+    let name = words[0].clone();
     let matches = grammar::with_negative_numbers(Line::command()).try_get_matches_from(words);
     match matches.and_then(|matches| Line::from_arg_matches(&matches)) {
         Ok(Line {

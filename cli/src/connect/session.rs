@@ -12,7 +12,7 @@ pub(super) struct Session {
     pub(super) printer: Printer,
     /// Inputs that `press` holds.
     pub(super) pressed: Switches,
-    /// What acted before each `apply` and `load`, the newest last.
+    /// Settings that were in force before each `apply` and `load`, the newest last.
     pub(super) undo: Vec<Before>,
     /// The origin of the settings that act, as far as this session knows it.
     pub(super) origin: Origin,
@@ -28,16 +28,13 @@ pub(super) struct Origin {
 }
 
 impl Session {
-    pub(super) const fn new(client: Client, printer: Printer) -> Self {
+    pub(super) fn new(client: Client, printer: Printer) -> Self {
         Self {
             client,
             printer,
             pressed: Switches::NONE,
             undo: Vec::new(),
-            origin: Origin {
-                loaded: None,
-                edited: false,
-            },
+            origin: Origin::default(),
         }
     }
 

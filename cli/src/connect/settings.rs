@@ -4,6 +4,7 @@ use std::path::Path;
 
 use anyhow::{Context, anyhow, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
+use quadrant::store::PROVENANCE_BYTES;
 use quadrant_sim::client::settings::{self, Difference, whole_path};
 use quadrant_sim::client::{Client, ClientError};
 use quadrant_sim::report::whole;
@@ -231,9 +232,6 @@ pub(super) fn store(session: &mut Session, provenance: Option<&str>) -> anyhow::
     ))
 }
 
-/// Most bytes of a stored origin.
-const MOST_ORIGIN: usize = 200;
-
 /// Returns the origin of the settings that act: the file that was loaded, or the origin that was stored before, and whether they were
 /// edited since.
 fn known_origin(session: &mut Session) -> Result<String, ClientError> {
@@ -248,7 +246,7 @@ fn known_origin(session: &mut Session) -> Result<String, ClientError> {
         return Ok(own);
     }
     let edit = if session.origin.edited { &edit } else { "" };
-    let room = MOST_ORIGIN.saturating_sub(edit.len());
+    let room = PROVENANCE_BYTES.saturating_sub(edit.len());
     Ok(format!(
         "{}{edit}",
         &before[..before.floor_char_boundary(room)]

@@ -139,38 +139,38 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .as_ref()
             .map(|cascade| replay_closed_loop(&candidate.model, &recording, &signals, cascade)),
     };
-    let mut chosen = best.clone();
-    let on_other = |candidate: &Candidate| -> anyhow::Result<Option<f64>> {
-        let Some(other) = &other else {
-            return Ok(None);
-        };
-        let one = std::slice::from_ref(candidate);
-        Ok(validate(one, other, &settings)?.first().copied())
-    };
+    let is_best = |candidate: &Candidate| std::ptr::eq(candidate, best);
+    let mut chosen = candidates
+        .iter()
+        .position(is_best)
+        .context("the recommended model is none of the candidates")?;
     // A search that found no end, or nothing better, leaves the best as it is.
     if let Ok(refined) = refined {
         let rms = |candidate: &Candidate| rerun(candidate).open_loop.position_rms_mm;
         if refined.explains_as_well_as(best) && rms(&refined) < rms(best) {
-            chosen = refined.clone();
+            chosen = candidates.len();
         }
         candidates.push(refined);
     }
     let reruns: Vec<Reruns> = candidates.iter().map(rerun).collect();
     bar.finish_and_clear();
     let mut tables = vec![candidates_table(&candidates, &reruns)];
+    let model = &candidates[chosen].model;
+    let mut error = model.relative_error;
     if let (Some(path), Some(other)) = (&arguments.validate, &other) {
         let errors = validate(&candidates, other, &settings)?;
+        error = errors[chosen];
         let errors: Vec<_> = candidates.iter().zip(errors).collect();
         tables.push(validation_table(&errors, &path.display().to_string()));
     }
-    tables.push(motion_table(&chosen.model, arguments.force_per_volt));
+    tables.push(motion_table(model, arguments.force_per_volt));
     for table in &tables {
         output.table(table)?;
     }
     let page = motion_page(
         &title,
         tables,
-        &chosen,
+        &candidates[chosen],
         provenance(&command_line(), output.seed),
     );
     output.page(&page, "motion.html")?;
@@ -179,7 +179,6 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         destination,
         ..
     } = arguments;
-    let error = on_other(&chosen)?.unwrap_or(chosen.model.relative_error);
     let explained = 100.0 * (1.0 - error).max(0.0);
     ensure!(
         error <= LARGEST_ERROR,
@@ -199,8 +198,8 @@ pub(crate) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         &records,
         &["friction", "plant"],
         |settings| {
-            settings.plant = Some(chosen.model.plant());
-            put_friction(settings, chosen.model.friction_settings());
+            settings.plant = Some(model.plant());
+            put_friction(settings, model.friction_settings());
         },
     )?;
     if error > DOUBTFUL_ERROR {

@@ -1,4 +1,4 @@
-//! What the command prints when it is run for the first time.
+//! Output of the command when it is run for the first time.
 
 use crate::command;
 

@@ -78,7 +78,7 @@ impl Person {
         self.reads_until(text);
     }
 
-    /// What is on the screen from here to the text.
+    /// Returns the text on the screen from here to `text`.
     fn reads_until(&mut self, text: &str) -> String {
         let due = Instant::now() + SAID;
         loop {
@@ -113,6 +113,18 @@ impl Person {
         }
         // The command is under way.
         thread::sleep(Duration::from_millis(200));
+    }
+
+    fn finds_the_axes_at_rest(&mut self) {
+        self.types("status\r");
+        self.sees("enabled, at rest");
+        self.sees("quadrant> ");
+    }
+
+    /// Ends the session with Ctrl-D.
+    fn leaves(mut self) {
+        self.types("\x04");
+        assert_eq!(self.gives_back(), Some(0));
     }
 
     /// Waits for the program's end, and checks the modes that it leaves.
@@ -153,12 +165,9 @@ fn an_interrupted_command_ends_and_the_prompt_goes_on() {
         person.sees("quadrant> ");
         // Longer than a look at whether the session has ended.
         thread::sleep(Duration::from_millis(300));
-        person.types("status\r");
-        person.sees("enabled, at rest");
-        person.sees("quadrant> ");
+        person.finds_the_axes_at_rest();
     }
-    person.types("\x04");
-    assert_eq!(person.gives_back(), Some(0));
+    person.leaves();
 }
 
 #[test]
@@ -170,8 +179,7 @@ fn a_terminal_without_an_interrupt_gets_one() {
     person.types("\x03");
     person.sees("interrupted: the axes have stopped");
     person.sees("quadrant> ");
-    person.types("\x04");
-    assert_eq!(person.gives_back(), Some(0));
+    person.leaves();
 }
 
 #[test]
@@ -215,11 +223,8 @@ fn a_motion_that_was_ordered_arrives_while_the_prompt_waits() {
     person.types("stop\r");
     person.sees("quadrant> ");
     thread::sleep(Duration::from_millis(500));
-    person.types("status\r");
-    person.sees("enabled, at rest");
-    person.sees("quadrant> ");
-    person.types("\x04");
-    assert_eq!(person.gives_back(), Some(0));
+    person.finds_the_axes_at_rest();
+    person.leaves();
 }
 
 #[test]
@@ -229,6 +234,5 @@ fn a_tab_completes_what_all_that_is_possible_begins_with() {
     person.sees("pid/kp_v_per_mm");
     let answer = person.reads_until("quadrant> ");
     assert!(!answer.contains("error"), "{answer}");
-    person.types("\x04");
-    assert_eq!(person.gives_back(), Some(0));
+    person.leaves();
 }

@@ -346,7 +346,7 @@ pub fn load_undoably(
     exchange(client, settings, before)
 }
 
-/// Makes the draft what is wanted, looks at it, and lets it act.
+/// Writes the requested settings into the draft, calls `look`, and applies the draft.
 fn exchange<T>(
     client: &mut Client,
     settings: &StageSettings,

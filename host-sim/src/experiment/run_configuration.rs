@@ -53,7 +53,7 @@ impl ModelKnowledge {
         }
     }
 
-    /// What the law knows, in words that need no definition.
+    /// Knowledge of the law, in words that need no definition.
     pub const fn friction(self) -> &'static str {
         match self {
             Self::Exact => "friction known exactly",

@@ -97,7 +97,7 @@ const NO_REFERENCE: &str = "the stage has no machine coordinates; the axes stay 
 const NO_CYCLES: &str =
     "it concerns canned cycles and the feed a revolution, and neither is supported";
 
-/// What a code asks for that is not supported, in the plural; nothing of codes that are unknown.
+/// Name of the unsupported feature that a code asks for, in the plural; nothing for codes that are unknown.
 fn beyond_a_test(letter: char, code: u32) -> Option<&'static str> {
     Some(match (letter, code) {
         ('G', 50..=53) => "splines (G5)",

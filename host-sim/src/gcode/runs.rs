@@ -24,7 +24,7 @@ pub(super) struct Run {
 /// moves of one speed are one stretch.
 const SPEED_RATIO: f64 = 1.05;
 
-/// What bounds the speed on a path.
+/// Bounds of the speed on a path.
 struct Bounds<'m> {
     moves: &'m [Move],
     /// Largest speed on each move, mm/s, and its pace.

@@ -168,7 +168,7 @@ pub(super) struct Translated {
     pub(super) text: Vec<u8>,
     /// Lines that it has before those of the file: a header, where the file has none.
     pub(super) added_lines: u64,
-    /// What was guessed and assumed.
+    /// Guesses and assumptions, for the user.
     pub(super) notes: Vec<String>,
     /// True if positions are in no unit of length, or voltages in none of voltage.
     pub(super) other_length: bool,
@@ -486,7 +486,7 @@ impl Translation {
 }
 
 impl Form {
-    /// What was guessed of it, if it is not ours.
+    /// Names the guesses, if the form is not ours.
     fn note(&self) -> Option<String> {
         let mut parts = Vec::new();
         match self.delimiter {

@@ -33,7 +33,7 @@ pub struct Candidate {
 }
 
 impl Candidate {
-    /// True if it leaves no more of its record's voltage unexplained than another does, but for what tells nothing.
+    /// True if it leaves no more of its record's voltage unexplained than another does, within what distinguishes models.
     pub fn explains_as_well_as(&self, other: &Self) -> bool {
         self.fitted.all <= as_good_as(other.fitted.all)
             && self.fitted.sliding <= as_good_as(other.fitted.sliding)
@@ -45,8 +45,8 @@ fn as_good_as(error: f64) -> f64 {
     (AS_GOOD * error).max(error + AS_GOOD_SHARE)
 }
 
-/// Relative errors of a model. About a reversal one without pre-sliding is wrong for the time that the axis sticks, which tells little
-/// of mass and friction.
+/// Relative errors of a model. About a reversal one without pre-sliding is wrong for the time that the axis sticks, which says little
+/// about mass and friction.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Errors {
     /// On all rows.
@@ -86,15 +86,15 @@ const PARTS: usize = 8;
 const LEAST_REVERSALS: usize = 3;
 /// Errors, over the smallest, up to which a model is as good as the best: the simplest of them is recommended.
 const AS_GOOD: f64 = 1.02;
-/// The same as a share of the voltage that is left unexplained beyond the smallest: less tells nothing of a model.
+/// The same as a share of the voltage that is left unexplained beyond the smallest: less does not distinguish models.
 const AS_GOOD_SHARE: f64 = 1.5e-3;
 /// Errors on all rows, over the smallest, from which on a model is contradicted by reversals.
 const CONTRADICTED: f64 = 3.0;
 /// Validation errors, over the smallest, up to which a model's parameters count as another opinion.
 const ANOTHER_OPINION: f64 = 2.0;
 
-/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done. What a record does not tell, or
-/// tells as a mass or a friction below zero, is no candidate.
+/// Fits every structure of [`Structure::ALL`] to a record; `progress` is told the share that is done. A structure whose
+/// parameters the record does not determine, or whose mass or friction is below zero, is no candidate.
 ///
 /// A parameter's standard error covers the record's noise, what the value becomes with parts of the trajectory withheld, and
 /// how far it lies from that of the other models which predict withheld parts at most twice as badly as the best.
