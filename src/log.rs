@@ -7,6 +7,7 @@ use core::sync::atomic::{AtomicU32, Ordering};
 
 use quadrant::app::friction_monitor::FrictionChange;
 use quadrant::app::glitch_monitor::GlitchEvent;
+use quadrant::app::oscillation_report::Oscillated;
 use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
 use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
@@ -15,6 +16,7 @@ use quadrant::command::Command;
 use quadrant::hal::ResetCause;
 use quadrant::motion::MotionMode;
 use quadrant::safety::Fault;
+use quadrant::safety::oscillation::OscillationKind;
 use quadrant::scalar::{Quantity, Scalar};
 use quadrant::settings::StageSettings;
 
@@ -197,7 +199,7 @@ const fn topic(event: Event) -> Topic {
         Event::MotionStarted | Event::MotionFinished | Event::MovedWhileOff(_) => Topic::Motion,
         Event::Refused(..) => Topic::Refusals,
         Event::Faulted(_) | Event::Stopping(_) | Event::Held(_) => Topic::Faults,
-        Event::FrictionChanged(_) => Topic::Friction,
+        Event::FrictionChanged(_) | Event::Oscillated(_) => Topic::Friction,
     }
 }
 
@@ -211,6 +213,7 @@ fn print_event(event: Event) {
             defmt::warn!("{=str} moves though the outputs are off", axis.as_str());
         }
         Event::FrictionChanged(change) => print_friction(change),
+        Event::Oscillated(found) => print_oscillation(found),
         Event::Refused(_, refusal) => match refusal.axis() {
             Some(axis) => {
                 defmt::warn!(
@@ -267,6 +270,31 @@ fn print_friction(change: FrictionChange) {
             axis,
             times
         );
+    }
+}
+
+fn print_oscillation(found: Oscillated) {
+    let (axis, um) = (found.axis.as_str(), found.micrometres);
+    let hertz = f32::from(found.decihertz) / 10.0;
+    match found.kind {
+        OscillationKind::Hum => defmt::warn!(
+            "{=str} hums at rest, {=u16} um at {=f32} Hz: lower the gains, or look for what shakes it",
+            axis,
+            um,
+            hertz
+        ),
+        OscillationKind::Added => defmt::warn!(
+            "the feedforward of {=str} made it swing, {=u16} um at {=f32} Hz, and is taken away for a while: check its kind and gains",
+            axis,
+            um,
+            hertz
+        ),
+        OscillationKind::AddedForGood => defmt::warn!(
+            "the feedforward of {=str} made it swing, {=u16} um at {=f32} Hz, and is off until the outputs are off: check its kind and gains",
+            axis,
+            um,
+            hertz
+        ),
     }
 }
 

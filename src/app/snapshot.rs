@@ -8,6 +8,7 @@ use crate::law::injection::InjectionProgress;
 use crate::law::learning::LearningReading;
 use crate::law::safety::Switches;
 use crate::law::safety::monitor::FollowingState;
+use crate::law::safety::oscillation::OscillationReading;
 use crate::law::scalar::Scalar;
 use crate::law::stage::{StageRef, StageState};
 use crate::law::telemetry::LimitedBy;
@@ -32,6 +33,8 @@ pub struct AxisSnapshot<S> {
     pub following: FollowingState<S>,
     /// The result of learning.
     pub learning: LearningReading<S>,
+    /// The oscillation that was found last.
+    pub oscillation: OscillationReading,
 }
 
 /// The machine at one tick.
@@ -82,6 +85,7 @@ impl<S: Scalar> Snapshot<S> {
                 limited_by: telemetry.limited_by,
                 following: axis.following(),
                 learning: axis.learning().reading(),
+                oscillation: axis.oscillation(),
             };
         }
         self.tick = state.tick();

@@ -3,6 +3,7 @@
 use super::Snapshot;
 use super::friction_monitor::FrictionMonitor;
 use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
+use super::oscillation_report::OscillationReport;
 use crate::app::supervisor::{Decision, Event, Supervisor};
 use crate::law::command::Command;
 use crate::law::scalar::Scalar;
@@ -20,8 +21,8 @@ pub struct Supervised {
     pub status_due: bool,
 }
 
-/// Most events of one run: those of a [`Decision`], and a change of friction of each axis.
-const MAX_EVENTS: usize = 8;
+/// Most events of one run: those of a [`Decision`], and a change of friction and an oscillation of each axis.
+const MAX_EVENTS: usize = 11;
 
 /// The supervising task's state.
 #[derive(Clone, Debug)]
@@ -29,6 +30,7 @@ pub struct Supervision {
     supervisor: Supervisor,
     glitches: GlitchMonitor,
     friction: FrictionMonitor,
+    oscillations: OscillationReport,
     runs: u32,
 }
 
@@ -38,10 +40,12 @@ const STATUS_RUNS: u32 = 1_000;
 impl Supervision {
     /// Returns the task before its first run. `resolution_mm` are the lengths of the encoders' counts.
     pub fn new(resolution_mm: [f64; 3]) -> Self {
+        let resolution_mm = resolution_mm.map(|length| length as f32);
         Self {
             supervisor: Supervisor::default(),
-            glitches: GlitchMonitor::new(resolution_mm.map(|length| length as f32)),
+            glitches: GlitchMonitor::new(resolution_mm),
             friction: FrictionMonitor::default(),
+            oscillations: OscillationReport::new(resolution_mm),
             runs: 0,
         }
     }
@@ -58,9 +62,18 @@ impl Supervision {
             .friction
             .step(snapshot)
             .map(|change| change.map(Event::FrictionChanged));
+        let oscillations = self
+            .oscillations
+            .step(snapshot)
+            .map(|found| found.map(Event::Oscillated));
         Supervised {
             command,
-            events: events.into_iter().chain(changes).flatten().collect(),
+            events: events
+                .into_iter()
+                .chain(changes)
+                .chain(oscillations)
+                .flatten()
+                .collect(),
             glitches: self.glitches.step(snapshot),
             status_due: self.runs.is_multiple_of(STATUS_RUNS),
         }

@@ -4,6 +4,7 @@
 //! run of the same job decide alike.
 
 use super::friction_monitor::FrictionChange;
+use super::oscillation_report::Oscillated;
 use crate::law::axes::AxisName;
 use crate::law::command::Command;
 use crate::law::safety::{Fault, SafetyState, Station};
@@ -34,6 +35,8 @@ pub enum Event {
     MovedWhileOff(AxisName),
     /// The friction of an axis has settled away from what was commissioned.
     FrictionChanged(FrictionChange),
+    /// An axis oscillates, or did so until what is added to it was taken away.
+    Oscillated(Oscillated),
     /// A request was refused.
     Refused(Command, Refusal),
 }

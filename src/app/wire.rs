@@ -8,6 +8,7 @@ use crate::law::learning::LearningStatus;
 use crate::law::motion::MotionMode;
 use crate::law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use crate::law::safety::SafetyState;
+use crate::law::safety::oscillation::OscillationKind;
 use crate::law::telemetry::LimitedBy;
 use crate::settings::{self, PlanSettings};
 
@@ -71,6 +72,16 @@ impl From<SafetyState> for wire::MachineState {
     }
 }
 
+impl From<OscillationKind> for wire::OscillationKind {
+    fn from(kind: OscillationKind) -> Self {
+        match kind {
+            OscillationKind::Hum => Self::Hum,
+            OscillationKind::Added => Self::Added,
+            OscillationKind::AddedForGood => Self::AddedForGood,
+        }
+    }
+}
+
 impl From<MotionMode> for wire::AxisMode {
     fn from(mode: MotionMode) -> Self {
         match mode {
@@ -110,6 +121,12 @@ impl From<supervisor::Event> for wire::Event {
                 axis: change.axis.into(),
                 percent: change.percent,
                 needs_maintenance: change.needs_maintenance,
+            },
+            Event::Oscillated(found) => Self::Oscillated {
+                axis: found.axis.into(),
+                kind: found.kind.into(),
+                decihertz: found.decihertz,
+                micrometres: found.micrometres,
             },
             Event::Refused(_, reason) => Self::Refused(text(format_args!("{reason}"))),
         }

@@ -17,6 +17,7 @@ use crate::law::motion::ReferenceGenerator;
 use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
 use crate::law::rounding;
 use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
+use crate::law::safety::oscillation::Oscillation;
 use crate::law::safety::overload::Overload;
 use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
 use crate::law::safety::travel::Travel;
@@ -25,15 +26,32 @@ use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
 use crate::law::units::{DacCode, Position};
 
-/// Counts that an axis shows for certain: those of one dead line, and noise.
-const HELD_COUNTS: f64 = 5.0;
 /// Counts that a step of an axis may have however slow: noise of a count RMS makes up to six in the difference of two readings.
 const LEAST_STEP_COUNTS: i32 = 8;
-/// Stiffness before sliding, and breakaway, over those of the settings, at most.
-const HELD_ERROR: f64 = 1.25;
+/// Counts that an axis shows for certain: those of one dead line, and noise; and what friction takes up before it yields by
+/// them, over what the settings say, at most.
+const HELD_COUNTS: f64 = 5.0;
+const HELD_ERROR: f64 = 2.0;
+/// Breakaway over that of the settings that need not show as motion in open loop, and below which silence is none.
 const FRICTION_ERROR: f64 = 1.5;
-/// Least voltage that must show as motion, as a share of the output limit.
-const HELD_SHARE: f64 = 0.01;
+const SILENT_FRICTIONS: f64 = 2.0;
+/// What it takes up over breakaway at least, however stiff the settings say it is.
+const HELD_FRICTIONS: f64 = 0.65;
+/// What friction takes up, over breakaway: of an axis that stands after it slid; that slides; that is turned around, twice 1.4 of
+/// it and some more.
+const STUCK_FRICTIONS: f64 = 0.75;
+const SLIDING_FRICTIONS: f64 = 1.0;
+const TURNED_FRICTIONS: f64 = 3.0;
+/// Voltage with which the law answers a displacement, over its proportional gain: the integral's answer comes to it.
+const ANSWER_ERROR: f64 = 3.0;
+/// Motion that turns an axis around, or shows that it is alive, mm, and in counts at least: noise of some counts stays below.
+const TURN_MM: f64 = 0.032;
+const TURN_COUNTS: f64 = 16.0;
+const ALIVE_COUNTS: f64 = 64.0;
+/// Distance of the model ahead of an axis that does not follow, mm.
+const AHEAD_MM: f64 = 0.2;
+/// Breakaway of the settings that is a load that there may be, however small the output limit is, at first and later.
+const FIRST_LOAD_FRICTIONS: f64 = 3.0;
 /// Largest load, as a share of the output limit; and before the axis has moved so far after enabling, mm.
 const LOAD_SHARE: f64 = 0.3;
 const FIRST_LOAD_SHARE: f64 = 0.1;
@@ -44,6 +62,8 @@ const MODEL_COUNTS: f64 = 20.0;
 /// The addition to that distance for the error of the dead time, over gain times largest output times its square: a fifth of the
 /// way that this output brings within it.
 const DELAY_ERROR: f64 = 0.1;
+/// The addition for friction that breaks away or is turned around: the way that its level brings within this time, s.
+const FRICTION_S: f64 = 3.5e-3;
 /// Speed that no load explains, mm/s, and in counts per tick.
 const MODEL_VELOCITY_MM_S: f64 = 80.0;
 const MODEL_STEP_COUNTS: f64 = 8.0;
@@ -196,11 +216,18 @@ impl AxisSettings {
             ))
             .overspeed(Overspeed::new(limits.overspeed_ratio * 0.5 * largest_step))
             .signal_loss(SignalLoss::new(
-                limits.silent_share * amplifier.output_limit_v,
+                // Below it, friction and a load may hold an axis.
+                (limits.silent_share * amplifier.output_limit_v)
+                    .max(SILENT_FRICTIONS * self.largest_breakaway_v()),
                 rounding::round(limits.silent_s / period_s) as u32,
             ))
             .plausibility(self.build_plausibility(period_s))
             .overload(amplifier.build_overload(period_s))
+            .oscillation(Oscillation::new(
+                feedforward.kind != FeedforwardKind::None,
+                limits.following_error_mm / encoder.resolution_mm,
+                period_s,
+            ))
             .learning(self.build_learning(period_s))
             .cancelling(cancelling.as_ref().map(|(settings, of)| (settings, of)))
             .index_spacing(IndexSpacing::new(
@@ -239,14 +266,16 @@ impl AxisSettings {
             let breakaway_v = OPEN_SHARE * limit_v;
             return Plausibility::without_model(OPEN_BUDGET_V_S, breakaway_v, words, period_s);
         };
-        // Where the level rises with the speed, a vibration may have hidden some of it at rest.
-        let PerDirection { positive, negative } = &self.friction.sliding;
-        let level_v = |curve: &StribeckCurve| curve.breakaway_v.max(curve.coulomb_v);
-        let breakaway_v = level_v(&positive.curve).max(level_v(&negative.curve));
+        let breakaway_v = self.largest_breakaway_v();
         // Turned around, an axis goes twice as far along the branch of its virgin curve for twice the force (Masing).
         let seen_mm = HELD_COUNTS * resolution_mm;
         let held_v = 2.0 * self.friction.gms.virgin_curve_v(0.5 * seen_mm, breakaway_v);
+        let least_load_v = FIRST_LOAD_FRICTIONS * breakaway_v;
         let delay_s = plant.delay_s;
+        let gain = plant.gain_mm_per_v_s2;
+        let delayed_mm = DELAY_ERROR * gain * limit_v * delay_s * delay_s;
+        let breaking_mm = 0.5 * gain * breakaway_v * FRICTION_S * FRICTION_S;
+        let least_mm = MODEL_COUNTS * resolution_mm;
         let model = PlausibilityModel {
             gain_mm_per_v_s2: plant.gain_mm_per_v_s2,
             damping_per_s: plant.damping_per_s,
@@ -254,17 +283,38 @@ impl AxisSettings {
             limit_v,
             // Beyond it, a step of the encoder is a jump.
             largest_mm_s: 2.0 * self.limits.max_velocity_mm_s,
-            held_v: (HELD_ERROR * held_v).max(HELD_SHARE * limit_v),
-            breakaway_v: (FRICTION_ERROR * breakaway_v).max(HELD_SHARE * limit_v),
-            load_v: LOAD_SHARE * limit_v,
-            first_load_v: FIRST_LOAD_SHARE * limit_v,
+            held_v: (HELD_ERROR * held_v).max(HELD_FRICTIONS * breakaway_v),
+            stuck_v: STUCK_FRICTIONS * breakaway_v,
+            sliding_v: SLIDING_FRICTIONS * breakaway_v,
+            turned_v: TURNED_FRICTIONS * breakaway_v,
+            answer_v_per_mm: ANSWER_ERROR * self.largest_gain(|gains| gains.kp_v_per_mm),
+            answer_v_s_per_mm: self.largest_gain(|gains| gains.kd_v_s_per_mm),
+            turn_mm: TURN_MM.max(TURN_COUNTS * resolution_mm),
+            alive_mm: TURN_MM.max(ALIVE_COUNTS * resolution_mm),
+            ahead_mm: (AHEAD_MM + delayed_mm).max(least_mm),
+            breakaway_v: FRICTION_ERROR * breakaway_v,
+            load_v: (LOAD_SHARE * limit_v).max(FIRST_LOAD_SHARE * limit_v + least_load_v),
+            first_load_v: (FIRST_LOAD_SHARE * limit_v).max(least_load_v),
             proving_mm: PROVING_MM,
-            distance_mm: (MODEL_DISTANCE_MM
-                + DELAY_ERROR * plant.gain_mm_per_v_s2 * limit_v * delay_s * delay_s)
-                .max(MODEL_COUNTS * resolution_mm),
+            distance_mm: (MODEL_DISTANCE_MM + delayed_mm.max(breaking_mm)).max(least_mm),
             velocity_mm_s: MODEL_VELOCITY_MM_S.max(MODEL_STEP_COUNTS * resolution_mm / period_s),
         };
         Plausibility::new(&model, words, resolution_mm, period_s)
+    }
+
+    /// The larger breakaway of both senses, V. Where the level rises with the speed, a vibration may have hidden some of it at
+    /// rest.
+    fn largest_breakaway_v(&self) -> f64 {
+        let PerDirection { positive, negative } = &self.friction.sliding;
+        let level_v = |curve: &StribeckCurve| curve.breakaway_v.max(curve.coulomb_v);
+        level_v(&positive.curve).max(level_v(&negative.curve))
+    }
+
+    /// The largest gain of a kind that the law may have, the nonlinear one at its largest.
+    fn largest_gain(&self, gain: impl Fn(&PidGains) -> f64) -> f64 {
+        let gains = self.feedback.linear_gains();
+        let linear = gains.iter().map(gain).fold(0.0, f64::max);
+        linear * self.feedback.nonlinear.map_or(1.0, |gain| gain.largest())
     }
 
     #[inline(never)]

@@ -227,6 +227,15 @@ fn notices() -> Vec<(Notice, &'static str)> {
             "0001ac020e01a00101",
         ),
         (
+            event(Event::Oscillated {
+                axis: Y,
+                kind: OscillationKind::Added,
+                decihertz: 2590,
+                micrometres: 3,
+            }),
+            "0001ac020f01019e1403",
+        ),
+        (
             Notice::Telemetry(TelemetryBlock {
                 generation: 2,
                 sequence: 128,

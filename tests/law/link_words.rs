@@ -3,8 +3,8 @@
 use quadrant::link::frame::{DecodeError, EncodeError};
 use quadrant::link::message::{
     AxisName, AxisSet, AxisSignal, BLOCK_WORDS, Body, CaptureRequest, Channel, Event,
-    InjectRequest, LearningState, MachineState, Plan, Reply, SettingsRequest, StageSignal, Status,
-    StreamRequest, TelemetryBlock, TelemetryRequest, Voltages, Words, text,
+    InjectRequest, LearningState, MachineState, OscillationKind, Plan, Reply, SettingsRequest,
+    StageSignal, Status, StreamRequest, TelemetryBlock, TelemetryRequest, Voltages, Words, text,
 };
 use quadrant_fault_bench::tasks::Tasks;
 
@@ -189,8 +189,26 @@ fn events_and_states_of_learning_are_told_in_words() {
         percent,
         needs_maintenance,
     };
+    let oscillated = |kind, decihertz| Event::Oscillated {
+        axis: AxisName::X,
+        kind,
+        decihertz,
+        micrometres: 344,
+    };
     for (event, said) in [
         (Event::Enabled, "outputs on"),
+        (
+            oscillated(OscillationKind::Hum, 2590),
+            "x hums at rest, 344 um at 259.0 Hz: lower the gains, or look for what shakes it",
+        ),
+        (
+            oscillated(OscillationKind::Added, 16),
+            "the feedforward of x made it swing, 344 um at 1.6 Hz, and is taken away for a while: check feedforward.kind and its gains",
+        ),
+        (
+            oscillated(OscillationKind::AddedForGood, 16),
+            "the feedforward of x made it swing, 344 um at 1.6 Hz, and is off until the outputs are off: check feedforward.kind and its gains",
+        ),
         (
             Event::Fault {
                 code: 7,

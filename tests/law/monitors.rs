@@ -10,7 +10,7 @@ use quadrant::safety::monitor::{Following, FollowingState, SignalLoss, SignalLos
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::{Inputs, Stage, StageState};
 
-use crate::common::{Rig, with_x};
+use crate::common::{Noise, Rig, with_x};
 
 /// Ticks until an encoder whose counts move like this is found silent, at an output of 2 V; at most 1000.
 fn silent(steps: impl Fn(u32) -> i32) -> Option<u32> {
@@ -20,7 +20,7 @@ fn silent(steps: impl Fn(u32) -> i32) -> Option<u32> {
 }
 
 #[test]
-fn an_encoder_that_dithers_by_two_counts_is_silent_and_three_counts_are_motion() {
+fn counts_that_come_and_go_are_silence_and_64_one_way_are_motion() {
     // Back and forth, from where it stood and to either side.
     let dither = |counts: i32| {
         move |tick: u32| {
@@ -31,15 +31,25 @@ fn an_encoder_that_dithers_by_two_counts_is_silent_and_three_counts_are_motion()
             }
         }
     };
-    for counts in [0, 1, -1, 2, -2] {
+    for counts in [0, 1, -1, 2, -2, 5, -20, 63, -63] {
         assert_eq!(silent(dither(counts)), Some(100), "{counts}");
     }
-    for counts in [3, -3] {
+    for counts in [64, -64] {
         assert_eq!(silent(dither(counts)), None, "{counts}");
     }
-    // As slow as it may be: three counts within the time.
-    assert_eq!(silent(|tick| i32::from(tick.is_multiple_of(33))), None);
-    assert!(silent(|tick| i32::from(tick.is_multiple_of(51))).is_some());
+    // As slow as it may be: 66 counts within the time, and 50.
+    assert_eq!(silent(|tick| i32::from(!tick.is_multiple_of(3))), None);
+    assert_eq!(silent(|tick| -i32::from(!tick.is_multiple_of(3))), None);
+    assert!(silent(|tick| i32::from(tick.is_multiple_of(2))).is_some());
+}
+
+#[test]
+fn counts_that_go_astray_are_silence() {
+    for seed in 1..=20 {
+        let noise = std::cell::RefCell::new(Noise::new(seed));
+        let astray = |_| noise.borrow_mut().counts(1) as i32;
+        assert!(silent(astray).is_some(), "{seed}");
+    }
 }
 
 #[test]

@@ -10,6 +10,7 @@ use quadrant::safety::plausibility::{
     Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
 };
 use quadrant::settings::StageSettings;
+use quadrant_fault_bench::noise::Noise;
 use quadrant_fault_bench::plant::{MODEL, Plant, Truth};
 
 use crate::common::Rig;
@@ -41,6 +42,9 @@ const AMPLIFIERS: [Words; 3] = [
     },
 ];
 
+/// More than any output.
+const NEVER_V: f64 = 1e6;
+
 fn model() -> PlausibilityModel {
     PlausibilityModel {
         gain_mm_per_v_s2: 2000.0,
@@ -49,6 +53,15 @@ fn model() -> PlausibilityModel {
         limit_v: 10.0,
         largest_mm_s: 300.0,
         held_v: 0.6,
+        // Of no concern, but to those that set them.
+        stuck_v: NEVER_V,
+        sliding_v: NEVER_V,
+        turned_v: NEVER_V,
+        answer_v_per_mm: 0.0,
+        answer_v_s_per_mm: 0.0,
+        turn_mm: 0.032,
+        alive_mm: 0.032,
+        ahead_mm: 0.2,
         breakaway_v: 0.8,
         load_v: 3.0,
         first_load_v: 1.0,
@@ -80,6 +93,7 @@ fn time_until_found(
             count: (position_mm / COUNT_MM).round() as i32,
             speed: (velocity_mm_s * SPEED).round() as i32,
             words: sum,
+            reference: 0,
             open,
         };
         if !plausibility.step(&mut state, shown) {
@@ -298,6 +312,7 @@ fn gain_found_s(axis: &Plausibility, count: i32, moved_to: Option<i32>, first: i
         count,
         speed: (speed_mm_s * SPEED).round() as i32,
         words: 0,
+        reference: 0,
         open: false,
     };
     let mut state = axis.start(shown(count, 0.0));
@@ -368,6 +383,7 @@ fn a_loop_that_is_opened_begins_its_standstill_anew() {
             count: 0,
             speed: 0,
             words: 0,
+            reference: 0,
             open: false,
         };
         let mut step = |state: &mut PlausibilityState| {
@@ -396,6 +412,7 @@ fn a_spent_budget_says_nothing_of_a_closed_loop() {
         count: 0,
         speed: 0,
         words: 0,
+        reference: 0,
         open: true,
     };
     let word = 3 * AMPLIFIERS[0].per_volt as i32 * INTERVAL as i32;
@@ -410,4 +427,183 @@ fn a_spent_budget_says_nothing_of_a_closed_loop() {
     shown.open = false;
     shown.words += word;
     assert!(axis.step(&mut state, shown));
+}
+
+/// A jog, in which the axis follows for 0.3 s under the voltage at which it slides, and then shows what `motion` gives, mm since,
+/// while the voltage grows by so many V/s. Gives the time from then until it is found, s, at most 2.
+fn found_in_jog(
+    model: &PlausibilityModel,
+    jog_mm_s: f64,
+    growth_v_per_s: f64,
+    mut motion: impl FnMut(f64) -> f64,
+) -> Option<f64> {
+    let axis = Plausibility::new(model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+    let mut state = PlausibilityState::default();
+    let (mut sum, mut speed) = (0_i32, 0.0);
+    let mut before_mm = 0.0;
+    for tick in 1..23_000_u32 {
+        let since_s = f64::from(tick) * PERIOD_S - SLIDES_S;
+        let volts = SLIDES_V * jog_mm_s.signum() + growth_v_per_s * since_s.max(0.0);
+        sum = sum.wrapping_add((volts * AMPLIFIERS[0].per_volt).round() as i32);
+        let position_mm = if since_s < 0.0 {
+            jog_mm_s * (SLIDES_S + since_s)
+        } else {
+            jog_mm_s * SLIDES_S + motion(since_s)
+        };
+        let count = (position_mm / COUNT_MM).round();
+        speed += (256.0 * (count - before_mm) - speed) / 8.0;
+        before_mm = count;
+        let shown = Shown {
+            count: count as i32,
+            speed: speed as i32,
+            words: sum,
+            reference: (jog_mm_s * (SLIDES_S + since_s) / COUNT_MM * 256.0).round() as i32,
+            open: false,
+        };
+        if tick.is_multiple_of(INTERVAL) && !axis.step(&mut state, shown) {
+            return Some(since_s);
+        }
+    }
+    None
+}
+
+/// Voltage at which the axis of these jogs slides, V, and how long it does, s.
+const SLIDES_V: f64 = 0.2;
+const SLIDES_S: f64 = 0.3;
+
+fn following_model() -> PlausibilityModel {
+    PlausibilityModel {
+        held_v: NEVER_V,
+        load_v: NEVER_V,
+        first_load_v: NEVER_V,
+        sliding_v: 0.1,
+        turned_v: 0.5,
+        ..model()
+    }
+}
+
+/// The time in which a model that nothing holds but `taken_v` has gone the distance under a growing voltage, s.
+fn expected_in_jog(model: &PlausibilityModel, growth_v_per_s: f64, taken_v: f64) -> Option<f64> {
+    let (mut force, mut velocity, mut ahead) = (0.0, 0.0, 0.0);
+    expected(|time_s| {
+        force += (growth_v_per_s * time_s - force) * INTERVAL_S / (model.delay_s + FILTER_S);
+        let excess: f64 = force - taken_v;
+        ahead -= ahead * INTERVAL_S / FORGET_S;
+        if excess > 0.0 {
+            velocity +=
+                (model.gain_mm_per_v_s2 * excess - model.damping_per_s * velocity) * INTERVAL_S;
+            ahead += velocity * INTERVAL_S;
+        }
+        ahead > model.ahead_mm
+    })
+}
+
+#[test]
+fn counts_that_flicker_or_go_astray_do_not_hide_that_the_axis_does_not_follow() {
+    let model = following_model();
+    for (jog_mm_s, growth_v_per_s) in [(1.0, 2.0), (1.0, 0.5), (-1.0, -2.0), (10.0, 2.0)] {
+        let growth = f64::abs(growth_v_per_s);
+        let stands_s = expected_in_jog(&model, growth, model.sliding_v);
+        let found = found_in_jog(&model, jog_mm_s, growth_v_per_s, |_| 0.0);
+        near(&format!("{jog_mm_s} mm/s, stands"), found, stands_s);
+        let stands_s = stands_s.expect("found");
+        for counts in [1, 2, 5, 20] {
+            let mut noise = Noise::new(7);
+            let flicker = |_| noise.counts(counts) as f64 * COUNT_MM;
+            let found = found_in_jog(&model, jog_mm_s, growth_v_per_s, flicker).expect("found");
+            assert!(
+                found < 1.3 * stands_s + 0.02,
+                "flicker of {counts}: {found} s, {stands_s} s"
+            );
+        }
+        let (mut noise, mut astray, mut ticks) = (Noise::new(7), 0, 0);
+        let walk = |_| {
+            ticks += 1;
+            astray += if ticks % 10 == 0 { noise.counts(1) } else { 0 };
+            astray as f64 * COUNT_MM
+        };
+        let found = found_in_jog(&model, jog_mm_s, growth_v_per_s, walk).expect("found");
+        assert!(
+            found < 1.5 * stands_s + 0.05,
+            "astray: {found} s, {stands_s} s"
+        );
+    }
+}
+
+#[test]
+fn an_axis_that_follows_by_more_than_half_or_moves_some_way_is_alive_whatever_its_load() {
+    let model = following_model();
+    for share in [0.6, 1.0, 1.5] {
+        assert_eq!(
+            found_in_jog(&model, 1.0, 2.0, |time_s| share * time_s),
+            None,
+            "{share}"
+        );
+    }
+    // A quarter as fast as the reference, but 64 counts every 32 ms.
+    assert_eq!(found_in_jog(&model, 4.0, 2.0, |time_s| 1.0 * time_s), None);
+    assert!(found_in_jog(&model, 4.0, 2.0, |time_s| 0.2 * time_s).is_some());
+}
+
+/// Friction of an axis that was turned around takes up twice what it takes of one that slides.
+#[test]
+fn an_axis_that_is_turned_around_may_take_up_more_before_it_follows() {
+    let model = following_model();
+    let found = found_in_jog(&model, 1.0, -2.0, |time_s| -time_s.min(0.0));
+    // Its reference goes on, so nothing is owed the other way.
+    assert_eq!(found, None);
+    // Pushed back by 0.1 mm before it stands.
+    let pushed = |time_s: f64| -0.1 * (time_s / 0.05).min(1.0);
+    let found = found_in_jog(&model, 1.0, 2.0, pushed);
+    near(
+        "turned",
+        found,
+        expected_in_jog(&model, 2.0, model.turned_v),
+    );
+}
+
+#[test]
+fn a_load_that_was_seen_to_push_the_axis_back_is_answered_by_as_much() {
+    let pushed_mm = 0.02;
+    let model = PlausibilityModel {
+        answer_v_per_mm: 10.0,
+        ..following_model()
+    };
+    let pushed = |time_s: f64| -pushed_mm * (time_s / 0.02).min(1.0);
+    let taken_v = model.sliding_v + model.answer_v_per_mm * pushed_mm;
+    near(
+        "pushed",
+        found_in_jog(&model, 1.0, 2.0, pushed),
+        expected_in_jog(&model, 2.0, taken_v),
+    );
+    let model = PlausibilityModel {
+        answer_v_s_per_mm: 0.05,
+        ..following_model()
+    };
+    // Thrown at 5 mm/s, a count a tick, against a reference of 1 mm/s.
+    let thrown = |time_s: f64| -5.0 * time_s.min(0.005);
+    let taken_v = model.sliding_v + 0.05 * 6.0;
+    near(
+        "thrown",
+        found_in_jog(&model, 1.0, 2.0, thrown),
+        expected_in_jog(&model, 2.0, taken_v),
+    );
+}
+
+#[test]
+fn an_axis_that_slid_and_stands_takes_up_little_more_in_that_sense() {
+    let model = PlausibilityModel {
+        stuck_v: 0.1,
+        held_v: 0.6,
+        ..model()
+    };
+    let stands = |_| 0.0;
+    let forth = found_in_jog(&model, 1.0, 2.0, stands).expect("found");
+    let back = found_in_jog(&model, 1.0, -2.0, stands).expect("found");
+    assert!(forth < back - 0.15, "{forth} {back}");
+    near(
+        "the other way",
+        found_in_jog(&model, -1.0, -2.0, stands),
+        Some(forth),
+    );
 }

@@ -38,11 +38,12 @@ fn numbers_and_names_are_stable() {
             "encoder-implausible",
             "stop-overrun",
             "overload",
+            "oscillation",
         ]
     );
     for code in FaultCode::ALL {
         assert_eq!(FaultCode::from_number(code.number()), Some(code));
     }
     assert_eq!(FaultCode::from_number(0), None);
-    assert_eq!(FaultCode::from_number(31), None);
+    assert_eq!(FaultCode::from_number(32), None);
 }

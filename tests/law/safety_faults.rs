@@ -357,7 +357,7 @@ fn every_fault_is_found_in_its_tick_with_the_outputs_of_its_reaction() {
 }
 
 /// Those of other tests, and then those that the tick cannot find by itself.
-pub(crate) const OF_OTHERS: [FaultCode; 10] = [
+pub(crate) const OF_OTHERS: [FaultCode; 11] = [
     // Of a stream: see the tests of streaming.
     FaultCode::StreamUnderrun,
     // Of an injected voltage: see its tests.
@@ -369,6 +369,8 @@ pub(crate) const OF_OTHERS: [FaultCode; 10] = [
     FaultCode::StopOverrun,
     // Of a motor that gets hot: see `overload`.
     FaultCode::Overload,
+    // Of a loop that swings: see `oscillation`.
+    FaultCode::Oscillation,
     FaultCode::WatchdogReset,
     FaultCode::Panic,
     FaultCode::HardFault,

@@ -2,6 +2,7 @@
 //!
 //! - [`tasks`]: control interrupt, supervising task and server, each interrupted by those above it;
 //! - [`plant`]: an x axis that moves as its output makes it, and an encoder that dies;
+//! - [`lone`]: one axis of the law on that plant, without a stage;
 //! - [`flash`]: two sectors that lose their power in the middle of things, and wear;
 //! - [`noise`]: the same random numbers on every machine.
 //!
@@ -10,6 +11,7 @@
 #![allow(missing_docs)]
 
 pub mod flash;
+pub mod lone;
 pub mod noise;
 pub mod plant;
 pub mod tasks;

@@ -24,6 +24,9 @@ fn commissioned(axis: AxisParameters, travel_mm: f64) -> Commissioned {
     commission(&mut test_axis, &base, &request, &mut |_, _| {}).unwrap()
 }
 
+/// Friction of an axis that is warm, over that of the cold one.
+const MOST_RISEN: f64 = 2.2;
+
 /// An axis whose friction rises by a share a second of its use.
 struct Warming {
     axis: SimulatedTestAxis,
@@ -51,7 +54,7 @@ impl TestAxis for Warming {
     ) -> Result<Recording, ExperimentError> {
         let recording = self.axis.perform(experiment, progress)?;
         self.used_s += recording.len() as f64 * recording.sample_time_s;
-        let risen = 1.0 + self.rises_per_s * self.used_s;
+        let risen = (1.0 + self.rises_per_s * self.used_s).min(MOST_RISEN);
         self.axis.change(x().with_friction(risen));
         Ok(recording)
     }

@@ -58,6 +58,9 @@ use crate::law::safety::monitor::{
     Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
     SignalLossState, speed_limit,
 };
+use crate::law::safety::oscillation::{
+    Oscillation, OscillationInput, OscillationReading, OscillationState,
+};
 use crate::law::safety::overload::{Overload, OverloadState};
 use crate::law::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
 use crate::law::safety::travel::{Travel, TravelState};
@@ -121,6 +124,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     unit_mm_s: S::Gain,
     plausibility: Plausibility,
     overload: Overload,
+    oscillation: Oscillation<S>,
     index_spacing: IndexSpacing,
     /// Measured speed above which the axis does not stand, 2^-8 counts per tick.
     standstill: u32,
@@ -214,6 +218,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.signal_loss = SignalLoss::off();
         axis.plausibility = Plausibility::default();
         axis.overload = Overload::UNLIMITED;
+        axis.oscillation = Oscillation::off();
         axis.index_spacing = IndexSpacing::default();
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
@@ -340,6 +345,13 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         self
     }
 
+    /// The monitor for oscillation.
+    #[must_use]
+    pub fn oscillation(self, oscillation: Oscillation<S>) -> Self {
+        self.axis.oscillation = oscillation;
+        self
+    }
+
     /// Learning of the friction feedforward's scale.
     #[must_use]
     pub fn learning(self, learning: Learning<S>) -> Self {
@@ -457,6 +469,7 @@ pub struct AxisState<S: Scalar, const N: usize> {
     generator: GeneratorState<S>,
     plausibility: PlausibilityState,
     overload: OverloadState,
+    oscillation: OscillationState,
     preview: [Position; PREVIEW_ROOM],
     /// Position of the axis at the last index pulse, until homing takes it.
     pulse: Option<Position>,
@@ -476,6 +489,7 @@ impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
             signal_loss: SignalLossState::default(),
             plausibility: PlausibilityState::default(),
             overload: OverloadState::default(),
+            oscillation: OscillationState::default(),
             index: IndexState::default(),
             following: FollowingState::default(),
             travel: TravelState::default(),
@@ -511,6 +525,11 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
     /// The memory of cancelling: the voltage that it adds.
     pub fn cancelling(&self) -> &CancellingState<S> {
         &self.cancelling
+    }
+
+    /// The oscillation that was found last.
+    pub fn oscillation(&self) -> OscillationReading {
+        self.oscillation.reading()
     }
 
     /// Takes the speed of the spindle over.
@@ -553,6 +572,7 @@ impl<S: Scalar, const N: usize> AxisState<S, N> {
             count: self.encoder.count().0 as i32,
             speed: self.speed(),
             words: self.telemetry.code_sum,
+            reference: Shown::reference(self.telemetry.reference),
             open: self.mode() == MotionMode::OpenLoop,
         }
     }
@@ -653,6 +673,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             signal_loss: SignalLoss::default(),
             plausibility: Plausibility::default(),
             overload: Overload::UNLIMITED,
+            oscillation: Oscillation::off(),
             index_spacing: IndexSpacing::default(),
             following: Following::default(),
             travel: Travel::UNLIMITED,
@@ -791,13 +812,30 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let bears = self
             .overload
             .step(&mut state.overload, state.telemetry.code.0);
+        let stable = self.watch_oscillation(state);
         if !self.plausibility.step(&mut state.plausibility, shown) {
             Err(FaultCode::EncoderImplausible)
         } else if !bears {
             Err(FaultCode::Overload)
+        } else if !stable {
+            Err(FaultCode::Oscillation)
         } else {
             Ok(())
         }
+    }
+
+    /// Watches the error of the last tick for oscillation; returns false if the axis is not stable.
+    #[inline(always)]
+    fn watch_oscillation(&self, state: &mut AxisState<S, N>) -> bool {
+        let seen = &state.telemetry;
+        let reference = seen.reference.0 >> POSITION_FRACTION_BITS;
+        let input = OscillationInput {
+            error: reference.wrapping_sub(seen.measured.0),
+            reference,
+            sense: i8::from(seen.velocity > S::ZERO) - i8::from(seen.velocity < S::ZERO),
+            excited: (state.injected != S::ZERO) | (state.mode() == MotionMode::OpenLoop),
+        };
+        self.oscillation.step(&mut state.oscillation, input)
     }
 
     /// Learns from what the last tick left.
@@ -822,6 +860,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             error: seen.error,
             status,
         };
+        if state.oscillation.takes() {
+            self.learning.unsettle(&mut state.learning);
+        }
         let gained = self
             .learning
             .step(&mut state.learning, input, |error| match &self.feedback {
@@ -876,6 +917,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let here = state.encoder.position();
         let shown = Shown {
             speed: 0,
+            reference: Shown::reference(here),
             ..state.shown()
         };
         // Field by field: a whole state, made apart and copied, takes half a tick longer.
@@ -901,6 +943,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             friction,
             generator,
             plausibility,
+            oscillation,
             preview,
             pulse,
             learning,
@@ -924,6 +967,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         *friction = self.feedforward.start();
         generator.reset();
         *plausibility = self.plausibility.start(shown);
+        oscillation.forget();
         *preview = [here; PREVIEW_ROOM];
         *pulse = None;
         self.learning.resume(learning);
@@ -1156,6 +1200,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         };
         if changed {
             self.feedforward.go_on(&mut state.friction, step.velocity);
+            state.oscillation.forget();
         }
         seen.feedforward = self.feedforward.step(&mut state.friction, step);
         let mut total = seen.feedforward.total();
@@ -1167,6 +1212,9 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             if self.cancels {
                 total = total + self.add_cancelling(state, changed);
             }
+        }
+        if state.oscillation.takes() {
+            total = self.take_away(state, total);
         }
         let input = FeedbackInput {
             error,
@@ -1233,6 +1281,19 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             self.cancelling.start(&mut state.cancelling);
         }
         self.cancelling.advance(&mut state.cancelling)
+    }
+
+    /// Leaves of the friction fed forward the share that the monitor for oscillation allows; returns the whole feedforward, V.
+    ///
+    /// Cancelling is left alone: it has a guard of its own, and would learn nothing right of a part of itself.
+    #[cold]
+    #[inline(never)]
+    fn take_away(&self, state: &mut AxisState<S, N>, total: S) -> S {
+        let share = self.oscillation.share(&state.oscillation);
+        let terms = &mut state.telemetry.feedforward;
+        let cancelled = total - terms.total();
+        terms.scale_friction(share);
+        terms.total() + cancelled
     }
 
     /// Puts the injected voltage out.
@@ -1328,6 +1389,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
     fn forget_learnt(&self, state: &mut AxisState<S, N>) {
         state.learning = LearningState::default();
         self.cancelling.start(&mut state.cancelling);
+        state.oscillation.forget();
     }
 
     /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick.
@@ -1339,6 +1401,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         let measured = state.encoder.count();
         state.generator.hold();
         state.injected = S::ZERO;
+        state.oscillation.forget();
         state.plausibility = self.plausibility.start(state.shown());
         state.telemetry = AxisTelemetry {
             reference: state.encoder.position(),

@@ -391,6 +391,11 @@ impl<S: Scalar> Learning<S> {
         *lately = Fit::default();
     }
 
+    /// Learns nothing for a while: what the axis does now is not what the model does.
+    pub(crate) fn unsettle(&self, state: &mut LearningState<S>) {
+        state.settling = self.settling_steps;
+    }
+
     /// A voltage over the scale, V: what the friction has to grow by, so that the output grows by as much.
     pub(crate) fn unscaled(&self, state: &LearningState<S>, voltage: S) -> S {
         voltage.times(self.one + state.inverse, Quantity::Multiplier)

@@ -82,13 +82,15 @@ pub enum FaultCode {
     StopOverrun = 29,
     /// The motor was loaded for longer than it bears.
     Overload = 30,
+    /// The axis swung to and fro by itself.
+    Oscillation = 31,
 }
 
 impl FaultCode {
     /// All faults, in order of their numbers.
     pub const ALL: [Self; Self::COUNT] = *Self::VARIANTS.first_chunk().unwrap();
 
-    /// The stable number, 1 to 30.
+    /// The stable number, 1 to 31.
     pub const fn number(self) -> u8 {
         self as u8
     }
@@ -130,7 +132,8 @@ impl FaultCode {
             | Self::IndexNearSwitch
             | Self::InjectionUnderrun
             | Self::InjectionBounds
-            | Self::Overload => Reaction::Stop,
+            | Self::Overload
+            | Self::Oscillation => Reaction::Stop,
             _ => Reaction::Off,
         }
     }
@@ -257,6 +260,11 @@ impl FaultCode {
                 "the output was above amplifier.continuous_v for longer than amplifier.overload_s allows",
                 "let the motor cool; check for a tight guide, a blocked axis and a brake that holds; lower accelerations or \
                  the share of motion; check amplifier.continuous_v",
+            ],
+            Self::Oscillation => [
+                "the axis swung evenly for a second by more than following_error_mm",
+                "lower the gains of the feedback, or identify the plant and design them again; check for a loose coupling and a \
+                 spring between motor and encoder",
             ],
             Self::StopOverrun => [
                 "a controlled stop lasted longer than braking_mm_s2 and braking_jerk_mm_s3 allow",

@@ -17,6 +17,7 @@
 //! | every output and reading | [`plausibility`] | encoder dead, or of the wrong sign |
 //! | every output | [`overload`] | load of the motor, I²t |
 //! | every error | [`monitor`] | following error |
+//! | every fourth error | [`oscillation`] | feedforward that harms, hum, a loop that swings by itself |
 //! | every reference | [`travel`], [`Switches`] | braking distance, limit switches |
 //! | the board's inputs | [`Switches`] | emergency stop, amplifier fault, output mismatch |
 
@@ -24,6 +25,7 @@ mod brake;
 mod fault;
 pub mod monitor;
 mod operation;
+pub mod oscillation;
 pub mod overload;
 pub mod plausibility;
 mod state;

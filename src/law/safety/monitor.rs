@@ -5,8 +5,9 @@ use core::hint::cold_path;
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
-/// Counts within which an encoder with one dead line dithers.
-pub(super) const DITHER_COUNTS: u32 = 2;
+/// Way in one sense that is motion under a high output, counts: a dead line dithers by one, and a cable that floats shows
+/// some that come and go.
+const MOTION_COUNTS: u32 = 64;
 /// Fraction bits of a filtered speed.
 pub(super) const SPEED_FRACTION_BITS: u32 = 8;
 /// The speed is filtered over 2^3 ticks: at one count a tick, a single reading says little.
@@ -81,8 +82,8 @@ impl OverspeedState {
     }
 }
 
-/// Watches for an encoder that shows no motion while the output is high. An encoder of which one line is dead dithers by
-/// a count; that is no motion.
+/// Watches for an encoder that shows no motion while the output is high: less than 64 counts from where it stood. An encoder
+/// of which a line is dead, or whose cable floats, shows counts that come and go.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct SignalLoss<S> {
     level: S,
@@ -128,7 +129,7 @@ impl<S: Scalar> SignalLoss<S> {
     fn watch(&self, state: &mut SignalLossState, counts: i32) -> bool {
         let before = if state.ticks == 0 { 0 } else { state.travelled };
         state.travelled = before.saturating_add(counts);
-        if state.travelled.unsigned_abs() > DITHER_COUNTS {
+        if state.travelled.unsigned_abs() >= MOTION_COUNTS {
             state.ticks = 0;
         } else {
             state.ticks = state.ticks.saturating_add(1);

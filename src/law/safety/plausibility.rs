@@ -1,14 +1,19 @@
 //! The encoder held against the plant: the motion that an output must have caused has to be seen.
 //!
 //! An encoder that dies lies to every other monitor too: with it, the axis neither leaves its reference nor is it too
-//! fast. The output does not lie. Two comparisons, both on the voltage that has reached the axis, which is that of the
-//! output through a lag of the plant's dead time:
+//! fast. The output does not lie. What is compared is the voltage that has reached the axis, which is that of the
+//! output through a lag of the plant's dead time. Three comparisons:
 //!
 //! - **No motion.** While the encoder stands (or dithers between two counts, as with one dead line), the voltage may
 //!   change by what friction takes up before it yields visibly. What goes beyond moves a model, `v' = A u - B v`, from
 //!   rest; when that has gone farther than a distance, the encoder is dead or the axis is blocked. The change counts from
-//!   the last motion that was seen, because a load may be held at rest with any voltage. In open loop nothing is held, so
+//!   the last motion that was seen, because a load may be held at rest with any voltage; and in the sense in which the axis
+//!   last slid, from the voltage at which it slid, beyond which friction takes up little more. In open loop nothing is held, so
 //!   there the voltage itself counts too, beyond what friction can hold.
+//! - **Not following.** Under control the net motion has to follow the reference, at least half as fast. While it does not, the
+//!   voltage may grow by what friction takes up, and by what the law answers to a load that was seen to push the axis back. What
+//!   goes beyond moves the model; when that is farther ahead of the motion shown than a distance, the encoder is dead. Counts
+//!   that flicker, or go astray, are no net motion. A motion of some way shows that the axis is alive.
 //! - **Wrong motion.** The model's speed with the largest load against it, and with the largest load behind it, are the
 //!   bounds of the measured one; a bound that the axis passes goes along with it (a CUSUM test, Page 1954). An encoder or
 //!   amplifier of the wrong sign, or an encoder that dies at speed, needs more load than there can be. Until the axis has
@@ -23,8 +28,9 @@
 //!
 //! [`Overspeed`]: super::monitor::Overspeed
 
-use super::monitor::{DITHER_COUNTS, SPEED_FILTER_BITS, SPEED_FRACTION_BITS};
+use super::monitor::{SPEED_FILTER_BITS, SPEED_FRACTION_BITS};
 use crate::law::rounding;
+use crate::law::units::{POSITION_FRACTION_BITS, Position};
 
 /// Ticks from one comparison of an axis to the next, as a power of two.
 const INTERVAL_BITS: u32 = 2;
@@ -39,6 +45,21 @@ const FORGET_S: f64 = 0.3;
 
 /// Largest speed, and gain of speed from one comparison to the next, that there is room for.
 const ROOM: f64 = (1u32 << 28) as f64;
+
+/// Counts within which an encoder with one dead line dithers.
+const DITHER_COUNTS: u32 = 2;
+
+/// Comparisons over which the heading takes the mean of the motion, as a power of two.
+const MEAN_BITS: u32 = 4;
+
+/// Largest way that there is room for, counts.
+const LARGEST_WAY: f64 = (1u32 << 15) as f64;
+
+/// Fraction bits of the force of a speed.
+const THROWN_BITS: u32 = 16;
+
+/// What an axis that is turned around takes up at most, over what the settings say.
+const MOST_TURNED: f64 = 1.5;
 
 /// Fraction bits of a speed that a distance does without.
 const DISTANCE_BITS: u32 = 8;
@@ -82,6 +103,22 @@ pub struct PlausibilityModel {
     pub largest_mm_s: f64,
     /// Change of the voltage that need not show as motion, in closed loop, V.
     pub held_v: f64,
+    /// What friction takes up while the axis stands, in the sense in which it last slid, beyond the voltage at which it slid, V.
+    pub stuck_v: f64,
+    /// The same while an axis that slides does not follow, V.
+    pub sliding_v: f64,
+    /// The same of an axis that was turned around, or has not moved, V.
+    pub turned_v: f64,
+    /// Voltage with which the law answers a displacement, V/mm, at most.
+    pub answer_v_per_mm: f64,
+    /// Voltage with which the law answers a speed, V s/mm, at most.
+    pub answer_v_s_per_mm: f64,
+    /// Motion the other way that turns an axis around, mm.
+    pub turn_mm: f64,
+    /// Motion of an axis that did not follow that shows that it is alive, mm.
+    pub alive_mm: f64,
+    /// Distance of the model ahead of what is shown that is a fault while the axis does not follow, mm.
+    pub ahead_mm: f64,
     /// Voltage that need not show as motion, in open loop, V.
     pub breakaway_v: f64,
     /// Largest load, V at the amplifier's input.
@@ -110,6 +147,18 @@ pub struct Plausibility {
     /// Share of the way to the output that the lagging force goes, 2^-32.
     lag: i32,
     held: i32,
+    stuck: i32,
+    sliding: i32,
+    turned: i32,
+    most_turned: i32,
+    /// Force with which the law answers a count, and a speed, the latter in 2^-16.
+    answer: i32,
+    answer_to_speed: i32,
+    /// Ways, 2^-8 counts.
+    turn: i32,
+    alive: i32,
+    /// As `distance`.
+    ahead: i32,
     breakaway: i32,
     /// Share of a speed that is lost, 2^-32.
     drag: i32,
@@ -132,8 +181,18 @@ pub struct Shown {
     pub speed: i32,
     /// Sum of the converter's words so far; wraps.
     pub words: i32,
+    /// Position of the reference, 2^-8 counts; wraps.
+    pub reference: i32,
     /// The loop is open.
     pub open: bool,
+}
+
+impl Shown {
+    /// The low bits of a position of the reference, 2^-8 counts.
+    #[inline(always)]
+    pub(crate) const fn reference(position: Position) -> i32 {
+        (position.0 >> (POSITION_FRACTION_BITS - SPEED_FRACTION_BITS)) as i32
+    }
 }
 
 /// The memory of the comparison.
@@ -157,6 +216,43 @@ pub struct PlausibilityState {
     /// Speeds of the model with the largest load against it, and behind it.
     least: i32,
     most: i32,
+    /// Reference at the last comparison.
+    reference: i32,
+    heading: Heading,
+    /// What the axis is behind its reference in the positive sense, and in the negative one.
+    forth: Lag,
+    back: Lag,
+}
+
+/// The sense in which an axis slides, from the running mean of its motion. Ways are in 2^-8 counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Heading {
+    /// 1 or -1; zero until the axis has moved.
+    sense: i32,
+    /// Force when the axis last went on in that sense.
+    level: i32,
+    /// Motion that the mean does not yet have, and the mean since the axis last went on.
+    pending: i32,
+    away: i32,
+}
+
+/// What an axis is behind its reference in one sense; senses, forces and speeds as seen from there. Ways are in 2^-8 counts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Lag {
+    /// Way of the reference that the axis has not followed by half.
+    behind: i32,
+    /// Force from which a growth counts, and true if the axis slides in this sense.
+    base: i32,
+    slides: bool,
+    /// What friction takes up of the growth if it does not.
+    turned: i32,
+    /// Way of the axis since it was behind, the farthest of it the other way, and the least speed beside the reference's.
+    way: i32,
+    pushed: i32,
+    thrown: i32,
+    /// Speed of the model, and how far it is ahead of the motion shown.
+    modelled: i32,
+    ahead: i32,
 }
 
 impl Plausibility {
@@ -174,15 +270,31 @@ impl Plausibility {
         let force = |volts: f64| rounding::round(push * volts * unit) as i32;
         let filter_s = period_s * (f64::from(1u32 << SPEED_FILTER_BITS) + 0.5 * INTERVAL_TICKS);
         let counts_per_speed = unit * f64::from(1u32 << (SPEED_FRACTION_BITS - DISTANCE_BITS));
+        let distance = |mm: f64| rounding::round(mm / resolution_mm * counts_per_speed) as i32;
+        let way = |mm: f64| {
+            let counts = (mm / resolution_mm).min(LARGEST_WAY);
+            rounding::round(counts * f64::from(1u32 << SPEED_FRACTION_BITS)) as i32
+        };
+        let thrown = f64::from(1u32 << THROWN_BITS);
+        let answer_to_speed = rounding::round(push * model.answer_v_s_per_mm / filtered * thrown);
         Self {
             modelled: true,
             shift,
             lag: share(interval_s / (model.delay_s + filter_s)),
             held: force(model.held_v),
+            stuck: force(model.stuck_v),
+            sliding: force(model.sliding_v),
+            turned: force(model.turned_v),
+            most_turned: force(MOST_TURNED * model.turned_v),
+            answer: force(model.answer_v_per_mm * resolution_mm),
+            answer_to_speed: answer_to_speed as i32,
+            turn: way(model.turn_mm),
+            alive: way(model.alive_mm),
+            ahead: distance(model.ahead_mm),
             breakaway: force(model.breakaway_v),
             drag: share(model.damping_per_s * interval_s),
             forget_shift: whole_log2(FORGET_S / interval_s),
-            distance: rounding::round(model.distance_mm / resolution_mm * counts_per_speed) as i32,
+            distance: distance(model.distance_mm),
             first_load: force(model.first_load_v),
             load: force(model.load_v),
             proving_counts: (model.proving_mm / resolution_mm) as u32,
@@ -224,6 +336,7 @@ impl Plausibility {
             words: shown.words,
             least: speed,
             most: speed,
+            reference: shown.reference,
             ..PlausibilityState::default()
         }
     }
@@ -239,7 +352,10 @@ impl Plausibility {
         if self.modelled {
             state.force += part(pushed.saturating_sub(state.force), self.lag);
             let speed = shown.speed.wrapping_shl(self.shift);
-            self.moves_along(state, counts, speed) & self.stands(state, counts, shown.open)
+            let follows = self.follows(state, counts, speed, shown);
+            self.moves_along(state, counts, speed)
+                & self.stands(state, counts, shown.open)
+                & follows
         } else {
             state.force = pushed;
             !shown.open | self.stands(state, counts, shown.open)
@@ -269,6 +385,119 @@ impl Plausibility {
             & (speed.saturating_sub(state.most) <= self.velocity)
     }
 
+    /// False if the net motion does not follow the reference though the force grows.
+    #[inline(always)]
+    fn follows(
+        &self,
+        state: &mut PlausibilityState,
+        counts: i32,
+        speed: i32,
+        shown: Shown,
+    ) -> bool {
+        let wanted = shown.reference.wrapping_sub(state.reference);
+        let moved = counts.saturating_mul(1 << SPEED_FRACTION_BITS);
+        state.reference = shown.reference;
+        state.heading.turn(moved, state.force, self.turn);
+        let step = Step {
+            wanted,
+            moved,
+            speed,
+            force: state.force,
+            heading: state.heading.sense,
+            level: state.heading.level,
+        };
+        if shown.open {
+            (state.forth, state.back) = (Lag::default(), Lag::default());
+            return true;
+        }
+        self.keeps_up(&mut state.forth, step) & self.keeps_up(&mut state.back, step.reversed())
+    }
+
+    /// False if the axis must have gone farther in a sense than it shows.
+    #[inline(always)]
+    fn keeps_up(&self, lag: &mut Lag, step: Step) -> bool {
+        let Step { moved, force, .. } = step;
+        // Where the reference goes the other way, the axis need not lead it.
+        let kept = if step.wanted < 0 {
+            moved >> 1
+        } else {
+            moved << 1
+        };
+        lag.behind = lag.behind.saturating_add(step.wanted).saturating_sub(kept);
+        let alive = lag.way.saturating_sub(lag.pushed) > self.alive;
+        if (lag.behind <= 0) | alive {
+            let slides = step.heading > 0;
+            *lag = Lag {
+                base: if slides {
+                    force.max(step.level).max(self.sliding)
+                } else {
+                    force
+                },
+                slides,
+                // It slides the other way at this level, however far the settings' friction is from its own.
+                turned: step
+                    .level
+                    .saturating_abs()
+                    .saturating_mul(2)
+                    .max(self.turned)
+                    .min(self.most_turned),
+                modelled: lag.modelled,
+                ..Lag::default()
+            };
+        } else {
+            lag.way = lag.way.saturating_add(moved);
+            lag.pushed = lag.pushed.min(lag.way);
+            let wished = self.speed(step.wanted).max(0) >> INTERVAL_BITS;
+            lag.thrown = lag.thrown.min(step.speed.saturating_sub(wished));
+            lag.slides &= step.heading > 0;
+        }
+        let taken = if lag.slides {
+            self.sliding
+        } else {
+            lag.turned.max(self.turned)
+        };
+        let pushed = (i64::from(self.answer) * i64::from(lag.pushed)) >> SPEED_FRACTION_BITS;
+        let thrown = (i64::from(self.answer_to_speed) * i64::from(lag.thrown)) >> THROWN_BITS;
+        let excess = force
+            .saturating_sub(lag.base)
+            .saturating_sub(taken)
+            .saturating_add(pushed as i32)
+            .saturating_add(thrown as i32);
+        lag.ahead -= lag.ahead >> self.forget_shift;
+        if excess <= 0 {
+            lag.modelled = step.speed.min(0);
+        } else {
+            let lost = part(lag.modelled, self.drag);
+            lag.modelled = lag.modelled.saturating_add(excess.saturating_sub(lost));
+            let shown = self.speed(moved) >> SPEED_FRACTION_BITS;
+            let gained = (lag.modelled >> (DISTANCE_BITS - INTERVAL_BITS)).saturating_sub(shown);
+            lag.ahead = lag.ahead.saturating_add(gained).max(0);
+        }
+        lag.ahead <= self.ahead
+    }
+
+    /// A motion between two comparisons in the unit of speeds, for as many ticks.
+    #[inline(always)]
+    fn speed(&self, moved: i32) -> i32 {
+        moved.saturating_mul(1 << self.shift)
+    }
+
+    /// The force beyond that at which the axis slid, and what friction takes up of it.
+    #[inline(always)]
+    fn beyond_sliding(&self, state: &PlausibilityState) -> i32 {
+        let Heading { sense, level, .. } = state.heading;
+        // A load may have moved the axis against its law.
+        let forth = state.anchor.max(level);
+        let back = state.anchor.min(level);
+        let forth = state.force.saturating_sub(forth).saturating_sub(self.stuck);
+        let back = state.force.saturating_sub(back).saturating_add(self.stuck);
+        match sense {
+            1 => forth.max(0),
+            -1 => back.min(0),
+            _ => 0,
+        }
+    }
+
     /// False if the encoder stands though the axis must have moved.
     #[inline(always)]
     fn stands(&self, state: &mut PlausibilityState, counts: i32, open: bool) -> bool {
@@ -278,7 +507,8 @@ impl Plausibility {
             state.anchor = state.force;
             state.modelled = 0;
         } else {
-            let mut force = beyond(state.force.saturating_sub(state.anchor), self.held);
+            let held = beyond(state.force.saturating_sub(state.anchor), self.held);
+            let mut force = larger(held, self.beyond_sliding(state));
             if open && force == 0 {
                 force = beyond(state.force, self.breakaway);
             }
@@ -297,6 +527,55 @@ impl Plausibility {
     }
 }
 
+/// What an axis did since the last comparison, in one sense.
+#[derive(Clone, Copy)]
+struct Step {
+    /// Ways of the reference and of the axis, 2^-8 counts.
+    wanted: i32,
+    moved: i32,
+    speed: i32,
+    force: i32,
+    /// Sense in which the axis slides, and the force at which it did.
+    heading: i32,
+    level: i32,
+}
+
+impl Step {
+    #[inline(always)]
+    fn reversed(self) -> Self {
+        Self {
+            wanted: self.wanted.saturating_neg(),
+            moved: self.moved.saturating_neg(),
+            speed: self.speed.saturating_neg(),
+            force: self.force.saturating_neg(),
+            heading: -self.heading,
+            level: self.level.saturating_neg(),
+        }
+    }
+}
+
+impl Heading {
+    /// Takes a motion under a force; one of more than `turn` the other way turns the axis around.
+    #[inline(always)]
+    fn turn(&mut self, moved: i32, force: i32, turn: i32) {
+        self.pending = self.pending.saturating_add(moved);
+        let mean = self.pending >> MEAN_BITS;
+        self.pending -= mean;
+        self.away = self.away.saturating_add(mean);
+        let goes_on = self.sense * self.away.signum() > 0;
+        let way = if goes_on {
+            1 << SPEED_FRACTION_BITS
+        } else {
+            turn
+        };
+        if self.away.saturating_abs() >= way {
+            self.sense = self.away.signum();
+            self.level = force;
+            self.away = 0;
+        }
+    }
+}
+
 impl PlausibilityState {
     /// Leaves a mean word out of the output since the last comparison: one that nothing but a load answers.
     #[inline(always)]
@@ -306,7 +585,11 @@ impl PlausibilityState {
 
     /// Goes on from another origin of the count.
     pub fn recount(&mut self, count: i32) {
+        let offset = count.wrapping_sub(self.count);
         self.count = count;
+        self.reference = self
+            .reference
+            .wrapping_add(offset.wrapping_shl(SPEED_FRACTION_BITS));
     }
 
     /// Begins a standstill anew: the loop is opened.
@@ -332,6 +615,16 @@ fn whole_log2(value: f64) -> u32 {
 #[inline(always)]
 fn part(value: i32, share: i32) -> i32 {
     ((i64::from(value) * i64::from(share)) >> 32) as i32
+}
+
+/// The one of two values that is farther from zero.
+#[inline(always)]
+fn larger(a: i32, b: i32) -> i32 {
+    if a.saturating_abs() >= b.saturating_abs() {
+        a
+    } else {
+        b
+    }
 }
 
 /// The part of a value beyond `dead` either way.

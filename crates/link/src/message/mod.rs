@@ -31,7 +31,7 @@ pub use motion::{
     AxisPoint, Harmonic, Motion, Plan, PointToPoint, STREAM_POINTS, SetPoint, StreamRequest,
     StreamStatus,
 };
-pub use notice::{Event, Notice};
+pub use notice::{Event, Notice, OscillationKind};
 pub use observe::{
     BLOCK_BYTES, BLOCK_WORDS, CaptureRequest, CaptureStatus, MAX_CHANNELS, SERIAL_VALUES_PER_S,
     TelemetryBlock, TelemetryRequest, WordPage, Words,

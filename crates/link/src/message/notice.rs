@@ -86,6 +86,28 @@ pub enum Event {
         /// True if the change asks for maintenance.
         needs_maintenance: bool,
     },
+    /// An axis oscillates, or did so until what is added to it was taken away.
+    Oscillated {
+        /// The axis.
+        axis: AxisName,
+        /// What was found, and done.
+        kind: OscillationKind,
+        /// Frequency, 0.1 Hz.
+        decihertz: u16,
+        /// Amplitude, um.
+        micrometres: u16,
+    },
+}
+
+/// An oscillation of an axis, and what was done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum OscillationKind {
+    /// The axis hums at rest; nothing was done.
+    Hum,
+    /// What is added, the friction's feedforward or the cancelling, swung the axis: it was taken away, and comes back slowly.
+    Added,
+    /// It did so for the third time, and stays away until the settings change or the outputs are off.
+    AddedForGood,
 }
 
 impl fmt::Display for Event {
@@ -123,6 +145,31 @@ impl fmt::Display for Event {
                 match needs_maintenance {
                     true => f.write_str(": look after guide, drive and lubrication"),
                     false => Ok(()),
+                }
+            }
+            Self::Oscillated {
+                axis,
+                kind,
+                decihertz,
+                micrometres,
+            } => {
+                let (hertz, tenth) = (decihertz / 10, decihertz % 10);
+                let amount = format_args!("{micrometres} um at {hertz}.{tenth} Hz");
+                match kind {
+                    OscillationKind::Hum => write!(
+                        f,
+                        "{axis} hums at rest, {amount}: lower the gains, or look for what shakes it"
+                    ),
+                    OscillationKind::Added => write!(
+                        f,
+                        "the feedforward of {axis} made it swing, {amount}, and is taken away for a while: \
+                         check feedforward.kind and its gains"
+                    ),
+                    OscillationKind::AddedForGood => write!(
+                        f,
+                        "the feedforward of {axis} made it swing, {amount}, and is off until the outputs are off: \
+                         check feedforward.kind and its gains"
+                    ),
                 }
             }
         }
