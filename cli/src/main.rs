@@ -12,6 +12,7 @@ mod grammar;
 mod identify;
 mod kept;
 mod numbers;
+mod own_stage;
 mod plane;
 mod replay;
 mod replay_program;

@@ -164,6 +164,7 @@ impl Programs {
             at > 0 && arguments[at - 1].starts_with("--") && !arguments[at - 1].contains('=');
         let flag = [
             "--simulated",
+            "--simulated=commissioned",
             "--emulated",
             "--echo",
             "--json",

@@ -25,8 +25,9 @@ use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
 use serde_json::{Value, json};
 
-use super::endpoint::Endpoint;
+use super::endpoint::{Endpoint, Simulation};
 use super::kept;
+use super::own_stage::OwnStage;
 use super::subject::{and_restored, known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
@@ -38,8 +39,8 @@ pub(super) struct Arguments {
     /// The axis to commission.
     #[arg(long, value_enum)]
     axis: Axis,
-    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it),
-    /// emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
+    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it, not
+    /// commissioned), simulated:commissioned, emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
     #[arg(
         long,
         default_value = "law",
@@ -47,6 +48,8 @@ pub(super) struct Arguments {
         conflicts_with = "record"
     )]
     machine: Endpoint,
+    #[command(flatten)]
+    stage: OwnStage,
     /// The folder of an earlier commissioning instead, whose recordings are identified anew; nothing moves, so there is no
     /// verdict and no cross-check.
     #[arg(long, value_name = "FOLDER")]
@@ -149,10 +152,19 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(folder) = &arguments.record {
         return arguments.run_saved(folder, start);
     }
-    let mut machine = arguments.machine.open(output.seed)?;
+    let stage = arguments.stage.read()?;
+    let own_travel = stage
+        .as_ref()
+        .and_then(|stage| stage.travel_mm[axis.index()])
+        .map(Travel::between);
+    let simulation = Simulation {
+        seed: output.seed,
+        stage,
+    };
+    let mut machine = arguments.machine.open(&simulation)?;
     let job = Job {
         axis: (*axis).into(),
-        travel: arguments.travel,
+        travel: arguments.travel.or(own_travel),
         start,
         into: into.as_deref(),
         request,

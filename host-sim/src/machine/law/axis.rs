@@ -57,11 +57,18 @@ impl SimulatedTestAxis {
     /// Axis 0 to 2 with `truth`, under the default settings of that axis without feedforward and nonlinear gain; `seed`
     /// decides the noise.
     pub fn new(index: usize, truth: AxisParameters, seed: u64) -> Self {
-        let mut stage = StageSettings::simulated();
+        Self::under(&StageSettings::simulated(), index, truth, seed)
+    }
+
+    /// The same under other settings.
+    pub fn under(settings: &StageSettings, index: usize, truth: AxisParameters, seed: u64) -> Self {
+        let mut stage = settings.clone();
         let mut axis = stage.axes[index].clone();
         axis.feedback.law = LawKind::Pid;
         axis.feedforward.kind = FeedforwardKind::None;
-        stage.axes[0] = axis;
+        // Whoever measures the axis watches it; the others stand still, whatever their law.
+        axis.commissioned = true;
+        stage.axes = [axis.clone(), axis.clone(), axis];
         Self {
             name: NAMES[index],
             full_scale_v: truth.full_scale_v,

@@ -1,0 +1,81 @@
+//! Numbers of an axis in a stage file: name, range, default and meaning in one table.
+
+use serde::Deserialize;
+
+/// A number of an axis.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Field {
+    /// Name, with the unit at its end.
+    pub name: &'static str,
+    /// Smallest and largest value.
+    pub range: (f64, f64),
+    /// Value where it is left out.
+    pub default: f64,
+    /// Meaning.
+    pub help: &'static str,
+}
+
+macro_rules! numbers {
+    ($($name:ident: $least:literal..=$most:literal, $default:literal, $help:literal;)*) => {
+        /// The numbers of an axis, as the file has them.
+        #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+        #[serde(default, deny_unknown_fields)]
+        pub(super) struct Numbers {
+            $(pub(super) $name: f64,)*
+            pub(super) friction_model: super::FrictionModel,
+            pub(super) encoder: super::EncoderPlace,
+            pub(super) travel_mm: [f64; 2],
+        }
+
+        impl Default for Numbers {
+            fn default() -> Self {
+                Self {
+                    $($name: $default,)*
+                    friction_model: super::FrictionModel::default(),
+                    encoder: super::EncoderPlace::default(),
+                    travel_mm: super::TRAVEL_MM,
+                }
+            }
+        }
+
+        impl Numbers {
+            /// The values, in the order of [`FIELDS`].
+            pub(super) fn values(&self) -> [f64; FIELDS.len()] {
+                [$(self.$name),*]
+            }
+        }
+
+        /// Every number of an axis.
+        pub const FIELDS: &[Field] = &[$(Field {
+            name: stringify!($name),
+            range: ($least, $most),
+            default: $default,
+            help: $help,
+        }),*];
+    };
+}
+
+numbers! {
+    mass_kg: 0.01..=100_000.0, 10.0, "Moving mass, the rotor and the screw reduced to it.";
+    force_n_per_v: 0.01..=1_000_000.0, 693.9, "Force for a volt at the amplifier's input.";
+    full_scale_v: 0.1..=20.0, 10.0, "Voltage of the converter's largest code; the amplifier saturates there.";
+    delay_ms: 0.0..=20.0, 1.2, "Delay from the converter's output to the force.";
+    coulomb_n: 0.01..=1_000_000.0, 83.268, "Friction while it slides fast.";
+    breakaway_n: 0.01..=1_000_000.0, 104.085, "Friction at which it breaks away.";
+    stribeck_velocity_mm_s: 0.01..=1000.0, 1.0, "Speed over which friction falls from the one to the other.";
+    viscous_n_s_per_m: 0.0..=1_000_000.0, 1448.0, "Damping: friction that grows with the speed.";
+    friction_asymmetry_percent: -50.0..=50.0, 3.0, "How much more friction there is in the positive direction than in the mean.";
+    friction_variation_percent: 0.0..=90.0, 0.0, "How much friction changes along the travel, as a sine.";
+    friction_period_mm: 1.0..=10_000.0, 100.0, "Length of that sine.";
+    presliding_um: 0.1..=1000.0, 30.0, "Way that the axis gives before it breaks away.";
+    resolution_um: 0.001..=1000.0, 0.5, "Length of a count of the encoder.";
+    noise_um: 0.0..=100.0, 0.15, "Standard deviation of the encoder's noise.";
+    resonance_hz: 0.0..=2000.0, 0.0, "Resonance of motor against table; 0 for none.";
+    resonance_damping: 0.001..=1.0, 0.03, "Its damping ratio.";
+    motor_share: 0.05..=0.95, 0.5, "Share of the mass on the motor's side of the resonance or the backlash.";
+    backlash_um: 0.0..=10_000.0, 0.0, "Backlash between motor and table; without a resonance the teeth oscillate at 500 Hz.";
+    offset_mv: -1000.0..=1000.0, 3.0, "Offset of converter and amplifier.";
+    gravity_n: -1_000_000.0..=1_000_000.0, 0.0, "Weight less its counterweight; negative towards smaller positions.";
+    ripple_n: 0.0..=100_000.0, 1.3878, "Amplitude of a force that repeats with every turn of the screw.";
+    screw_lead_mm: 0.1..=1000.0, 10.0, "Lead of the screw.";
+}
