@@ -9,7 +9,7 @@ pub struct Field {
     pub name: &'static str,
     /// Smallest and largest value.
     pub range: (f64, f64),
-    /// Value where it is left out.
+    /// Value where it is left out and no other number says it: that of the simulated stage's x axis.
     pub default: f64,
     /// Meaning.
     pub help: &'static str,
@@ -17,24 +17,26 @@ pub struct Field {
 
 macro_rules! numbers {
     ($($name:ident: $least:literal..=$most:literal, $default:literal, $help:literal;)*) => {
-        /// The numbers of an axis, as the file has them.
-        #[derive(Clone, Copy, Debug, PartialEq, Deserialize)]
+        /// An axis as the file has it.
+        #[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
         #[serde(default, deny_unknown_fields)]
-        pub(super) struct Numbers {
-            $(pub(super) $name: f64,)*
-            pub(super) friction_model: super::FrictionModel,
+        pub(super) struct Written {
+            $(pub(super) $name: Option<f64>,)*
+            pub(super) friction: super::Friction,
             pub(super) encoder: super::EncoderPlace,
-            pub(super) travel_mm: [f64; 2],
+            pub(super) travel_mm: Option<[f64; 2]>,
         }
 
-        impl Default for Numbers {
-            fn default() -> Self {
-                Self {
-                    $($name: $default,)*
-                    friction_model: super::FrictionModel::default(),
-                    encoder: super::EncoderPlace::default(),
-                    travel_mm: super::TRAVEL_MM,
-                }
+        /// The numbers of an axis, with those that the file leaves out.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        pub(super) struct Numbers {
+            $(pub(super) $name: f64,)*
+        }
+
+        impl Written {
+            /// The numbers, each that is left out from the table.
+            pub(super) fn with_defaults(&self) -> Numbers {
+                Numbers { $($name: self.$name.unwrap_or($default),)* }
             }
         }
 
@@ -61,15 +63,15 @@ numbers! {
     full_scale_v: 0.1..=20.0, 10.0, "Voltage of the converter's largest code; the amplifier saturates there.";
     delay_ms: 0.0..=20.0, 1.2, "Delay from the converter's output to the force.";
     coulomb_n: 0.01..=1_000_000.0, 83.268, "Friction while it slides fast.";
-    breakaway_n: 0.01..=1_000_000.0, 104.085, "Friction at which it breaks away.";
+    breakaway_n: 0.01..=1_000_000.0, 104.085, "Friction at which it breaks away; without it 1.25 times coulomb_n.";
     stribeck_velocity_mm_s: 0.01..=1000.0, 1.0, "Speed over which friction falls from the one to the other.";
     viscous_n_s_per_m: 0.0..=1_000_000.0, 1448.0, "Damping: friction that grows with the speed.";
     friction_asymmetry_percent: -50.0..=50.0, 3.0, "How much more friction there is in the positive direction than in the mean.";
     friction_variation_percent: 0.0..=90.0, 0.0, "How much friction changes along the travel, as a sine.";
     friction_period_mm: 1.0..=10_000.0, 100.0, "Length of that sine.";
-    presliding_um: 0.1..=1000.0, 30.0, "Way that the axis gives before it breaks away.";
+    presliding_um: 0.1..=1000.0, 30.0, "Way that the axis gives before it breaks away; for coulomb and static without it 1, or more under much friction.";
     resolution_um: 0.001..=1000.0, 0.5, "Length of a count of the encoder.";
-    noise_um: 0.0..=100.0, 0.15, "Standard deviation of the encoder's noise.";
+    noise_um: 0.0..=100.0, 0.15, "Standard deviation of the encoder's noise; without it 0.3 counts.";
     resonance_hz: 0.0..=2000.0, 0.0, "Resonance of motor against table; 0 for none.";
     resonance_damping: 0.001..=1.0, 0.03, "Its damping ratio.";
     motor_share: 0.05..=0.95, 0.5, "Share of the mass on the motor's side of the resonance or the backlash.";
