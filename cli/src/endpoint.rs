@@ -35,11 +35,6 @@ pub(super) struct Simulation {
 }
 
 impl Simulation {
-    /// The simulated stage with the noise of a seed.
-    pub(super) const fn seeded(seed: u64) -> Self {
-        Self { seed, stage: None }
-    }
-
     fn setup(&self, preset: Preset) -> anyhow::Result<StageSetup> {
         Ok(match (preset, &self.stage) {
             (Preset::Fresh, None) => StageSetup::simulated(),

@@ -51,10 +51,9 @@ impl LawStage {
         }
     }
 
-    /// The same machine under other settings from the start.
-    #[must_use]
-    pub fn with_settings(self, settings: StageSettings) -> Self {
-        Self { settings, ..self }
+    /// The travel of an axis from where it stands.
+    pub const fn travel(&self, axis: AxisName) -> Travel {
+        self.travel[axis as usize]
     }
 }
 
@@ -72,7 +71,7 @@ impl Machine for LawStage {
     }
 
     fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
-        Ok(Some(self.travel[axis as usize]))
+        Ok(Some(self.travel(axis)))
     }
 
     /// The axis as it was switched on, under its PID alone.
