@@ -3,6 +3,7 @@
 use anyhow::{bail, ensure};
 use clap::Args;
 use quadrant::axes::AxisName;
+use quadrant::settings::StageSettings;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, share};
@@ -71,6 +72,9 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let stage = arguments.stage.read()?;
     let sines = arguments.sines(stage.as_ref())?;
     let (setups, subject) = arguments.subject(stage.as_ref(), sines)?;
+    for setup in &setups {
+        refuse_faster(&setup.stage, &subject.sines)?;
+    }
     let bar = share("comparing on a simulated stage");
     bar.set_length(STEPS);
     let request = Request {
@@ -186,7 +190,7 @@ impl Arguments {
         };
         let name = stage.path.display().to_string();
         let axis = sines.axis;
-        if stage.travel_mm[axis as usize].is_none() {
+        if stage.known[axis as usize].is_none() {
             bail!("{name} has no table [{axis}]: add one, or give another --axis");
         }
         let setup = own_stage::setup(stage, &[axis], &self.settings, &self.output)?;
@@ -215,6 +219,30 @@ impl Arguments {
         }
         command
     }
+}
+
+/// Refuses sines beyond the limits of their axis.
+fn refuse_faster(stage: &StageSettings, sines: &Sines) -> anyhow::Result<()> {
+    let limits = &stage.axes[sines.axis as usize].limits;
+    for velocity in &sines.velocities_mm_s {
+        ensure!(
+            *velocity <= limits.max_velocity_mm_s,
+            "--velocity {velocity} is above the {} mm/s that {} may go: give a lower one, or raise max_velocity_mm_s (of --stage, or \
+             below limits in --settings)",
+            limits.max_velocity_mm_s,
+            sines.axis
+        );
+        let acceleration_mm_s2 = velocity * velocity / sines.amplitude_mm;
+        ensure!(
+            acceleration_mm_s2 <= limits.max_acceleration_mm_s2,
+            "--velocity {velocity} with --amplitude {} takes {acceleration_mm_s2:.0} mm/s^2, and {} may have {}: give a lower velocity or a \
+             larger amplitude, or raise max_acceleration_mm_s2 (of --stage, or below limits in --settings)",
+            sines.amplitude_mm,
+            sines.axis,
+            limits.max_acceleration_mm_s2
+        );
+    }
+    Ok(())
 }
 
 /// Lines of the reversal's plot.

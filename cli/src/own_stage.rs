@@ -2,9 +2,10 @@
 
 use std::path::PathBuf;
 
-use anyhow::{bail, ensure};
+use anyhow::{Context, bail, ensure};
 use clap::Args;
 use quadrant::axes::AxisName;
+use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::StageSettings;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, share};
@@ -12,10 +13,11 @@ use quadrant_cli::say;
 use quadrant_sim::commission::commission_stage;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::machine::StageSetup;
 use quadrant_sim::record::AxisLimits;
 use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
-use quadrant_sim::stage_file::{StageFile, StageFileError};
+use quadrant_sim::stage_file::StageFile;
 
 /// Option that names a simulated stage of one's own.
 #[derive(Clone, Debug, Default, Args)]
@@ -30,9 +32,20 @@ impl OwnStage {
     /// Reads the file, if there is one.
     ///
     /// # Errors
-    /// A file that cannot be read, or describes no stage.
-    pub(super) fn read(&self) -> Result<Option<StageFile>, StageFileError> {
-        self.stage.as_deref().map(StageFile::read).transpose()
+    /// A file that cannot be read, or describes no stage, or one that the firmware has no settings for.
+    pub(super) fn read(&self) -> anyhow::Result<Option<StageFile>> {
+        let Some(path) = &self.stage else {
+            return Ok(None);
+        };
+        let file = StageFile::read(path)?;
+        let settings = StageSetup::of(&file).settings;
+        settings.validate(FIRMWARE_ELEMENTS).with_context(|| {
+            format!(
+                "{}: its limits and its encoder do not go together",
+                path.display()
+            )
+        })?;
+        Ok(Some(file))
     }
 
     /// Returns the option as a command line repeats it, with a space before it; empty without a file.
@@ -44,7 +57,7 @@ impl OwnStage {
 
 /// Axes that the file describes.
 pub(super) fn axes(stage: &StageFile) -> Vec<AxisName> {
-    let described = |axis: &AxisName| stage.travel_mm[*axis as usize].is_some();
+    let described = |axis: &AxisName| stage.known[*axis as usize].is_some();
     AxisName::ALL.into_iter().filter(described).collect()
 }
 
@@ -73,7 +86,8 @@ pub(super) fn setup(
     Ok(RunConfiguration::commissioned(
         settings,
         stage.truth.clone(),
-    ))
+        axes,
+    )?)
 }
 
 /// Writes settings among the results, and says what commissioning chose.
@@ -144,7 +158,7 @@ fn refuse_other_hardware(
 
 /// Length of an axis' travel, mm, where the file describes the axis.
 fn span_mm(stage: &StageFile, axis: AxisName) -> Option<f64> {
-    stage.travel_mm[axis as usize].map(|[negative_mm, positive_mm]| positive_mm - negative_mm)
+    stage.known[axis as usize].map(|known| known.span_mm())
 }
 
 /// Refuses a motion that is longer than the travel of an axis; `what` names its option.
@@ -168,10 +182,16 @@ pub(super) fn refuse_longer(
 
 /// The limits that a record for an axis of the stage must keep, for those of the built-in stage.
 pub(super) fn record_limits(stage: &StageFile, axis: AxisName, built_in: AxisLimits) -> AxisLimits {
+    let Some(known) = stage.known[axis as usize] else {
+        return built_in;
+    };
     AxisLimits {
-        travel_mm: span_mm(stage, axis).unwrap_or(built_in.travel_mm),
+        travel_mm: known.span_mm(),
+        max_velocity_mm_s: known.max_velocity_mm_s,
+        max_acceleration_mm_s2: known
+            .max_acceleration_mm_s2
+            .max(built_in.max_acceleration_mm_s2),
         resolution_mm: stage.truth.axes[axis as usize].resolution_mm,
-        ..built_in
     }
 }
 

@@ -211,8 +211,12 @@ impl Subject {
             seed,
             stage: self.stage.read()?,
         };
+        let known = simulation.stage.as_ref();
+        let known = known.and_then(|stage| stage.known[axis as usize]);
+        let nearer_mm = known.map(|known| Travel::between(known.travel_mm).nearer_mm());
         let mut machine = self.machine.open(&simulation)?;
-        let travel_mm = travel_mm(&mut *machine, axis, self.travel, fallback_mm)?;
+        let given_mm = self.travel.or(nearer_mm);
+        let travel_mm = travel_mm(&mut *machine, axis, given_mm, fallback_mm)?;
         let stage = machine.settings()?;
         let found = on_axis(&mut *machine, axis, travel_mm, start, measure)?;
         if machine.is_simulated() {

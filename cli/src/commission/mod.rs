@@ -155,8 +155,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let stage = arguments.stage.read()?;
     let own_travel = stage
         .as_ref()
-        .and_then(|stage| stage.travel_mm[axis.index()])
-        .map(Travel::between);
+        .and_then(|stage| stage.known[axis.index()])
+        .map(|known| Travel::between(known.travel_mm));
     let simulation = Simulation {
         seed: output.seed,
         stage,

@@ -132,7 +132,7 @@ pub fn comparison_page(
     for &knowledge in &subject.knowledge {
         let velocities = subject.sines.velocities_mm_s.iter();
         let figures = velocities.map(|&velocity| {
-            let id = format!("error-{}-{velocity}", knowledge.name().replace(' ', "-"));
+            let id = format!("error-{}-{velocity}", knowledge.name()).replace([' ', '.'], "-");
             let figure =
                 reversal_figure(id, comparison, subject, &subject.all, knowledge, velocity);
             Block::Figure(figure)

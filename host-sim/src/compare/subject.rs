@@ -143,7 +143,12 @@ mod tests {
     fn a_commissioned_axis_is_compared_as_commissioning_left_it_or_fed_where_that_kept_the_pid() {
         let mut stage = identified_settings().unwrap().stage;
         let subject = |stage: &quadrant::settings::StageSettings| {
-            let setup = RunConfiguration::commissioned(stage.clone(), StageParameters::real());
+            let setup = RunConfiguration::commissioned(
+                stage.clone(),
+                StageParameters::real(),
+                &[AxisName::Y],
+            )
+            .unwrap();
             Subject::commissioned("mine.toml".to_owned(), &setup, sines(&[5.0]))
         };
         let chosen = subject(&stage);

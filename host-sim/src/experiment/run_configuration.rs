@@ -10,12 +10,13 @@
 
 use std::path::Path;
 
+use quadrant::axes::AxisName;
 use quadrant::control::feedback::LawKind;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
 
 use crate::design::DesignError;
-use crate::design::best::with_best_pid;
+use crate::design::best::{set_best_pid, with_best_pid};
 use crate::experiment::configuration::{Configuration, Gains};
 use crate::identify::single_state::with_all_models;
 use crate::plant::{AxisParameters, StageParameters};
@@ -115,19 +116,30 @@ impl RunConfiguration {
         }
     }
 
-    /// A stage with the settings that commissioning it gave. Its best PID is theirs: the best on the model, or a softer one where the
-    /// axis asked for it.
-    pub fn commissioned(stage: StageSettings, truth: StageParameters) -> Self {
+    /// A stage with the settings that commissioning gave, of `axes` on this very stage. Their best PID is that of the settings: the
+    /// best on the model, or a softer one where the axis asked for it. That of the others is designed.
+    ///
+    /// # Errors
+    /// A model that no PID keeps the bounds on.
+    pub fn commissioned(
+        stage: StageSettings,
+        truth: StageParameters,
+        axes: &[AxisName],
+    ) -> Result<Self, DesignError> {
         let mut best = stage.clone();
-        for axis in &mut best.axes {
-            axis.feedback.law = LawKind::Pid;
-            axis.feedback.nonlinear = None;
+        for (name, axis) in AxisName::ALL.into_iter().zip(&mut best.axes) {
+            if axes.contains(&name) {
+                axis.feedback.law = LawKind::Pid;
+                axis.feedback.nonlinear = None;
+            } else {
+                set_best_pid(axis, stage.rate_hz)?;
+            }
         }
-        Self {
+        Ok(Self {
             best: Some(best),
             commissioned: true,
             ..Self::on(stage, truth)
-        }
+        })
     }
 
     /// Both, with the controllers of these settings.

@@ -27,10 +27,12 @@ use crate::plant::{
 /// Travel where it is left out, from where the axis stands, mm.
 const TRAVEL_MM: [f64; 2] = [-200.0, 200.0];
 /// Distance of the limit switches from the ends of the travel, mm.
-const LIMIT_BEYOND_MM: f64 = 5.0;
-/// Shares of the way to the negative end at which the home switch and the index pulse beside it are.
+pub const LIMIT_BEYOND_MM: f64 = 5.0;
+/// Share of the way to the negative end at which the home switch is.
 const HOME_SHARE: f64 = 0.2;
-const INDEX_SHARE: f64 = 0.18;
+/// Share of the screw's lead by which an index pulse is beside it, and of the travel that this is at most.
+const INDEX_SHARE: f64 = 0.4;
+const INDEX_TRAVEL_SHARE: f64 = 0.1;
 /// Least counts between two index pulses, as settings allow them.
 const LEAST_INDEX_COUNTS: i64 = 16;
 /// Largest way to an end of the travel, mm.
@@ -85,11 +87,29 @@ pub struct StageFile {
     pub path: PathBuf,
     /// The stage.
     pub truth: StageParameters,
-    /// Travel of x, y and z from where they stand, mm: to the negative and to the positive end; none where the axis has no
-    /// table in the file.
-    pub travel_mm: [Option<[f64; 2]>; 3],
+    /// What a data sheet says of x, y and z; nothing where the axis has no table in the file.
+    pub known: [Option<DataSheet>; 3],
     /// Switches and index pulses.
     pub marks: [MarkParameters; 3],
+}
+
+/// What a person knows of an axis without measuring it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DataSheet {
+    /// Travel from where the axis stands, mm: to the negative and to the positive end.
+    pub travel_mm: [f64; 2],
+    /// Largest velocity, mm/s.
+    pub max_velocity_mm_s: f64,
+    /// Largest acceleration, mm/s².
+    pub max_acceleration_mm_s2: f64,
+}
+
+impl DataSheet {
+    /// Length of the travel, mm.
+    pub const fn span_mm(&self) -> f64 {
+        let [negative_mm, positive_mm] = self.travel_mm;
+        positive_mm - negative_mm
+    }
 }
 
 /// The text of a file.
@@ -162,7 +182,7 @@ impl StageFile {
             source: Box::new(source),
         })?;
         let mut truth = StageParameters::real();
-        let mut travel_mm = [None; 3];
+        let mut known = [None; 3];
         let mut marks = [MarkParameters::default(); 3];
         for (axis, written) in AxisName::ALL.into_iter().zip([x, y, z]) {
             let Some(written) = written else {
@@ -170,10 +190,10 @@ impl StageFile {
             };
             let described = Axis::checked(&written, axis, path)?;
             truth.axes[axis as usize] = described.parameters();
-            travel_mm[axis as usize] = Some(described.travel_mm);
+            known[axis as usize] = Some(described.data_sheet());
             marks[axis as usize] = described.marks();
         }
-        if travel_mm == [None; 3] {
+        if known == [None; 3] {
             return Err(StageFileError::Empty {
                 path: path.to_owned(),
             });
@@ -181,7 +201,7 @@ impl StageFile {
         Ok(Self {
             path: path.to_owned(),
             truth,
-            travel_mm,
+            known,
             marks,
         })
     }
@@ -396,15 +416,26 @@ impl Axis {
         }
     }
 
+    fn data_sheet(&self) -> DataSheet {
+        DataSheet {
+            travel_mm: self.travel_mm,
+            max_velocity_mm_s: self.numbers.max_velocity_mm_s,
+            max_acceleration_mm_s2: self.numbers.max_acceleration_mm_s2,
+        }
+    }
+
     /// Limit switches beyond the ends of the travel, home switch and index pulse within it.
     fn marks(&self) -> MarkParameters {
         let [negative_mm, positive_mm] = self.travel_mm;
+        let home_mm = HOME_SHARE * negative_mm;
+        let beside_mm = (INDEX_SHARE * self.numbers.screw_lead_mm)
+            .min(INDEX_TRAVEL_SHARE * (positive_mm - negative_mm));
         let counts = |mm: f64| (mm / (1e-3 * self.numbers.resolution_um)).round() as i64;
         MarkParameters {
             negative_limit_mm: negative_mm - LIMIT_BEYOND_MM,
             positive_limit_mm: positive_mm + LIMIT_BEYOND_MM,
-            home_mm: HOME_SHARE * negative_mm,
-            index_count: counts(INDEX_SHARE * negative_mm),
+            home_mm,
+            index_count: counts(home_mm + beside_mm),
             counts_per_index: counts(self.numbers.screw_lead_mm).max(LEAST_INDEX_COUNTS),
             ..MarkParameters::default()
         }
@@ -497,7 +528,8 @@ mod tests {
             known.imperfections.encoder_noise_mm,
         );
         assert_eq!(found.drive, known.drive);
-        assert_eq!(file.travel_mm, [None, None, Some(TRAVEL_MM)]);
+        assert_eq!(file.known[..2], [None; 2]);
+        assert_eq!(file.known[2].unwrap().travel_mm, TRAVEL_MM);
         assert_eq!(file.marks, [MarkParameters::default(); 3]);
     }
 
@@ -517,7 +549,7 @@ mod tests {
             panic!("{:?}", axis.drive);
         };
         assert_eq!((gap.width_mm, gap.encoder), (5e-3, EncoderSide::Motor));
-        assert_eq!(file.travel_mm[0], Some([-3.0, 37.0]));
+        assert_eq!(file.known[0].unwrap().span_mm(), 40.0);
     }
 
     #[test]

@@ -44,9 +44,11 @@ impl LawStage {
             truth,
             seed,
             settings,
-            travel: file
-                .travel_mm
-                .map(|ends_mm| ends_mm.map_or(Travel::either_way(TRAVEL_MM), Travel::between)),
+            travel: file.known.map(|known| {
+                known.map_or(Travel::either_way(TRAVEL_MM), |known| {
+                    Travel::between(known.travel_mm)
+                })
+            }),
             description: "a simulated stage of one's own",
         }
     }
