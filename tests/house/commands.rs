@@ -164,7 +164,6 @@ impl Programs {
             at > 0 && arguments[at - 1].starts_with("--") && !arguments[at - 1].contains('=');
         let flag = [
             "--simulated",
-            "--simulated=commissioned",
             "--emulated",
             "--echo",
             "--json",

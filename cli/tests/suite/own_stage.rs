@@ -163,7 +163,7 @@ fn what_a_stage_does_not_allow_is_refused_with_the_field_and_the_remedy() {
     fs::write(at.join("typing.toml"), "[x]\nmas_kg = 3\n").unwrap();
     fs::write(
         at.join("fine.toml"),
-        "[x]\nresolution_um = 0.001\nmax_velocity_mm_s = 9000\n",
+        "[x]\nresolution_um = 0.001\nmax_velocity_mm_s = 900\n",
     )
     .unwrap();
     fs::write(at.join("other.toml"), "[x]\nresolution_um = 1\n").unwrap();

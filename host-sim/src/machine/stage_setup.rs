@@ -80,6 +80,8 @@ const SEARCH_MM_S: f64 = 20.0;
 const LATCH_MM_S: f64 = 2.0;
 /// Time by which an axis lags behind its reference at most, s: that of the simulated stage's settings.
 const LAG_S: f64 = 2e-3;
+/// Largest deceleration of a stop, mm/s²: the settings' bound.
+const MOST_BRAKING_MM_S2: f64 = 3e4;
 /// Largest tracking error at any speed, mm, and counts.
 const MOST_ERROR_MM: f64 = 20.0;
 const MOST_ERROR_COUNTS: f64 = 8e6;
@@ -92,7 +94,7 @@ fn enter_limits(limits: &mut LimitSettings, known: &DataSheet, resolution_mm: f6
     // Twice the largest acceleration, so that a motion that ends at the end of the travel does not look like one that will not.
     limits.braking_mm_s2 = limits
         .braking_mm_s2
-        .max(2.0 * known.max_acceleration_mm_s2)
+        .max((2.0 * known.max_acceleration_mm_s2).min(MOST_BRAKING_MM_S2))
         .max(known.max_velocity_mm_s);
     limits.braking_jerk_mm_s3 = limits.braking_jerk_mm_s3.max(limits.braking_mm_s2);
     limits.following_error_lag_s = LAG_S;
@@ -146,8 +148,9 @@ mod tests {
     fn a_stage_of_ones_own_has_the_limits_that_its_file_says_and_settings_that_are_accepted() {
         for text in [
             "[x]\ntravel_mm = [-3, 37]\nmax_velocity_mm_s = 40\nmax_acceleration_mm_s2 = 9000\n",
+            "[x]\nresolution_um = 0.001\n",
             "[x]\ntravel_mm = [0, 300]\nscrew_lead_mm = 0.1\nresolution_um = 10\n",
-            "[x]\ntravel_mm = [-3000, 0]\nscrew_lead_mm = 1000\nmax_velocity_mm_s = 3000\n",
+            "[x]\ntravel_mm = [-3000, 0]\nscrew_lead_mm = 1000\nmax_velocity_mm_s = 1000\nmax_acceleration_mm_s2 = 30000\n",
         ] {
             let file = StageFile::parse(text, Path::new("mine.toml")).unwrap();
             let setup = StageSetup::of(&file);

@@ -79,7 +79,7 @@ numbers! {
     offset_mv: -1000.0..=1000.0, 3.0, "Offset of converter and amplifier.";
     gravity_n: -1_000_000.0..=1_000_000.0, 0.0, "Weight less its counterweight; negative towards smaller positions.";
     ripple_n: 0.0..=100_000.0, 1.3878, "Amplitude of a force that repeats with every turn of the screw.";
-    max_velocity_mm_s: 0.1..=10_000.0, 250.0, "Largest velocity of the axis.";
-    max_acceleration_mm_s2: 1.0..=1_000_000.0, 2000.0, "Largest acceleration of its motions.";
+    max_velocity_mm_s: 0.1..=1000.0, 250.0, "Largest velocity of the axis; without it less if the encoder's counter cannot follow.";
+    max_acceleration_mm_s2: 1.0..=30_000.0, 2000.0, "Largest acceleration of its motions.";
     screw_lead_mm: 0.1..=1000.0, 10.0, "Lead of the screw.";
 }

@@ -53,6 +53,8 @@ const STIFF_HZ: f64 = 600.0;
 /// reaches 95 % of its level after three times level over stiffness.
 const VIRGIN_SLOPE: f64 = 4.0;
 const BRISTLE_SLOPE: f64 = 3.0;
+/// Counts in a second that a counter follows: the firmware takes 4096 in a tick at 10 kHz.
+const MOST_COUNTS_PER_S: f64 = 4e7;
 /// Encoder's noise where it is left out, counts.
 const NOISE_COUNTS: f64 = 0.3;
 
@@ -233,6 +235,10 @@ impl Axis {
         }
         if let (Some(resolution_um), None) = (written.resolution_um, written.noise_um) {
             numbers.noise_um = NOISE_COUNTS * resolution_um;
+        }
+        if written.max_velocity_mm_s.is_none() {
+            let counted_mm_s = 1e-3 * numbers.resolution_um * MOST_COUNTS_PER_S;
+            numbers.max_velocity_mm_s = numbers.max_velocity_mm_s.min(counted_mm_s);
         }
         let mut axis = Self {
             numbers,
@@ -656,5 +662,18 @@ mod tests {
             assert_eq!(commented.matches(&line).count(), 1, "{}", field.name);
         }
         assert_eq!(parse(text).unwrap(), parse(&commented).unwrap());
+    }
+
+    #[test]
+    fn the_page_has_a_row_for_every_number() {
+        let page = include_str!("../../../../docs/own-stage.md");
+        for field in FIELDS {
+            let (least, most) = field.range;
+            let row = format!(
+                "| `{}` | {least} to {most} | {} | {} |",
+                field.name, field.default, field.help
+            );
+            assert!(page.contains(&row), "docs/own-stage.md lacks\n{row}");
+        }
     }
 }
