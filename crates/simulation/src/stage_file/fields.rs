@@ -2,6 +2,8 @@
 
 use serde::Deserialize;
 
+use super::choices::{EncoderPlace, Friction};
+
 /// A number of an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Field {
@@ -22,8 +24,8 @@ macro_rules! numbers {
         #[serde(default, deny_unknown_fields)]
         pub(super) struct Written {
             $(pub(super) $name: Option<f64>,)*
-            pub(super) friction: super::Friction,
-            pub(super) encoder: super::EncoderPlace,
+            pub(super) friction: Friction,
+            pub(super) encoder: EncoderPlace,
             pub(super) travel_mm: Option<[f64; 2]>,
         }
 

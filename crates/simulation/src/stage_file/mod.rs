@@ -3,6 +3,7 @@
 //! TOML with a table for each of `x`, `y` and `z`. What is left out of a table is that of the simulated stage's x axis, or follows from
 //! what is written; an axis without a table is the simulated stage's own.
 
+mod choices;
 mod fields;
 
 use std::f64::consts::TAU;
@@ -17,6 +18,7 @@ use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
 use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use serde::Deserialize;
 
+use self::choices::{EncoderPlace, Friction};
 pub use self::fields::{FIELDS, Field};
 use self::fields::{Numbers, Written};
 use crate::plant::{
@@ -57,30 +59,6 @@ const BRISTLE_SLOPE: f64 = 3.0;
 const MOST_COUNTS_PER_S: f64 = 4e7;
 /// Encoder's noise where it is left out, counts.
 const NOISE_COUNTS: f64 = 0.3;
-
-/// Friction model of an axis.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum Friction {
-    /// One level, at rest as in motion.
-    Coulomb,
-    /// The Stribeck curve, and a short stiff spring before it slides.
-    Static,
-    #[default]
-    Gms,
-    SmoothedGms,
-    Lugre,
-    Dahl,
-}
-
-/// Side of resonance and backlash that the encoder is on.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-enum EncoderPlace {
-    #[default]
-    Table,
-    Motor,
-}
 
 /// A simulated stage of one's own.
 #[derive(Clone, Debug, PartialEq)]

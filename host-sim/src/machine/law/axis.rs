@@ -263,12 +263,16 @@ struct Step {
 impl Law {
     /// The law's reason to keep the outputs off.
     fn not_enabled(&self, experiment: &Experiment) -> ExperimentError {
-        let events = match self {
-            Self::OpenLoop => &[],
-            Self::ClosedLoop { machine, .. } => machine.events(),
+        let (events, safety) = match self {
+            Self::OpenLoop => (&[][..], None),
+            Self::ClosedLoop { machine, .. } => (machine.events(), Some(machine.state().safety())),
         };
         let refusal = events.iter().find_map(|(_, event)| match event {
             Event::Refused(Command::Enable, refusal) => Some(refusal.as_str()),
+            _ => None,
+        });
+        let refusal = refusal.or(match safety {
+            Some(SafetyState::Faulted(fault)) => Some(fault.code.cause()),
             _ => None,
         });
         ExperimentError::Impossible {
