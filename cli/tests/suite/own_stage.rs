@@ -36,7 +36,7 @@ fn the_example_says_what_its_axis_gains_within_eighty_columns() {
     for part in [
         "commissioned on the x axis of mine.toml, takes",
         "% off the largest error that the best PID leaves",
-        "as commissioned: N-PID",
+        "commissioned: N-PID",
         "friction identified from experiments",
         "quadrant-out/mine-x-settings.toml",
     ] {

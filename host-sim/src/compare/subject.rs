@@ -82,7 +82,7 @@ impl Subject {
     pub fn name(&self, configuration: Configuration) -> String {
         match (configuration.gains, &self.chosen) {
             (Gains::BestPid, _) => configuration.name(),
-            (Gains::Commissioned, Some(chosen)) => format!("as commissioned: {chosen}"),
+            (Gains::Commissioned, Some(chosen)) => format!("commissioned: {chosen}"),
             (Gains::Commissioned, None) => configuration.name(),
             (Gains::Settings, _) => format!("{} {}", self.own, configuration.name()),
         }
@@ -156,7 +156,7 @@ mod tests {
         let name = Configuration::name_of(&stage.axes[1]);
         assert_eq!(
             chosen.name(Configuration::COMMISSIONED),
-            format!("as commissioned: {name}")
+            format!("commissioned: {name}")
         );
         stage.axes[1].feedback.law = LawKind::Pid;
         stage.axes[1].feedforward.kind = FeedforwardKind::None;
