@@ -1,17 +1,20 @@
 //! `quadrant circle`.
 
 use crate::numbers::{self, Numbers};
+use crate::own_stage::{self, OwnStage};
 use crate::plane::PlaneName;
 use anyhow::{Context, ensure};
 use clap::Args;
+use quadrant::axes::AxisName;
+use quadrant::reference::Plane;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_cli::say;
 use quadrant_sim::circle::page::{circle_page, circle_tables};
 use quadrant_sim::circle::{CircleRequest, run_circle_tests};
-use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::pages::provenance;
+use quadrant_sim::stage_file::StageFile;
 
 /// Options of `quadrant circle`.
 #[derive(Clone, Debug, Args)]
@@ -19,15 +22,18 @@ pub(super) struct Arguments {
     /// Planes, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["xy", "yz", "zx"], value_name = "PLANES")]
     plane: Vec<PlaneName>,
-    /// Radii, mm, separated by commas.
-    #[arg(long, default_values_t = [Numbers(vec![5.0, 15.0, 30.0, 50.0])], value_name = "MM,...")]
+    /// Radii, mm, separated by commas; without it 5, 15, 30 and 50, as far as they fit the travel that --stage says.
+    #[arg(long, value_name = "MM,...")]
     radius_mm: Vec<Numbers>,
     /// Feeds along the path, mm/min, separated by commas.
     #[arg(long, default_values_t = [Numbers(vec![300.0, 1000.0, 3000.0])], value_name = "MM/MIN,...")]
     feed_mm_min: Vec<Numbers>,
-    /// Run the thesis' eight configurations beside the best PID, not only its PID alone and N-PID with static and GMS feedforward.
+    /// Run the thesis' eight configurations beside the best PID, not only its PID alone and N-PID with static and GMS feedforward; on a
+    /// stage that is commissioned for it, the best PID with each feedforward.
     #[arg(long)]
     all: bool,
+    #[command(flatten)]
+    stage: OwnStage,
     /// Number of noise seeds, from --seed on, 1 to 100; with several, tables give means and spreads over them.
     #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(1..=100))]
     seeds: u64,
@@ -37,10 +43,52 @@ pub(super) struct Arguments {
     output: Output,
 }
 
+/// Radii where none are given, mm.
+const RADII_MM: [f64; 4] = [5.0, 15.0, 30.0, 50.0];
+
+impl Arguments {
+    /// The radii that are asked for, or the usual ones that fit the travel of `axes`.
+    fn radii_mm(&self, own: Option<&StageFile>, axes: &[AxisName]) -> anyhow::Result<Vec<f64>> {
+        let given = numbers::all(&self.radius_mm);
+        let Some(own) = own else {
+            return Ok(if given.is_empty() {
+                RADII_MM.to_vec()
+            } else {
+                given
+            });
+        };
+        if given.is_empty() {
+            let mut fitting = RADII_MM.to_vec();
+            fitting.retain(|radius_mm| own_stage::fits(own, axes, 2.0 * radius_mm));
+            ensure!(
+                !fitting.is_empty(),
+                "no circle of {} mm radius or more fits the travel in {}: give a smaller --radius-mm",
+                RADII_MM[0],
+                own.path.display()
+            );
+            return Ok(fitting);
+        }
+        for radius_mm in &given {
+            for &axis in axes {
+                let what = format!("--radius-mm {radius_mm}");
+                own_stage::refuse_longer(own, axis, 2.0 * radius_mm, &what)?;
+            }
+        }
+        Ok(given)
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let output = &arguments.output;
     output.ready()?;
-    let radii_mm = numbers::all(&arguments.radius_mm);
+    let own = arguments.stage.read()?;
+    let planes: Vec<_> = arguments.plane.iter().map(|name| name.plane()).collect();
+    let moving = |axis: &AxisName| {
+        let moves = |plane: &Plane| <[usize; 2]>::from(plane.axes()).contains(&(*axis as usize));
+        planes.iter().any(moves)
+    };
+    let axes: Vec<AxisName> = AxisName::ALL.into_iter().filter(moving).collect();
+    let radii_mm = arguments.radii_mm(own.as_ref(), &axes)?;
     let feeds_mm_min = numbers::all(&arguments.feed_mm_min);
     for (option, values) in [("--radius-mm", &radii_mm), ("--feed-mm-min", &feeds_mm_min)] {
         for value in values {
@@ -50,20 +98,27 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             );
         }
     }
-    let stage = arguments.settings.read()?.stage;
-    let setup = RunConfiguration::identified(stage).with_best_pid()?;
+    let setup = match &own {
+        None => RunConfiguration::identified(arguments.settings.read()?.stage).with_best_pid()?,
+        Some(own) => {
+            let mut described = own_stage::axes(own);
+            described.retain(|axis| axes.contains(axis));
+            ensure!(
+                !described.is_empty(),
+                "{} describes no axis of these planes: add a table, or give another --plane",
+                own.path.display()
+            );
+            own_stage::setup(own, &described, &arguments.settings, output)?
+        }
+    };
     let last_seed = output.seed.checked_add(arguments.seeds - 1);
     let last_seed =
         last_seed.context("--seed plus --seeds is beyond 2^64; choose a smaller one")?;
     let request = CircleRequest {
-        planes: arguments.plane.iter().map(|name| name.plane()).collect(),
+        planes,
         radii_mm,
         feeds_mm_min,
-        configurations: if arguments.all {
-            Configuration::with_best_pid()
-        } else {
-            Configuration::USUAL.to_vec()
-        },
+        configurations: setup.configurations(arguments.all),
         seeds: (output.seed..=last_seed).collect(),
     };
     let bar = progress(request.cases().len() as u64, "running circles");

@@ -3,15 +3,50 @@
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
-use anyhow::Context;
+use anyhow::{Context, bail};
+use clap::ValueEnum;
 use quadrant_cli::{terminal, warn};
 use quadrant_sim::client::{Client, Interrupt};
 use quadrant_sim::machine::{
-    LawStage, Machine, SerialTransport, Shared, SimulatedLink, TcpTransport, Transport,
+    LawStage, Machine, SerialTransport, Shared, SimulatedLink, StageSetup, TcpTransport, Transport,
 };
+use quadrant_sim::stage_file::StageFile;
 
 /// Image that `cargo xtask build --board mps2` leaves, from the workspace's folder.
 pub(super) const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
+
+/// What a simulated machine knows when it is switched on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
+pub(super) enum Preset {
+    /// Nothing, as a board from the shop: it refuses to be enabled until an axis is commissioned, or settings are loaded.
+    #[default]
+    Fresh,
+    /// Settings that suit the simulated stage, for a quick look.
+    Commissioned,
+}
+
+/// The stage of a machine that is not real.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Simulation {
+    /// Seed of its noise.
+    pub(super) seed: u64,
+    /// A stage of one's own.
+    pub(super) stage: Option<StageFile>,
+}
+
+impl Simulation {
+    fn setup(&self, preset: Preset) -> anyhow::Result<StageSetup> {
+        Ok(match (preset, &self.stage) {
+            (Preset::Fresh, None) => StageSetup::simulated(),
+            (Preset::Fresh, Some(stage)) => StageSetup::of(stage),
+            (Preset::Commissioned, None) => StageSetup::commissioned(),
+            (Preset::Commissioned, Some(stage)) => bail!(
+                "the stage of {} has no settings ready: commission its axes, or load the settings that a commissioning has left",
+                stage.path.display()
+            ),
+        })
+    }
+}
 
 /// A machine, as `--machine` names it.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -26,7 +61,7 @@ pub(super) enum Endpoint {
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub(super) enum LinkEndpoint {
     /// The firmware's application in this process.
-    Simulated,
+    Simulated(Preset),
     /// The firmware's image in QEMU.
     Emulated(PathBuf),
     /// A board at a serial port.
@@ -44,10 +79,13 @@ impl FromStr for Endpoint {
         let link = match text.split_once(':') {
             None => match text {
                 "law" => return Ok(Self::Law),
-                "simulated" => LinkEndpoint::Simulated,
+                "simulated" => LinkEndpoint::Simulated(Preset::Fresh),
                 "emulated" => LinkEndpoint::Emulated(DEFAULT_IMAGE.into()),
                 _ => return Err(Self::EXPECTED.to_owned()),
             },
+            Some(("simulated", preset)) => LinkEndpoint::Simulated(
+                Preset::from_str(preset, false).map_err(|_| Self::EXPECTED.to_owned())?,
+            ),
             Some(("emulated", image)) => LinkEndpoint::Emulated(image.into()),
             Some(("serial", port)) => LinkEndpoint::Serial(port.to_owned()),
             Some(("tcp", address)) => LinkEndpoint::Tcp(address.to_owned()),
@@ -58,37 +96,55 @@ impl FromStr for Endpoint {
 }
 
 impl Endpoint {
-    const EXPECTED: &str =
-        "give law, simulated, emulated, emulated:ELF, serial:PORT or tcp:HOST:PORT";
+    const EXPECTED: &str = "give law, simulated, simulated:commissioned, emulated, emulated:ELF, serial:PORT or tcp:HOST:PORT";
 
-    /// Opens the machine; `seed` decides the noise of a simulated stage.
-    pub(super) fn open(&self, seed: u64) -> anyhow::Result<Box<dyn Machine>> {
+    /// Opens the machine, on this stage if it is not real.
+    pub(super) fn open(&self, simulation: &Simulation) -> anyhow::Result<Box<dyn Machine>> {
         Ok(match self {
-            Self::Law => Box::new(LawStage::new(seed)),
-            Self::Link(link) => Box::new(link.connect(seed, None, None)?),
+            Self::Law => Box::new(match &simulation.stage {
+                Some(stage) => LawStage::of(stage, simulation.seed),
+                None => LawStage::new(simulation.seed),
+            }),
+            Self::Link(link) => Box::new(link.connect(simulation, None, None)?),
         })
     }
 }
 
 impl LinkEndpoint {
-    /// Opens a session; `seed` decides the noise of a simulated stage, a file keeps the flash of its machine, and others may
+    /// Opens a session: on this stage if the machine is not real, a file keeps the flash of its machine, and others may
     /// look at the address `share`.
     pub(super) fn connect(
         &self,
-        seed: u64,
+        simulation: &Simulation,
         flash: Option<&Path>,
         share: Option<&str>,
     ) -> anyhow::Result<Client> {
-        let client = self.open(seed, flash, share)?;
+        let client = self.open(simulation, flash, share)?;
         heed_signals(client.interrupt())?;
         terminal::keep_modes();
         Ok(client)
     }
 
-    fn open(&self, seed: u64, flash: Option<&Path>, share: Option<&str>) -> anyhow::Result<Client> {
+    fn open(
+        &self,
+        simulation: &Simulation,
+        flash: Option<&Path>,
+        share: Option<&str>,
+    ) -> anyhow::Result<Client> {
+        if let Some(stage) = &simulation.stage
+            && !matches!(self, Self::Simulated(_) | Self::Emulated(_))
+        {
+            bail!(
+                "--stage {}: this machine has a stage of its own; a file describes that of a simulated or emulated one",
+                stage.path.display()
+            );
+        }
         match self {
-            Self::Simulated => session(SimulatedLink::start(seed, flash)?, share),
-            Self::Emulated(image) => emulated(image, seed, flash, share),
+            Self::Simulated(preset) => {
+                let setup = simulation.setup(*preset)?;
+                session(SimulatedLink::start(&setup, simulation.seed, flash)?, share)
+            }
+            Self::Emulated(image) => emulated(image, simulation, flash, share),
             Self::Serial(path) => {
                 let port = SerialTransport::open(path).with_context(|| {
                     format!(
@@ -182,16 +238,17 @@ fn on_signals(act: impl Fn(bool) + Send + 'static) -> Result<(), ctrlc::Error> {
 #[cfg(all(unix, feature = "emulated"))]
 fn emulated(
     image: &Path,
-    seed: u64,
+    simulation: &Simulation,
     flash: Option<&Path>,
     share: Option<&str>,
 ) -> anyhow::Result<Client> {
-    let link = quadrant_sim::machine::EmulatedLink::start(image, seed, flash)?;
+    let setup = simulation.setup(Preset::Fresh)?;
+    let link = quadrant_sim::machine::EmulatedLink::start(image, &setup, simulation.seed, flash)?;
     session(link, share)
 }
 
 #[cfg(not(all(unix, feature = "emulated")))]
-fn emulated(_: &Path, _: u64, _: Option<&Path>, _: Option<&str>) -> anyhow::Result<Client> {
+fn emulated(_: &Path, _: &Simulation, _: Option<&Path>, _: Option<&str>) -> anyhow::Result<Client> {
     anyhow::bail!(if cfg!(unix) {
         "emulated: this program was built without QEMU's side; build it with `--features emulated`, as in `cargo run \
          --release --features emulated -- connect --emulated`"
@@ -202,7 +259,7 @@ fn emulated(_: &Path, _: u64, _: Option<&Path>, _: Option<&str>) -> anyhow::Resu
 
 #[cfg(test)]
 mod tests {
-    use super::{Endpoint, LinkEndpoint};
+    use super::{Endpoint, LinkEndpoint, Preset};
 
     #[test]
     fn every_machine_has_a_name_and_others_are_refused_with_them() {
@@ -211,7 +268,11 @@ mod tests {
             other => panic!("{text}: {other:?}"),
         };
         assert_eq!("law".parse(), Ok(Endpoint::Law));
-        assert_eq!(link("simulated"), LinkEndpoint::Simulated);
+        assert_eq!(link("simulated"), LinkEndpoint::Simulated(Preset::Fresh));
+        assert_eq!(
+            link("simulated:commissioned"),
+            LinkEndpoint::Simulated(Preset::Commissioned)
+        );
         assert_eq!(
             link("emulated:a.elf"),
             LinkEndpoint::Emulated("a.elf".into())
@@ -224,7 +285,7 @@ mod tests {
             link("tcp:shop:7000"),
             LinkEndpoint::Tcp("shop:7000".to_owned())
         );
-        for text in ["", "board", "usb:1"] {
+        for text in ["", "board", "usb:1", "simulated:commissionned"] {
             let refused = text.parse::<Endpoint>().unwrap_err();
             assert!(refused.contains("serial:PORT"), "{text}: {refused}");
         }

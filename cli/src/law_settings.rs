@@ -10,7 +10,7 @@ use quadrant_sim::settings_file::{SettingsFile, SettingsFileError};
 #[derive(Clone, Debug, Default, Args)]
 pub struct LawSettings {
     /// Settings of the control law, as `quadrant commission` leaves them; without them, those that commissioning the
-    /// simulated stage gave.
+    /// simulated stage gave, or gives of a stage of your own.
     #[arg(id = "settings", long, value_name = "FILE")]
     pub path: Option<PathBuf>,
 }

@@ -12,6 +12,7 @@ mod grammar;
 mod identify;
 mod kept;
 mod numbers;
+mod own_stage;
 mod plane;
 mod replay;
 mod replay_program;
@@ -47,8 +48,8 @@ enum Command {
     Circle(circle::Arguments),
     /// Commission an axis, unattended: from nothing known to settings that the firmware runs, with a report.
     Commission(commission::Arguments),
-    /// Run the thesis' comparison on the simulated stage: PID and N-PID with every feedforward, three velocities, and a
-    /// circle.
+    /// Compare laws on a simulated stage, the built-in one or your own: the best PID with and without feedforward of friction, and the
+    /// thesis' laws, at three velocities, and on a circle.
     Compare(compare::Arguments),
     /// Write what a shell needs to complete this program's commands.
     Completions(completions::Arguments),

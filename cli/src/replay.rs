@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use clap::Args;
+use quadrant::axes::AxisName;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, progress};
 use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
@@ -12,7 +13,9 @@ use quadrant_sim::record::Record;
 use quadrant_sim::replay::recorded;
 use quadrant_sim::replay::recorded::RecordedAxis;
 use quadrant_sim::replay::recorded_page::{recorded_page, recorded_table};
+use quadrant_sim::stage_file::StageFile;
 
+use super::own_stage::{self, OwnStage};
 use super::replay_program::{self, ProgramOptions};
 use quadrant_cli::warn;
 
@@ -39,9 +42,30 @@ pub(super) struct Arguments {
     #[arg(long, value_enum, default_value = "identified")]
     model: ModelKnowledge,
     #[command(flatten)]
+    stage: OwnStage,
+    #[command(flatten)]
     settings: LawSettings,
     #[command(flatten)]
     output: Output,
+}
+
+impl Arguments {
+    /// The axes of a stage of one's own that will move.
+    fn axes_of(&self, own: &StageFile) -> anyhow::Result<Vec<AxisName>> {
+        let described = own_stage::axes(own);
+        let Some(axis) = self.axis else {
+            return Ok(described);
+        };
+        let Some(name) = axis.name() else {
+            bail!("--stage is for x, y and z; the EMPS axis has its published model");
+        };
+        ensure!(
+            described.contains(&name),
+            "{} has no table [{name}]: add one, or give another --axis",
+            own.path.display()
+        );
+        Ok(vec![name])
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
@@ -50,6 +74,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         axis,
         program,
         model,
+        stage,
         settings,
         output,
     } = arguments;
@@ -58,24 +83,41 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         settings.path.is_none() || *axis != Some(RecordedAxis::Emps),
         "--settings is for an axis of the simulated stage; the EMPS axis has its published model"
     );
-    let stage = settings.read()?.stage;
-    let setup = RunConfiguration::new(*model, stage).with_best_pid()?;
+    let own = stage.read()?;
+    let setup = match &own {
+        None => RunConfiguration::new(*model, settings.read()?.stage).with_best_pid()?,
+        Some(own) => {
+            ensure!(
+                *model == ModelKnowledge::Identified,
+                "--model exact is for the built-in stage: the law knows of yours what commissioning found"
+            );
+            let axes = arguments.axes_of(own)?;
+            own_stage::setup(own, &axes, settings, output)?
+        }
+    };
     if let Some(path) = &program.gcode {
-        return replay_program::run(path, program, &setup, output);
+        return replay_program::run(path, program, &setup, own.as_ref(), output);
     }
     // The command line has either a program, or a reference and its axis.
     let (Some(reference), Some(axis)) = (reference, axis) else {
         bail!("nothing to follow; give --gcode, or --reference with --axis");
     };
-    let record = Record::read(reference, &axis.limits())?;
+    let limits = match (&own, axis.name()) {
+        (Some(own), Some(name)) => own_stage::record_limits(own, name, axis.limits()),
+        _ => axis.limits(),
+    };
+    let record = Record::read(reference, &limits)?;
     for doubt in &record.doubts {
         warn!("note: {doubt}");
     }
-    let bar = progress(recorded::RUNS, "following the record");
+    let bar = progress(
+        setup.configurations(true).len() as u64,
+        "following the record",
+    );
     let outcomes = recorded::replay(&record, *axis, &setup, output.seed, &|| bar.inc(1))?;
     bar.finish_and_clear();
     output.table(&recorded_table(&outcomes, *axis))?;
-    let settings = settings.option();
+    let settings = format!("{}{}", stage.option(), settings.option());
     let shown = match model {
         ModelKnowledge::Identified => "",
         ModelKnowledge::Exact => " --model exact",

@@ -3,15 +3,18 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use quadrant::axes::AxisName;
 use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_cli::{say, warn};
-use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::write_trace;
 use quadrant_sim::replay::part_program::{ProgramOutcome, ProgramTables, run_program};
 use quadrant_sim::replay::part_program_page::{motion_summary_table, program_page, program_table};
+use quadrant_sim::stage_file::StageFile;
+
+use crate::own_stage;
 
 /// Options of `quadrant replay --gcode`.
 #[derive(Clone, Debug, Args)]
@@ -42,6 +45,7 @@ pub(super) fn run(
     path: &Path,
     options: &ProgramOptions,
     setup: &RunConfiguration,
+    own: Option<&StageFile>,
     output: &Output,
 ) -> anyhow::Result<()> {
     let program = Program::read(path)?;
@@ -59,11 +63,16 @@ pub(super) fn run(
     };
     let trajectory = Trajectory::plan(&program, &limits)?;
     let tables = ProgramTables::sample(&trajectory, &setup.stage);
-    let configurations = if options.all {
-        Configuration::with_best_pid()
-    } else {
-        Configuration::USUAL.to_vec()
-    };
+    if let Some(own) = own {
+        for axis in AxisName::ALL {
+            let reference_mm = tables.reference_mm[axis as usize].iter();
+            let (low_mm, high_mm) = reference_mm.fold((f64::MAX, f64::MIN), |(low, high), &mm| {
+                (low.min(mm), high.max(mm))
+            });
+            own_stage::refuse_longer(own, axis, high_mm - low_mm, "the program")?;
+        }
+    }
+    let configurations = setup.configurations(options.all);
     let bar = progress(configurations.len() as u64, "following the program");
     let outcomes = run_program(
         &trajectory,

@@ -9,8 +9,9 @@ use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::{Machine, MachineError, TestAxis, Travel};
 use quadrant_sim::settings_file::SettingsFile;
 
-use super::endpoint::Endpoint;
+use super::endpoint::{Endpoint, Simulation};
 use super::kept;
+use super::own_stage::OwnStage;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::command_line;
 use quadrant_cli::{explained, say};
@@ -21,8 +22,8 @@ pub(super) struct Subject {
     /// The axis: of the machine, or, with --record, of --settings and --into.
     #[arg(long, value_enum, required_unless_present = "record")]
     pub(super) axis: Option<Axis>,
-    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it),
-    /// emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
+    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it, not
+    /// commissioned), simulated:commissioned, emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
     #[arg(
         long,
         default_value = "law",
@@ -30,6 +31,8 @@ pub(super) struct Subject {
         conflicts_with = "record"
     )]
     pub(super) machine: Endpoint,
+    #[command(flatten)]
+    pub(super) stage: OwnStage,
     /// Travel either way from where the axis stands, mm; without it, that to the soft limits of a homed axis.
     #[arg(long, value_name = "MM", value_parser = travel, conflicts_with = "record")]
     pub(super) travel: Option<f64>,
@@ -204,8 +207,16 @@ impl Subject {
         measure: impl FnOnce(&mut dyn TestAxis, &AxisSettings) -> anyhow::Result<T>,
     ) -> anyhow::Result<Measured<T>> {
         let axis = AxisName::from(self.axis()?);
-        let mut machine = self.machine.open(seed)?;
-        let travel_mm = travel_mm(&mut *machine, axis, self.travel, fallback_mm)?;
+        let simulation = Simulation {
+            seed,
+            stage: self.stage.read()?,
+        };
+        let known = simulation.stage.as_ref();
+        let known = known.and_then(|stage| stage.known[axis as usize]);
+        let nearer_mm = known.map(|known| Travel::between(known.travel_mm).nearer_mm());
+        let mut machine = self.machine.open(&simulation)?;
+        let given_mm = self.travel.or(nearer_mm);
+        let travel_mm = travel_mm(&mut *machine, axis, given_mm, fallback_mm)?;
         let stage = machine.settings()?;
         let found = on_axis(&mut *machine, axis, travel_mm, start, measure)?;
         if machine.is_simulated() {

@@ -12,6 +12,7 @@
 //! - [`design`]: margins, loop shaping, the choice of gains;
 //! - [`record`]: recorded motions from CSV files, checked;
 //! - [`gcode`]: part programs, and their motion;
+//! - [`stage_file`]: a simulated stage of one's own, as TOML;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML; [`setting_value`]: their values, and what differs;
 //! - [`settings_reference`]: the meaning of every setting, as a page;
 //! - [`report`], [`pages`]: pages, tables and figures, and parts that several pages have.
@@ -32,5 +33,5 @@ pub mod pages;
 pub mod record;
 pub mod replay;
 pub use quadrant_report as report;
-pub use quadrant_simulation::{plant, setting_value, settings_file};
+pub use quadrant_simulation::{plant, setting_value, settings_file, stage_file};
 pub mod settings_reference;

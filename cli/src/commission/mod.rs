@@ -23,10 +23,12 @@ use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
 use quadrant_sim::settings_file::SettingsFile;
+use quadrant_sim::stage_file::StageFile;
 use serde_json::{Value, json};
 
-use super::endpoint::Endpoint;
+use super::endpoint::{Endpoint, Simulation};
 use super::kept;
+use super::own_stage::OwnStage;
 use super::subject::{and_restored, known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
@@ -38,8 +40,8 @@ pub(super) struct Arguments {
     /// The axis to commission.
     #[arg(long, value_enum)]
     axis: Axis,
-    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it),
-    /// emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
+    /// The machine: law (the control law alone on the simulated stage), simulated (the firmware's application on it, not
+    /// commissioned), simulated:commissioned, emulated or emulated:ELF (its image in QEMU), serial:PORT, tcp:HOST:PORT.
     #[arg(
         long,
         default_value = "law",
@@ -47,6 +49,8 @@ pub(super) struct Arguments {
         conflicts_with = "record"
     )]
     machine: Endpoint,
+    #[command(flatten)]
+    stage: OwnStage,
     /// The folder of an earlier commissioning instead, whose recordings are identified anew; nothing moves, so there is no
     /// verdict and no cross-check.
     #[arg(long, value_name = "FOLDER")]
@@ -108,6 +112,8 @@ pub(super) struct Job<'a> {
     pub(super) axis: AxisName,
     /// Travel from where the axis stands; without it, that to the soft limits.
     pub(super) travel: Option<Travel>,
+    /// Simulated stage of one's own that the machine has.
+    pub(super) stage: Option<&'a StageFile>,
     /// Settings to start from; without them, those of the machine.
     pub(super) start: Option<SettingsFile>,
     /// File for the settings, in place of `settings.toml` in the folder for results.
@@ -149,10 +155,20 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(folder) = &arguments.record {
         return arguments.run_saved(folder, start);
     }
-    let mut machine = arguments.machine.open(output.seed)?;
+    let stage = arguments.stage.read()?;
+    let own_travel = stage
+        .as_ref()
+        .and_then(|stage| stage.known[axis.index()])
+        .map(|known| Travel::between(known.travel_mm));
+    let simulation = Simulation {
+        seed: output.seed,
+        stage,
+    };
+    let mut machine = arguments.machine.open(&simulation)?;
     let job = Job {
         axis: (*axis).into(),
-        travel: arguments.travel,
+        travel: arguments.travel.or(own_travel),
+        stage: simulation.stage.as_ref(),
         start,
         into: into.as_deref(),
         request,
@@ -274,7 +290,9 @@ impl Job<'_> {
         let folder = output.below(axis.as_str());
         folder.ready()?;
         let experiments = folder.file(EXPERIMENTS)?;
-        let words = self.request.words(output.seed, self.travel, &base);
+        let words = self
+            .request
+            .words(output.seed, self.travel, self.stage, &base);
         if self.request.resume {
             warn!("{}", resumed(&experiments, &words)?);
         }
@@ -381,8 +399,15 @@ impl Request {
         }
     }
 
-    /// The only thing that a commissioning can be resumed with: seed, options, and the settings of the axis that it starts from.
-    fn words(&self, seed: u64, travel: Option<Travel>, base: &AxisSettings) -> String {
+    /// The only thing that a commissioning can be resumed with: seed, options, the stage of one's own, and the settings of the axis that it
+    /// starts from.
+    fn words(
+        &self,
+        seed: u64,
+        travel: Option<Travel>,
+        stage: Option<&StageFile>,
+        base: &AxisSettings,
+    ) -> String {
         let mut words = format!("--seed {seed}");
         if let Some(travel) = travel {
             let _ = write!(
@@ -402,9 +427,21 @@ impl Request {
         if self.quick {
             words.push_str(" --quick");
         }
-        let mut hasher = DefaultHasher::new();
-        format!("{base:?}").hash(&mut hasher);
-        let _ = write!(words, " and settings number {:08x}", hasher.finish() as u32);
+        let number = |text: String| {
+            let mut hasher = DefaultHasher::new();
+            text.hash(&mut hasher);
+            hasher.finish() as u32
+        };
+        if let Some(stage) = stage {
+            let truth = number(format!("{:?}", stage.truth));
+            let _ = write!(
+                words,
+                " --stage {} of number {truth:08x}",
+                stage.path.display()
+            );
+        }
+        let settings = number(format!("{base:?}"));
+        let _ = write!(words, " and settings number {settings:08x}");
         words
     }
 
@@ -656,6 +693,7 @@ mod tests {
         let job = Job {
             axis: AxisName::X,
             travel: Some(Travel::either_way(30.0)),
+            stage: None,
             start: None,
             into: None,
             request: &request,
@@ -750,6 +788,21 @@ mod tests {
         Journal::remove(&experiments).unwrap();
         let ended = said(commission_with(folder.path(), &mut machine, &["--resume"]));
         assert!(ended.contains("has ended is not begun again"), "{ended}");
+    }
+
+    #[test]
+    fn a_commissioning_is_resumed_on_the_same_stage_of_ones_own_alone() {
+        let Words { request, .. } = clap::Parser::parse_from([""]);
+        let base = StageSettings::simulated().axes[0].clone();
+        let words = |text: &str| {
+            let stage = StageFile::parse(text, Path::new("mine.toml")).unwrap();
+            request.words(1, None, Some(&stage), &base)
+        };
+        let light = words("[x]\nmass_kg = 10\n");
+        assert!(light.contains("--stage mine.toml"), "{light}");
+        assert_eq!(light, words("[x]\n"));
+        assert_ne!(light, words("[x]\nmass_kg = 11\n"));
+        assert_ne!(light, request.words(1, None, None, &base));
     }
 
     #[test]

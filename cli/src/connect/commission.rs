@@ -10,6 +10,7 @@ pub(super) fn run(client: &mut Client, options: &CommissionOptions) -> anyhow::R
     let job = Job {
         axis: options.axis.into(),
         travel: options.travel,
+        stage: None,
         start: None,
         into: None,
         request: &options.request,

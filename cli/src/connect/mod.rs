@@ -34,7 +34,8 @@ use self::answer::Answer;
 use self::command::Command;
 use self::printer::Printer;
 use self::session::Session;
-use crate::endpoint::{DEFAULT_IMAGE, LinkEndpoint};
+use crate::endpoint::{DEFAULT_IMAGE, LinkEndpoint, Preset, Simulation};
+use crate::own_stage::OwnStage;
 
 /// Time between two looks at a motion.
 const LOOK: Duration = Duration::from_millis(20);
@@ -44,6 +45,8 @@ const LOOK: Duration = Duration::from_millis(20);
 pub(super) struct Arguments {
     #[command(flatten)]
     machine: MachineOptions,
+    #[command(flatten)]
+    stage: OwnStage,
     /// Seed of the simulated stage's noise; the same seed gives the same results.
     #[arg(long, default_value_t = 1, conflicts_with_all = ["port", "tcp", "look"])]
     seed: u64,
@@ -85,9 +88,10 @@ struct MachineOptions {
     #[arg(long, value_name = "HOST:PORT")]
     look: Option<String>,
     /// The firmware's own code on the simulated stage, in this process. Its time passes as fast as it can while it is waited for,
-    /// as the clock's while the prompt waits for a command, and not at all while a script is read.
-    #[arg(long)]
-    simulated: bool,
+    /// as the clock's while the prompt waits for a command, and not at all while a script is read. It is not commissioned, as a
+    /// board from the shop; --simulated=commissioned has settings that suit the stage.
+    #[arg(long, value_enum, value_name = "STATE", num_args = 0..=1, require_equals = true, default_missing_value = "fresh")]
+    simulated: Option<Preset>,
     /// The firmware's image in QEMU on the simulated stage, the same way; without a path, the one that `cargo xtask build
     /// --board mps2` has left below this folder.
     #[arg(long, value_name = "ELF", num_args = 0..=1, require_equals = true, default_missing_value = DEFAULT_IMAGE)]
@@ -155,19 +159,29 @@ fn stay(client: &mut Client) -> anyhow::Result<bool> {
 
 fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
     let named = &arguments.machine;
-    let endpoint = match (&named.port, &named.tcp, &named.look, &named.emulated) {
+    let endpoint = match (
+        &named.port,
+        &named.tcp,
+        &named.look,
+        &named.emulated,
+        named.simulated,
+    ) {
         (Some(path), ..) => LinkEndpoint::Serial(path.clone()),
         (_, Some(address), ..) => LinkEndpoint::Tcp(address.clone()),
-        (_, _, Some(address), _) => LinkEndpoint::Look(address.clone(), arguments.token.clone()),
-        (.., Some(image)) => LinkEndpoint::Emulated(image.clone()),
-        _ if named.simulated => LinkEndpoint::Simulated,
+        (_, _, Some(address), ..) => LinkEndpoint::Look(address.clone(), arguments.token.clone()),
+        (.., Some(image), _) => LinkEndpoint::Emulated(image.clone()),
+        (.., Some(preset)) => LinkEndpoint::Simulated(preset),
         _ => anyhow::bail!(
             "no machine is named: give --port PATH for a board, --tcp HOST:PORT, or --simulated or --emulated to try \
              without one"
         ),
     };
+    let simulation = Simulation {
+        seed: arguments.seed,
+        stage: arguments.stage.read()?,
+    };
     endpoint.connect(
-        arguments.seed,
+        &simulation,
         arguments.flash.as_deref(),
         arguments.share.as_deref(),
     )

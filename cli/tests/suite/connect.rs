@@ -15,11 +15,11 @@ const LIMITS: AxisLimits = AxisLimits {
     resolution_mm: 0.0005,
 };
 
-/// Gives a script to a machine that has just been switched on.
+/// Gives a script to a machine with settings that suit it.
 fn session(folder: &Path, options: &[&str], script: &str) -> Output {
     command::play(
         folder,
-        &[&["connect", "--simulated"], options].concat(),
+        &[&["connect", "--simulated=commissioned"], options].concat(),
         script,
     )
 }
@@ -567,4 +567,31 @@ fn an_axis_that_does_not_learn_has_nothing_to_keep() {
         errors.contains("set y/feedforward/learning present"),
         "{errors}"
     );
+}
+
+#[test]
+fn a_fresh_machine_is_not_commissioned_refuses_to_be_enabled_and_names_the_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for more in [&[][..], &["--flash", "new.flash"]] {
+        let options = [&["connect", "--simulated", "--keep-going"], more].concat();
+        let output = command::play(
+            at,
+            &options,
+            "provenance\nget x/commissioned\nenable\nstatus\n",
+        );
+        let said = String::from_utf8(output.stdout).unwrap();
+        assert!(
+            said.contains("starts not commissioned") && said.contains("\nfalse\n"),
+            "{said}"
+        );
+        assert!(said.contains("disabled, at rest"), "{said}");
+        let errors = String::from_utf8(output.stderr).unwrap();
+        assert!(
+            errors.contains("not commissioned") && errors.contains("`quadrant commission`"),
+            "{errors}"
+        );
+    }
+    let quick_look = ["connect", "--simulated=commissioned", "enable"];
+    assert!(command::succeed(at, &quick_look).contains("the outputs are on"));
 }

@@ -18,7 +18,7 @@ fn play(options: &[&str], script: &str) -> Played {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     let output = command::play(
         root,
-        &[&["connect", "--simulated"], options].concat(),
+        &[&["connect", "--simulated=commissioned"], options].concat(),
         script,
     );
     Played {

@@ -13,7 +13,7 @@ fn session(options: &[&str], script: &str) -> Output {
     let root = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/.."));
     command::play(
         root,
-        &[&["connect", "--simulated"], options].concat(),
+        &[&["connect", "--simulated=commissioned"], options].concat(),
         script,
     )
 }

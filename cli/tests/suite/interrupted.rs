@@ -20,12 +20,17 @@ fn error_text(output: &Output) -> String {
 
 #[test]
 fn a_signal_in_the_middle_of_a_command_stops_the_axes_and_ends_the_script() {
-    let mut child = quadrant(&["connect", "--simulated", "--echo", "--keep-going"])
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .spawn()
-        .unwrap();
+    let mut child = quadrant(&[
+        "connect",
+        "--simulated=commissioned",
+        "--echo",
+        "--keep-going",
+    ])
+    .stdin(Stdio::piped())
+    .stdout(Stdio::piped())
+    .stderr(Stdio::piped())
+    .spawn()
+    .unwrap();
     let mut input = child.stdin.take().unwrap();
     input
         .write_all(b"enable\njog x 0.001\nwait rest --timeout 100000\nenable\n")

@@ -23,8 +23,9 @@ struct Holder {
 impl Holder {
     /// With as many open files as `files`.
     fn share(address: &str, files: u32) -> Self {
-        let command =
-            format!("ulimit -n {files}; exec \"$0\" connect --simulated --share {address}");
+        let command = format!(
+            "ulimit -n {files}; exec \"$0\" connect --simulated=commissioned --share {address}"
+        );
         let mut child = Command::new("sh")
             .args(["-c", &command, PROGRAM])
             .stdin(Stdio::piped())

@@ -39,7 +39,7 @@ impl Person {
         // It makes the terminal the one whose Ctrl-C is the program's.
         let child = Command::new("setsid")
             .args(["--ctty", env!("CARGO_BIN_EXE_quadrant")])
-            .args(["connect", "--simulated"])
+            .args(["connect", "--simulated=commissioned"])
             .env("TERM", "xterm")
             .stdin(Stdio::from(terminal.try_clone().unwrap()))
             .stdout(Stdio::from(terminal.try_clone().unwrap()))

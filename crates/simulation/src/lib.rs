@@ -3,6 +3,7 @@
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`law_machine`]: the control law and its supervisor, tick by tick;
 //! - [`settings_file`]: a stage's settings with their origin, as TOML;
+//! - [`stage_file`]: a stage of one's own, as TOML;
 //! - [`setting_value`]: a setting's value as it crosses the link, and as JSON;
 //! - [`held_plant`], [`loop_shape`], [`margins`]: the linear axis behind its converter, the open loop, its margins.
 //!
@@ -18,6 +19,7 @@ pub mod margins;
 pub mod plant;
 pub mod setting_value;
 pub mod settings_file;
+pub mod stage_file;
 
 #[cfg(test)]
 mod fixtures {

@@ -6,7 +6,7 @@
 
 use rayon::prelude::*;
 
-use crate::compare::sine::{Outcome, run_at_amplitude};
+use crate::compare::sine::{Outcome, Sines, run_sines};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::{Metric, Score, change_percent};
 use crate::experiment::run::{AxisTrace, RunError};
@@ -16,8 +16,8 @@ use crate::experiment::statistic::Statistic;
 /// Amplitudes of the sine, mm: that of most of the chapter, and that of Tables 5.21 and 5.22.
 pub const AMPLITUDES_MM: [f64; 2] = [30.0, 15.0];
 
-/// Seconds that a run takes on two cores of a current machine, for each mm of amplitude.
-const SECONDS_PER_MM: f64 = 0.009;
+/// Seconds that a run takes on two cores of a current machine, for each second of its longest cycle.
+const SECONDS_PER_CYCLE_S: f64 = 0.0072;
 
 /// Result of one configuration on one sine.
 #[derive(Clone, Debug)]
@@ -49,8 +49,8 @@ pub struct Request<'a> {
     pub setups: &'a [RunConfiguration],
     /// The configurations.
     pub configurations: &'a [Configuration],
-    /// Amplitudes of the sines, mm.
-    pub amplitudes_mm: &'a [f64],
+    /// The sines.
+    pub sines: Vec<Sines>,
     /// The first seed of the noise; the others follow it.
     pub seed: u64,
     /// Number of seeds, one at least.
@@ -60,7 +60,7 @@ pub struct Request<'a> {
 /// One run of a request.
 struct Run<'a> {
     setup: &'a RunConfiguration,
-    amplitude_mm: f64,
+    sines: &'a Sines,
     configuration: Configuration,
     seed: u64,
 }
@@ -78,11 +78,11 @@ impl Request<'_> {
     fn runs(&self) -> Vec<Run<'_>> {
         let mut runs = Vec::new();
         for setup in self.setups {
-            for &amplitude_mm in self.amplitudes_mm {
+            for sines in &self.sines {
                 for &configuration in self.configurations {
                     runs.extend((0..self.seeds_of(setup.knowledge)).map(|further| Run {
                         setup,
-                        amplitude_mm,
+                        sines,
                         configuration,
                         seed: self.seed.wrapping_add(further),
                     }));
@@ -105,17 +105,18 @@ impl Request<'_> {
     pub fn run(&self, advance: &(dyn Fn(f64) + Sync)) -> Result<Comparison, RunError> {
         let runs = self.runs();
         let whole_s = self.expected_s();
-        let outcomes: Vec<[Outcome; 3]> = runs
+        let outcomes: Vec<Vec<Outcome>> = runs
             .par_iter()
             .map(|run| {
                 let Run {
                     setup,
-                    amplitude_mm,
+                    sines,
                     configuration,
                     seed,
                 } = *run;
-                let mut outcomes =
-                    run_at_amplitude::<f32>(configuration, setup, amplitude_mm, seed)?;
+                let outcomes = run_sines::<f32>(configuration, setup, sines, seed)?;
+                let count = sines.velocities_mm_s.len();
+                let mut outcomes: Vec<Outcome> = outcomes.into_iter().take(count).collect();
                 if seed != self.seed {
                     // One trace is drawn; the others would only fill the memory.
                     outcomes
@@ -136,7 +137,7 @@ impl Request<'_> {
 
 impl Run<'_> {
     fn expected_s(&self) -> f64 {
-        SECONDS_PER_MM * self.amplitude_mm
+        SECONDS_PER_CYCLE_S * self.sines.longest_cycle_s()
     }
 }
 
@@ -252,7 +253,7 @@ mod tests {
         let request = Request {
             setups: &setups,
             configurations: &configurations,
-            amplitudes_mm: &[1.0, 0.5],
+            sines: [1.0, 0.5].map(Sines::of_amplitude).to_vec(),
             seed: 3,
             seeds: 2,
         };

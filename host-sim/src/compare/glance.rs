@@ -2,8 +2,9 @@
 
 use crate::compare::comparison::Comparison;
 use crate::compare::reversal::Reversal;
-use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
-use crate::experiment::configuration::{Configuration, Gains};
+use crate::compare::sine::Sines;
+use crate::compare::subject::Subject;
+use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::{Metric, change_percent};
 use crate::experiment::run_configuration::ModelKnowledge;
 use crate::pages::UM_PER_MM;
@@ -17,33 +18,35 @@ const KNOWLEDGE: ModelKnowledge = ModelKnowledge::Identified;
 pub struct Glance {
     /// The result in a sentence.
     pub sentence: String,
-    /// The errors of four laws.
+    /// The errors of a few laws.
     pub table: Table,
-    /// A reversal of the best PID alone, and with feedforward.
+    /// A reversal of the best PID alone, and of the law whose effect is the result.
     pub reversals: Vec<(String, Reversal)>,
 }
 
 impl Glance {
-    /// The glance at a comparison that has all of [`Configuration::USUAL`]. `own` is whose gains the settings have: "the thesis'".
-    pub fn of(comparison: &Comparison, own: &str) -> Self {
-        let [alone, fed, ..] = Configuration::USUAL;
+    /// The glance at the comparison of a subject.
+    pub fn of(comparison: &Comparison, subject: &Subject) -> Self {
+        let slowest = subject.sines.velocities_mm_s[0];
         let reversal = |configuration: Configuration| {
-            let entry =
-                comparison.find(configuration, KNOWLEDGE, AMPLITUDE_MM, VELOCITIES_MM_S[0])?;
+            let amplitude_mm = subject.sines.amplitude_mm;
+            let entry = comparison.find(configuration, KNOWLEDGE, amplitude_mm, slowest)?;
             Some((configuration.name(), Reversal::of(&entry.last_cycle)?))
         };
         Self {
-            sentence: sentence(comparison, [alone, fed]),
-            table: glance_table(comparison, own),
-            reversals: [alone, fed].into_iter().filter_map(reversal).collect(),
+            sentence: sentence(comparison, subject),
+            table: glance_table(comparison, subject),
+            reversals: subject.shown.into_iter().filter_map(reversal).collect(),
         }
     }
 }
 
 /// Returns the largest errors at the velocities, um; none of what was not run.
-fn largest_um(comparison: &Comparison, configuration: Configuration) -> Vec<f64> {
-    let find = |&velocity: &f64| comparison.find(configuration, KNOWLEDGE, AMPLITUDE_MM, velocity);
-    VELOCITIES_MM_S
+fn largest_um(comparison: &Comparison, configuration: Configuration, sines: &Sines) -> Vec<f64> {
+    let find =
+        |&velocity: &f64| comparison.find(configuration, KNOWLEDGE, sines.amplitude_mm, velocity);
+    sines
+        .velocities_mm_s
         .iter()
         .filter_map(find)
         .map(|entry| UM_PER_MM * entry.statistic(Metric::ALL[0].read).mean)
@@ -62,8 +65,10 @@ fn mean_change_percent(from: &[f64], to: &[f64]) -> f64 {
     mean(&changes)
 }
 
-fn sentence(comparison: &Comparison, [alone, fed]: [Configuration; 2]) -> String {
-    let [alone, fed] = [alone, fed].map(|configuration| largest_um(comparison, configuration));
+fn sentence(comparison: &Comparison, subject: &Subject) -> String {
+    let [alone, fed] = subject
+        .shown
+        .map(|configuration| largest_um(comparison, configuration, &subject.sines));
     let change = mean_change_percent(&alone, &fed);
     let effect = if change < 0.0 {
         format!(
@@ -73,25 +78,37 @@ fn sentence(comparison: &Comparison, [alone, fed]: [Configuration; 2]) -> String
     } else {
         format!("does not help here: the largest error is {change:.0} % above the best PID's")
     };
+    let (law, kept) = match &subject.chosen {
+        None => ("Feedforward of friction".to_owned(), ""),
+        Some(chosen) if subject.shown[1] == Configuration::COMMISSIONED => {
+            (format!("{chosen}, commissioned on {},", subject.axis()), "")
+        }
+        Some(_) => (
+            format!("Feedforward of friction on {}", subject.axis()),
+            " Commissioning kept the PID alone: on some of its own sines nothing was better.",
+        ),
+    };
+    let mean_over = if subject.sines.velocities_mm_s.len() > 1 {
+        format!("mean over {}", subject.velocities())
+    } else {
+        format!("at {}", subject.velocities())
+    };
     format!(
-        "Feedforward of friction {effect}: {fed:.1} um in place of {alone:.1} um, mean over 5, 10 and 15 mm/s. \
-         Simulated, not measured.",
+        "{law} {effect}: {fed:.1} um in place of {alone:.1} um, {mean_over}.{kept} Simulated, not measured.",
         fed = mean(&fed),
         alone = mean(&alone),
     )
 }
 
-fn glance_table(comparison: &Comparison, own: &str) -> Table {
-    let baseline = largest_um(comparison, Configuration::BEST_PID);
-    let rows = Configuration::USUAL
-        .into_iter()
-        .map(|configuration| {
-            let name = match configuration.gains {
-                Gains::BestPid => configuration.name(),
-                Gains::Settings => format!("{own} {}", configuration.name()),
-            };
-            let errors = largest_um(comparison, configuration);
-            let mut row = vec![Cell::text(name)];
+fn glance_table(comparison: &Comparison, subject: &Subject) -> Table {
+    let sines = &subject.sines;
+    let baseline = largest_um(comparison, Configuration::BEST_PID, sines);
+    let rows = subject
+        .few
+        .iter()
+        .map(|&configuration| {
+            let errors = largest_um(comparison, configuration, sines);
+            let mut row = vec![Cell::text(subject.name(configuration))];
             row.extend(errors.iter().map(|error| Cell::number(*error, 1)));
             row.push(if configuration == Configuration::BEST_PID {
                 Cell::Missing
@@ -102,14 +119,14 @@ fn glance_table(comparison: &Comparison, own: &str) -> Table {
         })
         .collect();
     let mut columns = vec![Column::new("Law")];
-    columns.extend(
-        VELOCITIES_MM_S.map(|velocity| Column::with_unit(format!("{velocity} mm/s"), "um")),
-    );
+    let velocities = sines.velocities_mm_s.iter();
+    columns.extend(velocities.map(|velocity| Column::with_unit(format!("{velocity} mm/s"), "um")));
     columns.push(Column::with_unit("Change", "%"));
     Table {
         id: "best-pid".to_owned(),
         caption: format!(
-            "Largest error on a sine of {AMPLITUDE_MM} mm; {}",
+            "Largest error on a sine of {} mm; {}",
+            sines.amplitude_mm,
             KNOWLEDGE.friction()
         ),
         columns,

@@ -7,3 +7,4 @@ pub mod headlines;
 pub mod page;
 mod reversal;
 pub mod sine;
+pub mod subject;

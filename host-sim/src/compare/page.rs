@@ -6,7 +6,7 @@ use crate::compare::comparison::Comparison;
 use crate::compare::glance::Glance;
 use crate::compare::headlines::{HEADLINE_PROSE, headline_table};
 use crate::compare::reversal::Reversal;
-use crate::compare::sine::{AMPLITUDE_MM, VELOCITIES_MM_S};
+use crate::compare::subject::Subject;
 use crate::design::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 use crate::experiment::configuration::Configuration;
 use crate::experiment::metrics::{GLITCH_WINDOW, Metric, change_percent};
@@ -21,28 +21,40 @@ const IDS: [&str; 3] = [
     "quadrant-glitch",
 ];
 
-/// The comparison's tables: one for each score, the headlines, the circles.
-pub fn comparison_tables(comparison: &Comparison, circles: &[CircleOutcome]) -> Vec<Table> {
-    IDS.into_iter()
-        .zip(Metric::ALL)
-        .map(|(id, metric)| score_table(id, metric, comparison))
-        .chain([headline_table(comparison), circle_table(circles)])
-        .collect()
+/// The comparison's tables: one for each score, the headlines if the sines are the thesis', the circles if there are any.
+pub fn comparison_tables(
+    comparison: &Comparison,
+    subject: &Subject,
+    circles: &[CircleOutcome],
+) -> Vec<Table> {
+    let scores = IDS.into_iter().zip(Metric::ALL);
+    let mut tables: Vec<Table> = scores
+        .map(|(id, metric)| score_table(id, metric, comparison, subject))
+        .collect();
+    if subject.is_the_thesis() {
+        tables.push(headline_table(comparison));
+    }
+    if !circles.is_empty() {
+        tables.push(circle_table(circles));
+    }
+    tables
 }
 
-fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
+fn score_table(id: &str, metric: Metric, comparison: &Comparison, subject: &Subject) -> Table {
+    let sines = &subject.sines;
     let value = |configuration, knowledge, velocity| {
         comparison
-            .find(configuration, knowledge, AMPLITUDE_MM, velocity)
+            .find(configuration, knowledge, sines.amplitude_mm, velocity)
             .map(|entry| entry.statistic(metric.read).mean * UM_PER_MM)
     };
-    let rows = Configuration::with_best_pid()
-        .into_iter()
-        .map(|configuration| {
+    let rows = subject
+        .all
+        .iter()
+        .map(|&configuration| {
             let mut row = vec![Cell::text(configuration.name())];
-            for knowledge in ModelKnowledge::ALL {
+            for &knowledge in &subject.knowledge {
                 let mut changes = Vec::new();
-                for velocity in VELOCITIES_MM_S {
+                for &velocity in &sines.velocities_mm_s {
                     let own = value(configuration, knowledge, velocity);
                     let baseline = value(Configuration::BEST_PID, knowledge, velocity);
                     row.push(own.map_or(Cell::Missing, |um| Cell::number(um, 2)));
@@ -66,16 +78,16 @@ fn score_table(id: &str, metric: Metric, comparison: &Comparison) -> Table {
             "{} over two cycles; change against the best PID",
             metric.title
         ),
-        columns: score_columns(),
+        columns: score_columns(subject),
         rows,
     }
 }
 
 /// Heads of the errors with each knowledge at each velocity, and of their mean change, beside the configurations.
-fn score_columns() -> Vec<Column> {
+fn score_columns(subject: &Subject) -> Vec<Column> {
     let mut columns = vec![Column::new("Configuration")];
-    for knowledge in ModelKnowledge::ALL {
-        for velocity in VELOCITIES_MM_S {
+    for knowledge in &subject.knowledge {
+        for velocity in &subject.sines.velocities_mm_s {
             let heading = format!("{}, {velocity} mm/s", knowledge.short());
             columns.push(Column::with_unit(heading, "um"));
         }
@@ -88,117 +100,130 @@ fn score_columns() -> Vec<Column> {
 /// The comparison's page.
 pub fn comparison_page(
     comparison: &Comparison,
+    subject: &Subject,
     glance: &Glance,
     circles: &[CircleOutcome],
     provenance: Provenance,
 ) -> Page {
-    let mut tables = comparison_tables(comparison, circles).into_iter();
-    let mut next_tables = |count| {
-        tables
-            .by_ref()
-            .take(count)
-            .map(Block::Table)
-            .collect::<Vec<_>>()
+    let mut tables = comparison_tables(comparison, subject, circles).into_iter();
+    let scores: Vec<Block> = tables.by_ref().take(IDS.len()).map(Block::Table).collect();
+    let section = |id: &str, heading: &str, prose: Vec<String>, blocks: Vec<Block>| Section {
+        provenance: None,
+        id: id.to_owned(),
+        heading: heading.to_owned(),
+        prose,
+        blocks,
     };
-    let scores = next_tables(IDS.len());
-    let headlines = next_tables(1);
-    let circle_tables = next_tables(1);
-    let errors = |knowledge: ModelKnowledge| {
-        VELOCITIES_MM_S
-            .iter()
-            .map(|&velocity| {
-                let configurations = Configuration::with_best_pid();
-                let id = format!("error-{}-{velocity}", knowledge.name().replace(' ', "-"));
-                let figure = reversal_figure(id, comparison, &configurations, knowledge, velocity);
-                Block::Figure(figure)
-            })
-            .collect::<Vec<_>>()
-    };
-    let first_reversal = reversal_figure(
-        "reversal".to_owned(),
-        comparison,
-        &SHOWN,
-        ModelKnowledge::Identified,
-        VELOCITIES_MM_S[0],
-    );
+    let mut sections = vec![glance_section(comparison, subject, glance, circles)];
+    if subject.is_the_thesis() {
+        sections.push(section(
+            "summary",
+            "The thesis' headlines",
+            vec![HEADLINE_PROSE.to_owned(), experiment_prose(subject)],
+            tables.by_ref().take(1).map(Block::Table).collect(),
+        ));
+    }
+    let mut prose = vec![metric_prose()];
+    if !subject.is_the_thesis() {
+        prose.push(experiment_prose(subject));
+    }
+    let heading = "Tracking error and quadrant glitch";
+    sections.push(section("scores", heading, prose, scores));
+    for &knowledge in &subject.knowledge {
+        let velocities = subject.sines.velocities_mm_s.iter();
+        let figures = velocities.map(|&velocity| {
+            let id = format!("error-{}-{velocity}", knowledge.name()).replace([' ', '.'], "-");
+            let figure =
+                reversal_figure(id, comparison, subject, &subject.all, knowledge, velocity);
+            Block::Figure(figure)
+        });
+        sections.push(section(
+            match knowledge {
+                ModelKnowledge::Exact => "exact-model",
+                ModelKnowledge::Identified => "identified-model",
+            },
+            &format!("A reversal, {}", knowledge.friction()),
+            vec![],
+            figures.collect(),
+        ));
+    }
+    if !circles.is_empty() {
+        let figures = circle_figures(circles).into_iter().map(Block::Figure);
+        let blocks = tables.map(Block::Table).chain(figures).collect();
+        sections.push(section("circle", "Circle in XY", vec![], blocks));
+    }
     Page {
-        title: "Friction compensation on the simulated stage".to_owned(),
-        subtitle: "The best PID with and without feedforward of friction, and the thesis' PID and N-PID, each with no, static, GMS \
-                   and combined feedforward; simulated, not measured"
-            .to_owned(),
+        title: format!("Friction compensation on {}", subject.stage),
+        subtitle: if subject.chosen.is_some() {
+            "The best PID with each feedforward of friction, and what commissioning chose; simulated, not measured"
+        } else {
+            "The best PID with and without feedforward of friction, and the thesis' PID and N-PID, each with no, static, GMS \
+             and combined feedforward; simulated, not measured"
+        }
+        .to_owned(),
         provenance,
-        sections: vec![
-            Section {
-                provenance: None,
-                id: "glance".to_owned(),
-                heading: "At a glance".to_owned(),
-                prose: vec![glance.sentence.clone(), glance_prose(circles), best_pid_prose()],
-                blocks: vec![
-                    Block::Table(glance.table.clone()),
-                    Block::Figure(polar_figure("circle-glance", circles, |configuration| {
-                        SHOWN.contains(&configuration)
-                    })),
-                    Block::Figure(first_reversal),
-                ],
-            },
-            Section {
-                provenance: None,
-                id: "summary".to_owned(),
-                heading: "The thesis' headlines".to_owned(),
-                prose: vec![HEADLINE_PROSE.to_owned(), experiment_prose()],
-                blocks: headlines,
-            },
-            Section {
-                provenance: None,
-                id: "scores".to_owned(),
-                heading: "Tracking error and quadrant glitch".to_owned(),
-                prose: vec![metric_prose()],
-                blocks: scores,
-            },
-            Section {
-                provenance: None,
-                id: "exact-model".to_owned(),
-                heading: "A reversal, friction known exactly".to_owned(),
-                prose: vec![],
-                blocks: errors(ModelKnowledge::Exact),
-            },
-            Section {
-                provenance: None,
-                id: "identified-model".to_owned(),
-                heading: "A reversal, friction identified from experiments".to_owned(),
-                prose: vec![],
-                blocks: errors(ModelKnowledge::Identified),
-            },
-            Section {
-                provenance: None,
-                id: "circle".to_owned(),
-                heading: "Circle in XY".to_owned(),
-                prose: vec![],
-                blocks: circle_tables
-                    .into_iter()
-                    .chain(circle_figures(circles).into_iter().map(Block::Figure))
-                    .collect(),
-            },
-        ],
+        sections,
     }
 }
 
-/// The laws whose circle and reversal are shown at first.
-const SHOWN: [Configuration; 2] = [Configuration::BEST_PID, Configuration::BEST_PID_FED];
+fn glance_section(
+    comparison: &Comparison,
+    subject: &Subject,
+    glance: &Glance,
+    circles: &[CircleOutcome],
+) -> Section {
+    let first_reversal = reversal_figure(
+        "reversal".to_owned(),
+        comparison,
+        subject,
+        &subject.shown,
+        ModelKnowledge::Identified,
+        subject.sines.velocities_mm_s[0],
+    );
+    let mut blocks = vec![Block::Table(glance.table.clone())];
+    if !circles.is_empty() {
+        let is_shown = |configuration| subject.shown.contains(&configuration);
+        blocks.push(Block::Figure(polar_figure(
+            "circle-glance",
+            circles,
+            is_shown,
+        )));
+    }
+    blocks.push(Block::Figure(first_reversal));
+    Section {
+        provenance: None,
+        id: "glance".to_owned(),
+        heading: "At a glance".to_owned(),
+        prose: vec![
+            glance.sentence.clone(),
+            glance_prose(subject, circles),
+            best_pid_prose(subject),
+        ],
+        blocks,
+    }
+}
 
-fn glance_prose(circles: &[CircleOutcome]) -> String {
+fn glance_prose(subject: &Subject, circles: &[CircleOutcome]) -> String {
+    let reversal = "Where an axis reverses, friction holds it, and the error rises until it breaks away: the quadrant glitch. Feedforward \
+                    puts the friction's voltage out before it is missed.";
+    let velocity = subject.sines.velocities_mm_s[0];
+    if circles.is_empty() {
+        return format!(
+            "One reversal of {} at {velocity} mm/s. {reversal}",
+            subject.axis()
+        );
+    }
     let deviation_um = |configuration| {
         let found = circles
             .iter()
             .find(|circle| circle.configuration == configuration);
         found.map_or(f64::NAN, |circle| circle.circular_deviation_mm * UM_PER_MM)
     };
-    let [alone, fed] = SHOWN;
+    let [alone, fed] = subject.shown;
     format!(
-        "A circle of the simulated XY stage, and one reversal of its x axis at {velocity} mm/s. Where an axis reverses, friction \
-         holds it, and the error rises until it breaks away: the quadrant glitch. Feedforward puts the friction's voltage out \
-         before it is missed. Circular deviation: {alone_um:.1} um with the {alone_name}, {fed_um:.1} um with {fed_name}.",
-        velocity = VELOCITIES_MM_S[0],
+        "A circle of the simulated XY stage, and one reversal of its {axis} axis at {velocity} mm/s. {reversal} Circular deviation: \
+         {alone_um:.1} um with the {alone_name}, {fed_um:.1} um with {fed_name}.",
+        axis = subject.sines.axis,
         alone_name = alone.name(),
         fed_name = fed.name(),
         alone_um = deviation_um(alone),
@@ -206,19 +231,38 @@ fn glance_prose(circles: &[CircleOutcome]) -> String {
     )
 }
 
-fn best_pid_prose() -> String {
+fn best_pid_prose(subject: &Subject) -> String {
+    let others = if subject.chosen.is_some() {
+        "Where the axis oscillated under it, commissioning made it softer. What commissioning chose is the law that was best on its own sines, \
+         or the PID alone where nothing was better on all of them."
+    } else {
+        "The PID of the settings has the thesis' margins, which leave its integral weak; what friction's feedforward is worth on a \
+         well-tuned axis is the change against the best PID."
+    };
     format!(
         "The best PID is the one that commissioning designs: the least error after a step of the load, with |S| up to \
-         {SENSITIVITY_PEAK} and |T| up to {COMPLEMENTARY_PEAK} on the sampled loop. The PID of the settings has the thesis' margins, \
-         which leave its integral weak; what friction's feedforward is worth on a well-tuned axis is the change against the best PID."
+         {SENSITIVITY_PEAK} and |T| up to {COMPLEMENTARY_PEAK} on the sampled loop. {others}"
     )
 }
 
-fn experiment_prose() -> String {
+fn experiment_prose(subject: &Subject) -> String {
+    let Subject { sines, .. } = subject;
+    let designed = if subject.chosen.is_some() {
+        "that commissioning this very stage designed, from what it measured; none was given the stage's own numbers."
+    } else if subject.knowledge == ModelKnowledge::ALL {
+        "that commissioning the simulated stage designed."
+    } else {
+        "of the settings that were given."
+    };
+    let largest = if sines.velocities_mm_s.len() > 1 {
+        format!("in turn {}", subject.velocities())
+    } else {
+        subject.velocities()
+    };
     format!(
-        "The x axis follows a sine of {AMPLITUDE_MM} mm amplitude whose largest velocity is 5, 10 or 15 mm/s. The \
-         control law is the firmware's, in f32, at 10 kHz; the stage is simulated. The controllers are those that \
-         commissioning the simulated stage designed."
+        "The {} axis follows a sine of {} mm amplitude whose largest velocity is {largest}. The control law is the firmware's, in f32, at \
+         10 kHz; the stage is simulated. The controllers are those {designed}",
+        sines.axis, sines.amplitude_mm,
     )
 }
 
@@ -235,12 +279,14 @@ fn metric_prose() -> String {
 fn reversal_figure(
     id: String,
     comparison: &Comparison,
+    subject: &Subject,
     configurations: &[Configuration],
     knowledge: ModelKnowledge,
     velocity_mm_s: f64,
 ) -> Figure {
+    let amplitude_mm = subject.sines.amplitude_mm;
     let find = |&configuration: &Configuration| {
-        comparison.find(configuration, knowledge, AMPLITUDE_MM, velocity_mm_s)
+        comparison.find(configuration, knowledge, amplitude_mm, velocity_mm_s)
     };
     let series = configurations
         .iter()

@@ -1,5 +1,6 @@
-//! One configuration on sines of three velocities, of 30 mm unless another amplitude is asked for.
+//! One configuration on sines of up to three velocities: x on 30 mm at 5, 10 and 15 mm/s unless others are asked for.
 
+use quadrant::axes::AxisName;
 use quadrant::lockstep::Job;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::scalar::Scalar;
@@ -22,6 +23,48 @@ pub const SCORED_CYCLES: usize = 2;
 /// Lead-in and lead-out, s.
 const LEAD_S: f64 = 0.5;
 
+/// Sines of an axis, which run side by side.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Sines {
+    /// The axis.
+    pub axis: AxisName,
+    /// Their amplitude, mm; above zero and within the axis' travel.
+    pub amplitude_mm: f64,
+    /// Their largest velocities, mm/s; one to three, above zero.
+    pub velocities_mm_s: Vec<f64>,
+}
+
+impl Default for Sines {
+    /// Those of most of the thesis' chapter.
+    fn default() -> Self {
+        Self::of_amplitude(AMPLITUDE_MM)
+    }
+}
+
+impl Sines {
+    /// The x axis at the usual velocities.
+    pub fn of_amplitude(amplitude_mm: f64) -> Self {
+        Self {
+            axis: AxisName::X,
+            amplitude_mm,
+            velocities_mm_s: VELOCITIES_MM_S.to_vec(),
+        }
+    }
+
+    /// Time of the longest cycle, s.
+    pub fn longest_cycle_s(&self) -> f64 {
+        let cycles = self.velocities_mm_s.iter();
+        let cycles = cycles.map(|&velocity| cycle_s(self.amplitude_mm, velocity));
+        cycles.fold(0.0, f64::max)
+    }
+
+    /// A velocity for each axis of the machine: the last one is repeated.
+    fn side_by_side(&self) -> [f64; 3] {
+        let last = self.velocities_mm_s.last().copied().unwrap_or_default();
+        std::array::from_fn(|index| self.velocities_mm_s.get(index).copied().unwrap_or(last))
+    }
+}
+
 /// Result of one configuration at one velocity.
 #[derive(Clone, Debug)]
 pub struct Outcome {
@@ -37,17 +80,17 @@ pub struct Outcome {
     pub last_cycle: AxisTrace,
 }
 
-/// The x axis three times, one for each velocity, and the sines they run.
-fn job(configuration: Configuration, setup: &RunConfiguration, amplitude_mm: f64) -> Job {
+/// The axis three times, one for each velocity, and the sines they run.
+fn job(configuration: Configuration, setup: &RunConfiguration, sines: &Sines) -> Job {
     let mut stage = setup.stage_of(configuration);
-    let x = stage.axes[0].clone();
-    stage.axes = [x.clone(), x.clone(), x];
+    let axis = stage.axes[sines.axis as usize].clone();
+    stage.axes = [axis.clone(), axis.clone(), axis];
     Job {
         stage,
         plan: PlanSettings {
-            motions: VELOCITIES_MM_S.map(|velocity| {
+            motions: sines.side_by_side().map(|velocity| {
                 MotionSettings::Harmonic(HarmonicSettings::with_velocity(
-                    amplitude_mm,
+                    sines.amplitude_mm,
                     velocity,
                     CYCLES,
                     LEAD_S,
@@ -74,20 +117,20 @@ pub struct Bench {
 }
 
 impl Bench {
-    /// The x axis three times, on its job.
+    /// The axis three times, on its job.
     pub fn new(
         configuration: Configuration,
         setup: &RunConfiguration,
-        amplitude_mm: f64,
+        sines: &Sines,
         seed: u64,
     ) -> Self {
-        let job = job(configuration, setup, amplitude_mm);
-        let [x, ..] = &setup.truth.axes;
+        let job = job(configuration, setup, sines);
+        let axis = &setup.truth.axes[sines.axis as usize];
         let truth = StageParameters {
-            axes: [x.clone(), x.clone(), x.clone()],
+            axes: [axis.clone(), axis.clone(), axis.clone()],
         };
         let rate_hz = job.stage.rate_hz;
-        let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * cycle_s(amplitude_mm, VELOCITIES_MM_S[0]);
+        let longest_s = 2.0 + 2.0 * LEAD_S + CYCLES * sines.longest_cycle_s();
         Self {
             plant: SimulatedStage::new(&truth, rate_hz, seed),
             operator: Operator::runs_the_plan(),
@@ -97,7 +140,7 @@ impl Bench {
     }
 }
 
-/// Runs one configuration at all velocities, side by side, on a sine of 30 mm in the arithmetic of `S`.
+/// Runs one configuration on the usual sines in the arithmetic of `S`.
 ///
 /// # Errors
 /// Refused settings or a fault.
@@ -106,21 +149,21 @@ pub fn run_configuration<S: Scalar>(
     setup: &RunConfiguration,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
-    run_at_amplitude::<S>(configuration, setup, AMPLITUDE_MM, seed)
+    run_sines::<S>(configuration, setup, &Sines::default(), seed)
 }
 
-/// The same on a sine of any amplitude, mm, above zero and within the axis' travel.
+/// The same on any sines, side by side: of fewer than three velocities the last outcomes are alike.
 ///
 /// # Errors
 /// Refused settings or a fault.
-pub fn run_at_amplitude<S: Scalar>(
+pub fn run_sines<S: Scalar>(
     configuration: Configuration,
     setup: &RunConfiguration,
-    amplitude_mm: f64,
+    sines: &Sines,
     seed: u64,
 ) -> Result<[Outcome; 3], RunError> {
-    let bench = Bench::new(configuration, setup, amplitude_mm, seed);
-    run_bench::<S>(bench, configuration, setup, amplitude_mm)
+    let bench = Bench::new(configuration, setup, sines, seed);
+    run_bench::<S>(bench, configuration, setup, sines)
 }
 
 /// The same on a bench that is there: its plant may have been changed.
@@ -128,7 +171,7 @@ pub fn run_bench<S: Scalar>(
     mut bench: Bench,
     configuration: Configuration,
     setup: &RunConfiguration,
-    amplitude_mm: f64,
+    sines: &Sines,
 ) -> Result<[Outcome; 3], RunError> {
     let rate_hz = bench.job.stage.rate_hz;
     let resolution_mm = bench
@@ -145,7 +188,8 @@ pub fn run_bench<S: Scalar>(
         bench.most_ticks,
     )?;
     let samples = |seconds: f64| (seconds * rate_hz).round() as usize;
-    let mut velocities = VELOCITIES_MM_S.into_iter();
+    let amplitude_mm = sines.amplitude_mm;
+    let mut velocities = sines.side_by_side().into_iter();
     Ok(traces.map(|trace| {
         let velocity_mm_s = velocities.next().unwrap_or_default();
         let period_s = cycle_s(amplitude_mm, velocity_mm_s);

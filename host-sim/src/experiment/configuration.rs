@@ -2,7 +2,7 @@
 
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::StageSettings;
+use quadrant::settings::{AxisSettings, StageSettings};
 
 /// Room for GMS elements: the exact model has the plant's ten.
 pub const ELEMENTS: usize = 10;
@@ -22,6 +22,8 @@ pub enum Gains {
     Settings,
     /// Those of the best PID that commissioning designs on the axis' model.
     BestPid,
+    /// Those of the settings, with the law and the feedforward of each axis as commissioning chose them.
+    Commissioned,
 }
 
 impl Configuration {
@@ -40,6 +42,11 @@ impl Configuration {
         feedforward: FeedforwardKind::Combined,
         ..Self::BEST_PID
     };
+    /// Each axis as commissioning left it.
+    pub const COMMISSIONED: Self = Self {
+        gains: Gains::Commissioned,
+        ..Self::PID
+    };
     /// Everything: N-PID with static and GMS feedforward.
     pub const BEST: Self = Self {
         controller: LawKind::NPid,
@@ -50,6 +57,22 @@ impl Configuration {
     pub const USUAL: [Self; 4] = [Self::BEST_PID, Self::BEST_PID_FED, Self::PID, Self::BEST];
     /// The two configurations that most studies compare.
     pub const EXTREMES: [Self; 2] = [Self::PID, Self::BEST];
+
+    /// Those that a command compares on a stage that was commissioned for it: the best PID alone, with feedforward, and what
+    /// commissioning chose.
+    pub const OF_COMMISSIONED: [Self; 3] = [Self::BEST_PID, Self::BEST_PID_FED, Self::COMMISSIONED];
+
+    /// The best PID with each of the thesis' feedforwards, and what commissioning chose.
+    pub fn all_of_commissioned() -> Vec<Self> {
+        FeedforwardKind::THESIS
+            .into_iter()
+            .map(|feedforward| Self {
+                feedforward,
+                ..Self::BEST_PID
+            })
+            .chain([Self::COMMISSIONED])
+            .collect()
+    }
 
     /// The best PID alone and with feedforward, and all eight.
     pub fn with_best_pid() -> Vec<Self> {
@@ -78,8 +101,19 @@ impl Configuration {
         let controller = match self.gains {
             Gains::Settings => self.controller.name().to_owned(),
             Gains::BestPid => format!("best {}", self.controller.name()),
+            Gains::Commissioned => return "as commissioned".to_owned(),
         };
-        match self.feedforward {
+        Self::with_feedforward(controller, self.feedforward)
+    }
+
+    /// Name of an axis' law and feedforward as its settings have them.
+    pub fn name_of(axis: &AxisSettings) -> String {
+        let controller = axis.feedback.law.name().to_owned();
+        Self::with_feedforward(controller, axis.feedforward.kind)
+    }
+
+    fn with_feedforward(controller: String, feedforward: FeedforwardKind) -> String {
+        match feedforward {
             FeedforwardKind::None => controller,
             FeedforwardKind::Static => format!("{controller} + static"),
             FeedforwardKind::Gms => format!("{controller} + GMS"),
@@ -90,8 +124,11 @@ impl Configuration {
         }
     }
 
-    /// Sets its law and feedforward; gains stay as they are.
+    /// Sets its law and feedforward; gains stay as they are, and everything does that commissioning chose.
     pub fn apply(self, stage: &mut StageSettings) {
+        if self.gains == Gains::Commissioned {
+            return;
+        }
         for axis in &mut stage.axes {
             axis.feedback.law = self.controller;
             axis.feedforward.kind = self.feedforward;

@@ -10,11 +10,13 @@
 
 use std::path::Path;
 
+use quadrant::axes::AxisName;
+use quadrant::control::feedback::LawKind;
 use quadrant::friction::stribeck::StaticFriction;
 use quadrant::settings::StageSettings;
 
 use crate::design::DesignError;
-use crate::design::best::with_best_pid;
+use crate::design::best::{set_best_pid, with_best_pid};
 use crate::experiment::configuration::{Configuration, Gains};
 use crate::identify::single_state::with_all_models;
 use crate::plant::{AxisParameters, StageParameters};
@@ -79,6 +81,8 @@ pub struct RunConfiguration {
     pub stage: StageSettings,
     /// The same with the best PID on each axis, once it was designed.
     best: Option<StageSettings>,
+    /// True if the settings are those that commissioning this very stage gave.
+    commissioned: bool,
     pub truth: StageParameters,
 }
 
@@ -91,18 +95,51 @@ impl RunConfiguration {
             knowledge: ModelKnowledge::Exact,
             stage,
             best: None,
+            commissioned: false,
             truth,
         }
     }
 
     /// The stage with everything a real one has, and these settings as they are.
     pub fn identified(stage: StageSettings) -> Self {
+        Self::on(stage, StageParameters::real())
+    }
+
+    /// Another stage with everything a real one has, and settings that know no more of it than was identified.
+    pub const fn on(stage: StageSettings, truth: StageParameters) -> Self {
         Self {
             knowledge: ModelKnowledge::Identified,
             stage,
             best: None,
-            truth: StageParameters::real(),
+            commissioned: false,
+            truth,
         }
+    }
+
+    /// A stage with the settings that commissioning gave, of `axes` on this very stage. Their best PID is that of the settings: the
+    /// best on the model, or a softer one where the axis asked for it. That of the others is designed.
+    ///
+    /// # Errors
+    /// A model that no PID keeps the bounds on.
+    pub fn commissioned(
+        stage: StageSettings,
+        truth: StageParameters,
+        axes: &[AxisName],
+    ) -> Result<Self, DesignError> {
+        let mut best = stage.clone();
+        for (name, axis) in AxisName::ALL.into_iter().zip(&mut best.axes) {
+            if axes.contains(&name) {
+                axis.feedback.law = LawKind::Pid;
+                axis.feedback.nonlinear = None;
+            } else {
+                set_best_pid(axis, stage.rate_hz)?;
+            }
+        }
+        Ok(Self {
+            best: Some(best),
+            commissioned: true,
+            ..Self::on(stage, truth)
+        })
     }
 
     /// Both, with the controllers of these settings.
@@ -127,12 +164,22 @@ impl RunConfiguration {
         Ok(self)
     }
 
+    /// Laws that a command compares, the baseline first: the few of a glance, or all.
+    pub fn configurations(&self, all: bool) -> Vec<Configuration> {
+        match (self.commissioned, all) {
+            (false, false) => Configuration::USUAL.to_vec(),
+            (false, true) => Configuration::with_best_pid(),
+            (true, false) => Configuration::OF_COMMISSIONED.to_vec(),
+            (true, true) => Configuration::all_of_commissioned(),
+        }
+    }
+
     /// Returns the settings of a configuration. Gains of the best PID need [`Self::with_best_pid`].
     pub fn stage_of(&self, configuration: Configuration) -> StageSettings {
         let stage = match (configuration.gains, &self.best) {
             (Gains::BestPid, Some(best)) => best,
             (Gains::BestPid, None) => panic!("no best PID was designed"),
-            (Gains::Settings, _) => &self.stage,
+            (Gains::Settings | Gains::Commissioned, _) => &self.stage,
         };
         let mut stage = stage.clone();
         configuration.apply(&mut stage);

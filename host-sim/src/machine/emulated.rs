@@ -16,13 +16,14 @@ use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant::stage::Outputs;
 
 use super::emulator::{EmulatorError, Lockstep, Memory, Program};
+use super::stage_setup::StageSetup;
 use super::timing::{OFF_TICKS, PORT_BYTES};
-use crate::plant::{SimulatedStage, StageParameters};
+use crate::plant::SimulatedStage;
 
-/// Settings of a machine whose flash is empty: the simulated stage's, without a motion.
-fn first_job() -> Vec<u8> {
+/// The job of a machine whose flash is empty: its settings, without a motion.
+fn first_job(settings: &StageSettings) -> Vec<u8> {
     let job = Job {
-        stage: StageSettings::simulated(),
+        stage: settings.clone(),
         plan: PlanSettings::default(),
     };
     // Plain data: it cannot fail.
@@ -33,6 +34,8 @@ fn first_job() -> Vec<u8> {
 pub struct EmulatedMachine {
     lockstep: Lockstep,
     plant: SimulatedStage,
+    /// What the firmware is given at each start, encoded.
+    job: Vec<u8>,
     port: HostPort,
     outputs: Outputs,
     pressed: Switches,
@@ -49,7 +52,7 @@ impl EmulatedMachine {
     /// QEMU is not installed, or the flash is of another size.
     pub fn start(
         program: Program,
-        truth: &StageParameters,
+        setup: &StageSetup,
         seed: u64,
         flash: &[u8],
     ) -> Result<Self, EmulatorError> {
@@ -61,12 +64,21 @@ impl EmulatedMachine {
         }
         let memory = Memory::create()?;
         memory.write(FLASH, &inverted(flash))?;
-        memory.prepare(Mode::Lockstep, 0, &first_job())?;
+        let StageSetup {
+            settings,
+            truth,
+            marks,
+        } = setup;
+        let mut plant = SimulatedStage::new(truth, settings.rate_hz, seed);
+        plant.set_marks(*marks);
+        let job = first_job(settings);
+        memory.prepare(Mode::Lockstep, 0, &job)?;
         let port = HostPort::default();
         port.reset(&memory)?;
         Ok(Self {
             lockstep: Lockstep::start(program, memory, |_| {})?,
-            plant: SimulatedStage::new(truth, StageSettings::simulated().rate_hz, seed),
+            plant,
+            job,
             port,
             outputs: Outputs::default(),
             pressed: Switches::NONE,
@@ -177,7 +189,7 @@ impl EmulatedMachine {
             ..HostPort::default()
         };
         self.port.reset(self.lockstep.memory())?;
-        self.lockstep.restart(&first_job())
+        self.lockstep.restart(&self.job)
     }
 
     /// Cuts the supply, lets the stage coast, and switches it on again: what is in flash stays.

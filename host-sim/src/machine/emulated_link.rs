@@ -6,17 +6,16 @@ use std::time::Duration;
 
 use quadrant::lockstep::FLASH_BYTES;
 use quadrant::safety::Switches;
-use quadrant::settings::StageSettings;
 
 use super::emulated::EmulatedMachine;
 use super::emulator::Program;
 use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};
 use super::simulated_io::SimulatedIo;
+use super::stage_setup::StageSetup;
 use super::timing::server_period;
-use crate::plant::StageParameters;
 
-/// The firmware's image in QEMU on the simulated stage, and the bytes to and from it.
+/// The firmware's image in QEMU on a simulated stage, and the bytes to and from it.
 pub struct EmulatedLink {
     machine: EmulatedMachine,
     flash: Option<FlashFile>,
@@ -29,19 +28,24 @@ impl EmulatedLink {
     ///
     /// # Errors
     /// An image that is none, QEMU that is not installed, or a file that is no flash.
-    pub fn start(program: &Path, seed: u64, flash: Option<&Path>) -> io::Result<Loopback<Self>> {
+    pub fn start(
+        program: &Path,
+        setup: &StageSetup,
+        seed: u64,
+        flash: Option<&Path>,
+    ) -> io::Result<Loopback<Self>> {
         let program = Program::read(program).map_err(io::Error::other)?;
         let flash = flash
             .map(|path| FlashFile::open(path, FLASH_BYTES))
             .transpose()?;
         let erased = vec![0xFF; FLASH_BYTES];
         let content = flash.as_ref().map_or(&erased[..], FlashFile::content);
-        let machine = EmulatedMachine::start(program, &StageParameters::real(), seed, content)
-            .map_err(io::Error::other)?;
+        let machine =
+            EmulatedMachine::start(program, setup, seed, content).map_err(io::Error::other)?;
         Ok(Loopback::new(Self {
             machine,
             flash,
-            period: server_period(&StageSettings::simulated()),
+            period: server_period(&setup.settings),
         }))
     }
 }

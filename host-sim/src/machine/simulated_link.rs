@@ -7,17 +7,16 @@ use std::time::Duration;
 use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::lockstep::FLASH_BYTES;
 use quadrant::safety::Switches;
-use quadrant::settings::StageSettings;
 
 use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};
 use super::memory_flash::MemoryFlash;
 use super::simulated::SimulatedMachine;
 use super::simulated_io::SimulatedIo;
+use super::stage_setup::StageSetup;
 use super::timing::server_period;
-use crate::plant::StageParameters;
 
-/// The firmware's application on the simulated stage, with that stage's settings, and the bytes to and from it.
+/// The firmware's application on a simulated stage, and the bytes to and from it.
 pub struct SimulatedLink {
     machine: SimulatedMachine,
     flash: Option<FlashFile>,
@@ -29,25 +28,16 @@ impl SimulatedLink {
     ///
     /// # Errors
     /// Defaults that are refused, or a file that is no flash.
-    pub fn start(seed: u64, flash: Option<&Path>) -> io::Result<Loopback<Self>> {
-        Self::on(
-            &StageSettings::simulated(),
-            &StageParameters::real(),
-            seed,
-            flash,
-        )
-    }
-
-    /// The same on any stage, with `settings` as the defaults of its firmware.
-    ///
-    /// # Errors
-    /// Defaults that are refused, or a file that is no flash.
-    pub fn on(
-        settings: &StageSettings,
-        truth: &StageParameters,
+    pub fn start(
+        setup: &StageSetup,
         seed: u64,
         flash: Option<&Path>,
     ) -> io::Result<Loopback<Self>> {
+        let StageSetup {
+            settings,
+            truth,
+            marks,
+        } = setup;
         let flash = flash
             .map(|path| FlashFile::open(path, FLASH_BYTES))
             .transpose()?;
@@ -55,8 +45,9 @@ impl SimulatedLink {
             .as_ref()
             .and_then(|file| MemoryFlash::of(file.content().to_vec()))
             .unwrap_or_default();
-        let machine = SimulatedMachine::with_flash(settings, truth, seed, content)
+        let mut machine = SimulatedMachine::with_flash(settings, truth, seed, content)
             .map_err(io::Error::other)?;
+        machine.plant_mut().set_marks(*marks);
         Ok(Loopback::new(Self {
             machine,
             flash,

@@ -18,6 +18,14 @@ impl Travel {
         }
     }
 
+    /// To both ends, mm: from where the axis stands, the negative one first.
+    pub const fn between([negative_mm, positive_mm]: [f64; 2]) -> Self {
+        Self {
+            negative_mm: -negative_mm,
+            positive_mm,
+        }
+    }
+
     /// From the middle to either end, mm.
     pub fn half_mm(self) -> f64 {
         0.5 * (self.negative_mm + self.positive_mm)
@@ -48,5 +56,6 @@ mod tests {
         assert_eq!(travel.start_mm() - travel.negative_mm, -travel.half_mm());
         assert_eq!(travel.nearer_mm(), 5.0);
         assert_eq!(Travel::either_way(20.0).start_mm(), 0.0);
+        assert_eq!(Travel::between([-5.0, 180.0]), travel);
     }
 }

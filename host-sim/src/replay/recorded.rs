@@ -3,6 +3,7 @@
 use std::fmt;
 
 use heapless::Vec as ShortVec;
+use quadrant::axes::AxisName;
 use quadrant::control::feedback::LawKind;
 use quadrant::control::npid::NonlinearGain;
 use quadrant::control::plant_model::PlantModel;
@@ -103,6 +104,16 @@ impl RecordedAxis {
             Self::Y => simulated(1),
             Self::Z => simulated(2),
         })
+    }
+
+    /// The axis of a stage; none of the EMPS axis.
+    pub const fn name(self) -> Option<AxisName> {
+        match self {
+            Self::Emps => None,
+            Self::X => Some(AxisName::X),
+            Self::Y => Some(AxisName::Y),
+            Self::Z => Some(AxisName::Z),
+        }
     }
 
     /// Returns the limits that a record for this axis must keep.
@@ -279,9 +290,6 @@ pub fn recorded_motion(
     ))
 }
 
-/// Number of runs in [`replay`].
-pub const RUNS: u64 = 10;
-
 /// Runs all configurations over the record's reference, in parallel, and scores them beside the recorded machine.
 /// An axis of the simulated stage is that of `setup`.
 ///
@@ -319,7 +327,8 @@ pub fn replay(
             period_s: record.sample_time_s,
         }
     });
-    let ours: Result<Vec<_>, ReplayError> = Configuration::with_best_pid()
+    let ours: Result<Vec<_>, ReplayError> = setup
+        .configurations(true)
         .into_par_iter()
         .map(|configuration| {
             let outcome = run_record(configuration, &axis, &table, most_ticks, seed);
@@ -339,7 +348,7 @@ fn run_record(
 ) -> Result<RecordedOutcome, ReplayError> {
     let mut settings = StageSettings::simulated();
     settings.axes[0] = match configuration.gains {
-        Gains::Settings => axis.settings.clone(),
+        Gains::Settings | Gains::Commissioned => axis.settings.clone(),
         Gains::BestPid => axis.best.clone(),
     };
     configuration.apply(&mut settings);

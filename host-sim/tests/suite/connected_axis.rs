@@ -15,12 +15,13 @@ use quadrant_sim::client::{Client, ClientError, settings};
 use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
 use quadrant_sim::identify::motor_constant::{self, MotorConstantSettings};
 use quadrant_sim::machine::{
-    Drive, Experiment, ExperimentError, SimulatedLink, SimulatedTestAxis, TestAxis, Travel,
+    Drive, Experiment, ExperimentError, SimulatedLink, SimulatedTestAxis, StageSetup, TestAxis,
+    Travel,
 };
 use quadrant_sim::plant::StageParameters;
 
 fn client() -> Client {
-    Client::open(SimulatedLink::start(1, None).unwrap()).unwrap()
+    Client::open(SimulatedLink::start(&StageSetup::commissioned(), 1, None).unwrap()).unwrap()
 }
 
 fn enabled() -> Client {

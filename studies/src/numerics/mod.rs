@@ -10,7 +10,7 @@ pub mod page;
 use indicatif::ProgressBar;
 use quadrant::lockstep::InputRecord;
 use quadrant::scalar::{Fixed, Scalar};
-use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_configuration};
+use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_configuration};
 use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
@@ -94,7 +94,7 @@ fn shadow(numerics: &mut Numerics, setup: &RunConfiguration, seed: u64) -> Resul
         mut plant,
         most_ticks,
         mut operator,
-    } = Bench::new(numerics.configuration, setup, AMPLITUDE_MM, seed);
+    } = Bench::new(numerics.configuration, setup, &Sines::default(), seed);
     let mut exact = LawMachine::<f64, ELEMENTS>::new(&job)?;
     let mut single = LawMachine::<f32, ELEMENTS>::new(&job)?;
     let mut fixed = LawMachine::<Fixed, ELEMENTS>::new(&job)?;

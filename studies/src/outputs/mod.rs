@@ -5,7 +5,7 @@ pub mod command;
 pub mod page;
 
 use quadrant::drivers::noise_shaper::NoiseShaper;
-use quadrant_sim::compare::sine::{AMPLITUDE_MM, Bench, Outcome, run_bench};
+use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_bench};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
@@ -59,13 +59,14 @@ pub fn run_all(setup: &RunConfiguration, seed: u64) -> Result<Vec<OutputRun>, Ru
         .collect();
     runs.into_par_iter()
         .map(|(configuration, output)| {
-            let mut bench = Bench::new(configuration, setup, AMPLITUDE_MM, seed);
+            let sines = Sines::default();
+            let mut bench = Bench::new(configuration, setup, &sines, seed);
             if let Output::Bits12(shaper) = output {
                 bench.plant = bench.plant.behind_12_bits(shaper);
             }
             Ok(OutputRun {
                 output,
-                outcomes: run_bench::<f32>(bench, configuration, setup, AMPLITUDE_MM)?,
+                outcomes: run_bench::<f32>(bench, configuration, setup, &sines)?,
             })
         })
         .collect()

@@ -24,7 +24,7 @@ use quadrant_sim::experiment::sine_test::SineTest;
 use quadrant_sim::identify::plant::PlantError;
 use quadrant_sim::machine::{
     AxisInfo, Experiment, ExperimentError, Machine, MachineError, SimulatedLink, SimulatedTestAxis,
-    TestAxis, approach,
+    StageSetup, TestAxis, approach,
 };
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;
@@ -260,7 +260,12 @@ fn over_a_link(subject: &Subject, base: &AxisSettings) -> Result<Tested, Machine
     let mut truth = StageParameters::real();
     truth.axes[0] = subject.parameters.clone();
     let connection = |error: ClientError| MachineError::Connection(Box::new(error));
-    let link = SimulatedLink::on(&settings, &truth, subject.seed, None)
+    let setup = StageSetup {
+        settings,
+        truth,
+        ..StageSetup::simulated()
+    };
+    let link = SimulatedLink::start(&setup, subject.seed, None)
         .map_err(|error| MachineError::Connection(Box::new(error)))?;
     let mut client = Client::open(link).map_err(connection)?;
     let (found, used_s, tried) = {

@@ -1,7 +1,7 @@
 //! The headlines, and chapter 5.
 
 use quadrant_sim::compare::comparison::Request;
-use quadrant_sim::compare::sine::AMPLITUDE_MM;
+use quadrant_sim::compare::sine::Sines;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::report::Section;
 
@@ -21,7 +21,7 @@ pub(super) fn headline_s(context: &Context) -> f64 {
     let one = Request {
         setups: &[identified],
         configurations: &Configuration::EXTREMES,
-        amplitudes_mm: &[AMPLITUDE_MM],
+        sines: vec![Sines::default()],
         seed: context.seed,
         seeds: context.seeds.min(STUDY_SEEDS),
     };

@@ -5,6 +5,7 @@ use std::sync::OnceLock;
 
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Request};
+use quadrant_sim::compare::sine::Sines;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::pages::provenance;
@@ -63,7 +64,7 @@ impl Context {
         let [exact, identified] = setups.map(RunConfiguration::with_best_pid);
         let setups = [exact?, identified?];
         let best = Request {
-            amplitudes_mm: &AMPLITUDES_MM[..1],
+            sines: vec![Sines::default()],
             ..self.request(&setups, &[Configuration::BEST_PID])
         };
         comparison.join(best.run(&|_| {})?);
@@ -88,7 +89,7 @@ impl Context {
         Request {
             setups,
             configurations,
-            amplitudes_mm: &AMPLITUDES_MM,
+            sines: AMPLITUDES_MM.map(Sines::of_amplitude).to_vec(),
             seed: self.seed,
             seeds: self.seeds,
         }

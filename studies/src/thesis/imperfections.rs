@@ -5,7 +5,7 @@ use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::settings::SettingsError;
 use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::compare::comparison::{Comparison, Request};
-use quadrant_sim::compare::sine::AMPLITUDE_MM;
+use quadrant_sim::compare::sine::Sines;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
@@ -230,7 +230,7 @@ pub fn study(
                 Ok(setup) => Ok(Request {
                     setups: &[setup],
                     configurations: &Configuration::EXTREMES,
-                    amplitudes_mm: &[AMPLITUDE_MM],
+                    sines: vec![Sines::default()],
                     seed,
                     seeds,
                 }

@@ -3,7 +3,7 @@
 use std::collections::HashMap;
 
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Entry, Request};
-use quadrant_sim::compare::sine::VELOCITIES_MM_S;
+use quadrant_sim::compare::sine::{Sines, VELOCITIES_MM_S};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run::AxisTrace;
@@ -176,7 +176,7 @@ fn the_same_runs_on_one_thread_and_on_three_give_the_same_scores() {
     let request = Request {
         setups: &setups,
         configurations: &Configuration::EXTREMES,
-        amplitudes_mm: &[1.0],
+        sines: vec![Sines::of_amplitude(1.0)],
         seed: 5,
         seeds: 3,
     };

@@ -65,7 +65,7 @@ mod tests {
     use quadrant::link::message::{Body, MachineState};
     use quadrant::reference::{MotionSettings, PointToPointSettings};
     use quadrant::settings::PlanSettings;
-    use quadrant_sim::machine::SimulatedLink;
+    use quadrant_sim::machine::{SimulatedLink, StageSetup};
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
     use ratatui::crossterm::event::{KeyCode, KeyEvent, KeyModifiers};
@@ -81,7 +81,8 @@ mod tests {
     fn watched(words: &[&str]) -> (Client, Watch) {
         let words = ["watch"].iter().chain(words);
         let options = Line::parse_from(words).options;
-        let mut client = Client::open(SimulatedLink::start(1, None).unwrap()).unwrap();
+        let setup = StageSetup::commissioned();
+        let mut client = Client::open(SimulatedLink::start(&setup, 1, None).unwrap()).unwrap();
         let watch = Watch::start(&mut client, &options).unwrap();
         (client, watch)
     }

@@ -57,10 +57,17 @@ impl SimulatedTestAxis {
     /// Axis 0 to 2 with `truth`, under the default settings of that axis without feedforward and nonlinear gain; `seed`
     /// decides the noise.
     pub fn new(index: usize, truth: AxisParameters, seed: u64) -> Self {
-        let mut stage = StageSettings::simulated();
+        Self::under(&StageSettings::simulated(), index, truth, seed)
+    }
+
+    /// The same under other settings.
+    pub fn under(settings: &StageSettings, index: usize, truth: AxisParameters, seed: u64) -> Self {
+        let mut stage = settings.clone();
         let mut axis = stage.axes[index].clone();
         axis.feedback.law = LawKind::Pid;
         axis.feedforward.kind = FeedforwardKind::None;
+        // A person watches what is measured.
+        axis.commissioned = true;
         stage.axes[0] = axis;
         Self {
             name: NAMES[index],
@@ -256,12 +263,16 @@ struct Step {
 impl Law {
     /// The law's reason to keep the outputs off.
     fn not_enabled(&self, experiment: &Experiment) -> ExperimentError {
-        let events = match self {
-            Self::OpenLoop => &[],
-            Self::ClosedLoop { machine, .. } => machine.events(),
+        let (events, safety) = match self {
+            Self::OpenLoop => (&[][..], None),
+            Self::ClosedLoop { machine, .. } => (machine.events(), Some(machine.state().safety())),
         };
         let refusal = events.iter().find_map(|(_, event)| match event {
             Event::Refused(Command::Enable, refusal) => Some(refusal.as_str()),
+            _ => None,
+        });
+        let refusal = refusal.or(match safety {
+            Some(SafetyState::Faulted(fault)) => Some(fault.code.cause()),
             _ => None,
         });
         ExperimentError::Impossible {

@@ -7,9 +7,11 @@ use quadrant::settings::StageSettings;
 use super::axis::{SimulatedTestAxis, TRAVEL_MM};
 use crate::machine::error::MachineError;
 use crate::machine::interface::Machine;
+use crate::machine::stage_setup::StageSetup;
 use crate::machine::test_axis::TestAxis;
 use crate::machine::travel::Travel;
 use crate::plant::StageParameters;
+use crate::stage_file::StageFile;
 
 /// The simulated stage, with everything a real one has, under the control law alone.
 #[derive(Clone, Debug)]
@@ -17,6 +19,8 @@ pub struct LawStage {
     truth: StageParameters,
     seed: u64,
     settings: StageSettings,
+    travel: [Travel; 3],
+    description: &'static str,
 }
 
 impl LawStage {
@@ -26,13 +30,38 @@ impl LawStage {
             truth: StageParameters::real(),
             seed,
             settings: StageSettings::simulated(),
+            travel: [Travel::either_way(TRAVEL_MM); 3],
+            description: "the simulated stage",
         }
+    }
+
+    /// A stage of one's own, which nobody has commissioned.
+    pub fn of(file: &StageFile, seed: u64) -> Self {
+        let StageSetup {
+            settings, truth, ..
+        } = StageSetup::of(file);
+        Self {
+            truth,
+            seed,
+            settings,
+            travel: file.known.map(|known| {
+                known.map_or(Travel::either_way(TRAVEL_MM), |known| {
+                    Travel::between(known.travel_mm)
+                })
+            }),
+            description: "a simulated stage of one's own",
+        }
+    }
+
+    /// The travel of an axis from where it stands.
+    pub const fn travel(&self, axis: AxisName) -> Travel {
+        self.travel[axis as usize]
     }
 }
 
 impl Machine for LawStage {
     fn description(&self) -> String {
-        "the simulated stage".to_owned()
+        self.description.to_owned()
     }
 
     fn is_simulated(&mut self) -> bool {
@@ -43,8 +72,8 @@ impl Machine for LawStage {
         Ok(self.settings.clone())
     }
 
-    fn free_travel(&mut self, _: AxisName) -> Result<Option<Travel>, MachineError> {
-        Ok(Some(Travel::either_way(TRAVEL_MM)))
+    fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
+        Ok(Some(self.travel(axis)))
     }
 
     /// The axis as it was switched on, under its PID alone.
@@ -54,7 +83,8 @@ impl Machine for LawStage {
         travel: Travel,
     ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
         let truth = self.truth.axes[axis as usize].clone();
-        let test_axis = SimulatedTestAxis::new(axis as usize, truth, self.seed).with_travel(travel);
+        let test_axis = SimulatedTestAxis::under(&self.settings, axis as usize, truth, self.seed)
+            .with_travel(travel);
         Ok(Box::new(test_axis))
     }
 

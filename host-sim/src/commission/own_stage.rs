@@ -1,0 +1,86 @@
+//! Settings for a simulated stage of one's own, by the way that a person has: its axes are commissioned.
+
+use std::path::PathBuf;
+use std::sync::Mutex;
+
+use quadrant::axes::AxisName;
+use quadrant::settings::{AxisSettings, StageSettings};
+use rayon::prelude::*;
+
+use super::chain::commission;
+use super::commissioned::CommissionSettings;
+use super::error::CommissionError;
+use crate::experiment::run_configuration::identified_settings;
+use crate::machine::{LawStage, Machine, StageSetup};
+use crate::settings_file::SettingsFileError;
+use crate::stage_file::StageFile;
+
+/// Reason why there are no settings for a stage.
+#[derive(Debug, thiserror::Error)]
+pub enum OwnStageError {
+    /// The built-in settings of the axes that are not in the file.
+    #[error(transparent)]
+    Settings(#[from] SettingsFileError),
+    /// The commissioning of an axis has ended early.
+    #[error("{}: {axis} cannot be commissioned", path.display())]
+    Axis {
+        path: PathBuf,
+        axis: AxisName,
+        source: CommissionError,
+    },
+}
+
+/// Commissions axes of a stage, in parallel, each as it is switched on: the law knows of it what a data sheet says, and what is measured.
+/// The other axes have the settings that commissioning the built-in stage gave. `progress` is told the share that is done.
+///
+/// # Errors
+/// The first axis whose commissioning ends early.
+pub fn commission_stage(
+    file: &StageFile,
+    axes: &[AxisName],
+    seed: u64,
+    progress: &(dyn Fn(f64) + Sync),
+) -> Result<StageSettings, OwnStageError> {
+    let mut stage = identified_settings()?.stage;
+    let shares = Mutex::new([0.0; 3]);
+    let advance = |axis: AxisName, share: f64| {
+        let Ok(mut shares) = shares.lock() else {
+            return;
+        };
+        shares[axis as usize] = share;
+        progress(shares.iter().sum::<f64>() / axes.len() as f64);
+    };
+    let found: Result<Vec<AxisSettings>, OwnStageError> = axes
+        .par_iter()
+        .map(|&axis| {
+            commission_axis(file, axis, seed, &|share| advance(axis, share)).map_err(|source| {
+                OwnStageError::Axis {
+                    path: file.path.clone(),
+                    axis,
+                    source,
+                }
+            })
+        })
+        .collect();
+    for (&axis, settings) in axes.iter().zip(found?) {
+        stage.axes[axis as usize] = settings;
+    }
+    Ok(stage)
+}
+
+fn commission_axis(
+    file: &StageFile,
+    axis: AxisName,
+    seed: u64,
+    progress: &dyn Fn(f64),
+) -> Result<AxisSettings, CommissionError> {
+    let mut machine = LawStage::of(file, seed);
+    let travel = machine.travel(axis);
+    let base = StageSetup::of(file).settings.axes[axis as usize].clone();
+    let mut test_axis = machine.test_axis(axis, travel)?;
+    let request = CommissionSettings::default();
+    let found = commission(&mut *test_axis, &base, &request, &mut |_, share| {
+        progress(share)
+    })?;
+    Ok(found.settings)
+}

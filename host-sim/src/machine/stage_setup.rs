@@ -1,0 +1,170 @@
+//! Parts of a simulated machine that a person chooses: the stage that it drives, and its settings while nothing is stored.
+
+use quadrant::friction::Direction;
+use quadrant::settings::{
+    HomeSwitch, HomingSettings, LimitSettings, StageSettings, TravelSettings,
+};
+
+use crate::plant::{MarkParameters, StageParameters};
+use crate::stage_file::{DataSheet, LIMIT_BEYOND_MM, StageFile};
+
+/// The stage of a simulated machine, and the settings of its firmware while its flash is empty.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StageSetup {
+    /// Settings without stored ones.
+    pub settings: StageSettings,
+    /// The stage.
+    pub truth: StageParameters,
+    /// Its switches and index pulses.
+    pub marks: [MarkParameters; 3],
+}
+
+impl StageSetup {
+    /// A stage under a firmware that nobody has commissioned: it knows no more than the encoders and the converter's full
+    /// scale.
+    pub fn fresh(truth: StageParameters, marks: [MarkParameters; 3]) -> Self {
+        let mut settings = StageSettings::default();
+        for ((axis, truth), marks) in settings.axes.iter_mut().zip(&truth.axes).zip(&marks) {
+            axis.encoder.resolution_mm = truth.resolution_mm;
+            axis.encoder.counts_per_index = u32::try_from(marks.counts_per_index).ok();
+            axis.amplifier.full_scale_v = truth.full_scale_v;
+        }
+        Self {
+            settings,
+            truth,
+            marks,
+        }
+    }
+
+    /// The simulated stage under a firmware that nobody has commissioned.
+    pub fn simulated() -> Self {
+        Self::fresh(StageParameters::real(), [MarkParameters::default(); 3])
+    }
+
+    /// A stage of one's own under a firmware that nobody has commissioned, and that a person has told what data sheets say: limits,
+    /// travel, and where the home switch is.
+    pub fn of(file: &StageFile) -> Self {
+        let mut setup = Self::fresh(file.truth.clone(), file.marks);
+        for ((axis, known), marks) in setup
+            .settings
+            .axes
+            .iter_mut()
+            .zip(&file.known)
+            .zip(&file.marks)
+        {
+            if let Some(known) = known {
+                enter_limits(&mut axis.limits, known, axis.encoder.resolution_mm);
+                axis.homing = Some(HomingSettings {
+                    search_mm_s: SEARCH_MM_S.min(known.max_velocity_mm_s),
+                    latch_mm_s: LATCH_MM_S.min(known.max_velocity_mm_s),
+                    mark_mm: marks.index_count as f64 * axis.encoder.resolution_mm,
+                    travel_mm: known.span_mm() + 2.0 * LIMIT_BEYOND_MM,
+                    ..homing()
+                });
+            }
+        }
+        setup
+    }
+
+    /// The simulated stage with the settings that are chosen for it: for a quick look.
+    pub fn commissioned() -> Self {
+        Self {
+            settings: StageSettings::simulated(),
+            ..Self::simulated()
+        }
+    }
+}
+
+/// Velocities of homing, mm/s.
+const SEARCH_MM_S: f64 = 20.0;
+const LATCH_MM_S: f64 = 2.0;
+/// Time by which an axis lags behind its reference at most, s: that of the simulated stage's settings.
+const LAG_S: f64 = 2e-3;
+/// Largest deceleration of a stop, mm/s²: the settings' bound.
+const MOST_BRAKING_MM_S2: f64 = 3e4;
+/// Largest tracking error at any speed, mm, and counts.
+const MOST_ERROR_MM: f64 = 20.0;
+const MOST_ERROR_COUNTS: f64 = 8e6;
+
+/// Enters what a data sheet says.
+fn enter_limits(limits: &mut LimitSettings, known: &DataSheet, resolution_mm: f64) {
+    let [negative, positive] = known.travel_mm;
+    limits.max_velocity_mm_s = known.max_velocity_mm_s;
+    limits.max_acceleration_mm_s2 = known.max_acceleration_mm_s2;
+    // Twice the largest acceleration, so that a motion that ends at the end of the travel does not look like one that will not.
+    limits.braking_mm_s2 = limits
+        .braking_mm_s2
+        .max((2.0 * known.max_acceleration_mm_s2).min(MOST_BRAKING_MM_S2))
+        .max(known.max_velocity_mm_s);
+    limits.braking_jerk_mm_s3 = limits.braking_jerk_mm_s3.max(limits.braking_mm_s2);
+    limits.following_error_lag_s = LAG_S;
+    limits.following_error_max_mm = (limits.following_error_mm + LAG_S * known.max_velocity_mm_s)
+        .min(MOST_ERROR_MM)
+        .min(MOST_ERROR_COUNTS * resolution_mm);
+    limits.travel_mm = Some(TravelSettings { negative, positive });
+}
+
+/// Homing by the home switch and the index pulse beside it.
+fn homing() -> HomingSettings {
+    HomingSettings {
+        direction: Direction::Negative,
+        switch: HomeSwitch::Home,
+        search_mm_s: SEARCH_MM_S,
+        latch_mm_s: LATCH_MM_S,
+        debounce_s: 5e-4,
+        index: true,
+        mark_mm: 0.0,
+        park_mm: 0.0,
+        travel_mm: 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+
+    use super::*;
+
+    #[test]
+    fn a_fresh_machine_has_a_boards_defaults_and_its_encoders_and_is_not_commissioned() {
+        let fresh = StageSetup::simulated();
+        let mut known = StageSettings::default();
+        for axis in &mut known.axes {
+            axis.encoder = StageSettings::simulated().axes[0].encoder;
+        }
+        assert_eq!(fresh.settings, known);
+        assert!(!fresh.settings.is_commissioned());
+        assert!(StageSetup::commissioned().settings.is_commissioned());
+        let mut truth = StageParameters::real();
+        truth.axes[1].resolution_mm = 1e-4;
+        let other = StageSetup::fresh(truth, fresh.marks);
+        assert_eq!(other.settings.axes[1].encoder.resolution_mm, 1e-4);
+        other.settings.validate(FIRMWARE_ELEMENTS).unwrap();
+    }
+
+    #[test]
+    fn a_stage_of_ones_own_has_the_limits_that_its_file_says_and_settings_that_are_accepted() {
+        for text in [
+            "[x]\ntravel_mm = [-3, 37]\nmax_velocity_mm_s = 40\nmax_acceleration_mm_s2 = 9000\n",
+            "[x]\nresolution_um = 0.001\n",
+            "[x]\ntravel_mm = [0, 300]\nscrew_lead_mm = 0.1\nresolution_um = 10\n",
+            "[x]\ntravel_mm = [-3000, 0]\nscrew_lead_mm = 1000\nmax_velocity_mm_s = 1000\nmax_acceleration_mm_s2 = 30000\n",
+        ] {
+            let file = StageFile::parse(text, Path::new("mine.toml")).unwrap();
+            let setup = StageSetup::of(&file);
+            setup.settings.validate(FIRMWARE_ELEMENTS).unwrap();
+            let known = file.known[0].unwrap();
+            let axis = &setup.settings.axes[0];
+            assert_eq!(axis.limits.max_velocity_mm_s, known.max_velocity_mm_s);
+            let travel = axis.limits.travel_mm.unwrap();
+            assert_eq!([travel.negative, travel.positive], known.travel_mm);
+            assert!(!axis.commissioned);
+            assert_eq!(
+                setup.settings.axes[1],
+                StageSetup::simulated().settings.axes[1]
+            );
+        }
+    }
+}
