@@ -247,7 +247,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
             },
         },
         FaultCode::Oscillation => Case {
-            how: "a load of 0.35 V and 60 Hz on x at rest; 0.2 mm of error allowed",
+            how: "a load of 0.5 V and 60 Hz on x at rest; 0.2 mm of error allowed",
             adjust: |configuration| {
                 each(configuration, |axis| axis.limits.following_error_mm = 0.2)
             },
@@ -257,7 +257,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
                     fixture,
                     Box::new(|_, plant, tick| {
                         let phase = 60.0 * std::f64::consts::TAU * f64::from(tick) * 1e-4;
-                        plant.axes_mut()[0].set_load_v(0.35 * phase.sin());
+                        plant.axes_mut()[0].set_load_v(0.5 * phase.sin());
                     }),
                 ))
             },
