@@ -15,7 +15,7 @@ use quadrant_sim::stage_file::StageFile;
 /// Image that `cargo xtask build --board mps2` leaves, from the workspace's folder.
 pub(super) const DEFAULT_IMAGE: &str = "target/images/mps2-f32.elf";
 
-/// What a simulated machine knows when it is switched on.
+/// Settings that a simulated machine has when it is switched on.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub(super) enum Preset {
     /// Nothing, as a board from the shop: it refuses to be enabled until an axis is commissioned, or settings are loaded.

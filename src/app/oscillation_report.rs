@@ -12,7 +12,7 @@ use crate::law::scalar::Scalar;
 pub struct Oscillated {
     /// The axis.
     pub axis: AxisName,
-    /// What was found, and done.
+    /// The finding, and the action taken.
     pub kind: OscillationKind,
     /// Frequency, 0.1 Hz.
     pub decihertz: u16,

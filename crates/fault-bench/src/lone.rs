@@ -11,7 +11,7 @@ use quadrant::settings::StageSettings;
 
 use crate::plant::{Encoder, Plant};
 
-/// What an axis is asked to do.
+/// An order to an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Order {
     Rest,

@@ -7,7 +7,7 @@ use crate::compare::sine::Sines;
 use crate::experiment::configuration::{Configuration, Gains};
 use crate::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 
-/// What a comparison compares, for its tables and its page.
+/// Subject of a comparison, for its tables and its page.
 #[derive(Clone, Debug)]
 pub struct Subject {
     /// The stage, in words: "the simulated stage".
@@ -16,7 +16,7 @@ pub struct Subject {
     pub own: &'static str,
     /// The sines.
     pub sines: Sines,
-    /// What the laws know of friction.
+    /// Friction as the laws know it.
     pub knowledge: Vec<ModelKnowledge>,
     /// The laws at a glance, the baseline first.
     pub few: Vec<Configuration>,

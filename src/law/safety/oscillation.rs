@@ -79,15 +79,15 @@ pub struct Oscillation<S: Scalar> {
     share: S::Gain,
 }
 
-/// What has been found of an oscillation.
+/// Kind of an oscillation that was found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum OscillationKind {
     /// The axis hums at rest.
     #[default]
     Hum,
-    /// What is added made it; it is taken away, and comes back.
+    /// The friction fed forward made it; it is taken away, and comes back.
     Added,
-    /// What is added made it for the third time; it stays away.
+    /// The friction fed forward made it for the third time; it stays away.
     AddedForGood,
 }
 
@@ -108,7 +108,7 @@ pub struct OscillationReading {
     pub swings: u32,
 }
 
-/// What the axis does in a look.
+/// Motion of the axis in a look.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct OscillationInput {
     /// Tracking error, counts.
@@ -121,7 +121,7 @@ pub struct OscillationInput {
     pub excited: bool,
 }
 
-/// What is done with what is added.
+/// Treatment of the friction fed forward.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum Phase {
     /// All of it acts, unless it is on its way back.

@@ -90,7 +90,7 @@ pub enum Event {
     Oscillated {
         /// The axis.
         axis: AxisName,
-        /// What was found, and done.
+        /// The finding, and the action taken.
         kind: OscillationKind,
         /// Frequency, 0.1 Hz.
         decihertz: u16,
@@ -104,7 +104,7 @@ pub enum Event {
 pub enum OscillationKind {
     /// The axis hums at rest; nothing was done.
     Hum,
-    /// What is added, the friction's feedforward or the cancelling, swung the axis: it was taken away, and comes back slowly.
+    /// The friction's feedforward swung the axis: it was taken away, and comes back slowly.
     Added,
     /// It did so for the third time, and stays away until the settings change or the outputs are off.
     AddedForGood,

@@ -1,4 +1,4 @@
-//! What a stage file names in words.
+//! Choices that a stage file names in words.
 
 use serde::Deserialize;
 

@@ -67,13 +67,13 @@ pub struct StageFile {
     pub path: PathBuf,
     /// The stage.
     pub truth: StageParameters,
-    /// What a data sheet says of x, y and z; nothing where the axis has no table in the file.
+    /// Data sheets of x, y and z; nothing where the axis has no table in the file.
     pub known: [Option<DataSheet>; 3],
     /// Switches and index pulses.
     pub marks: [MarkParameters; 3],
 }
 
-/// What a person knows of an axis without measuring it.
+/// Numbers of an axis that a person knows without measuring it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DataSheet {
     /// Travel from where the axis stands, mm: to the negative and to the positive end.
@@ -263,7 +263,7 @@ impl Axis {
         }
     }
 
-    /// What does not go together, if anything.
+    /// Returns the first contradiction between the numbers.
     fn contradiction(&self) -> Option<String> {
         let [negative, positive] = self.travel_mm;
         if !(-MOST_TRAVEL_MM..=0.0).contains(&negative)
