@@ -607,3 +607,70 @@ fn an_axis_that_slid_and_stands_takes_up_little_more_in_that_sense() {
         Some(forth),
     );
 }
+
+#[test]
+fn a_load_that_pushes_an_axis_back_by_millimetres_is_answered_however_stiff_the_law_is() {
+    for (answer_v_per_mm, answer_v_s_per_mm) in [(1.0, 0.0), (300.0, 0.0), (1.0, 5.0)] {
+        let model = PlausibilityModel {
+            sliding_v: 0.1,
+            turned_v: 0.1,
+            answer_v_per_mm,
+            answer_v_s_per_mm,
+            held_v: NEVER_V,
+            ..model()
+        };
+        let axis = Plausibility::new(&model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+        let mut state = axis.start(STANDS);
+        let word = (0.4 * AMPLIFIERS[0].per_volt) as i32 * INTERVAL as i32;
+        for interval in 1..1000 {
+            let time_s = f64::from(interval) * INTERVAL_S;
+            let shown = Shown {
+                count: (-30.0 * time_s / COUNT_MM) as i32,
+                speed: (-30.0 * SPEED) as i32,
+                words: word * interval,
+                reference: (1.0 * time_s / COUNT_MM * 256.0) as i32,
+                ..STANDS
+            };
+            assert!(
+                axis.step(&mut state, shown),
+                "{answer_v_per_mm} V/mm, {answer_v_s_per_mm} V s/mm: found after {time_s} s"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_axis_that_does_not_follow_is_found_however_stiff_its_law_is() {
+    for answer_v_per_mm in [1.0, 300.0] {
+        let model = PlausibilityModel {
+            sliding_v: 0.1,
+            turned_v: 0.1,
+            answer_v_per_mm,
+            answer_v_s_per_mm: 0.1,
+            held_v: NEVER_V,
+            ..model()
+        };
+        let axis = Plausibility::new(&model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+        let mut state = axis.start(STANDS);
+        let word = (0.4 * AMPLIFIERS[0].per_volt) as i32 * INTERVAL as i32;
+        let found = (1..1000).find(|interval| {
+            let time_s = f64::from(*interval) * INTERVAL_S;
+            let shown = Shown {
+                words: word * interval,
+                reference: (1.0 * time_s / COUNT_MM * 256.0) as i32,
+                ..STANDS
+            };
+            !axis.step(&mut state, shown)
+        });
+        assert!(found.is_some(), "{answer_v_per_mm} V/mm");
+    }
+}
+
+/// An axis that stands at the origin of its counter.
+const STANDS: Shown = Shown {
+    count: 0,
+    speed: 0,
+    words: 0,
+    reference: 0,
+    open: false,
+};

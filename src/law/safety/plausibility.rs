@@ -348,7 +348,7 @@ impl Plausibility {
         let words = shown.words.wrapping_sub(state.words);
         (state.count, state.words) = (shown.count, shown.words);
         let pushed = words.wrapping_sub(self.offset);
-        let pushed = ((i64::from(pushed) * i64::from(self.push)) >> PUSH_BITS) as i32;
+        let pushed = scaled(pushed, self.push, PUSH_BITS);
         if self.modelled {
             state.force += part(pushed.saturating_sub(state.force), self.lag);
             let speed = shown.speed.wrapping_shl(self.shift);
@@ -456,13 +456,13 @@ impl Plausibility {
         } else {
             lag.turned.max(self.turned)
         };
-        let pushed = (i64::from(self.answer) * i64::from(lag.pushed)) >> SPEED_FRACTION_BITS;
-        let thrown = (i64::from(self.answer_to_speed) * i64::from(lag.thrown)) >> THROWN_BITS;
+        let pushed = scaled(lag.pushed, self.answer, SPEED_FRACTION_BITS);
+        let thrown = scaled(lag.thrown, self.answer_to_speed, THROWN_BITS);
         let excess = force
             .saturating_sub(lag.base)
             .saturating_sub(taken)
-            .saturating_add(pushed as i32)
-            .saturating_add(thrown as i32);
+            .saturating_add(pushed)
+            .saturating_add(thrown);
         lag.ahead -= lag.ahead >> self.forget_shift;
         if excess <= 0 {
             lag.modelled = step.speed.min(0);
@@ -615,6 +615,13 @@ fn whole_log2(value: f64) -> u32 {
 #[inline(always)]
 fn part(value: i32, share: i32) -> i32 {
     ((i64::from(value) * i64::from(share)) >> 32) as i32
+}
+
+/// The product of a value and a factor with fraction bits, rounded down, within what there is room for.
+#[inline(always)]
+fn scaled(value: i32, factor: i32, fraction_bits: u32) -> i32 {
+    let product = (i64::from(value) * i64::from(factor)) >> fraction_bits;
+    product.clamp(i32::MIN.into(), i32::MAX.into()) as i32
 }
 
 /// The one of two values that is farther from zero.

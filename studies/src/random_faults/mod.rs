@@ -25,10 +25,13 @@ const LARGEST_WORD: i16 = 32_767;
 /// Ticks from a fault that stops to outputs that are off: 105 ms of braking, 200 ticks of rest.
 const STOP_TICKS: u32 = 1050 + 200;
 /// Way of the x axis that its reference does not ask for until the outputs are off, mm; and in motions slower than so many
-/// mm/s, where what friction holds hides a dead encoder for longer.
+/// mm/s, where what friction holds hides a dead encoder for longer, and still slower: the voltage of an axis that slides grows as
+/// the following error does, by its reference, and until it has grown by what friction may hold, the axis gains speed.
 const UNPLANNED_MM: f64 = 2.1;
 const SLOW_UNPLANNED_MM: f64 = 17.0;
 const SLOW_MM_S: f64 = 2.0;
+const SLOWEST_UNPLANNED_MM: f64 = 25.0;
+const SLOWEST_MM_S: f64 = 0.15;
 /// The same under a voltage that is injected in closed loop, mm: it goes to and fro, and so does what is seen of the motion.
 const INJECTED_UNPLANNED_MM: f64 = 3.5;
 /// The same, mm, where an encoder shows counts of its own; and below so many mm/s they are taken for a motion.
@@ -209,6 +212,7 @@ fn most_unplanned_mm(activity: Activity, death: Option<Death>, speed_mm_s: f64) 
     match death {
         Some(death) if FLICKERS.contains(&death) => FLICKERING_UNPLANNED_MM,
         Some(_) if activity == Activity::ClosedLoop => INJECTED_UNPLANNED_MM,
+        Some(_) if speed_mm_s.abs() < SLOWEST_MM_S => SLOWEST_UNPLANNED_MM,
         Some(_) if speed_mm_s.abs() < SLOW_MM_S => SLOW_UNPLANNED_MM,
         _ => UNPLANNED_MM,
     }
