@@ -508,3 +508,48 @@ proptest! {
         hostile::<Fixed>(&steps)?;
     }
 }
+/// RMS error, um, over 20 s of a sine under a load, V and Hz; none if the outputs went off.
+fn under_slow_load(
+    settings: &StageSettings,
+    friction: f64,
+    hz: f64,
+    load: (f64, f64),
+) -> Option<f64> {
+    let amplitude_mm = 2.0;
+    let velocity_mm_s = std::f64::consts::TAU * hz * amplitude_mm;
+    let mut axis = Axis::<f32>::on(settings, friction, &sine_on_x(amplitude_mm, velocity_mm_s));
+    axis.shaken = load;
+    axis.command(Command::Run);
+    axis.run(10.0);
+    let square = axis.run(20.0);
+    let off = axis.rig.state.safety().fault().is_some();
+    (!off).then_some(1e3 * square.sqrt())
+}
+
+#[test]
+fn a_slow_load_is_not_taken_for_friction() {
+    let mut judged = 0;
+    for hz in [0.2, 0.5, 1.0, 2.0] {
+        for load_v in [0.05, 0.2] {
+            for load_hz in [0.2, 0.3, 0.6, 1.0, 1.5, 2.5, 5.0, 10.0] {
+                // With the friction that it knows, and with next to none, where no feedforward is best.
+                for friction in [1.0, 0.05] {
+                    let mut off = fixed();
+                    if friction < 0.5 {
+                        off.axes[0].feedforward.kind = FeedforwardKind::None;
+                    }
+                    let run = |settings| under_slow_load(settings, friction, hz, (load_v, load_hz));
+                    let (Some(without), Some(with)) = (run(&off), run(&learning())) else {
+                        continue;
+                    };
+                    judged += 1;
+                    assert!(
+                        with < 1.06 * without,
+                        "{hz} Hz under {load_v} V of {load_hz} Hz, friction x {friction}: {with} um, {without} um without"
+                    );
+                }
+            }
+        }
+    }
+    assert!(judged > 100, "{judged} of 128");
+}

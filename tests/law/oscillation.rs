@@ -9,7 +9,9 @@ use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
 use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::safety::FaultCode;
-use quadrant::safety::oscillation::{OscillationKind, OscillationReading};
+use quadrant::safety::oscillation::{
+    Oscillation, OscillationInput, OscillationKind, OscillationReading, OscillationState,
+};
 use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_simulation::plant::{
@@ -367,4 +369,84 @@ fn a_healthy_axis_keeps_what_is_added() {
         }
     }
     println!("{runs} runs");
+}
+
+/// The monitor alone, shown strokes of a way and of a swing of the error, in counts, that take 50 ms each.
+struct Shown {
+    monitor: Oscillation<f32>,
+    state: OscillationState,
+    forth: bool,
+}
+
+impl Shown {
+    /// Strokes of 80 counts in which the error swings by 100; on trial, by 50: what is added is taken away.
+    fn harmed() -> Self {
+        let mut shown = Self {
+            monitor: Oscillation::new(true, 1e6, 1e-4),
+            state: OscillationState::default(),
+            forth: false,
+        };
+        shown.strokes(4, 80, 100);
+        shown.strokes(8, 80, 50);
+        assert_eq!(shown.acts(), 0.0);
+        assert_eq!(shown.state.reading().number, 1);
+        shown
+    }
+
+    fn strokes(&mut self, count: usize, way: i64, swing: i64) {
+        for _ in 0..count {
+            self.forth = !self.forth;
+            for look in 1..=125 {
+                let part = if self.forth { look } else { 125 - look };
+                let input = OscillationInput {
+                    error: swing * part / 125,
+                    reference: way * part / 125,
+                    sense: if self.forth { 1 } else { -1 },
+                    excited: false,
+                };
+                assert!(self.monitor.step(&mut self.state, input));
+            }
+        }
+    }
+
+    /// Share of what is added that acts.
+    fn acts(&self) -> f64 {
+        self.monitor.share(&self.state).to_f64(Quantity::Multiplier)
+    }
+}
+
+#[test]
+fn what_was_taken_away_comes_back_at_once_where_the_error_is_no_less_without_it() {
+    let mut shown = Shown::harmed();
+    shown.strokes(4, 80, 100);
+    assert_eq!(shown.acts(), 1.0);
+    // For a minute it is not tried again.
+    shown.strokes(1000, 80, 100);
+    assert_eq!(shown.acts(), 1.0);
+}
+
+#[test]
+fn what_was_taken_away_comes_back_at_once_where_strokes_are_longer() {
+    for (way, comes_back) in [(80, false), (150, false), (170, true), (4000, true)] {
+        let mut shown = Shown::harmed();
+        shown.strokes(4, way, 40);
+        assert_eq!(shown.acts() == 1.0, comes_back, "{way}");
+        if comes_back {
+            // Short strokes are tried again.
+            shown.strokes(4, 80, 100);
+            shown.strokes(8, 80, 50);
+            assert_eq!(shown.acts(), 0.0, "{way}");
+            assert_eq!(shown.state.reading().number, 2, "{way}");
+        }
+    }
+}
+
+#[test]
+fn strokes_of_another_kind_say_nothing_of_what_was_taken_away() {
+    let mut shown = Shown::harmed();
+    shown.state = OscillationState::default();
+    shown.strokes(4, 80, 100);
+    shown.strokes(8, 50, 50);
+    assert_eq!(shown.acts(), 1.0);
+    assert_eq!(shown.state.reading().number, 0);
 }

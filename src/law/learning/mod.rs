@@ -79,7 +79,7 @@ const BLOCK_S: f64 = 12.8e-3;
 const UNIT: f64 = 4.0;
 
 /// Largest `sum(psi^2)` times time, in units: what was learnt before is halved beyond it.
-const MOST_INFORMATION: f64 = 0.02;
+const MOST_INFORMATION: f64 = 0.2;
 
 /// Difference of the scale by the last seconds from the present one beyond which the axis has changed; and the information that they
 /// need to say so, as a share of all that is remembered.
@@ -87,7 +87,7 @@ const DIFFERS: f64 = 0.1;
 const TELLING: f64 = 0.25;
 
 /// Rate of the scale down the slope, 1/s, per unit of information.
-const RATE: f64 = 300.0;
+const RATE: f64 = 500.0;
 
 /// Time constant of the pull to 1, s.
 const PULL_S: f64 = 600.0;

@@ -5,9 +5,10 @@
 //! - **What is added harms.** While the reference goes to and fro, the error swings by more than the distance that the
 //!   reference goes. A feedforward of friction does so that pushes an axis whose friction is not there, or is
 //!   behind a spring. After three such strokes one after the other, what is added (the friction fed forward) is taken away within 50 ms
-//!   *on trial*. If the error then swings by less than seven eighths, it was what is added: it is reported, and comes back slowly after
-//!   5 s and eight strokes, or 20 s; after the third time it stays away until the settings change or the outputs are off. If not, the axis is
-//!   shaken from outside: what was taken away comes back at once, and there is no other trial for a minute.
+//!   *on trial*. If the error then swings by less than seven eighths in strokes of the same kind, it was what is added: it is reported, and
+//!   comes back slowly after 5 s and eight strokes, or 20 s; after the third time it stays away until the settings change or the outputs are
+//!   off. If not, now or while it is away, the axis is shaken from outside: what was taken away comes back at once, and there is no other trial
+//!   for a minute. It also comes back at once with a stroke more than twice as long, in which it need not harm.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -150,8 +151,8 @@ pub struct OscillationState {
     /// Strokes of the trial.
     strokes: u8,
     bad: u8,
-    /// Swing that began the trial, counts.
-    before: u32,
+    /// The strokes that began the trial.
+    before: Strokes,
     stroke: Stroke,
     /// The stroke before.
     stroke_before: Stroke,
@@ -168,6 +169,16 @@ struct Stroke {
     to: i32,
     least: i32,
     most: i32,
+}
+
+/// Two strokes of the reference, forth and back.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+struct Strokes {
+    /// Distance between the ends of the error, and way of the reference, counts.
+    swing: u32,
+    way: u32,
+    /// Looks in the second.
+    looks: u32,
 }
 
 /// The turns of the error in a window.
@@ -273,11 +284,14 @@ impl<S: Scalar> Oscillation<S> {
         };
         let judged = ended.map(|stroke| {
             let before = core::mem::replace(&mut state.stroke_before, stroke);
-            let swing = stroke.swing_with(&before);
-            let way = stroke.reach().max(before.reach());
-            let bad = swing > way && swing > LEAST_HARM;
+            let strokes = Strokes {
+                swing: stroke.swing_with(&before),
+                way: stroke.reach().max(before.reach()),
+                looks: stroke.looks,
+            };
+            let bad = strokes.swing > strokes.way && strokes.swing > LEAST_HARM;
             state.bad = if bad { state.bad.saturating_add(1) } else { 0 };
-            (swing, stroke.looks)
+            strokes
         });
         match state.phase {
             Phase::Watching => {
@@ -285,11 +299,11 @@ impl<S: Scalar> Oscillation<S> {
                     state.taken -= 1;
                     state.looks = 0;
                 }
-                if let Some((swing, _)) = judged
+                if let Some(strokes) = judged
                     && state.bad >= BAD_STROKES
                     && state.patience == 0
                 {
-                    state.before = swing;
+                    state.before = strokes;
                     state.enter(Phase::Taking);
                 }
             }
@@ -303,6 +317,14 @@ impl<S: Scalar> Oscillation<S> {
             Phase::Away => {
                 let strokes = state.strokes.saturating_add(u8::from(judged.is_some()));
                 state.strokes = strokes;
+                if let Some(now) = judged {
+                    if now.is_like(&state.before) && !now.is_better_than(&state.before) {
+                        return self.restore(state);
+                    }
+                    if now.way > state.before.way.saturating_mul(2) {
+                        return state.enter(Phase::Restoring);
+                    }
+                }
                 let shortest = if strokes < AWAY_STROKES {
                     self.away_looks.saturating_mul(MOST_AWAY)
                 } else {
@@ -321,9 +343,9 @@ impl<S: Scalar> Oscillation<S> {
         }
     }
 
-    /// Judges whether what is taken away was the cause, by the swing and the looks of a stroke.
-    fn judge_trial(&self, state: &mut OscillationState, judged: Option<(u32, u32)>) {
-        let Some((swing, looks)) = judged else {
+    /// Judges whether what is taken away was the cause, by the strokes that ended.
+    fn judge_trial(&self, state: &mut OscillationState, judged: Option<Strokes>) {
+        let Some(now) = judged else {
             if state.looks >= self.trial_looks {
                 state.enter(Phase::Watching);
             }
@@ -334,9 +356,8 @@ impl<S: Scalar> Oscillation<S> {
         if state.strokes < MIXED_STROKES {
             return;
         }
-        if swing.saturating_mul(8) >= state.before.saturating_mul(7) {
-            state.patience = self.patience_looks;
-            state.enter(Phase::Restoring);
+        if !now.is_like(&state.before) || !now.is_better_than(&state.before) {
+            self.restore(state);
         } else if state.strokes > MIXED_STROKES {
             state.times = state.times.saturating_add(1);
             let kind = if state.times < MOST_TIMES {
@@ -344,9 +365,15 @@ impl<S: Scalar> Oscillation<S> {
             } else {
                 OscillationKind::AddedForGood
             };
-            self.report(state, kind, (1, looks, state.before));
+            self.report(state, kind, (1, now.looks, state.before.swing));
             state.enter(Phase::Away);
         }
+    }
+
+    /// Brings back what was not the cause.
+    fn restore(&self, state: &mut OscillationState) {
+        state.patience = self.patience_looks;
+        state.enter(Phase::Restoring);
     }
 
     /// Counts the turns of the error; returns false if it is not stable.
@@ -472,6 +499,19 @@ impl Stroke {
     /// The distance of the reference, counts.
     fn reach(&self) -> u32 {
         self.to.wrapping_sub(self.from).unsigned_abs()
+    }
+}
+
+impl Strokes {
+    /// True if way and time are those of others within a quarter.
+    fn is_like(&self, other: &Self) -> bool {
+        let near = |this: u32, other: u32| this.abs_diff(other) <= other >> 2;
+        near(self.way, other.way) & near(self.looks, other.looks)
+    }
+
+    /// True if the error swings by less than seven eighths of what it did in others.
+    fn is_better_than(&self, other: &Self) -> bool {
+        self.swing.saturating_mul(8) < other.swing.saturating_mul(7)
     }
 }
 
