@@ -114,6 +114,21 @@ fn losses_are_told_by_how_much_they_grew() {
         [StateChange::BadFrames(1)],
         "another selection counts from zero"
     );
+    machine.server.dropped_samples = 5;
+    machine.compare();
+    machine.server.bad_frames = 9;
+    machine.server.dropped_samples = 7;
+    machine.server.dropped_events = 4;
+    machine.timing.overruns = 6;
+    assert_eq!(
+        machine.compare(),
+        [
+            StateChange::BadFrames(5),
+            StateChange::SamplesLost(2),
+            StateChange::EventsLost(3),
+            StateChange::LateTicks(4)
+        ]
+    );
 }
 
 #[test]

@@ -121,3 +121,36 @@ fn of_an_injection_that_is_broken_off_nothing_comes_with_the_next() {
     assert!(!seen.is_empty());
     assert!(!seen.contains(&3000), "{seen:?}");
 }
+
+#[test]
+fn values_that_were_taken_may_come_again_after_the_last_one() {
+    let mut tasks = Tasks::new(&settings(), 1);
+    tasks.ask(Body::Enable).expect("enables");
+    let opened = open(&mut tasks);
+    assert_eq!(
+        opened.first_tick, None,
+        "nothing has been put out: {opened:?}"
+    );
+    let values = InjectRequest::Values {
+        sequence: 0,
+        values: Voltages::new([300; INJECT_VALUES].into_iter()),
+        last: true,
+    };
+    let first = inject(&mut tasks, values.clone());
+    // The answer was lost, and the host asks once more.
+    let again = inject(&mut tasks, values);
+    assert_eq!(again.next_sequence, first.next_sequence);
+    tasks.run(200);
+    let more = tasks.ask(Body::Inject(InjectRequest::Values {
+        sequence: first.next_sequence,
+        values: Voltages::new([300; 1].into_iter()),
+        last: false,
+    }));
+    assert!(
+        matches!(
+            more,
+            Err(_) | Ok(Reply::Inject(InjectStatus { ended: true, .. }))
+        ),
+        "{more:?}"
+    );
+}

@@ -328,6 +328,34 @@ fn what_a_cut_raises_ends_with_it() {
 }
 
 #[test]
+fn what_was_learnt_before_a_cut_is_right_after_it() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 0.7);
+    axis.command(Command::Run);
+    axis.run(12.0);
+    let before = axis.scale();
+    axis.shaken = (0.2, 350.0);
+    axis.run(8.0);
+    axis.shaken = (0.0, 0.0);
+    axis.run(0.5);
+    let after = axis.scale();
+    assert!((before - after).abs() < 0.03, "{before}, then {after}");
+}
+
+#[test]
+fn a_scale_that_is_right_stands_still() {
+    let mut axis = Axis::<f32>::on_sine(&learning(), 1.3);
+    axis.command(Command::Run);
+    axis.run(20.0);
+    let (mut least, mut most) = (f32::INFINITY, 0.0_f32);
+    for _ in 0..2000 {
+        axis.run(0.001);
+        least = least.min(axis.scale());
+        most = most.max(axis.scale());
+    }
+    assert!(most - least < 2e-3, "{least} to {most}");
+}
+
+#[test]
 fn nothing_is_learnt_at_rest_or_from_a_jog() {
     let mut axis = Axis::<f32>::on_sine(&learning(), 1.5);
     axis.run(1.0);

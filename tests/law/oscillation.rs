@@ -371,6 +371,18 @@ fn a_healthy_axis_keeps_what_is_added() {
     println!("{runs} runs");
 }
 
+#[test]
+fn a_hum_that_ends_and_begins_again_is_reported_again() {
+    let (mut bench, _) = at_rest::<f32>(0.3, 120.0, 1.5e-4);
+    assert_eq!(bench.found().number, 1);
+    bench.shaken = (0.0, 0.0);
+    bench.run(3.0);
+    assert_eq!(bench.found().number, 1);
+    bench.shaken = (0.3, 120.0);
+    bench.run(3.0);
+    assert_eq!(bench.found().number, 2);
+}
+
 /// The monitor alone, shown strokes of a way and of a swing of the error, in counts, that take 50 ms each.
 struct Shown {
     monitor: Oscillation<f32>,

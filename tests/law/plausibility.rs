@@ -666,6 +666,52 @@ fn an_axis_that_does_not_follow_is_found_however_stiff_its_law_is() {
     }
 }
 
+/// True if an axis is found that goes from its origin with a speed, mm/s, under a voltage of 0.4 V, while its reference has another.
+fn is_found(speed_mm_s: f64, reference_mm_s: f64) -> bool {
+    let model = PlausibilityModel {
+        sliding_v: 0.1,
+        turned_v: 0.1,
+        held_v: NEVER_V,
+        ..model()
+    };
+    let axis = Plausibility::new(&model, AMPLIFIERS[0], COUNT_MM, PERIOD_S);
+    let mut state = axis.start(STANDS);
+    let word = (0.4 * AMPLIFIERS[0].per_volt) as i32 * INTERVAL as i32;
+    (1..1000).any(|interval| {
+        let time_s = f64::from(interval) * INTERVAL_S;
+        let shown = Shown {
+            count: (speed_mm_s * time_s / COUNT_MM) as i32,
+            speed: (speed_mm_s * SPEED) as i32,
+            words: word * interval,
+            reference: (reference_mm_s * time_s / COUNT_MM * 256.0) as i32,
+            ..STANDS
+        };
+        !axis.step(&mut state, shown)
+    })
+}
+
+#[test]
+fn an_axis_has_to_follow_its_reference_by_half_and_need_not_lead_it() {
+    for (speed_mm_s, reference_mm_s, found) in [
+        (0.0, 4.0, true),
+        // Half of it is 2 mm/s; some of that shows that it is alive.
+        (0.05, 4.0, true),
+        (2.1, 4.0, false),
+        (-2.1, -4.0, false),
+        (-4.0, -4.0, false),
+        (-7.9, -4.0, false),
+        (0.0, 0.0, false),
+        // A motion of 64 counts is one, however far the reference has gone.
+        (1.0, 4.0, false),
+    ] {
+        assert_eq!(
+            is_found(speed_mm_s, reference_mm_s),
+            found,
+            "{speed_mm_s} mm/s of {reference_mm_s}"
+        );
+    }
+}
+
 /// An axis that stands at the origin of its counter.
 const STANDS: Shown = Shown {
     count: 0,
