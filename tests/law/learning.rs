@@ -140,6 +140,17 @@ fn the_friction_that_the_axis_has_is_learnt_in_every_number_type() {
 }
 
 #[test]
+fn a_friction_beyond_the_largest_scale_is_met_with_that() {
+    let mut settings = learning();
+    let gains = &mut settings.axes[0].feedforward.gains;
+    (gains.gms, gains.level, gains.viscous) = (0.2, 0.2, 0.2);
+    let mut axis = Axis::<f32>::on_sine(&settings, 1.0);
+    axis.command(Command::Run);
+    axis.run(20.0);
+    assert_eq!(axis.scale(), 2.5);
+}
+
+#[test]
 fn what_was_learnt_takes_the_error_away() {
     let error = |settings: &StageSettings| {
         let mut axis = Axis::<f32>::on_sine(settings, 1.5);
@@ -511,9 +522,19 @@ fn learning_needs_a_plant_with_a_dead_time_that_it_holds_and_a_pid() {
 /// Learning on an encoder that shows anything; the scale and the gate after each tick.
 fn hostile<S: Scalar>(steps: &[(i32, u16)]) -> Result<(), TestCaseError> {
     let mut rig = Rig::<S>::that_bears_any_error(learning());
+    // By the guard in a block of 13 ms, but where the gate has opened or closed since the last change.
+    let most_change = 1.01 * 0.0132;
+    let (mut scale_before, mut gates) = (1.0, (1.0_f32, 1.0_f32));
     for &(step, ticks) in steps {
         rig.show_counts(step, ticks, |axis| {
             let (scale, gate) = (axis.learning().scale(), axis.learning().gate());
+            gates = (gates.0.min(gate), gates.1.max(gate));
+            if scale != scale_before {
+                let change = (scale - scale_before).abs();
+                let passed = gates.0 < 0.91 && gates.1 > 0.89;
+                prop_assert!(passed || change <= most_change, "by {change} at once");
+                (scale_before, gates) = (scale, (gate, gate));
+            }
             prop_assert!((0.0..=2.5).contains(&scale), "scale {scale}");
             prop_assert!((-1e-3..=1.001).contains(&gate), "gate {gate}");
             prop_assert!(axis.telemetry().output_v().abs() <= 10.001);

@@ -305,6 +305,31 @@ fn a_wrong_sign_is_found_as_soon_wherever_the_counter_began() {
     assert_eq!(found, [found[0]; 3]);
 }
 
+#[test]
+fn an_axis_whose_encoder_is_not_plausible_is_homed_no_longer() {
+    for (truth, homed) in [
+        (MODEL, true),
+        (
+            Truth {
+                reversed: true,
+                ..MODEL
+            },
+            false,
+        ),
+    ] {
+        let mut axis = Moved::new(&truth, 0);
+        axis.run(100);
+        axis.rig.state.set_homed(AxisName::X, true);
+        axis.command(Command::Enable);
+        axis.run(100);
+        let scale = StageSettings::simulated().motion_scale(0);
+        axis.command(Command::Jog(AxisName::X, Velocity::from_mm_s(20.0, scale)));
+        axis.run(3000);
+        assert_eq!(axis.fault().is_none(), homed);
+        assert_eq!(axis.rig.state.axes()[0].is_homed(), homed);
+    }
+}
+
 /// Time, s, at most 0.1, until an axis is found that speeds up at 8000 mm/s^2 without a voltage, and whose count stands at `count`
 /// when the memory begins, at another place afterwards if it is given one, and `first` counts on from the first comparison.
 fn gain_found_s(axis: &Plausibility, count: i32, moved_to: Option<i32>, first: i32) -> Option<f64> {
