@@ -79,7 +79,7 @@ const BLOCK_S: f64 = 12.8e-3;
 const UNIT: f64 = 4.0;
 
 /// Largest `sum(psi^2)` times time, in units: what was learnt before is halved beyond it.
-const MOST_INFORMATION: f64 = 0.2;
+const MOST_INFORMATION: f64 = 0.07;
 
 /// Difference of the scale by the last seconds from the present one beyond which the axis has changed; and the information that they
 /// need to say so, as a share of all that is remembered.
