@@ -15,6 +15,7 @@ mod first_screen;
 mod identify_commands;
 mod interrupted;
 mod kept_settings;
+mod new;
 mod own_stage;
 mod part_program;
 mod record_bad_input;
