@@ -15,6 +15,7 @@ mod new;
 mod numbers;
 mod own_stage;
 mod plane;
+mod plot;
 mod replay;
 mod replay_program;
 mod settings;
@@ -65,6 +66,8 @@ enum Command {
     /// Write a settings file for a machine that nobody has commissioned: encoder, amplifier, limits, rate. Asks on a terminal for what is not
     /// given.
     New(new::Arguments),
+    /// Draw columns of CSV files over time, in the terminal or as a page: a capture, a recording, several runs over each other.
+    Plot(plot::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did, or along a part program in
     /// G-code.
     Replay(replay::Arguments),
@@ -98,6 +101,7 @@ fn run() -> anyhow::Result<()> {
         Some(Command::Design(command)) => design::run(&command),
         Some(Command::Identify(command)) => identify::run(&command),
         Some(Command::New(arguments)) => new::run(&arguments),
+        Some(Command::Plot(arguments)) => plot::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
         Some(Command::Settings(arguments)) => settings::run(&arguments),
     }
