@@ -65,7 +65,7 @@ pub trait SettingsFlash: NorFlash {
 
 /// A watchdog that resets the processor unless it is fed.
 pub trait Watchdog {
-    /// Starts it, for good. The first [`feed`](Self::feed) must follow within its time.
+    /// Starts it, for good; one that gave the start more time has its usual time from here on. The first [`feed`](Self::feed) must follow within its time.
     fn start(&mut self);
 
     /// Feeds it. `driving`: the amplifiers are enabled. While they are not, a board may let a debugger stop the

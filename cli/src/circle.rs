@@ -22,8 +22,7 @@ pub(super) struct Arguments {
     /// Planes, separated by commas.
     #[arg(long, value_enum, value_delimiter = ',', default_values = ["xy", "yz", "zx"], value_name = "PLANES")]
     plane: Vec<PlaneName>,
-    /// Radii, mm, separated by commas; without it 5, 15, 30 and 50, as far as they fit the travel that --stage says.
-    #[arg(long, value_name = "MM,...")]
+    #[arg(long, value_name = "MM,...", help = radii_help())]
     radius_mm: Vec<Numbers>,
     /// Feeds along the path, mm/min, separated by commas.
     #[arg(long, default_values_t = [Numbers(vec![300.0, 1000.0, 3000.0])], value_name = "MM/MIN,...")]
@@ -45,6 +44,14 @@ pub(super) struct Arguments {
 
 /// Radii where none are given, mm.
 const RADII_MM: [f64; 4] = [5.0, 15.0, 30.0, 50.0];
+
+/// Help of the radii, with those that are usual.
+fn radii_help() -> String {
+    let usual = RADII_MM.map(|radius_mm| radius_mm.to_string()).join(", ");
+    format!(
+        "Radii, mm, separated by commas; without it {usual}, as far as they fit the travel that --stage says"
+    )
+}
 
 impl Arguments {
     /// The radii that are asked for, or the usual ones that fit the travel of `axes`.
@@ -125,7 +132,8 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     let results = run_circle_tests(&request, &setup, &|| bar.inc(1));
     bar.finish_and_clear();
     say!(
-        "Simulated, not measured. 10 kHz, f32; seed {}\n",
+        "Simulated, not measured{}. 10 kHz, f32; seed {}\n",
+        own_stage::on(own.as_ref()),
         output.seed
     );
     for table in circle_tables(&results) {
@@ -135,6 +143,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         results.iter().any(|result| result.outcome.is_ok()),
         "no circle was run to its end; the table above says why"
     );
-    let page = circle_page(&results, provenance(&command_line(), output.seed));
+    let page = circle_page(
+        &results,
+        &own_stage::name(own.as_ref()),
+        provenance(&command_line(), output.seed),
+    );
     output.page(&page, "circle.html")
 }

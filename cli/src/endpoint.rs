@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
+use quadrant::axes::AxisName;
+use quadrant::settings::StageSettings;
 use quadrant_cli::{terminal, warn};
 use quadrant_sim::client::{Client, Interrupt};
 use quadrant_sim::machine::{
@@ -32,11 +34,16 @@ pub(super) struct Simulation {
     pub(super) seed: u64,
     /// A stage of one's own.
     pub(super) stage: Option<StageFile>,
+    /// Settings that a fresh machine starts with, in place of its own.
+    pub(super) start: Option<StageSettings>,
+    /// The only axis that has a law, of a machine that is the law alone; without it all of them have the simulated stage's.
+    pub(super) alone: Option<AxisName>,
 }
 
 impl Simulation {
+    /// The stage, and the settings of its firmware.
     fn setup(&self, preset: Preset) -> anyhow::Result<StageSetup> {
-        Ok(match (preset, &self.stage) {
+        let setup = match (preset, &self.stage) {
             (Preset::Fresh, None) => StageSetup::simulated(),
             (Preset::Fresh, Some(stage)) => StageSetup::of(stage),
             (Preset::Commissioned, None) => StageSetup::commissioned(),
@@ -44,6 +51,10 @@ impl Simulation {
                 "the stage of {} has no settings ready: commission its axes, or load the settings that a commissioning has left",
                 stage.path.display()
             ),
+        };
+        Ok(match (preset, &self.start) {
+            (Preset::Fresh, Some(start)) => setup.started_with(start),
+            _ => setup,
         })
     }
 }
@@ -101,10 +112,19 @@ impl Endpoint {
     /// Opens the machine, on this stage if it is not real.
     pub(super) fn open(&self, simulation: &Simulation) -> anyhow::Result<Box<dyn Machine>> {
         Ok(match self {
-            Self::Law => Box::new(match &simulation.stage {
-                Some(stage) => LawStage::of(stage, simulation.seed),
-                None => LawStage::new(simulation.seed),
-            }),
+            Self::Law => {
+                let stage = simulation.stage.as_ref();
+                let mut machine = stage.map_or_else(
+                    || LawStage::new(simulation.seed),
+                    |stage| LawStage::of(stage, simulation.seed),
+                );
+                if let Some(start) = &simulation.start {
+                    machine = machine.started_with(start);
+                } else if let Some(axis) = simulation.alone {
+                    machine = machine.with_law_of(axis);
+                }
+                Box::new(machine)
+            }
             Self::Link(link) => Box::new(link.connect(simulation, None, None)?),
         })
     }

@@ -11,9 +11,11 @@ mod endpoint;
 mod grammar;
 mod identify;
 mod kept;
+mod new;
 mod numbers;
 mod own_stage;
 mod plane;
+mod plot;
 mod replay;
 mod replay_program;
 mod settings;
@@ -61,6 +63,11 @@ enum Command {
     /// Identify an axis: its linear model, its friction, from experiments or from recordings.
     #[command(subcommand)]
     Identify(identify::Command),
+    /// Write a settings file for a machine that nobody has commissioned: encoder, amplifier, limits, rate. Asks on a terminal for what is not
+    /// given.
+    New(new::Arguments),
+    /// Draw columns of CSV files over time, in the terminal or as a page: a capture, a recording, several runs over each other.
+    Plot(plot::Arguments),
     /// Run our controllers over a recorded reference, beside what the recorded machine did, or along a part program in
     /// G-code.
     Replay(replay::Arguments),
@@ -93,6 +100,8 @@ fn run() -> anyhow::Result<()> {
         Some(Command::Connect(arguments)) => connect::run(&arguments),
         Some(Command::Design(command)) => design::run(&command),
         Some(Command::Identify(command)) => identify::run(&command),
+        Some(Command::New(arguments)) => new::run(&arguments),
+        Some(Command::Plot(arguments)) => plot::run(&arguments),
         Some(Command::Replay(arguments)) => replay::run(&arguments),
         Some(Command::Settings(arguments)) => settings::run(&arguments),
     }

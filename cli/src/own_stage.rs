@@ -13,7 +13,7 @@ use quadrant_cli::say;
 use quadrant_sim::commission::commission_stage;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
-use quadrant_sim::machine::StageSetup;
+use quadrant_sim::machine::{BUILT_IN_STAGE, StageSetup};
 use quadrant_sim::record::AxisLimits;
 use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::SettingsFile;
@@ -55,6 +55,19 @@ impl OwnStage {
     }
 }
 
+/// Name of the simulated stage, for captions.
+pub(super) fn name(stage: Option<&StageFile>) -> String {
+    stage.map_or_else(
+        || BUILT_IN_STAGE.to_owned(),
+        |stage| format!("{BUILT_IN_STAGE} of {}", stage.path.display()),
+    )
+}
+
+/// The same where it is one's own, for a line that says nothing of the built-in one.
+pub(super) fn on(stage: Option<&StageFile>) -> String {
+    stage.map_or_else(String::new, |_| format!(", on {}", name(stage)))
+}
+
 /// Axes that the file describes.
 pub(super) fn axes(stage: &StageFile) -> Vec<AxisName> {
     let described = |axis: &AxisName| stage.known[*axis as usize].is_some();
@@ -75,6 +88,7 @@ pub(super) fn setup(
     if given.path.is_some() {
         let settings = given.read()?.stage;
         refuse_other_hardware(stage, axes, &settings)?;
+        refuse_uncommissioned(stage, axes, &settings)?;
         return Ok(RunConfiguration::on(settings, stage.truth.clone()).with_best_pid()?);
     }
     let bar = share("commissioning your stage");
@@ -119,7 +133,10 @@ fn keep(
 }
 
 /// Refuses settings of another encoder or amplifier than the stage has.
-fn refuse_other_hardware(
+///
+/// # Errors
+/// The first of these axes whose encoder or amplifier is another.
+pub(super) fn refuse_other_hardware(
     stage: &StageFile,
     axes: &[AxisName],
     settings: &StageSettings,
@@ -147,8 +164,19 @@ fn refuse_other_hardware(
                 );
             }
         }
+    }
+    Ok(())
+}
+
+/// Refuses settings under which an axis of the stage has no law.
+fn refuse_uncommissioned(
+    stage: &StageFile,
+    axes: &[AxisName],
+    settings: &StageSettings,
+) -> anyhow::Result<()> {
+    for &axis in axes {
         ensure!(
-            settings.commissioned,
+            settings.axes[axis as usize].commissioned,
             "--settings: {axis} is not commissioned; leave --settings out, or commission it with --stage {}",
             stage.path.display()
         );

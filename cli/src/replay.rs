@@ -116,7 +116,11 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     );
     let outcomes = recorded::replay(&record, *axis, &setup, output.seed, &|| bar.inc(1))?;
     bar.finish_and_clear();
-    output.table(&recorded_table(&outcomes, *axis))?;
+    let title = match (&own, axis.name()) {
+        (Some(own), Some(name)) => format!("{name} of {}", own_stage::name(Some(own))),
+        _ => axis.to_string(),
+    };
+    output.table(&recorded_table(&outcomes, &title))?;
     let settings = format!("{}{}", stage.option(), settings.option());
     let shown = match model {
         ModelKnowledge::Identified => "",
@@ -132,6 +136,12 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             .map_or_else(String::new, |value| value.get_name().to_owned()),
         output.seed
     );
-    let page = recorded_page(&outcomes, *axis, *model, provenance(&command, output.seed));
+    let page = recorded_page(
+        &outcomes,
+        *axis,
+        &title,
+        *model,
+        provenance(&command, output.seed),
+    );
     output.page(&page, "replay.html")
 }

@@ -84,7 +84,8 @@ pub(super) fn run(
     )?;
     bar.finish_and_clear();
     say!(
-        "Simulated, not measured. 10 kHz, f32; seed {}\n",
+        "Simulated, not measured{}. 10 kHz, f32; seed {}\n",
+        own_stage::on(own),
         output.seed
     );
     output.table(&motion_summary_table(&trajectory, &tables))?;
@@ -93,6 +94,7 @@ pub(super) fn run(
     let title = path.file_name().unwrap_or(path.as_os_str());
     let page = program_page(
         &title.display().to_string(),
+        &own_stage::name(own),
         &trajectory,
         &tables,
         &outcomes,

@@ -210,6 +210,7 @@ impl Subject {
         let simulation = Simulation {
             seed,
             stage: self.stage.read()?,
+            ..Simulation::default()
         };
         let known = simulation.stage.as_ref();
         let known = known.and_then(|stage| stage.known[axis as usize]);

@@ -22,13 +22,14 @@ use quadrant_sim::identify::pages::revise::revise_table;
 use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::Table;
+use quadrant_sim::setting_value::{Change, changes};
 use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::stage_file::StageFile;
 use serde_json::{Value, json};
 
 use super::endpoint::{Endpoint, Simulation};
 use super::kept;
-use super::own_stage::OwnStage;
+use super::own_stage::{OwnStage, axes, refuse_other_hardware};
 use super::subject::{and_restored, known_travel, travel_both_ways};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::{Output, command_line, share};
@@ -59,7 +60,8 @@ pub(super) struct Arguments {
     /// that to the soft limits of a homed axis.
     #[arg(long, value_name = "MM", value_parser = travel_both_ways, allow_hyphen_values = true, conflicts_with = "record")]
     travel: Option<Travel>,
-    /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are.
+    /// Settings to start from: encoder, amplifier and limits of this axis, and the other axes, which stay as they are. The law of this
+    /// axis is not read. A machine that is not real starts with them, and has their rate, encoder and converter.
     /// Without them those of --into if it is there; else the machine's for this axis, and everything else as it is in the
     /// folder for results, or as the machine has it.
     #[arg(long, value_name = "FILE")]
@@ -151,7 +153,10 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     } = arguments;
     let existing = into.as_deref().filter(|path| path.exists());
     let start = arguments.settings.as_deref().or(existing);
-    let start = start.map(SettingsFile::read).transpose()?;
+    let name = AxisName::from(*axis);
+    let start = start
+        .map(|path| SettingsFile::read_for_commissioning(path, name))
+        .transpose()?;
     if let Some(folder) = &arguments.record {
         return arguments.run_saved(folder, start);
     }
@@ -160,13 +165,18 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
         .as_ref()
         .and_then(|stage| stage.known[axis.index()])
         .map(|known| Travel::between(known.travel_mm));
+    if let (Some(stage), Some(start)) = (&stage, &start) {
+        refuse_other_hardware(stage, &axes(stage), &start.stage)?;
+    }
     let simulation = Simulation {
         seed: output.seed,
         stage,
+        start: start.as_ref().map(|file| file.stage.clone()),
+        alone: Some(name),
     };
     let mut machine = arguments.machine.open(&simulation)?;
     let job = Job {
-        axis: (*axis).into(),
+        axis: name,
         travel: arguments.travel.or(own_travel),
         stage: simulation.stage.as_ref(),
         start,
@@ -245,6 +255,23 @@ fn beside_others(
     Ok(file)
 }
 
+/// Refuses settings that a machine takes with a restart alone, and has others of.
+fn refuse_restart(
+    machine: &StageSettings,
+    start: &StageSettings,
+    axis: AxisName,
+) -> anyhow::Result<()> {
+    let differing = changes(machine, start).into_iter().find(|change| {
+        change.path == "rate_hz" || change.path.starts_with(&format!("{axis}/encoder/"))
+    });
+    if let Some(Change { path, old, new }) = differing {
+        bail!(
+            "the machine has {path} = {old}, and the settings to start from say {new}, which it takes with a restart: `load` them in              its console, `store` and `reboot`, then commission it"
+        );
+    }
+    Ok(())
+}
+
 /// Checks that a folder holds experiments of the commissioning that `words` are of, and says what is adopted from there.
 fn resumed(experiments: &Path, words: &str) -> anyhow::Result<String> {
     let folder = experiments.display();
@@ -278,7 +305,10 @@ impl Job<'_> {
         let travel = known_travel(machine, axis, self.travel)?;
         let before = machine.settings()?;
         let mut file = match self.start {
-            Some(file) => file,
+            Some(file) => {
+                refuse_restart(&before, &file.stage, axis)?;
+                file
+            }
             None => beside_others(before.clone(), axis, &output.file(SETTINGS)?)?,
         };
         let result = match self.into {

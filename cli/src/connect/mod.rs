@@ -179,6 +179,7 @@ fn connect(arguments: &Arguments) -> anyhow::Result<Client> {
     let simulation = Simulation {
         seed: arguments.seed,
         stage: arguments.stage.read()?,
+        ..Simulation::default()
     };
     endpoint.connect(
         &simulation,

@@ -32,6 +32,10 @@ fn a_commissioned_axis_beats_its_pid_and_its_settings_replay() {
     assert!(shown.contains("Simulated, not measured"), "{shown}");
 
     let file = SettingsFile::read(&at.join("x/settings.toml")).unwrap();
+    // Of the axis that was commissioned, and of no other.
+    let commissioned = file.stage.axes.each_ref().map(|axis| axis.commissioned);
+    assert_eq!(commissioned, [true, false, false]);
+    assert!(file.stage.is_commissioned());
     let axis = &file.stage.axes[0];
     assert_eq!(axis.feedforward.kind, FeedforwardKind::Combined);
     let [origin] = &file.provenance[..] else {

@@ -60,6 +60,35 @@ fn a_signal_in_the_middle_of_a_command_stops_the_axes_and_ends_the_script() {
 }
 
 #[test]
+fn a_commissioning_that_a_person_ends_says_so_and_blames_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut child = quadrant(&["commission", "--axis", "x", "--machine", "simulated"])
+        .args(["--travel", "15", "--quick"])
+        .current_dir(folder.path())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    // Until something was measured, and the next experiment is under way.
+    let experiments = folder.path().join("quadrant-out/x/experiments");
+    let measured = || std::fs::read_dir(&experiments).map_or(0, Iterator::count);
+    while measured() < 4 {
+        std::thread::sleep(Duration::from_millis(20));
+        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+    }
+    let number = child.id().to_string();
+    let sent = Command::new("kill").args(["-INT", &number]).status();
+    assert!(sent.unwrap().success());
+    let output = child.wait_with_output().unwrap();
+    let errors = error_text(&output);
+    assert_eq!(output.status.code(), Some(1));
+    assert!(errors.contains("interrupted"), "{errors}");
+    for blamed in ["oscillated", "stiffened", "resonat"] {
+        assert!(!errors.contains(blamed), "{errors}");
+    }
+}
+
+#[test]
 fn a_reader_that_has_seen_enough_is_no_error() {
     for words in [
         &["settings"][..],

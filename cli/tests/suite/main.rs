@@ -15,8 +15,10 @@ mod first_screen;
 mod identify_commands;
 mod interrupted;
 mod kept_settings;
+mod new;
 mod own_stage;
 mod part_program;
+mod plot;
 mod record_bad_input;
 #[cfg(target_os = "linux")]
 mod record_large;

@@ -107,6 +107,10 @@ fn circle_and_replay_run_on_a_stage_that_was_commissioned_for_them() {
     let shown = command::succeed(at, &circle);
     assert!(shown.contains("Commissioned: x with "), "{shown}");
     assert!(shown.contains(", y with "), "{shown}");
+    let on_mine = "on the simulated stage of mine.toml";
+    assert!(words(&shown).contains(on_mine), "{shown}");
+    let page = fs::read_to_string(at.join("quadrant-out/circle.html")).unwrap();
+    assert!(page.contains(on_mine), "circle.html");
     // Of the usual radii two fit 50 mm of travel.
     for part in [" 15.0 ", "best PID + static + GMS", "as commissioned"] {
         assert!(shown.contains(part), "{part}:\n{shown}");
@@ -117,10 +121,15 @@ fn circle_and_replay_run_on_a_stage_that_was_commissioned_for_them() {
     let replay = ["replay", "--stage", "mine.toml", "--settings", settings];
     let shown = command::succeed(at, &[&replay[..], &["--gcode", "part.ngc"]].concat());
     assert!(shown.contains("best PID"), "{shown}");
+    assert!(words(&shown).contains(on_mine), "{shown}");
     let reference = "quadrant-out/part-program-x.csv";
     let recorded = ["--reference", reference, "--axis", "x"];
     let shown = command::succeed(at, &[&replay[..], &recorded].concat());
     assert!(shown.contains("best PID"), "{shown}");
+    assert!(
+        words(&shown).contains("x of the simulated stage of mine.toml"),
+        "{shown}"
+    );
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Recordings that are spoilt, through the commands: each is refused with its place and a remedy, none is identified from.
 
+use crate::command;
 use std::fmt::Write as _;
+use std::fs;
 use std::path::Path;
 use std::process::Command;
 use std::sync::LazyLock;
@@ -401,4 +403,31 @@ proptest! {
             prop_assert_eq!(recording.len(), 60);
         }
     }
+}
+
+#[test]
+fn a_recorded_motion_of_a_tenth_of_a_millimetre_is_replayed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let script = "enable\nhome x\nwait rest\nrecord --seconds 0.6 --out run.csv -- move x 0.1\n";
+    command::play(at, &["connect", "--simulated=commissioned"], script);
+    let text = fs::read_to_string(at.join("run.csv")).unwrap();
+    let shown = command::succeed(at, &["replay", "--reference", "run.csv", "--axis", "x"]);
+    assert!(shown.contains("best PID"), "{shown}");
+    // The same numbers times a thousandth are metres under the name of millimetres.
+    let metres = text
+        .lines()
+        .enumerate()
+        .fold(String::new(), |mut all, (index, line)| {
+            let cells = line.split(',').enumerate().map(|(column, cell)| {
+                let scaled = (index > 0 && (1..4).contains(&column))
+                    .then(|| (1e-3 * cell.parse::<f64>().unwrap()).to_string());
+                scaled.unwrap_or_else(|| cell.to_owned())
+            });
+            let _ = writeln!(all, "{}", cells.collect::<Vec<_>>().join(","));
+            all
+        });
+    fs::write(at.join("metres.csv"), metres).unwrap();
+    let said = command::fail(at, &["replay", "--reference", "metres.csv", "--axis", "x"]);
+    assert!(said.contains("looks like metres"), "{said}");
 }

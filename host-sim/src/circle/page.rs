@@ -222,7 +222,7 @@ fn refusal_table(results: &[CircleResult]) -> Table {
 }
 
 /// The sections of a report: results, figures, every circle.
-pub fn circle_sections(results: &[CircleResult]) -> Vec<Section> {
+pub fn circle_sections(results: &[CircleResult], stage: &str) -> Vec<Section> {
     let circles = circles(results);
     let mut tables = circle_tables(results).into_iter().map(Block::Table);
     let mut summary: Vec<Block> = tables.by_ref().take(1).collect();
@@ -232,7 +232,7 @@ pub fn circle_sections(results: &[CircleResult]) -> Vec<Section> {
             provenance: None,
             id: "circle-summary-section".to_owned(),
             heading: "Circle tests".to_owned(),
-            prose: vec![method_prose()],
+            prose: vec![method_prose(stage)],
             blocks: summary,
         },
         Section {
@@ -255,11 +255,12 @@ pub fn circle_sections(results: &[CircleResult]) -> Vec<Section> {
     ]
 }
 
-fn method_prose() -> String {
-    "Two axes follow each circle together, clockwise and counter-clockwise, at 10 kHz on the firmware's control law in \
+fn method_prose(stage: &str) -> String {
+    format!(
+        "Two axes follow each circle together, clockwise and counter-clockwise, at 10 kHz on the firmware's control law in \
      f32. Two turns are run at the full feed between a smooth lead-in and lead-out, and the middle 360 degrees count. The \
-     path is the simulated stage's true one, so that neither encoder noise nor quantisation is in it."
-        .to_owned()
+     path is the true one of {stage}, so that neither encoder noise nor quantisation is in it."
+    )
 }
 
 fn definition_prose() -> String {
@@ -270,12 +271,12 @@ fn definition_prose() -> String {
         .to_owned()
 }
 
-/// The page of the circle tests.
-pub fn circle_page(results: &[CircleResult], provenance: Provenance) -> Page {
+/// The page of the circle tests on a stage of this name.
+pub fn circle_page(results: &[CircleResult], stage: &str, provenance: Provenance) -> Page {
     Page {
         title: "Circle tests".to_owned(),
-        subtitle: "ISO 230-4 on the simulated stage, not measured".to_owned(),
+        subtitle: format!("ISO 230-4 on {stage}, not measured"),
         provenance,
-        sections: circle_sections(results),
+        sections: circle_sections(results, stage),
     }
 }

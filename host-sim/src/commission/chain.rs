@@ -46,7 +46,9 @@ pub fn commission(
             ..found
         }),
         Err(error) => Err(match guard.ringing() {
-            Some(ringing) if !matches!(error, CommissionError::Rings { .. }) => {
+            Some(ringing)
+                if !matches!(error, CommissionError::Rings { .. }) && !error.is_interrupted() =>
+            {
                 CommissionError::rings(ringing, error)
             }
             _ => error,

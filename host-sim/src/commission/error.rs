@@ -70,6 +70,25 @@ pub enum CommissionError {
 }
 
 impl CommissionError {
+    /// True if a person ended it: no further attempt is made, and nothing that was seen of the axis is the reason.
+    pub(super) fn is_interrupted(&self) -> bool {
+        matches!(self.experiment(), Some(ExperimentError::Interrupted { .. }))
+    }
+
+    /// The experiment that ended early; none of another reason.
+    fn experiment(&self) -> Option<&ExperimentError> {
+        match self {
+            Self::Sine(error)
+            | Self::Motor(MotorConstantError::Experiment(error))
+            | Self::Response(FrfError::Experiment(error))
+            | Self::Friction(StaticFrictionError::Experiment(error))
+            | Self::Revise(ReviseError::Experiment(error))
+            | Self::Verify(VerifyError::TestAxis(error)) => Some(error),
+            Self::Rings { source, .. } => source.experiment(),
+            _ => None,
+        }
+    }
+
     /// A step that failed because the axis oscillated.
     pub(super) fn rings(ringing: Ringing, error: Self) -> Self {
         Self::Rings {
@@ -77,5 +96,38 @@ impl CommissionError {
             amplitude_um: 1e3 * ringing.amplitude_mm,
             source: Box::new(error),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_interruption_is_found_below_every_step() {
+        let experiment = || ExperimentError::Interrupted {
+            experiment: "moving".to_owned(),
+            done: "the axes have stopped",
+        };
+        let response = CommissionError::Response(FrfError::from(experiment()));
+        for error in [
+            CommissionError::Sine(experiment()),
+            CommissionError::Motor(MotorConstantError::from(experiment())),
+            CommissionError::Friction(StaticFrictionError::from(experiment())),
+            CommissionError::Revise(ReviseError::from(experiment())),
+            CommissionError::Verify(VerifyError::from(experiment())),
+            response,
+        ] {
+            assert!(error.is_interrupted(), "{error}");
+            assert!(
+                error.to_string().contains("interrupted in moving"),
+                "{error}"
+            );
+        }
+        let other = ExperimentError::Impossible {
+            experiment: "moving".to_owned(),
+            reason: "interrupted".to_owned(),
+        };
+        assert!(!CommissionError::Sine(other).is_interrupted());
     }
 }

@@ -49,7 +49,10 @@ pub(super) fn linear_model(
     motor: MotorConstant,
     progress: &mut dyn FnMut(f64),
 ) -> Result<Linear, CommissionError> {
-    let mut model = |test_axis: &mut Guard<'_>, motor: &MotorConstant, misjudged: f64| {
+    let mut model = |test_axis: &mut Guard<'_>,
+                     motor: &MotorConstant,
+                     misjudged: f64|
+     -> Result<Linear, CommissionError> {
         test_axis.slowed_by(by_friction(motor.gain_mm_per_v_s2, motor));
         if middle_first(&test_axis.info()).is_some() {
             to_the_middle(test_axis, base, motor, misjudged)?;
@@ -61,6 +64,7 @@ pub(super) fn linear_model(
     };
     let first: CommissionError = match model(test_axis, &motor, 1.0) {
         Ok(found) => return Ok(found),
+        Err(error) if error.is_interrupted() => return Err(error),
         Err(error) => error,
     };
     // Of an axis that rings, the gentle test may tell the mass better, and so make a better first controller.
@@ -68,11 +72,14 @@ pub(super) fn linear_model(
     let gentle = motor_constant::measure_gently(test_axis, steps, &mut |_| {});
     let as_shown = gentle.is_ok().then_some(1.0);
     let motor = gentle.unwrap_or(motor);
-    as_shown
-        .into_iter()
-        .chain(MISJUDGED)
-        .find_map(|misjudged| model(test_axis, &motor, misjudged).ok())
-        .ok_or(first)
+    for misjudged in as_shown.into_iter().chain(MISJUDGED) {
+        match model(test_axis, &motor, misjudged) {
+            Ok(found) => return Ok(found),
+            Err(error) if error.is_interrupted() => return Err(error),
+            Err(_) => {}
+        }
+    }
+    Err(first)
 }
 
 /// Deceleration by friction alone, mm/s^2, of an axis that a volt accelerates by so much.
@@ -169,6 +176,7 @@ fn under_first_controllers(
     };
     let first = match attempt(test_axis, 1.0, 1.0, progress) {
         Ok(found) => return Ok(found),
+        Err(error) if error.is_interrupted() => return Err(error),
         Err(error) => error,
     };
     let mut seen = rings(test_axis, &first);
@@ -190,6 +198,7 @@ fn under_first_controllers(
         }
         match attempt(test_axis, share, trim, progress) {
             Ok(found) => return Ok(found),
+            Err(error) if error.is_interrupted() => return Err(error),
             Err(error) => {
                 let now = rings(test_axis, &error);
                 next = next_share(share, &error, now, is_short);
@@ -216,7 +225,7 @@ fn rings(test_axis: &Guard<'_>, error: &CommissionError) -> Option<Ringing> {
 }
 
 /// Factor on the friction that is fed forward, after the tracking error stopped an axis that lagged by more friction, or ran
-/// ahead by less, or one leapt; none after another failure.
+/// ahead by less, or one jumped; none after another failure.
 fn trimmed(test_axis: &Guard<'_>, error: &CommissionError, rings: Option<Ringing>) -> Option<f64> {
     let stopped = test_axis.interrupted()?;
     if rings.is_some() {

@@ -72,8 +72,8 @@ const OTHER_KINDS: usize = 2;
 const SHARES: [f64; 3] = [0.75, 0.5, 0.25];
 /// Errors over those of the best kind up to which a kind that stands before it in [`KINDS`] is taken.
 const AS_GOOD: f64 = 1.1;
-/// Errors of the static model alone over the PID's from which on its steps make the axis leap.
-const LEAPS: f64 = 3.0;
+/// Errors of the static model alone over the PID's from which on its steps make the axis jump.
+const JUMP_RATIO: f64 = 3.0;
 /// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
 const NO_WORSE: f64 = 1.01;
 /// Mean of the errors over the PID's, and largest error on a withheld sine, from which on a law is not worth its risk on motions that
@@ -357,15 +357,15 @@ pub fn verify(
         }
     }
     note(&mut drift, &bench.try_law(AGAIN, &pid, 1)?.0);
-    // An axis that the sign of the velocity alone makes leap is not to be given it beside a model with memory.
-    let leaps = kinds.iter().any(|(kind, law)| {
-        *kind == FeedforwardKind::Static && law.against(&pid_alone, &drift).1 > LEAPS
+    // An axis that the sign of the velocity alone makes jump is not to be given it beside a model with memory.
+    let jumps = kinds.iter().any(|(kind, law)| {
+        *kind == FeedforwardKind::Static && law.against(&pid_alone, &drift).1 > JUMP_RATIO
     });
     let is_step =
         |kind: FeedforwardKind| matches!(kind, FeedforwardKind::Combined | FeedforwardKind::Static);
-    let (leaping, mut kinds): (Vec<_>, Vec<_>) = kinds
+    let (jumping, mut kinds): (Vec<_>, Vec<_>) = kinds
         .into_iter()
-        .partition(|(kind, _)| leaps && is_step(*kind));
+        .partition(|(kind, _)| jumps && is_step(*kind));
     let means = kinds
         .iter()
         .map(|(_, law)| law.against(&pid_alone, &drift).1);
@@ -447,7 +447,7 @@ pub fn verify(
         chosen = bench.without_nonlinear_gain(&mut laws, &pid, &drift)?;
     }
     // The others are shown, too, after those that ran on every sine.
-    laws.extend(kinds.into_iter().chain(leaping).map(|(_, law)| law));
+    laws.extend(kinds.into_iter().chain(jumping).map(|(_, law)| law));
     Ok(Verification {
         sines,
         laws,

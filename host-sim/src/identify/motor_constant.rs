@@ -24,7 +24,7 @@ pub struct MotorConstantSettings {
     pub dwell_s: f64,
     /// Levels in a pass.
     pub levels: usize,
-    /// Time in which the voltage rises before the first level, s; 0 for none. A motor on a soft spring does not leap then.
+    /// Time in which the voltage rises before the first level, s; 0 for none. A motor on a soft spring does not jump then.
     pub rise_s: f64,
     /// Upper level over the lower.
     pub upper_ratio: f64,
@@ -364,7 +364,7 @@ pub fn measure(
     }
 }
 
-/// Runs the test with a voltage that rises first, to levels that are nearer to each other: for a motor that leaps on a soft spring.
+/// Runs the test with a voltage that rises first, to levels that are nearer to each other: for a motor that jumps on a soft spring.
 ///
 /// # Errors
 /// As [`measure`].

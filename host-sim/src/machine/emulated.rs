@@ -17,7 +17,7 @@ use quadrant::stage::Outputs;
 
 use super::emulator::{EmulatorError, Lockstep, Memory, Program};
 use super::stage_setup::StageSetup;
-use super::timing::{OFF_TICKS, PORT_BYTES};
+use super::timing::{OFF_TICKS, port_bytes};
 use crate::plant::SimulatedStage;
 
 /// The job of a machine whose flash is empty: its settings, without a motion.
@@ -73,7 +73,10 @@ impl EmulatedMachine {
         plant.set_marks(*marks);
         let job = first_job(settings);
         memory.prepare(Mode::Lockstep, 0, &job)?;
-        let port = HostPort::default();
+        let port = HostPort {
+            room: port_bytes(settings).min(LINK_BYTES),
+            ..HostPort::default()
+        };
         port.reset(&memory)?;
         Ok(Self {
             lockstep: Lockstep::start(program, memory, |_| {})?,
@@ -186,6 +189,7 @@ impl EmulatedMachine {
         self.told.extend(self.lockstep.new_lines()?);
         self.port = HostPort {
             to_host: std::mem::take(&mut self.port.to_host),
+            room: self.port.room,
             ..HostPort::default()
         };
         self.port.reset(self.lockstep.memory())?;
@@ -210,6 +214,8 @@ impl EmulatedMachine {
 struct HostPort {
     to_machine: VecDeque<u8>,
     to_host: Vec<u8>,
+    /// Bytes that the wire carries in a run of the server.
+    room: usize,
     /// Bytes written to the ring towards the machine since its start.
     written: u32,
     /// Bytes read from the other ring.
@@ -227,7 +233,7 @@ impl HostPort {
 
     /// Lets the machine write as many bytes as the wire carries in a run of the server: the rest of the ring counts as full.
     fn make_room(&self, memory: &Memory) -> Result<(), EmulatorError> {
-        let full = (LINK_BYTES - PORT_BYTES) as u32;
+        let full = (LINK_BYTES - self.room) as u32;
         memory.set_word(LINK_OUT_TAKEN, self.read.wrapping_sub(full))
     }
 

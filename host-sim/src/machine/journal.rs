@@ -143,6 +143,7 @@ impl Stopped {
             }),
             ExperimentError::Motion { .. }
             | ExperimentError::Impossible { .. }
+            | ExperimentError::Interrupted { .. }
             | ExperimentError::TimedOut { .. } => None,
         }
     }

@@ -66,7 +66,7 @@ pub use serial::{BAUD, SerialTransport, serial_ports};
 pub use shared::{MOST_VIEWERS, PASSED_ON, Shared, VIEWER_IDS};
 pub use simulated_io::SimulatedIo;
 pub use simulated_link::SimulatedLink;
-pub use stage_setup::StageSetup;
+pub use stage_setup::{BUILT_IN_STAGE, StageSetup, enter_limits};
 pub use tcp::TcpTransport;
 pub use test_axis::{
     AxisInfo, Drive, Experiment, ExperimentError, Sides, TestAxis, open_loop_mm, room_mm, span_mm,

@@ -13,7 +13,7 @@ use quadrant::stage::Outputs;
 
 use super::application::{BoardIdentity, Running, Start};
 use super::memory_flash::MemoryFlash;
-use super::timing::{OFF_TICKS, PORT_BYTES};
+use super::timing::{OFF_TICKS, port_bytes};
 use crate::plant::{SimulatedStage, StageParameters};
 
 /// Name, timer and number type for the greeting.
@@ -64,6 +64,8 @@ pub struct SimulatedMachine {
     plant: SimulatedStage,
     defaults: StageSettings,
     wire: Wire,
+    /// Bytes that the wire carries in a run of the server.
+    port_bytes: usize,
     outputs: Outputs,
     /// Inputs that somebody holds pressed, beside those of the stage.
     pressed: Switches,
@@ -99,6 +101,7 @@ impl SimulatedMachine {
             plant: SimulatedStage::new(truth, settings.rate_hz, seed),
             defaults: settings.clone(),
             wire: Wire::default(),
+            port_bytes: port_bytes(settings),
             outputs: Outputs::default(),
             pressed: Switches::NONE,
             been_mm: [(0.0, 0.0); 3],
@@ -155,7 +158,7 @@ impl SimulatedMachine {
     fn step(&mut self) {
         let mut inputs = self.plant.read_inputs(None);
         inputs.switches = inputs.switches.with(self.pressed);
-        self.wire.room = PORT_BYTES;
+        self.wire.room = self.port_bytes;
         let (outputs, after) = self.running.tick(&inputs, &mut self.wire);
         self.outputs = outputs;
         self.plant.step(&self.outputs);

@@ -2,11 +2,14 @@
 
 use quadrant::friction::Direction;
 use quadrant::settings::{
-    HomeSwitch, HomingSettings, LimitSettings, StageSettings, TravelSettings,
+    AxisSettings, HomeSwitch, HomingSettings, LimitSettings, StageSettings, TravelSettings,
 };
 
-use crate::plant::{MarkParameters, StageParameters};
+use crate::plant::{AxisParameters, MarkParameters, StageParameters};
 use crate::stage_file::{DataSheet, LIMIT_BEYOND_MM, StageFile};
+
+/// Name of the built-in stage, for captions.
+pub const BUILT_IN_STAGE: &str = "the simulated stage";
 
 /// The stage of a simulated machine, and the settings of its firmware while its flash is empty.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,6 +69,24 @@ impl StageSetup {
         setup
     }
 
+    /// The same stage under a firmware that starts with other settings, and with the encoders and converters that these say.
+    #[must_use]
+    pub fn started_with(self, settings: &StageSettings) -> Self {
+        let Self {
+            mut truth,
+            mut marks,
+            ..
+        } = self;
+        for ((truth, marks), axis) in truth.axes.iter_mut().zip(&mut marks).zip(&settings.axes) {
+            equip(truth, marks, axis);
+        }
+        Self {
+            settings: settings.clone(),
+            truth,
+            marks,
+        }
+    }
+
     /// The simulated stage with the settings that are chosen for it: for a quick look.
     pub fn commissioned() -> Self {
         Self {
@@ -73,6 +94,19 @@ impl StageSetup {
             ..Self::simulated()
         }
     }
+}
+
+/// Gives a simulated axis the encoder and the converter that settings say. Its noise is as many counts as before, and an index pulse is
+/// where it was.
+fn equip(truth: &mut AxisParameters, marks: &mut MarkParameters, settings: &AxisSettings) {
+    let finer = truth.resolution_mm / settings.encoder.resolution_mm;
+    let rescaled = |counts: i64| (counts as f64 * finer).round() as i64;
+    let spacing = settings.encoder.counts_per_index.map(i64::from);
+    marks.counts_per_index = spacing.unwrap_or_else(|| rescaled(marks.counts_per_index).max(1));
+    marks.index_count = rescaled(marks.index_count);
+    truth.imperfections.encoder_noise_mm /= finer;
+    truth.resolution_mm = settings.encoder.resolution_mm;
+    truth.full_scale_v = settings.amplifier.full_scale_v;
 }
 
 /// Velocities of homing, mm/s.
@@ -87,7 +121,7 @@ const MOST_ERROR_MM: f64 = 20.0;
 const MOST_ERROR_COUNTS: f64 = 8e6;
 
 /// Enters what a data sheet says.
-fn enter_limits(limits: &mut LimitSettings, known: &DataSheet, resolution_mm: f64) {
+pub fn enter_limits(limits: &mut LimitSettings, known: &DataSheet, resolution_mm: f64) {
     let [negative, positive] = known.travel_mm;
     limits.max_velocity_mm_s = known.max_velocity_mm_s;
     limits.max_acceleration_mm_s2 = known.max_acceleration_mm_s2;
@@ -142,6 +176,24 @@ mod tests {
         let other = StageSetup::fresh(truth, fresh.marks);
         assert_eq!(other.settings.axes[1].encoder.resolution_mm, 1e-4);
         other.settings.validate(FIRMWARE_ELEMENTS).unwrap();
+    }
+
+    #[test]
+    fn a_machine_that_starts_with_settings_has_the_encoder_and_the_converter_that_they_say() {
+        let same = StageSetup::simulated().started_with(&StageSettings::simulated());
+        assert_eq!(same, StageSetup::commissioned());
+        let mut settings = StageSettings::simulated();
+        settings.axes[1].encoder.resolution_mm = 1e-3;
+        settings.axes[1].encoder.counts_per_index = Some(5000);
+        settings.axes[1].amplifier.full_scale_v = 5.0;
+        let setup = StageSetup::simulated().started_with(&settings);
+        let (truth, marks) = (&setup.truth.axes[1], &setup.marks[1]);
+        assert_eq!((truth.resolution_mm, truth.full_scale_v), (1e-3, 5.0));
+        assert_eq!((marks.counts_per_index, marks.index_count), (5000, -36_000));
+        let counts = truth.imperfections.encoder_noise_mm / truth.resolution_mm;
+        let before = &same.truth.axes[1];
+        let known = before.imperfections.encoder_noise_mm / before.resolution_mm;
+        assert!((counts / known - 1.0).abs() < 1e-12, "{counts} {known}");
     }
 
     #[test]

@@ -217,6 +217,14 @@ pub enum ExperimentError {
         /// Description of what is missing, or failed.
         reason: String,
     },
+    /// A person asked to stop.
+    #[error("interrupted in {experiment}: {done}")]
+    Interrupted {
+        /// Name of the experiment.
+        experiment: String,
+        /// State of the axes since.
+        done: &'static str,
+    },
     /// The axis left its travel.
     #[error(
         "{experiment}: the axis left its travel of +-{travel_mm} mm after {time_s:.3} s; \

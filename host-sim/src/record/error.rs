@@ -117,13 +117,13 @@ pub enum RecordError {
         /// Description of the fault.
         fault: TimeFault,
     },
-    /// The position leaps.
+    /// The position jumps.
     #[error(
-        "{}, line {line}: the position leaps from {from_mm} mm to {to_mm} mm, and neither the rows before nor those after move so fast{}; \
+        "{}, line {line}: the position jumps from {from_mm} mm to {to_mm} mm, and neither the rows before nor those after move so fast{}; \
          are counts lost, or is the row wrong? Correct it, or keep the part before or after it",
         path.display(), Others(*others)
     )]
-    Leap {
+    Jump {
         /// Path of the file.
         path: PathBuf,
         /// Line number; the header is 1.
@@ -132,7 +132,7 @@ pub enum RecordError {
         from_mm: f64,
         /// Position in that row, mm.
         to_mm: f64,
-        /// Further leaps of the record.
+        /// Further jumps of the record.
         others: usize,
     },
     /// The sample rate is not one that anything is controlled at.

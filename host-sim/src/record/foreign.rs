@@ -324,13 +324,16 @@ impl Form {
     }
 }
 
+/// Cell of a row of units for a column that has none.
+const NO_UNIT: &str = "-";
+
 /// The unit that a cell or the bracket of a name holds, if any quantity has it.
 fn unit_of(cell: &str) -> Option<&str> {
     let bare = cell.trim_matches(['[', ']', '(', ')']).trim();
     let known = QUANTITIES
         .iter()
         .any(|quantity| quantity.factor(bare).is_some());
-    (known || bare == "-").then_some(bare)
+    (known || bare == NO_UNIT).then_some(bare)
 }
 
 /// A name of a header without the unit in its bracket, and that unit.
@@ -412,7 +415,8 @@ impl Translation {
             let written = unit
                 .as_deref()
                 .or_else(|| units.get(index).copied().and_then(unit_of))
-                .or_else(|| name_and_unit(&found[index]).1);
+                .or_else(|| name_and_unit(&found[index]).1)
+                .filter(|unit| *unit != NO_UNIT);
             let own = quantity.units[0].0;
             let factor = quantity.factor(written.unwrap_or(own)).ok_or_else(|| {
                 refused(format!(

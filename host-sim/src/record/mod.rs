@@ -19,7 +19,7 @@ mod columns;
 mod error;
 mod force;
 mod foreign;
-mod leap;
+mod jump;
 mod limits;
 mod lines;
 mod motion;

@@ -39,6 +39,10 @@ pub(super) fn check(
     if reference.mm_per_unit == 1.0
         && motion.travel_mm > 0.0
         && motion.travel_mm * 1e3 < limits.travel_mm
+        && !columns
+            .position
+            .as_ref()
+            .is_some_and(|position| steps_by_counts(position, limits.resolution_mm))
     {
         let fault = UnitFault::LooksLikeMetres {
             travel_mm: motion.travel_mm,
@@ -61,6 +65,21 @@ pub(super) fn check(
         None => Ok(()),
     }
 }
+
+/// True if a position changes by counts of the axis' encoder, and never by less: then its unit is right, however small the motion.
+fn steps_by_counts(position: &Column, resolution_mm: f64) -> bool {
+    let changes = position
+        .values
+        .windows(2)
+        .map(|pair| (pair[1] - pair[0]).abs());
+    let least = changes
+        .filter(|change| *change > 0.0)
+        .fold(f64::INFINITY, f64::min);
+    least.is_finite() && position.mm_per_unit * least > LEAST_STEP_COUNTS * resolution_mm
+}
+
+/// Smallest change of a position that was read from an encoder, counts: one, but for rounding.
+const LEAST_STEP_COUNTS: f64 = 0.5;
 
 /// True if a measured position moves like a reference that moves by `reference_mm`, within what a controller can be to blame
 /// for.

@@ -9,7 +9,7 @@ use super::error::{RecordError, UnusableSignal};
 use super::foreign::{self, ColumnNames};
 use super::time::Grid;
 use super::trace::{TraceError, write_trace};
-use super::{leap, plausible, time};
+use super::{jump, plausible, time};
 
 /// Largest voltage of an amplifier's input, V.
 const MOST_VOLTS: f64 = 20.0;
@@ -163,12 +163,12 @@ impl Recording {
         Self::checked(path, columns, sample_time_s, Believed::ALL)
     }
 
-    /// Reads and checks a recorded motion as [`read_csv_with`](Self::read_csv_with), and that its position does not leap. Files of
+    /// Reads and checks a recorded motion as [`read_csv_with`](Self::read_csv_with), and that its position does not jump. Files of
     /// other programs are translated. Uneven steps of time are refused, or interpolated on request. Notes say what was guessed and
     /// done.
     ///
     /// # Errors
-    /// As [`read_csv`](Self::read_csv), a column that is not there, and a position that leaps.
+    /// As [`read_csv`](Self::read_csv), a column that is not there, and a position that jumps.
     pub fn read_motion(
         path: &Path,
         options: &MotionOptions,
@@ -203,7 +203,7 @@ impl Recording {
         };
         let (sample_time_s, note) = if options.resample {
             let grid = Grid::of(path, &columns.time, &columns.lines)?;
-            refuse_leaps(path, &columns)?;
+            refuse_jumps(path, &columns)?;
             resample_by(&grid, &mut columns);
             let (shortest_s, longest_s) = grid.steps_s;
             let note = format!(
@@ -218,7 +218,7 @@ impl Recording {
             (grid.sample_time_s, Some(note))
         } else {
             let sample_time_s = time::check(path, &columns.time, &columns.lines)?;
-            refuse_leaps(path, &columns)?;
+            refuse_jumps(path, &columns)?;
             (sample_time_s, None)
         };
         notes.extend(note);
@@ -267,9 +267,9 @@ impl Recording {
     }
 }
 
-fn refuse_leaps(path: &Path, columns: &Columns) -> Result<(), RecordError> {
+fn refuse_jumps(path: &Path, columns: &Columns) -> Result<(), RecordError> {
     match &columns.position {
-        Some(position) => leap::refuse(path, &columns.time.values, position, &columns.lines),
+        Some(position) => jump::refuse(path, &columns.time.values, position, &columns.lines),
         None => Ok(()),
     }
 }

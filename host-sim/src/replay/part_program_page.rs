@@ -91,9 +91,10 @@ pub fn motion_summary_table(trajectory: &Trajectory, tables: &ProgramTables) -> 
     }
 }
 
-/// The page of a part program.
+/// The page of a part program on a stage of this name.
 pub fn program_page(
     title: &str,
+    stage: &str,
     trajectory: &Trajectory,
     tables: &ProgramTables,
     outcomes: &[ProgramOutcome],
@@ -102,7 +103,7 @@ pub fn program_page(
     let (picture, magnified) = path_figure(tables, outcomes);
     Page {
         title: format!("Part program {title}"),
-        subtitle: "On the simulated stage with the firmware's control law, not measured".to_owned(),
+        subtitle: format!("On {stage} with the firmware's control law, not measured"),
         provenance,
         sections: vec![Section {
             provenance: None,

@@ -26,7 +26,7 @@ impl RecordedOutcome {
 }
 
 /// Tracking errors of our configurations beside the recorded machine's own.
-pub fn recorded_table(outcomes: &[RecordedOutcome], axis: RecordedAxis) -> Table {
+pub fn recorded_table(outcomes: &[RecordedOutcome], title: &str) -> Table {
     let find = |configuration| {
         outcomes
             .iter()
@@ -41,7 +41,7 @@ pub fn recorded_table(outcomes: &[RecordedOutcome], axis: RecordedAxis) -> Table
     Table {
         id: "recorded-reference".to_owned(),
         caption: format!(
-            "Tracking error over the recorded reference on {axis}, from {SETTLING_S} s after its start; change against {against}"
+            "Tracking error over the recorded reference on {title}, from {SETTLING_S} s after its start; change against {against}"
         ),
         columns: vec![
             Column::new("Controller"),
@@ -72,6 +72,7 @@ pub fn recorded_table(outcomes: &[RecordedOutcome], axis: RecordedAxis) -> Table
 pub fn recorded_page(
     outcomes: &[RecordedOutcome],
     axis: RecordedAxis,
+    title: &str,
     knowledge: ModelKnowledge,
     provenance: Provenance,
 ) -> Page {
@@ -112,7 +113,7 @@ pub fn recorded_page(
         })
     };
     let mut blocks = vec![
-        Block::Table(recorded_table(outcomes, axis)),
+        Block::Table(recorded_table(outcomes, title)),
         figure(
             "our-errors",
             "Tracking error of our configurations, simulated",
@@ -130,7 +131,7 @@ pub fn recorded_page(
     Page {
         title: "Our controllers over a recorded reference".to_owned(),
         subtitle: format!(
-            "{axis}, simulated; the recorded machine's own error, measured, beside it"
+            "{title}, simulated; the recorded machine's own error, measured, beside it"
         ),
         provenance,
         sections: vec![Section {

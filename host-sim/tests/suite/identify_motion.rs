@@ -436,27 +436,27 @@ fn no_candidate_has_a_mass_or_a_friction_below_zero() {
 }
 
 #[test]
-fn a_position_that_leaps_is_refused_with_its_line() {
+fn a_position_that_jumps_is_refused_with_its_line() {
     let rows = simulated_record(0.15, |_| 2e-3);
     assert!(read(&rows, false).is_ok());
-    for (index, leap_mm, stays) in [
+    for (index, jump_mm, stays) in [
         (2345, 5.0, false),
         (2345, -0.2, false),
         (1000, 1.0, true),
         (3000, -0.1, true),
     ] {
-        let mut leaping = rows.clone();
+        let mut jumping = rows.clone();
         let last = if stays { rows.len() } else { index + 1 };
-        for row in &mut leaping[index..last] {
-            row[1] += leap_mm;
+        for row in &mut jumping[index..last] {
+            row[1] += jump_mm;
         }
-        let refused = read(&leaping, false).unwrap_err();
+        let refused = read(&jumping, false).unwrap_err();
         // The header is line 1.
         assert!(
-            refused.contains(&format!("line {}: the position leaps", index + 2)),
-            "{leap_mm}: {refused}"
+            refused.contains(&format!("line {}: the position jumps", index + 2)),
+            "{jump_mm}: {refused}"
         );
-        assert!(read(&leaping, true).is_err());
+        assert!(read(&jumping, true).is_err());
     }
 }
 
@@ -538,6 +538,12 @@ fn records_of_other_programs_are_read_as_they_are() {
                 + &table(&|[t, x, u]| format!("{:.1},{:.3},{u:.6}\n", 1e6 * t, 2e3 * x)),
             "time=a:us,position=b:0.5um,voltage=c:V",
             &[],
+        ),
+        (
+            "a row of units that has none for a column",
+            "t,x,u\ns,-,-\n".to_owned() + &table(&|[t, x, u]| format!("{t:.4},{x:.6},{u:.6}\n")),
+            "time=t,position=x,voltage=u",
+            &["units in line 2"],
         ),
         (
             "columns by number, spaces, no header",

@@ -82,7 +82,7 @@ pub(crate) struct Board {
     pub(crate) switches: Switches,
     /// The serial port of the link.
     pub(crate) serial: Serial,
-    /// The watchdog, not started.
+    /// The watchdog, with seconds for the start.
     pub(crate) watchdog: Watchdog,
     /// The flash for settings.
     pub(crate) flash: SettingsFlash,
@@ -91,7 +91,7 @@ pub(crate) struct Board {
 }
 
 impl Board {
-    /// Starts the board, but for the control tick and the watchdog.
+    /// Starts the board, but for the control tick.
     pub(crate) fn init(core: cortex_m::Peripherals) -> Self {
         let Some(chip) = pac::Peripherals::take() else {
             panic!("the board is started twice");
@@ -106,6 +106,8 @@ impl Board {
         // Should that clock fail, the processor runs on from one of its own, at another speed, and takes the
         // non-maskable interrupt, which is the end (`fault::DefaultHandler`).
         rcc.cr().modify(|_, w| w.csson().set_bit());
+        // Not before: without its 8 MHz the start waits for them.
+        let watchdog = Watchdog::new(chip.IWDG, chip.DBGMCU);
         let port_a = chip.GPIOA.split(&mut rcc);
         let port_b = chip.GPIOB.split(&mut rcc);
         let port_c = chip.GPIOC.split(&mut rcc);
@@ -169,7 +171,7 @@ impl Board {
             idle: Idle,
             switches,
             serial,
-            watchdog: Watchdog::new(chip.IWDG, chip.DBGMCU),
+            watchdog,
             flash: SettingsFlash::new(chip.FLASH),
             reset_cause,
         }

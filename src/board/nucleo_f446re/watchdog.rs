@@ -12,7 +12,13 @@ const KEY_ACCESS: u16 = 0x5555;
 /// Reload value: 10 ms in steps of 125 us, at a prescaler of 4 (the value after reset) and 32 kHz. The oscillator may
 /// have 17 to 47 kHz: the watchdog bites after 6.8 to 18.8 ms.
 const RELOAD: u16 = 79;
-/// Cycles of the watchdog's oscillator until a new reload value is in force: five; this is far more.
+/// Prescaler bits of 4 and 256 (IWDG_PR).
+const PRESCALE_4: u8 = 0;
+const PRESCALE_256: u8 = 6;
+/// Reload value while the firmware starts: 8 s in steps of 8 ms, at a prescaler of 256; 5.4 to 15 s with that oscillator. A start
+/// takes less than 2 s.
+const START_RELOAD: u16 = 999;
+/// Looks until a new prescaler or reload value is in force: it takes five cycles of the prescaled oscillator, 75 ms at most.
 const PATIENCE: u32 = 1_000_000;
 
 /// The independent watchdog.
@@ -22,9 +28,27 @@ pub(crate) struct Watchdog {
 }
 
 impl Watchdog {
-    /// The watchdog, not started.
+    /// The watchdog, which gives the firmware seconds to start: a processor that stands still before the first tick is reset, too.
     pub(super) fn new(watchdog: IWDG, debugger: DBGMCU) -> Self {
-        Self { watchdog, debugger }
+        let mut new = Self { watchdog, debugger };
+        new.allow(PRESCALE_256, START_RELOAD);
+        hal::Watchdog::feed(&mut new, false);
+        new
+    }
+
+    /// Starts it, or changes its time.
+    fn allow(&mut self, prescaler: u8, reload: u16) {
+        self.key(KEY_START);
+        self.key(KEY_ACCESS);
+        self.watchdog.pr().write(|w| w.pr().set(prescaler));
+        self.watchdog.rlr().write(|w| w.rl().set(reload));
+        for _ in 0..PATIENCE {
+            let status = self.watchdog.sr().read();
+            if !status.rvu().bit_is_set() && !status.pvu().bit_is_set() {
+                break;
+            }
+        }
+        self.key(KEY_RELOAD);
     }
 
     #[inline(always)]
@@ -36,15 +60,7 @@ impl Watchdog {
 
 impl hal::Watchdog for Watchdog {
     fn start(&mut self) {
-        self.key(KEY_START);
-        self.key(KEY_ACCESS);
-        self.watchdog.rlr().write(|w| w.rl().set(RELOAD));
-        for _ in 0..PATIENCE {
-            if !self.watchdog.sr().read().rvu().bit_is_set() {
-                break;
-            }
-        }
-        self.key(KEY_RELOAD);
+        self.allow(PRESCALE_4, RELOAD);
     }
 
     /// A breakpoint freezes the watchdog as long as the amplifiers are off; once they are on, a halted processor is reset,

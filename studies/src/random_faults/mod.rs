@@ -209,11 +209,16 @@ impl Campaign {
 
 /// The largest way, mm, that is not planned in an activity after an encoder died at this speed.
 fn most_unplanned_mm(activity: Activity, death: Option<Death>, speed_mm_s: f64) -> f64 {
+    // As fast as it is ordered, or slower while it speeds up.
+    let speed_mm_s = match activity {
+        Activity::Jog(ordered) => speed_mm_s.abs().min(ordered.abs().into()),
+        _ => speed_mm_s.abs(),
+    };
     match death {
         Some(death) if FLICKERS.contains(&death) => FLICKERING_UNPLANNED_MM,
         Some(_) if activity == Activity::ClosedLoop => INJECTED_UNPLANNED_MM,
-        Some(_) if speed_mm_s.abs() < SLOWEST_MM_S => SLOWEST_UNPLANNED_MM,
-        Some(_) if speed_mm_s.abs() < SLOW_MM_S => SLOW_UNPLANNED_MM,
+        Some(_) if speed_mm_s < SLOWEST_MM_S => SLOWEST_UNPLANNED_MM,
+        Some(_) if speed_mm_s < SLOW_MM_S => SLOW_UNPLANNED_MM,
         _ => UNPLANNED_MM,
     }
 }

@@ -6,6 +6,7 @@ use quadrant_sim::circle::page::circle_sections;
 use quadrant_sim::circle::{CircleRequest, run_circle_tests};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
+use quadrant_sim::machine::BUILT_IN_STAGE;
 use quadrant_sim::report::Section;
 
 use crate::friction_models::page::friction_models_sections;
@@ -73,5 +74,5 @@ pub(super) fn circles(context: &Context, _: &Progress) -> anyhow::Result<Vec<Sec
     };
     let setup = RunConfiguration::identified(context.settings.stage.clone());
     let results = run_circle_tests(&request, &setup, &|| {});
-    Ok(circle_sections(&results))
+    Ok(circle_sections(&results, BUILT_IN_STAGE))
 }

@@ -24,8 +24,9 @@ use crate::record::Recording;
 
 /// Time from one look at the telemetry to the next.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time recorded after the motion, so that the last block has come.
+/// Time recorded after the motion, so that the last block has come: a block takes time to fill, and the server runs every so many ticks.
 const TAIL: Duration = Duration::from_millis(30);
+const TAIL_TICKS: f64 = 300.0;
 /// Time for whatever moves to come to rest before an experiment.
 const BEFORE: Duration = Duration::from_secs(60);
 /// Faults that end an experiment, and no more.
@@ -191,7 +192,8 @@ impl<'a> ConnectedAxis<'a> {
                 return Err(Stop::TimedOut);
             }
         }
-        telemetry.gather(self.client, TAIL)?;
+        let tail = TAIL.max(Duration::from_secs_f64(TAIL_TICKS / rate_hz));
+        telemetry.gather(self.client, tail)?;
         match injection {
             Some(injection) => Ok(Some(injection.finish(self.client)?)),
             None => Ok(None),

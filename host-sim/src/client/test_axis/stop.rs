@@ -51,6 +51,12 @@ impl Stop {
                         fault,
                     };
                 }
+                ClientError::Interrupted { done } => {
+                    return ExperimentError::Interrupted {
+                        experiment: name,
+                        done,
+                    };
+                }
                 other => other.to_string(),
             },
             Self::Lost(lost) => format!(

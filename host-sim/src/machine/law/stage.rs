@@ -7,10 +7,11 @@ use quadrant::settings::StageSettings;
 use super::axis::{SimulatedTestAxis, TRAVEL_MM};
 use crate::machine::error::MachineError;
 use crate::machine::interface::Machine;
-use crate::machine::stage_setup::StageSetup;
+use crate::machine::stage_setup::{BUILT_IN_STAGE, StageSetup};
 use crate::machine::test_axis::TestAxis;
 use crate::machine::travel::Travel;
-use crate::plant::StageParameters;
+use crate::plant::{MarkParameters, StageParameters};
+use crate::settings_file::without_law;
 use crate::stage_file::StageFile;
 
 /// The simulated stage, with everything a real one has, under the control law alone.
@@ -20,7 +21,7 @@ pub struct LawStage {
     seed: u64,
     settings: StageSettings,
     travel: [Travel; 3],
-    description: &'static str,
+    description: String,
 }
 
 impl LawStage {
@@ -31,7 +32,7 @@ impl LawStage {
             seed,
             settings: StageSettings::simulated(),
             travel: [Travel::either_way(TRAVEL_MM); 3],
-            description: "the simulated stage",
+            description: BUILT_IN_STAGE.to_owned(),
         }
     }
 
@@ -49,8 +50,42 @@ impl LawStage {
                     Travel::between(known.travel_mm)
                 })
             }),
-            description: "a simulated stage of one's own",
+            description: format!("{BUILT_IN_STAGE} of {}", file.path.display()),
         }
+    }
+
+    /// The same stage under a firmware that starts with other settings: with the encoders and converters that these say, and with their
+    /// travels.
+    #[must_use]
+    pub fn started_with(mut self, settings: &StageSettings) -> Self {
+        let setup = StageSetup {
+            settings: self.settings,
+            truth: self.truth,
+            marks: [MarkParameters::default(); 3],
+        };
+        StageSetup {
+            settings: self.settings,
+            truth: self.truth,
+            ..
+        } = setup.started_with(settings);
+        for (travel, axis) in self.travel.iter_mut().zip(&settings.axes) {
+            if let Some(limits) = axis.limits.travel_mm {
+                *travel = Travel::between([limits.negative, limits.positive]);
+            }
+        }
+        self
+    }
+
+    /// The same stage while only one of its axes has a law.
+    #[must_use]
+    pub fn with_law_of(mut self, axis: AxisName) -> Self {
+        for other in AxisName::ALL.into_iter().filter(|other| *other != axis) {
+            without_law(
+                &mut self.settings.axes[other as usize],
+                self.settings.rate_hz,
+            );
+        }
+        self
     }
 
     /// The travel of an axis from where it stands.
@@ -61,7 +96,7 @@ impl LawStage {
 
 impl Machine for LawStage {
     fn description(&self) -> String {
-        self.description.to_owned()
+        self.description.clone()
     }
 
     fn is_simulated(&mut self) -> bool {

@@ -1,4 +1,4 @@
-//! Positions that leap: counts that an encoder lost, and single rows that are wrong.
+//! Positions that jump: counts that an encoder lost, and single rows that are wrong.
 
 use std::path::Path;
 
@@ -10,18 +10,18 @@ use super::lines::Lines;
 const NEIGHBOURS: usize = 3;
 /// Share of the steps that are taken for ordinary.
 const ORDINARY: f64 = 0.99;
-/// A leap over what ordinary steps differ from their neighbours.
-const LEAP_RATIO: f64 = 20.0;
-/// A leap over the smallest change of the position.
-const LEAP_COUNTS: f64 = 30.0;
+/// A jump over what ordinary steps differ from their neighbours.
+const JUMP_RATIO: f64 = 20.0;
+/// A jump over the smallest change of the position.
+const JUMP_COUNTS: f64 = 30.0;
 /// Time at each end of the record that is not looked at, s: a motion may begin there at once, and identification cuts it.
 const EDGE_S: f64 = 0.05;
 
 /// Refuses a position that goes further in one row than the rows before and after it allow. A change of velocity stays, and a
-/// leap does not: so a step is compared with the medians of its neighbours on both sides, and counts as far as it is beyond both.
+/// jump does not: so a step is compared with the medians of its neighbours on both sides, and counts as far as it is beyond both.
 ///
 /// # Errors
-/// The first leap, with its line.
+/// The first jump, with its line.
 pub(super) fn refuse(
     path: &Path,
     time_s: &[f64],
@@ -46,19 +46,19 @@ pub(super) fn refuse(
         .map(|pair| (pair[1] - pair[0]).abs())
         .filter(|change| *change > 0.0)
         .fold(f64::INFINITY, f64::min);
-    let most = (LEAP_RATIO * ordinary).max(LEAP_COUNTS * count);
+    let most = (JUMP_RATIO * ordinary).max(JUMP_COUNTS * count);
     let inner = time_s[0] + EDGE_S..time_s[time_s.len() - 1] - EDGE_S;
-    let leaps = |step: &usize| beyond[*step] > most && inner.contains(&time_s[*step]);
-    let mut leaps = (0..beyond.len()).filter(leaps);
-    let Some(first) = leaps.next() else {
+    let jumps = |step: &usize| beyond[*step] > most && inner.contains(&time_s[*step]);
+    let mut jumps = (0..beyond.len()).filter(jumps);
+    let Some(first) = jumps.next() else {
         return Ok(());
     };
-    Err(RecordError::Leap {
+    Err(RecordError::Jump {
         path: path.to_owned(),
         line: lines.line(first + 1),
         from_mm: values[first] * position.mm_per_unit,
         to_mm: values[first + 1] * position.mm_per_unit,
-        others: leaps.count(),
+        others: jumps.count(),
     })
 }
 

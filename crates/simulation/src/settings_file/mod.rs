@@ -1,18 +1,24 @@
 //! The settings of a stage as a file: the result of commissioning, and the start of replays, comparisons and the firmware.
 //!
-//! TOML, with the names and units of [`StageSettings`], and above them where the numbers come from. A file is checked
-//! as a whole, against the firmware's own rules and its room for GMS elements.
+//! TOML, with the names and units of [`StageSettings`], and above them where the numbers come from. What it leaves out is
+//! the default. A file is checked as a whole, against the firmware's own rules and its room for GMS elements.
+
+mod error;
+mod sparse;
+mod uncommissioned;
 
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use quadrant::axes::AxisName;
 use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::settings::{SettingsError, StageSettings};
+use quadrant::settings::StageSettings;
 use serde::{Deserialize, Serialize};
 
-/// Form of the file; a file of another form is refused.
-const FORM: u32 = 1;
+use self::error::FORM;
+pub use self::error::SettingsFileError;
+pub use self::sparse::defaults_at;
+pub use self::uncommissioned::without_law;
 
 /// A stage's settings and their origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -41,59 +47,6 @@ pub struct Provenance {
     pub records: Vec<String>,
     /// Settings that it set.
     pub sets: Vec<String>,
-}
-
-/// Reason why a settings file cannot be used, or written.
-#[derive(Debug, thiserror::Error)]
-pub enum SettingsFileError {
-    /// The file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// Path of the file.
-        path: PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
-    /// It is no TOML, a field is missing, misspelt, or of the wrong type.
-    #[error("{}: {source}", path.display())]
-    Syntax {
-        /// Path of the file.
-        path: PathBuf,
-        /// Line and cause.
-        source: Box<toml::de::Error>,
-    },
-    /// It cannot be expressed as TOML.
-    #[error("{}: {source}", path.display())]
-    Serialise {
-        /// Path of the file.
-        path: PathBuf,
-        /// Cause.
-        source: toml::ser::Error,
-    },
-    /// It is of a form that this program does not know.
-    #[error("{}: form {form} of the settings file; this program reads form {FORM}", path.display())]
-    Form {
-        /// Path of the file.
-        path: PathBuf,
-        /// Form that the file names.
-        form: u32,
-    },
-    /// It has more axes than a stage.
-    #[error("{}: {count} times [[stage.axes]]; a stage has x, y and z", path.display())]
-    Axes {
-        /// Path of the file.
-        path: PathBuf,
-        /// Number of axes that the file has.
-        count: usize,
-    },
-    /// A value is refused.
-    #[error("{}: {source}", path.display())]
-    Refused {
-        /// Path of the file.
-        path: PathBuf,
-        /// The field and what is allowed.
-        source: SettingsError,
-    },
 }
 
 impl SettingsFile {
@@ -151,11 +104,22 @@ impl SettingsFile {
     /// # Errors
     /// A file that cannot be read or understood, or the first value that the firmware would refuse.
     pub fn read(path: &Path) -> Result<Self, SettingsFileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| SettingsFileError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
-        Self::parse(&text, path)
+        Self::parse(&text_of(path)?, path)
+    }
+
+    /// Reads a file to start from for a commissioning of `axis`: its law need not suit the rate and the limits, for it is replaced.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), but for the law of this axis.
+    pub fn read_for_commissioning(path: &Path, axis: AxisName) -> Result<Self, SettingsFileError> {
+        let mut file: Self = sparse::parsed(&text_of(path)?, path)?;
+        file.check_form(path)?;
+        if file.check(path).is_err() {
+            let rate_hz = file.stage.rate_hz;
+            without_law(&mut file.stage.axes[axis as usize], rate_hz);
+            file.check(path)?;
+        }
+        Ok(file)
     }
 
     /// Checks a file's text; `path` is what messages call it.
@@ -163,26 +127,8 @@ impl SettingsFile {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self, SettingsFileError> {
-        let file: Self = toml::from_str(text).map_err(|source| SettingsFileError::Syntax {
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
-        // What is too many for an array is passed over in silence.
-        let axes = toml::from_str::<toml::Table>(text)
-            .ok()
-            .and_then(|table| table.get("stage")?.get("axes")?.as_array().map(Vec::len));
-        if let Some(count) = axes.filter(|count| *count > AxisName::ALL.len()) {
-            return Err(SettingsFileError::Axes {
-                path: path.to_owned(),
-                count,
-            });
-        }
-        if file.form != FORM {
-            return Err(SettingsFileError::Form {
-                path: path.to_owned(),
-                form: file.form,
-            });
-        }
+        let file: Self = sparse::parsed(text, path)?;
+        file.check_form(path)?;
         file.check(path)?;
         Ok(file)
     }
@@ -215,6 +161,28 @@ impl SettingsFile {
         })
     }
 
+    /// Checks the file and returns its text with the settings that differ from the defaults alone, each with its unit and meaning.
+    ///
+    /// # Errors
+    /// A value that the firmware would refuse.
+    pub fn sparse_text(&self, path: &Path) -> Result<String, SettingsFileError> {
+        self.check(path)?;
+        sparse::text(self, &self.stage).map_err(|source| SettingsFileError::Serialise {
+            path: path.to_owned(),
+            source,
+        })
+    }
+
+    fn check_form(&self, path: &Path) -> Result<(), SettingsFileError> {
+        if self.form == FORM {
+            return Ok(());
+        }
+        Err(SettingsFileError::Form {
+            path: path.to_owned(),
+            form: self.form,
+        })
+    }
+
     fn check(&self, path: &Path) -> Result<(), SettingsFileError> {
         self.stage
             .validate(FIRMWARE_ELEMENTS)
@@ -223,6 +191,13 @@ impl SettingsFile {
                 source,
             })
     }
+}
+
+fn text_of(path: &Path) -> Result<String, SettingsFileError> {
+    std::fs::read_to_string(path).map_err(|source| SettingsFileError::Io {
+        path: path.to_owned(),
+        source,
+    })
 }
 
 #[cfg(test)]
@@ -351,6 +326,125 @@ mod tests {
                 .is_err()
         );
         assert_eq!(SettingsFile::read(&path).unwrap(), file());
+    }
+
+    #[test]
+    fn what_a_file_leaves_out_is_the_default() {
+        let read = |text: &str| parse(text).unwrap().stage;
+        assert_eq!(read("[stage]\n"), StageSettings::default());
+        let mut known = StageSettings::default();
+        known.axes[1].limits.max_velocity_mm_s = 80.0;
+        let one = "[[stage.axes]]\n[[stage.axes]]\nlimits.max_velocity_mm_s = 80\n";
+        assert_eq!(read(one), known);
+        // A part that is named has its own defaults.
+        let homed = read("[[stage.axes]]\n[stage.axes.homing]\ntravel_mm = 300\n");
+        let homing = homed.axes[0].homing.as_ref().unwrap();
+        assert_eq!((homing.travel_mm, homing.latch_mm_s), (300.0, 1.0));
+        // The default filter of the derivative would be refused at this rate.
+        let slow = read("stage.rate_hz = 2000\n");
+        assert_eq!(slow.axes[2].feedback.pid.derivative_filter_s, 5e-4);
+    }
+
+    #[test]
+    fn a_sparse_text_has_what_differs_alone_and_reads_back_to_the_last_bit() {
+        let mut slow = StageSettings {
+            rate_hz: 2e3,
+            ..StageSettings::default()
+        };
+        for axis in &mut slow.axes {
+            axis.feedback.pid.derivative_filter_s = 5e-4;
+        }
+        slow.axes[1].limits.max_velocity_mm_s = 1.0 / 3.0;
+        let mut parts = StageSettings::simulated();
+        parts.axes[0].feedforward.learning = Some(Default::default());
+        let mut simulated = StageSettings::simulated();
+        simulated.axes[2].plant = None;
+        for stage in [StageSettings::default(), slow.clone(), parts, simulated] {
+            let written = SettingsFile { stage, ..file() };
+            let text = written.sparse_text(Path::new("stage.toml")).unwrap();
+            assert_eq!(parse(&text).unwrap(), written, "{text}");
+        }
+        let text = SettingsFile::new(slow).sparse_text(Path::new("a")).unwrap();
+        assert_eq!(text.matches(" = ").count(), 3, "{text}");
+        assert!(
+            text.contains("rate_hz = 2000.0 # Hz: Control rate."),
+            "{text}"
+        );
+        assert!(text.contains(" # mm/s: Largest velocity"), "{text}");
+    }
+
+    #[test]
+    fn a_value_that_no_setting_takes_is_named_with_its_line() {
+        let refused = |text: &str| parse(text).unwrap_err().to_string();
+        let head = "form = 1\n\n[stage]\nrate_hz = 5000\n\n[[stage.axes]]\n";
+        for (text, line, parts) in [
+            (
+                "[stage.axes.feedback]\nlaw = \"pidd\"\n",
+                8,
+                "x/feedback/law: unknown variant `pidd`",
+            ),
+            (
+                "limits.max_velocity_mm_s = \"fast\"\n",
+                7,
+                "x/limits/max_velocity_mm_s: invalid type",
+            ),
+            (
+                "[[stage.axes]]\nencoder = 3\n",
+                8,
+                "y/encoder: invalid type",
+            ),
+            (
+                "limits.max_velocity = 3\n",
+                7,
+                "x/limits/max_velocity; did you mean x/limits/max_velocity_mm_s?",
+            ),
+        ] {
+            let message = refused(&format!("{head}{text}"));
+            assert!(
+                message.starts_with(&format!("stage.toml: line {line}: "))
+                    && message.contains(parts),
+                "{message}"
+            );
+        }
+        let message = refused("rate_hz = 5000\n");
+        assert!(
+            message.contains("line 1: ") && message.contains("rate_hz below [stage]"),
+            "{message}"
+        );
+        assert!(refused("form = 1\n").contains("missing field `stage`"));
+    }
+
+    #[test]
+    fn the_law_of_the_axis_that_is_commissioned_need_not_suit_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("stage.toml");
+        let mut slower = file();
+        slower.stage.rate_hz = 2e3;
+        for axis in &mut slower.stage.axes[1..] {
+            *axis = defaults_at(2e3).axes[0].clone();
+        }
+        std::fs::write(&path, toml::to_string_pretty(&slower).unwrap()).unwrap();
+        let refused = SettingsFile::read(&path).unwrap_err().to_string();
+        assert!(
+            refused.contains("x/feedback/pid/derivative_filter_s"),
+            "{refused}"
+        );
+        let read = |axis| SettingsFile::read_for_commissioning(&path, axis);
+        let x = &read(AxisName::X).unwrap().stage.axes[0];
+        assert_eq!(x.limits, slower.stage.axes[0].limits);
+        assert_eq!(x.encoder, slower.stage.axes[0].encoder);
+        assert!(x.plant.is_none() && !x.commissioned);
+        // Another axis keeps its law, and that must suit.
+        let refused = read(AxisName::Y).unwrap_err().to_string();
+        assert!(
+            refused.contains("x/feedback/pid/derivative_filter_s"),
+            "{refused}"
+        );
+        // Limits are no law.
+        slower.stage.axes[0].limits.overspeed_ratio = 9.0;
+        std::fs::write(&path, toml::to_string_pretty(&slower).unwrap()).unwrap();
+        let refused = read(AxisName::X).unwrap_err().to_string();
+        assert!(refused.contains("x/limits/overspeed_ratio"), "{refused}");
     }
 
     #[test]

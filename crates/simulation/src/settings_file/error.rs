@@ -1,0 +1,85 @@
+//! Reasons why a settings file cannot be used.
+
+use std::path::PathBuf;
+
+use quadrant::settings::SettingsError;
+
+/// Form of the file; a file of another form is refused.
+pub(super) const FORM: u32 = 1;
+
+/// Reason why a settings file cannot be used, or written.
+#[derive(Debug, thiserror::Error)]
+pub enum SettingsFileError {
+    /// The file cannot be read or written.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause.
+        source: std::io::Error,
+    },
+    /// It is no TOML, or has no settings.
+    #[error("{}: {source}", path.display())]
+    Syntax {
+        /// Path of the file.
+        path: PathBuf,
+        /// Line and cause.
+        source: Box<toml::de::Error>,
+    },
+    /// It has a setting that there is not.
+    #[error("{}: line {line}: there is no setting {setting}; did you mean {meant}?", path.display())]
+    Unknown {
+        /// Path of the file.
+        path: PathBuf,
+        /// Line of the setting.
+        line: usize,
+        /// Its path.
+        setting: String,
+        /// The most similar setting.
+        meant: String,
+    },
+    /// A value is of the wrong type, or no name that the setting may have.
+    #[error("{}: line {line}: {setting}: {reason}", path.display())]
+    Type {
+        /// Path of the file.
+        path: PathBuf,
+        /// Line of the setting.
+        line: usize,
+        /// Its path.
+        setting: String,
+        /// What was found, and what is expected.
+        reason: String,
+    },
+    /// It cannot be expressed as TOML.
+    #[error("{}: {source}", path.display())]
+    Serialise {
+        /// Path of the file.
+        path: PathBuf,
+        /// Cause.
+        source: toml::ser::Error,
+    },
+    /// It is of a form that this program does not know.
+    #[error("{}: form {form} of the settings file; this program reads form {FORM}", path.display())]
+    Form {
+        /// Path of the file.
+        path: PathBuf,
+        /// Form that the file names.
+        form: u32,
+    },
+    /// It has more axes than a stage.
+    #[error("{}: {count} times [[stage.axes]]; a stage has x, y and z", path.display())]
+    Axes {
+        /// Path of the file.
+        path: PathBuf,
+        /// Number of axes that the file has.
+        count: usize,
+    },
+    /// A value is refused.
+    #[error("{}: {source}", path.display())]
+    Refused {
+        /// Path of the file.
+        path: PathBuf,
+        /// The field and what is allowed.
+        source: SettingsError,
+    },
+}
