@@ -503,7 +503,7 @@ fn records_of_other_programs_are_read_as_they_are() {
         .collect();
     let comma = |text: String| text.replace('.', ",");
     let table = |row: &dyn Fn(&[f64; 3]) -> String| rows.iter().map(row).collect::<String>();
-    let cases: [(&str, String, &str, &[&str]); 9] = [
+    let cases: [(&str, String, &str, &[&str]); 10] = [
         (
             "semicolons, decimal commas, our names",
             "t_s;position_mm;voltage_v\n".to_owned()
