@@ -1,6 +1,6 @@
 //! Curves in characters, one sign a run.
 
-use quadrant_sim::report::fixed;
+use quadrant_sim::client::plot::number;
 
 /// Sign of each run; a place that several runs take has that of the last.
 const SIGNS: [char; 6] = ['*', 'o', '+', 'x', '#', '@'];
@@ -70,17 +70,6 @@ fn span<'a>(values: impl Iterator<Item = &'a f64>) -> (f64, f64) {
     finite.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
         (low.min(*value), high.max(*value))
     })
-}
-
-/// A number in few characters.
-fn number(value: f64) -> String {
-    let magnitude = value.abs();
-    if magnitude == 0.0 || (1e-3..1e6).contains(&magnitude) {
-        let digits = (4 - magnitude.max(1e-3).log10().floor() as i32).clamp(0, 6);
-        fixed(value, digits as usize)
-    } else {
-        format!("{value:.3e}")
-    }
 }
 
 #[cfg(test)]

@@ -113,7 +113,7 @@ fn draw(values: &[f64], (low, high): (f64, f64), width: usize, height: usize) ->
 }
 
 /// A number in few characters.
-fn number(value: f64) -> String {
+pub fn number(value: f64) -> String {
     let magnitude = value.abs();
     if magnitude == 0.0 || (1e-3..1e6).contains(&magnitude) {
         let digits = (4 - magnitude.max(1e-3).log10().floor() as i32).clamp(0, 6);
