@@ -298,8 +298,10 @@ fn next(machine: &Machine, axes: &[AxisName], file: impl Display) -> String {
          \n\
          Next, on the simulated stage:\n\
          \x20   quadrant commission --axis {axis} --settings {file} --machine simulated --travel {travel}\n\
-         On a board: `load {file}`, `store` and `reboot` in `quadrant connect --serial PORT`, then the same command with\n\
-         --machine serial:PORT, and with --travel as far as it may go from where it stands.",
+         On a board: `load {file}`, `store` and `reboot` in\n\
+         \x20   quadrant connect --port PATH\n\
+         then the same command with --machine serial:PATH, and with --travel as far as\n\
+         it may go from where it stands.",
         names.join(", "),
         short(count_um),
         short(machine.rate_hz),

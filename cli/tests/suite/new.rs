@@ -37,6 +37,7 @@ fn a_file_is_written_that_has_what_differs_from_the_defaults_with_units_and_name
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let shown = command::succeed(at, &new(&["--rate", "5000", "--axis", "y"]));
+    assert!(shown.contains("quadrant connect --port"), "{shown}");
     assert!(
         shown.contains("quadrant commission --axis y --settings mine.toml --machine simulated --travel -60..140"),
         "{shown}"
