@@ -266,7 +266,7 @@ fn refuse_restart(
     });
     if let Some(Change { path, old, new }) = differing {
         bail!(
-            "the machine has {path} = {old}, and the settings to start from say {new}, which it takes with a restart: `load` them in              its console, `store` and `reboot`, then commission it"
+            "the machine has {path} = {old}, and the settings to start from say {new}, which it takes with a restart: `load` them in its console, `store` and `reboot`, then commission it"
         );
     }
     Ok(())

@@ -5,7 +5,7 @@ use std::io::{self, IsTerminal};
 use anyhow::bail;
 use quadrant_cli::{say, terminal};
 
-/// What is not given as an option: asked for on a terminal, else the default.
+/// Values that no option gives: asked for on a terminal, else the defaults.
 pub(super) struct Questions {
     asks: bool,
     /// Options whose defaults were taken unasked, as a command line gives them.

@@ -276,7 +276,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What to do with the file.
+/// The next commands, with the file.
 fn next(machine: &Machine, axes: &[AxisName], file: impl Display) -> String {
     let names: Vec<&str> = axes.iter().map(|axis| axis.as_str()).collect();
     let axis = names.first().copied().unwrap_or("x");

@@ -47,7 +47,7 @@ pub enum SettingsFileError {
         line: usize,
         /// Its path.
         setting: String,
-        /// What was found, and what is expected.
+        /// The value found, and the kind that is expected.
         reason: String,
     },
     /// It cannot be expressed as TOML.

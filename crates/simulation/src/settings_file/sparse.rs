@@ -103,7 +103,7 @@ fn axes_overlaid(plain: Option<&Value>, full: &[Value], written: &[Value]) -> Ve
     axes.collect()
 }
 
-/// What of `value` differs from `plain`, or from `full` where a part of it is not there by default.
+/// The part of `value` that differs from `plain`, or from `full` where a part of it is not there by default.
 fn differing(value: &Table, plain: Option<&Table>, full: &Table) -> Table {
     let base = plain.unwrap_or(full);
     let mut table = Table::new();
@@ -140,7 +140,7 @@ fn line(text: &str, at: usize) -> usize {
     1 + text.bytes().take(at).filter(|byte| *byte == b'\n').count()
 }
 
-/// What the values of a file are looked up in.
+/// A walk through the values of a file.
 struct Walk<'a> {
     text: &'a str,
     path: &'a Path,
