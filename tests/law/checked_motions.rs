@@ -220,6 +220,16 @@ fn what_waits_of_a_stream_does_not_outlive_the_limits_that_it_was_checked_agains
     assert_eq!(tasks.upper.borrow().snapshot().axes[0].measured.0, 4000);
 }
 
+#[test]
+fn a_stream_is_not_opened_in_a_motion_which_goes_on() {
+    let mut tasks = Tasks::new(&limited(FAST), 1);
+    all(&mut tasks, &[plan(10.0, FAST), Body::Enable, Body::Run]);
+    let answer = tasks.ask(Body::Stream(StreamRequest::Open { period_ticks: 1000 }));
+    assert!(answer.is_err(), "{answer:?}");
+    tasks.run(4000);
+    assert_eq!(tasks.upper.borrow().snapshot().axes[0].measured.0, 20_000);
+}
+
 /// Settings of an x axis that is homed at the edge of its switch, which is `mark_mm` then.
 fn marked(mark_mm: f64) -> StageSettings {
     let mut settings = limited(FAST);

@@ -253,6 +253,7 @@ fn the_angle_errs_by_less_than_a_fifth_of_a_degree() {
         let (sine, cosine) = exact.to_radians().sin_cos();
         for radius in [0.1, 15.0, 300.0] {
             let shown = degrees((radius * sine) as f32, (radius * cosine) as f32);
+            assert!((0.0..=360.0).contains(&shown), "{exact}: {shown}");
             let off = (f64::from(shown) - exact + 180.0).rem_euclid(360.0) - 180.0;
             worst = worst.max(off.abs());
         }

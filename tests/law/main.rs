@@ -23,6 +23,7 @@ mod driver_tick_interval;
 mod encoder;
 mod encoder_dead;
 mod encoder_dead_by_speed;
+mod encoder_scale;
 mod every_parameter_counts;
 mod feedback_laws;
 mod feedforward;

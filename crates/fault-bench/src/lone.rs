@@ -38,6 +38,8 @@ pub struct Lone<S: Scalar> {
     pub fault: Option<FaultCode>,
     /// Output of the last tick, V.
     pub output_v: f64,
+    /// Position that the encoder showed in it, mm.
+    pub shown_mm: f64,
 }
 
 impl<S: Scalar> Lone<S> {
@@ -70,6 +72,7 @@ impl<S: Scalar> Lone<S> {
             ticks: 0,
             fault: None,
             output_v: 0.0,
+            shown_mm: 0.0,
         }
     }
 
@@ -82,6 +85,7 @@ impl<S: Scalar> Lone<S> {
     pub fn tick(&mut self) {
         let age = self.ticks.checked_sub(self.dies);
         let count = self.encoder.read(self.plant.position_mm, age);
+        self.shown_mm = count as f64 * crate::plant::COUNT_MM;
         let reading = EncoderReading::of(count as i32 as u32);
         if self.ticks == BEFORE
             && let Some(command) = self.start.take()

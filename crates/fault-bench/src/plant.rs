@@ -241,6 +241,11 @@ pub struct Encoder {
     pub noise: Noise,
     /// Noise that is added, counts rms.
     pub rms: f64,
+    /// Counts over those that there should be.
+    pub scale: f64,
+    /// Counts that are added in each tick.
+    pub drift: f64,
+    drifted: f64,
 }
 
 impl Encoder {
@@ -251,6 +256,9 @@ impl Encoder {
             seen: 0,
             noise: Noise::new(seed),
             rms: 0.0,
+            scale: 1.0,
+            drift: 0.0,
+            drifted: 0.0,
         }
     }
 
@@ -267,7 +275,8 @@ impl Encoder {
             } else {
                 0.0
             };
-        let raw = (position_mm / COUNT_MM + fine).floor() as i64;
+        self.drifted += self.drift;
+        let raw = (self.scale * position_mm / COUNT_MM + self.drifted + fine).floor() as i64;
         let step = raw - self.raw;
         self.raw = raw;
         let Some(age) = age else {

@@ -86,9 +86,9 @@ pub(super) struct Node {
     pub(super) response: Complex64,
 }
 
-/// `sin(x) / x`.
+/// `sin(x) / x` of a positive number.
 fn sinc(x: f64) -> f64 {
-    if x < 1e-9 { 1.0 } else { libm::sin(x) / x }
+    libm::sin(x) / x
 }
 
 fn cis(angle: f64) -> Complex64 {
