@@ -6,18 +6,18 @@ use num_complex::Complex64;
 use quadrant::control::feedback::LawKind;
 use quadrant::control::pid::PidGains;
 use quadrant::settings::{AxisSettings, StageSettings};
-use rayon::prelude::*;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
+use super::search::Search;
 
 /// Bounds on the peaks of `|S|` and `|T|`: usual ones (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
 pub const SENSITIVITY_PEAK: f64 = 1.7;
 pub const COMPLEMENTARY_PEAK: f64 = 1.5;
-/// Shares of the bounds that are tried for integral action.
-const INTEGRAL_SHARES: [f64; 3] = [0.05, 0.1, 0.2];
+/// Shares by which the search keeps away from its bounds, in turn until the loop keeps them: its frequencies may miss a peak.
+pub(super) const TIGHTER: [f64; 4] = [0.0002, 0.001, 0.005, 0.02];
 /// Band over which a disturbance counts, Hz, and the frequencies in it.
 const BAND_HZ: (f64, f64) = (0.1, 2000.0);
 const FREQUENCIES: usize = 400;
@@ -28,35 +28,36 @@ const FREQUENCIES: usize = 400;
 /// # Errors
 /// As [`design_pid`]: a process that allows no such loop.
 pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
-    let design = |integral_share: f64| {
-        let request = PidRequest {
-            target: Target::Bandwidth {
-                sensitivity_peak: SENSITIVITY_PEAK,
-                complementary_peak: COMPLEMENTARY_PEAK,
-                integral_share,
-            },
+    let kept = |tighter: f64| {
+        let search = Search::new(
+            &[(process.clone(), 1.0 - tighter, Vec::new())],
             form,
-            derivative_filter_s: filter_s,
-            ki_v_per_mm_s: None,
-        };
-        design_pid(process, &request)
+            filter_s,
+        );
+        let gains = search.best()?.gains;
+        let margins = process.margins(&gains, form).ok()?;
+        let keeps = margins.sensitivity_peak <= SENSITIVITY_PEAK
+            && margins.complementary_peak <= COMPLEMENTARY_PEAK;
+        keeps.then_some(PidDesign { gains, margins })
     };
-    let designs: Vec<_> = INTEGRAL_SHARES.into_par_iter().map(design).collect();
-    let best = designs
-        .iter()
-        .flatten()
-        .filter(|design| design.gains.ki_v_per_mm_s > 0.0)
-        .map(|design| (load_step_error(process, &design.gains, form), design))
-        .min_by(|a, b| a.0.total_cmp(&b.0));
-    if let Some((_, design)) = best {
-        return Ok(*design);
-    }
-    let refusal = designs.iter().find_map(|design| design.err());
-    Err(refusal.unwrap_or(DesignError::Bounds {
-        sensitivity_peak: SENSITIVITY_PEAK,
-        complementary_peak: COMPLEMENTARY_PEAK,
-        percent: 0.0,
-    }))
+    let best = TIGHTER.into_iter().find_map(kept);
+    // The stiffest loop says what stands in the way.
+    best.map_or_else(|| stiffest(process, form, filter_s), Ok)
+}
+
+/// The stiffest loop within the bounds, with a tenth of them for integral action.
+fn stiffest(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
+    let request = PidRequest {
+        target: Target::Bandwidth {
+            sensitivity_peak: SENSITIVITY_PEAK,
+            complementary_peak: COMPLEMENTARY_PEAK,
+            integral_share: 0.1,
+        },
+        form,
+        derivative_filter_s: filter_s,
+        ki_v_per_mm_s: None,
+    };
+    design_pid(process, &request)
 }
 
 /// The stage with the best PID on each axis whose model is known; no nonlinear gain.
@@ -170,7 +171,7 @@ mod tests {
             .unwrap();
             let error = |gains: &PidGains| load_step_error(&process, gains, SAMPLED);
             let ratio = error(&best.gains) / error(&thesis.gains);
-            assert!(ratio < 0.6, "{ratio}: {:?}", best.gains);
+            assert!(ratio < 0.45, "{ratio}: {:?}", best.gains);
         }
     }
 
@@ -203,10 +204,10 @@ mod tests {
             assert_eq!(axis.feedback.law, LawKind::Pid);
         }
         let pid = best.axes[0].feedback.pid;
-        // `quadrant design pid` on the sampled loop with an integral share of 0.05, the best of the three.
-        assert_eq!(pid.ki_v_per_mm_s, 80.0);
-        let near = |found: f64, known: f64| assert!((found / known - 1.0).abs() < 1e-6, "{pid:?}");
-        near(pid.kp_v_per_mm, 1.266_228);
-        near(pid.kd_v_s_per_mm, 0.004_189_688_5);
+        let near = |found: f64, known: f64| assert!((found / known - 1.0).abs() < 0.02, "{pid:?}");
+        // Another's search with SciPy within the same bounds: 1.3445, 144.1 and 0.005461.
+        near(pid.kp_v_per_mm, 1.3445);
+        near(pid.ki_v_per_mm_s, 144.1);
+        near(pid.kd_v_s_per_mm, 0.005461);
     }
 }

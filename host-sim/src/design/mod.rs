@@ -16,6 +16,7 @@ pub mod pages;
 pub mod pid;
 pub mod process;
 pub mod robustness;
+mod search;
 pub mod shaping;
 pub mod step_response;
 pub mod time_varying;

@@ -2,6 +2,7 @@
 //!
 //! One program of many modules: each would otherwise be linked with the whole library once more.
 
+mod best_pid;
 mod circle;
 mod commission_any_axis;
 mod connected_axis;
