@@ -12,10 +12,8 @@ use super::loop_shape::OpenLoop;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
 use super::search::Search;
+pub use super::search::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 
-/// Bounds on the peaks of `|S|` and `|T|`: usual ones (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
-pub const SENSITIVITY_PEAK: f64 = 1.7;
-pub const COMPLEMENTARY_PEAK: f64 = 1.5;
 /// Shares by which the search keeps away from its bounds, in turn until the loop keeps them: its frequencies may miss a peak.
 pub(super) const TIGHTER: [f64; 4] = [0.0002, 0.001, 0.005, 0.02];
 /// Band over which a disturbance counts, Hz, and the frequencies in it.

@@ -13,11 +13,13 @@ use num_complex::Complex64;
 use quadrant::control::pid::PidGains;
 use rayon::prelude::*;
 
-use super::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::process::Process;
 
+/// Bounds on the peaks of `|S|` and `|T|`: usual ones (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
+pub const SENSITIVITY_PEAK: f64 = 1.7;
+pub const COMPLEMENTARY_PEAK: f64 = 1.5;
 /// Ratios Kd/Kp, s, and ratios Ki/Kp over the inverse of that, of the grid.
 const RATIOS_S: (f64, f64) = (3e-5, 0.3);
 const RATIOS: usize = 28;
