@@ -860,7 +860,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             error: seen.error,
             status,
         };
-        if state.oscillation.takes() {
+        if state.oscillation.is_reduced() {
             self.learning.unsettle(&mut state.learning);
         }
         let gained = self
@@ -1213,7 +1213,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
                 total = total + self.add_cancelling(state, changed);
             }
         }
-        if state.oscillation.takes() {
+        if state.oscillation.is_reduced() {
             total = self.take_away(state, total);
         }
         let input = FeedbackInput {
