@@ -20,6 +20,7 @@ pub mod plant;
 pub mod setting_value;
 pub mod settings_file;
 pub mod stage_file;
+pub mod toml_file;
 
 #[cfg(test)]
 mod fixtures {
