@@ -193,6 +193,18 @@ pub fn restore_modes() {
     }
 }
 
+/// True unless the terminal at standard input has been closed.
+#[cfg(unix)]
+pub fn is_there() -> bool {
+    rustix::termios::tcgetattr(rustix::stdio::stdin()).is_ok()
+}
+
+/// Only Unix shows it before it is read.
+#[cfg(not(unix))]
+pub fn is_there() -> bool {
+    true
+}
+
 /// Only Unix has terminals with modes.
 #[cfg(not(unix))]
 pub fn keep_modes() {}
