@@ -294,7 +294,7 @@ fn the_last_line_says_what_the_model_explains_of_the_record_that_judges_it() {
     let at = folder.path();
     let measured = |out: &str, seed: &str| {
         let words = [
-            "motion", "--axis", "x", "--rounds", "1", "--seed", seed, "--out", out,
+            "motion", "--axis", "z", "--rounds", "1", "--seed", seed, "--out", out,
         ];
         succeed(at, &words)
     };
