@@ -64,7 +64,7 @@ const MOST_MM: f64 = 1e4;
 
 /// Reads a travel, mm.
 pub(super) fn travel(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    let value: f64 = text.parse().map_err(|_| "no number".to_owned())?;
     if value > 0.0 && value <= MOST_MM {
         Ok(value)
     } else {
@@ -80,7 +80,7 @@ pub(super) fn travel_both_ways(text: &str) -> Result<Travel, String> {
     let bound = |name: &str, text: &str, least: f64, most: f64| -> Result<f64, String> {
         let value: f64 = text
             .parse()
-            .map_err(|error| format!("{name} end {text:?}: {error}"))?;
+            .map_err(|_| format!("{name} end {text:?}: no number"))?;
         if (least..=most).contains(&value) {
             Ok(value)
         } else {

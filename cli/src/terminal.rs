@@ -5,8 +5,10 @@
 //! number.
 
 use std::fmt::{self, Arguments, Write as _};
-use std::io::{self, StdoutLock, Write};
+use std::io::{self, IsTerminal, StdoutLock, Write};
 use std::sync::Mutex;
+
+use quadrant_sim::report::wrapped;
 
 /// The first error of standard output.
 static FAILED: Mutex<Option<io::Error>> = Mutex::new(None);
@@ -72,8 +74,29 @@ fn to_output(write: impl FnOnce(&mut StdoutLock<'static>) -> io::Result<()>) {
 
 /// Prints to standard error, if that can be.
 pub fn print_error(what: Arguments<'_>) {
+    let text = what.to_string();
+    let width = match io::stderr().is_terminal() {
+        true => error_width(),
+        false => 0,
+    };
     // There is nowhere left to tell it.
-    let _ = write_plain(&mut io::stderr().lock(), what);
+    let _ = write_plain(
+        &mut io::stderr().lock(),
+        format_args!("{}", folded(&text, width)),
+    );
+}
+
+/// A text whose long lines are broken between words; not those that are indented, which are to be copied, nor any where the width is not
+/// known.
+fn folded(text: &str, width: usize) -> String {
+    let lines = text.split_inclusive('\n').map(|line| {
+        let bare = line.trim_end_matches('\n');
+        if width == 0 || line.starts_with(' ') || bare.chars().count() <= width {
+            return line.to_owned();
+        }
+        wrapped(bare, width).join("\n") + &line[bare.len()..]
+    });
+    lines.collect()
 }
 
 /// Writes a text without anything that acts on a terminal.
@@ -170,6 +193,18 @@ pub fn restore_modes() {
     }
 }
 
+/// True unless the terminal at standard input has been closed.
+#[cfg(unix)]
+pub fn is_there() -> bool {
+    rustix::termios::tcgetattr(rustix::stdio::stdin()).is_ok()
+}
+
+/// Only Unix shows it before it is read.
+#[cfg(not(unix))]
+pub fn is_there() -> bool {
+    true
+}
+
 /// Only Unix has terminals with modes.
 #[cfg(not(unix))]
 pub fn keep_modes() {}
@@ -193,7 +228,15 @@ pub fn finish() -> anyhow::Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::write_plain;
+    use super::{folded, write_plain};
+
+    #[test]
+    fn a_long_line_is_broken_between_words_unless_it_is_to_be_copied_or_the_width_is_not_known() {
+        let text = "error: the axis stands\n    quadrant commission --axis x\n\nshort\n";
+        let expected = "error: the axis\nstands\n    quadrant commission --axis x\n\nshort\n";
+        assert_eq!(folded(text, 16), expected);
+        assert_eq!(folded(text, 0), text);
+    }
 
     #[test]
     fn what_acts_on_a_terminal_is_shown_by_its_number_and_text_is_as_it_was() {

@@ -27,6 +27,7 @@ use crate::law::injection::{
 };
 use crate::law::reference::{Motion, Segment};
 use crate::law::safety::plausibility::is_due;
+use crate::law::safety::standstill::StandstillState;
 use crate::law::safety::{
     BrakeState, EnableInterlock, Fault, FaultCode, Operation, Reaction, SafetyState, Switches,
 };
@@ -110,6 +111,9 @@ pub struct StageState<S: Scalar, const N: usize = FIRMWARE_ELEMENTS> {
     interlock: Option<EnableInterlock>,
     /// An axis that moves though the outputs are off.
     moving: Option<AxisName>,
+    /// Tick in which it is judged again unless the outputs are driven.
+    standstill_tick: u32,
+    standstill: PerAxis<StandstillState>,
     held: Option<Fault>,
     /// Ticks since the axes came to rest after a fault.
     settled: u32,
@@ -133,6 +137,8 @@ impl<S: Scalar, const N: usize> Default for StageState<S, N> {
             tick: 0,
             interlock: None,
             moving: None,
+            standstill_tick: 0,
+            standstill: PerAxis::splat(StandstillState::default()),
             held: None,
             settled: 0,
             injection: InjectionState::default(),
@@ -413,7 +419,11 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
         if state.safety == SafetyState::Start && state.interlock.is_none() {
             state.safety = SafetyState::Disabled;
         }
-        state.moving = if driven { None } else { self.moving(state) };
+        state.moving = if driven {
+            None
+        } else {
+            self.moving(state, tick)
+        };
         if let Some(command) = inputs.command {
             self.handle_command(state, command, driven, tick);
         }
@@ -452,13 +462,23 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
     }
 
     /// The first axis that does not stand.
-    fn moving(&self, state: &StageState<S, N>) -> Option<AxisName> {
-        self.axes
+    fn moving(&self, state: &mut StageState<S, N>, tick: u32) -> Option<AxisName> {
+        let begins = state.standstill_tick != tick;
+        state.standstill_tick = tick.wrapping_add(1);
+        let mut moving = None;
+        for (((axis, memory), standstill), name) in self
+            .axes
             .into_iter()
             .zip(&state.axes)
+            .zip(&mut state.standstill)
             .zip(AxisName::ALL)
-            .find(|((axis, memory), _)| !axis.stands(memory))
-            .map(|(_, name)| name)
+        {
+            let stands = axis.stands(memory, standstill, begins);
+            if !stands && moving.is_none() {
+                moving = Some(name);
+            }
+        }
+        moving
     }
 
     /// Advances the references of driven axes, all of them or x alone.

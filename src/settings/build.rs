@@ -42,6 +42,8 @@ const HELD_FRICTIONS: f64 = 0.65;
 const STUCK_FRICTIONS: f64 = 0.75;
 const SLIDING_FRICTIONS: f64 = 1.0;
 const TURNED_FRICTIONS: f64 = 3.0;
+/// What an axis that is turned around takes up at most, over what the settings say.
+const MOST_TURNED: f64 = 1.5;
 /// Voltage with which the law answers a displacement, over its proportional gain: the integral's answer comes to it.
 const ANSWER_ERROR: f64 = 3.0;
 /// Motion that turns an axis around, or shows that it is alive, mm, and in counts at least: noise of some counts stays below.
@@ -287,6 +289,7 @@ impl AxisSettings {
             stuck_v: STUCK_FRICTIONS * breakaway_v,
             sliding_v: SLIDING_FRICTIONS * breakaway_v,
             turned_v: TURNED_FRICTIONS * breakaway_v,
+            most_turned_v: MOST_TURNED * (TURNED_FRICTIONS * breakaway_v),
             answer_v_per_mm: ANSWER_ERROR * self.largest_gain(|gains| gains.kp_v_per_mm),
             answer_v_s_per_mm: self.largest_gain(|gains| gains.kd_v_s_per_mm),
             turn_mm: TURN_MM.max(TURN_COUNTS * resolution_mm),

@@ -6,6 +6,7 @@ mod ahead;
 mod attribution;
 mod board_smoke;
 mod combinations;
+mod commission;
 mod converter;
 mod cortex_m;
 mod count;
@@ -69,6 +70,8 @@ enum Verb {
     Cycles(CountArgs),
     /// Run every feedback law with every feedforward in lockstep, and count what each costs
     Combinations(CombinationArgs),
+    /// Commission an axis of the emulated firmware through its link
+    Commission,
     /// Count the instructions of a control tick while link, queues and log are overloaded
     Saturation {
         /// The firmware's number type
@@ -164,6 +167,7 @@ fn run(cli: Cli) -> Result<()> {
             let only = args.only.as_deref();
             faults::run(toolchain, args.scalar, only, args.overwrite_expected)
         }
+        Verb::Commission => commission::run(toolchain),
         Verb::Saturation {
             scalar,
             overwrite_expected,

@@ -79,6 +79,43 @@ fn ticks_of_unrest(jump: i32) -> u32 {
     panic!("{jump}: never at rest");
 }
 
+/// Ticks out of `ticks` in which `Enable` is refused because x moves. It does so at `speed`, counts per tick, and its encoder has noise, of
+/// which `most` sets the size: 6, 16 and 52 make 1.2, 3 and 10 counts RMS.
+fn ticks_refused(rig: &mut Rig<f32>, noise: &mut Noise, most: i64, speed: f64, ticks: u32) -> u32 {
+    let start = f64::from(rig.inputs.readings[0].count.cast_signed());
+    let mut refused = 0;
+    for tick in 1..=ticks {
+        let sum: i64 = (0..12).map(|_| noise.counts(most)).sum();
+        let count = start + speed * f64::from(tick) + sum as f64 / 12.0_f64.sqrt() / 3.0;
+        rig.inputs.readings[0].count = (count.round() as i32).cast_unsigned();
+        rig.tick();
+        let said = refusal(rig.stage.as_ref().view(&rig.state), Command::Enable);
+        refused += u32::from(said == Some(Refusal::NotAtStandstill(AxisName::X)));
+    }
+    refused
+}
+
+#[test]
+fn noise_at_rest_is_no_motion_and_a_motion_in_noise_is_one() {
+    // 1.2, 3 and 10 counts RMS.
+    for most in [6, 16, 52] {
+        for seed in 1..=5 {
+            let mut noise = Noise::new(seed);
+            let mut rig = Rig::<f32>::new(&StageSettings::simulated(), &Default::default());
+            rig.stand();
+            ticks_refused(&mut rig, &mut noise, most, 0.0, 500);
+            let at_rest = ticks_refused(&mut rig, &mut noise, most, 0.0, 50_000);
+            assert_eq!(at_rest, 0, "{most}");
+            // 25 mm/s.
+            ticks_refused(&mut rig, &mut noise, most, 2.5, 500);
+            let moving = ticks_refused(&mut rig, &mut noise, most, 2.5, 20_000);
+            assert_eq!(moving, 20_000, "{most}");
+            ticks_refused(&mut rig, &mut noise, most, 0.0, 500);
+            assert_eq!(ticks_refused(&mut rig, &mut noise, most, 0.0, 1_000), 0);
+        }
+    }
+}
+
 #[test]
 fn a_jump_of_the_counter_is_motion_until_the_filter_has_forgotten_it() {
     // The filter takes an eighth of a step, and forgets an eighth a tick: down to the 1.5 counts a tick of standstill.

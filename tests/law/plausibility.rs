@@ -57,6 +57,7 @@ fn model() -> PlausibilityModel {
         stuck_v: NEVER_V,
         sliding_v: NEVER_V,
         turned_v: NEVER_V,
+        most_turned_v: 1.5 * NEVER_V,
         answer_v_per_mm: 0.0,
         answer_v_s_per_mm: 0.0,
         turn_mm: 0.032,
@@ -503,6 +504,7 @@ fn following_model() -> PlausibilityModel {
         first_load_v: NEVER_V,
         sliding_v: 0.1,
         turned_v: 0.5,
+        most_turned_v: 1.5 * 0.5,
         ..model()
     }
 }
@@ -661,6 +663,7 @@ fn is_found(
     let model = PlausibilityModel {
         sliding_v: 0.1,
         turned_v: 0.1,
+        most_turned_v: 1.5 * 0.1,
         answer_v_per_mm,
         answer_v_s_per_mm,
         held_v: NEVER_V,

@@ -69,6 +69,8 @@ enum Verb {
     Cycles(Forwarded),
     /// Run every feedback law with every feedforward in lockstep, and count what each costs
     Combinations(Forwarded),
+    /// Commission an axis of the emulated firmware through its link
+    Commission(Forwarded),
     /// Count the instructions of a control tick while link, queues and log are overloaded
     Saturation(Forwarded),
     /// Time the host simulation beside the same job in C++, Numba and NumPy
@@ -187,6 +189,7 @@ fn run(cli: Cli) -> Result<bool> {
         Verb::Count(args) => forward(toolchain()?, "count", args)?,
         Verb::Cycles(args) => forward(toolchain()?, "cycles", args)?,
         Verb::Combinations(args) => forward(toolchain()?, "combinations", args)?,
+        Verb::Commission(args) => forward(toolchain()?, "commission", args)?,
         Verb::Saturation(args) => forward(toolchain()?, "saturation", args)?,
         Verb::Peers => peers::run()?,
         Verb::Documented(options) => documented::run(&options)?,

@@ -312,6 +312,10 @@ fn emulated(report: &mut Report, toolchain: Toolchain) -> Result<()> {
         );
     }
     step("control under overload, mps2 f32", &["saturation"]);
+    step(
+        "an axis is commissioned through the link, mps2 f32",
+        &["commission"],
+    );
     report.step("a session through the console, end to end", || {
         transcript::run(toolchain, false)
     });

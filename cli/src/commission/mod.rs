@@ -21,7 +21,7 @@ use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
 use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
-use quadrant_sim::report::Table;
+use quadrant_sim::report::{Table, wrapped};
 use quadrant_sim::setting_value::{Change, changes};
 use quadrant_sim::settings_file::SettingsFile;
 use quadrant_sim::stage_file::StageFile;
@@ -226,12 +226,10 @@ impl Arguments {
             )?,
             checked: None,
         };
-        terminal::print(format_args!("{}", found.text()));
         let who = format!("the {axis} axis, recorded in {}", folder.display());
         let output = &output.below(axis.as_str());
-        for line in found.keep(output, &mut file, &path, axis, &who)? {
-            say!("{line}");
-        }
+        let text = found.keep(output, &mut file, &path, axis, &who)?;
+        terminal::print(format_args!("{text}"));
         Ok(())
     }
 }
@@ -342,12 +340,19 @@ impl Job<'_> {
         let found = match outcome {
             Ok(found) => found,
             Err(error) => {
+                let back = if restored.is_ok() {
+                    "; the machine has its old settings back, its outputs off"
+                } else {
+                    ""
+                };
                 let error = if Journal::count(&experiments) == 0 {
                     Journal::remove(&experiments)?;
-                    error.context("the commissioning has ended before anything was measured")
+                    error.context(format!(
+                        "the commissioning has ended before anything was measured{back}"
+                    ))
                 } else {
                     error.context(format!(
-                        "the commissioning has ended early; with --resume it goes on with what is in {}",
+                        "the commissioning has ended early{back}; with --resume it goes on with what is in {}",
                         experiments.display()
                     ))
                 };
@@ -362,11 +367,7 @@ impl Job<'_> {
         } else {
             folder.file(PID_ALONE)?
         };
-        let mut text = found.text();
-        for line in found.keep(&folder, &mut file, &path, axis, &who)? {
-            text.push_str(&line);
-            text.push('\n');
-        }
+        let mut text = found.keep(&folder, &mut file, &path, axis, &who)?;
         Journal::remove(&experiments)?;
         and_restored(Ok(()), restored)
             .with_context(|| format!("what was found is in {}", path.display()))?;
@@ -554,7 +555,8 @@ impl Found {
             notes.push(format!("The cross-checks were not made: {error}."));
         }
         for note in notes {
-            let _ = writeln!(text, "{note}\n");
+            let lines = wrapped(&note, terminal::output_width());
+            let _ = writeln!(text, "{}\n", lines.join("\n"));
         }
         let agreement = self
             .checked()
@@ -568,7 +570,8 @@ impl Found {
         text
     }
 
-    /// Writes everything: recordings, tables, the page, and the settings, which become those of `file`. Returns lines that say what is where.
+    /// Writes everything: recordings, tables, the page, and the settings, which become those of `file`. Returns the settings that change, the
+    /// tables, the verdict, and lines that say what is where: the result is what a person sees last.
     fn keep(
         &self,
         output: &Output,
@@ -576,7 +579,7 @@ impl Found {
         path: &Path,
         axis: AxisName,
         who: &str,
-    ) -> anyhow::Result<Vec<String>> {
+    ) -> anyhow::Result<String> {
         let (found, checked) = (&self.found, self.checked());
         let command = command_line();
         // Seen from the settings' file.
@@ -593,14 +596,20 @@ impl Found {
             records,
             &["feedback", "friction", "feedforward", "plant"],
         );
-        let mut lines = kept::write(file, &start, path)?;
+        let mut text = kept::write(file, &start, path)?.join("\n");
+        if !text.is_empty() {
+            text.push_str("\n\n");
+        }
+        text.push_str(&self.text());
         for table in self.tables() {
             output.keep_table(&table)?;
         }
         let page = commission_page(who, found, checked, provenance(&command, output.seed));
-        lines.push(format!("{}: the settings of the stage", path.display()));
-        lines.extend(output.keep_page(&page, "commission.html")?);
-        Ok(lines)
+        let _ = writeln!(text, "{}: the settings of the stage", path.display());
+        for line in output.keep_page(&page, "commission.html")? {
+            let _ = writeln!(text, "{line}");
+        }
+        Ok(text)
     }
 }
 
@@ -716,6 +725,15 @@ mod tests {
     }
 
     fn commission_with(folder: &Path, machine: &mut Spoilt, more: &[&str]) -> anyhow::Result<Done> {
+        commission_from(None, folder, machine, more)
+    }
+
+    fn commission_from(
+        start: Option<SettingsFile>,
+        folder: &Path,
+        machine: &mut Spoilt,
+        more: &[&str],
+    ) -> anyhow::Result<Done> {
         let words = ["", "--quick", "--out"].map(std::ffi::OsStr::new);
         let words = words.into_iter().chain([folder.as_os_str()]);
         let words = words.chain(more.iter().map(std::ffi::OsStr::new));
@@ -724,7 +742,7 @@ mod tests {
             axis: AxisName::X,
             travel: Some(Travel::either_way(30.0)),
             stage: None,
-            start: None,
+            start,
             into: None,
             request: &request,
             output: &output,
@@ -753,6 +771,38 @@ mod tests {
         assert!(!folder.path().join(SETTINGS).exists());
         assert_eq!(done.data["applied"], false);
         assert_eq!(machine.settings().unwrap(), before);
+    }
+
+    #[test]
+    fn settings_of_another_rate_or_encoder_than_the_machines_are_refused_before_anything_is_measured()
+     {
+        let folder = tempfile::tempdir().unwrap();
+        let mut machine = Spoilt {
+            stage: LawStage::new(1),
+            // Whatever is measured would be an error of its own.
+            dead: true,
+            deaf: false,
+            cut_at: None,
+        };
+        let before = machine.settings().unwrap();
+        let mut said = |change: fn(&mut StageSettings)| {
+            let mut stage = before.clone();
+            change(&mut stage);
+            let start = Some(SettingsFile::new(stage));
+            let outcome = commission_from(start, folder.path(), &mut machine, &[]);
+            quadrant_cli::explained(&outcome.err().unwrap())
+        };
+        let rate = said(|stage| stage.rate_hz = 5e3);
+        assert!(rate.contains("rate_hz = 10000"), "{rate}");
+        assert!(
+            rate.contains("say 5000") && rate.contains("`reboot`"),
+            "{rate}"
+        );
+        let encoder = said(|stage| stage.axes[0].encoder.resolution_mm *= 2.0);
+        assert!(encoder.contains("x/encoder/resolution_mm"), "{encoder}");
+        // That of another axis is none of this commissioning's.
+        let other = said(|stage| stage.axes[1].encoder.resolution_mm *= 2.0);
+        assert!(other.contains("the line is cut"), "{other}");
     }
 
     #[test]

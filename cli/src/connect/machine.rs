@@ -212,7 +212,7 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
     let text = match command {
         Command::Reset => "the fault is cleared; the outputs are off",
         Command::Enable => "the outputs are on; the axes hold",
-        Command::Home { .. } => "homing; `wait homed` waits for its end",
+        Command::Home { axes } => &homing(axes),
         Command::Run => "the plan begins; `wait rest` waits for its end",
         Command::Reboot => {
             client.restarted()?;
@@ -221,6 +221,15 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
         _ => "",
     };
     Ok(Answer::new(text, json!("done")))
+}
+
+/// Says what waits for the end of homing these axes; without any, of all.
+fn homing(axes: &[Axis]) -> String {
+    let axes = axes.iter().map(|axis| format!(" {}", axis.name()));
+    format!(
+        "homing; `wait homed{}` waits for its end",
+        axes.collect::<String>()
+    )
 }
 
 fn some_or_all(axes: &[Axis]) -> AxisSet {

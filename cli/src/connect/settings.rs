@@ -5,7 +5,7 @@ use std::path::Path;
 use anyhow::{Context, anyhow, bail};
 use quadrant::link::message::{Applied, Body, SettingsRequest};
 use quadrant::store::PROVENANCE_BYTES;
-use quadrant_sim::client::settings::{self, Difference, whole_path};
+use quadrant_sim::client::settings::{self, Before, Difference, whole_path};
 use quadrant_sim::client::{Client, ClientError};
 use quadrant_sim::report::whole;
 use quadrant_sim::setting_value::{meant, short};
@@ -177,13 +177,38 @@ fn origin_of(file: &Path, read: &SettingsFile) -> String {
 
 pub(super) fn apply(session: &mut Session) -> anyhow::Result<Answer> {
     let client = &mut session.client;
-    let before = settings::before(client)?;
-    let applied = settings::apply(client)?;
+    let mut before = None;
+    let outcome = settings::before(client).and_then(|found| {
+        before = Some(found);
+        settings::apply(client)
+    });
+    let applied = match outcome {
+        Err(error @ ClientError::Interrupted { .. }) => {
+            return Err(interrupted(session, before, &error)?);
+        }
+        outcome => outcome?,
+    };
     if !applied.changed.is_empty() {
-        session.undo.push(before);
+        session.undo.extend(before);
         session.origin.edited = true;
     }
     Ok(Answer::new(applied_text(&applied), json!(applied)))
+}
+
+/// The error of an `apply` that was interrupted, with its outcome: the machine may have applied the draft before its answer was received.
+fn interrupted(
+    session: &mut Session,
+    before: Option<Before>,
+    error: &ClientError,
+) -> Result<anyhow::Error, ClientError> {
+    if !settings::edited(&mut session.client)?.is_empty() {
+        return Ok(anyhow!(
+            "{error}; the draft does not act: `apply` again, or `revert`"
+        ));
+    }
+    session.undo.extend(before);
+    session.origin.edited = true;
+    Ok(anyhow!("{error}; the draft acts, and `undo` takes it back"))
 }
 
 pub(super) fn undo(session: &mut Session) -> anyhow::Result<Answer> {
@@ -260,4 +285,55 @@ pub(super) fn provenance(client: &mut Client) -> anyhow::Result<Answer> {
         text => text,
     };
     Ok(Answer::new(text, json!(provenance)))
+}
+
+#[cfg(test)]
+mod tests {
+    use quadrant_sim::machine::{Machine, SimulatedLink, StageSetup};
+
+    use super::*;
+    use crate::connect::printer::Printer;
+
+    const PATH: &str = "/axes/0/feedback/pid/kp_v_per_mm";
+
+    /// A session whose draft has another gain.
+    fn edited() -> Session {
+        let setup = StageSetup::commissioned();
+        let mut client = Client::open(SimulatedLink::start(&setup, 1, None).unwrap()).unwrap();
+        settings::set(&mut client, PATH, "1.5").unwrap();
+        Session::new(client, Printer { json: false })
+    }
+
+    fn acting(session: &mut Session) -> f64 {
+        session.client.resume();
+        let stage = session.client.settings().unwrap();
+        stage.axes[0].feedback.pid.kp_v_per_mm
+    }
+
+    #[test]
+    fn an_apply_that_is_interrupted_before_it_was_sent_leaves_the_settings_and_says_so() {
+        let mut session = edited();
+        session.client.interrupt().request();
+        let error = apply(&mut session).err().unwrap().to_string();
+        assert!(error.starts_with("interrupted: "), "{error}");
+        assert!(error.contains("the draft does not act"), "{error}");
+        assert_ne!(acting(&mut session), 1.5);
+        assert!(session.undo.is_empty());
+        apply(&mut session).unwrap();
+        assert_eq!(acting(&mut session), 1.5);
+    }
+
+    #[test]
+    fn an_apply_that_is_interrupted_after_it_was_sent_says_that_the_draft_acts_and_is_undone() {
+        let mut session = edited();
+        let before = settings::before(&mut session.client).unwrap();
+        let old = acting(&mut session);
+        session.client.interrupt().request();
+        let error = settings::apply(&mut session.client).unwrap_err();
+        let error = interrupted(&mut session, Some(before), &error).unwrap();
+        assert!(error.to_string().contains("the draft acts"), "{error}");
+        assert_eq!(acting(&mut session), 1.5);
+        undo(&mut session).unwrap();
+        assert_eq!(acting(&mut session), old);
+    }
 }

@@ -55,6 +55,7 @@ impl Questions {
             };
             match read(answer) {
                 Ok(value) => return Ok(value),
+                Err(_) if answer.is_empty() => say!("  an answer is needed"),
                 Err(error) => say!("  {answer}: {error}"),
             }
         }

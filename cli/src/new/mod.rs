@@ -77,7 +77,7 @@ pub(super) struct Arguments {
 }
 
 fn positive(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|error| format!("{error}"))?;
+    let value: f64 = text.parse().map_err(|_| "no number".to_owned())?;
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
@@ -90,7 +90,7 @@ const TURN_COUNTS: (u32, u32) = (16, 1_000_000_000);
 
 /// Lines or counts in a turn.
 fn turn(text: &str) -> Result<u32, String> {
-    let value: u32 = text.parse().map_err(|error| format!("{error}"))?;
+    let value: u32 = text.parse().map_err(|_| "no whole number".to_owned())?;
     let (least, most) = TURN_COUNTS;
     if (least..=most / 4).contains(&value) {
         Ok(value)
@@ -166,7 +166,7 @@ impl Arguments {
         let mut amplifier = questions.value(
             given,
             "--amplifier",
-            "amplifier: a name of --list-presets, or the full scale of its input in V",
+            "amplifier: a name of --list-presets, or its full scale in V",
             Some("analog-10v"),
             |answer| {
                 preset_or(answer, |full_scale_v| Amplifier {

@@ -27,63 +27,47 @@ impl Encoder {
     }
 }
 
+const fn rotary(counts: u32) -> Encoder {
+    Encoder::Rotary { counts }
+}
+
+const fn linear(count_mm: f64) -> Encoder {
+    Encoder::Linear { count_mm }
+}
+
 /// Encoders by name.
 pub(super) const ENCODERS: [(&str, Encoder, &str); 11] = [
     (
         "rotary-1000",
-        Encoder::Rotary { counts: 4_000 },
+        rotary(4_000),
         "1000 lines in a turn, 4000 counts",
     ),
     (
         "rotary-1024",
-        Encoder::Rotary { counts: 4_096 },
+        rotary(4_096),
         "1024 lines in a turn, 4096 counts",
     ),
     (
         "rotary-2500",
-        Encoder::Rotary { counts: 10_000 },
+        rotary(10_000),
         "2500 lines in a turn, 10 000 counts",
     ),
     (
         "rotary-5000",
-        Encoder::Rotary { counts: 20_000 },
+        rotary(20_000),
         "5000 lines in a turn, 20 000 counts",
     ),
-    (
-        "rotary-17bit",
-        Encoder::Rotary { counts: 131_072 },
-        "131 072 counts in a turn",
-    ),
+    ("rotary-17bit", rotary(131_072), "131 072 counts in a turn"),
     (
         "rotary-20bit",
-        Encoder::Rotary { counts: 1_048_576 },
+        rotary(1_048_576),
         "1 048 576 counts in a turn",
     ),
-    (
-        "linear-5um",
-        Encoder::Linear { count_mm: 5e-3 },
-        "scale, 5 um a count",
-    ),
-    (
-        "linear-1um",
-        Encoder::Linear { count_mm: 1e-3 },
-        "scale, 1 um a count",
-    ),
-    (
-        "linear-0.5um",
-        Encoder::Linear { count_mm: 5e-4 },
-        "scale, 0.5 um a count",
-    ),
-    (
-        "linear-0.1um",
-        Encoder::Linear { count_mm: 1e-4 },
-        "scale, 0.1 um a count",
-    ),
-    (
-        "linear-0.05um",
-        Encoder::Linear { count_mm: 5e-5 },
-        "scale, 0.05 um a count",
-    ),
+    ("linear-5um", linear(5e-3), "scale, 5 um a count"),
+    ("linear-1um", linear(1e-3), "scale, 1 um a count"),
+    ("linear-0.5um", linear(5e-4), "scale, 0.5 um a count"),
+    ("linear-0.1um", linear(1e-4), "scale, 0.1 um a count"),
+    ("linear-0.05um", linear(5e-5), "scale, 0.05 um a count"),
 ];
 
 /// An amplifier's input, V.
@@ -95,40 +79,27 @@ pub(super) struct Amplifier {
     pub(super) output_limit_v: f64,
 }
 
+const fn amplifier(full_scale_v: f64, output_limit_v: f64) -> Amplifier {
+    Amplifier {
+        full_scale_v,
+        output_limit_v,
+    }
+}
+
 /// Amplifiers by name.
 pub(super) const AMPLIFIERS: [(&str, Amplifier, &str); 4] = [
     (
         "analog-10v",
-        Amplifier {
-            full_scale_v: 10.0,
-            output_limit_v: 10.0,
-        },
+        amplifier(10.0, 10.0),
         "input of +-10 V, all of it used",
     ),
     (
         "analog-10v-limited",
-        Amplifier {
-            full_scale_v: 10.0,
-            output_limit_v: 3.0,
-        },
+        amplifier(10.0, 3.0),
         "input of +-10 V, 3 V of it used: for a first start",
     ),
-    (
-        "analog-5v",
-        Amplifier {
-            full_scale_v: 5.0,
-            output_limit_v: 5.0,
-        },
-        "input of +-5 V",
-    ),
-    (
-        "analog-2.5v",
-        Amplifier {
-            full_scale_v: 2.5,
-            output_limit_v: 2.5,
-        },
-        "input of +-2.5 V",
-    ),
+    ("analog-5v", amplifier(5.0, 5.0), "input of +-5 V"),
+    ("analog-2.5v", amplifier(2.5, 2.5), "input of +-2.5 V"),
 ];
 
 /// A preset of this name.

@@ -2,7 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{Context, bail, ensure};
+use anyhow::Context;
+use quadrant_cli::warn;
+use quadrant_sim::record::{ColumnNames, NumberTable};
 
 /// A run: a file's columns.
 pub(super) struct Run {
@@ -14,77 +16,27 @@ pub(super) struct Run {
     pub(super) columns: Vec<(String, Vec<f64>)>,
 }
 
-/// Names of a column of time in s, the first that is there.
-const TIME: [&str; 5] = ["t_s", "time_s", "t", "time", "seconds"];
-
-/// A name without quotes and without a unit in brackets.
-fn bare(name: &str) -> String {
-    let end = name.find(['[', '(']).unwrap_or(name.len());
-    name[..end].trim().to_ascii_lowercase()
-}
-
 impl Run {
-    /// Reads a file.
+    /// Reads a file, with columns named as `names` says; what is guessed and what is no number is said.
     ///
     /// # Errors
     /// A file that cannot be read, without a header, without a column of time, or with a row of another length.
-    pub(super) fn read(path: &Path) -> anyhow::Result<Self> {
+    pub(super) fn read(path: &Path, names: &ColumnNames) -> anyhow::Result<Self> {
         let shown = path.display();
-        let text =
-            std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read"))?;
-        let cells = |line: &str| -> Vec<String> {
-            let cells = line.split(',').map(|cell| cell.trim().trim_matches('"'));
-            cells.map(str::to_owned).collect()
-        };
-        let mut lines = text.lines().enumerate().filter(|(_, line)| {
-            let line = line.trim();
-            !line.is_empty() && !line.starts_with('#')
-        });
-        let header = lines.next().map(|(_, line)| cells(line));
-        let names = header.filter(|names| names.iter().any(|name| name.parse::<f64>().is_err()));
-        let Some(names) = names else {
-            bail!(
-                "{shown}: no header: the first line must name the columns, t_s for the time in s"
-            );
-        };
-        let time = TIME
-            .iter()
-            .find_map(|time| names.iter().position(|name| bare(name) == *time));
-        let Some(time) = time else {
-            bail!(
-                "{shown}: no column of the time in s: name one t_s; found {}",
-                names.join(", ")
-            );
-        };
-        let mut values = vec![Vec::new(); names.len()];
-        for (index, line) in lines {
-            let row = cells(line);
-            ensure!(
-                row.len() == names.len(),
-                "{shown}, line {}: {} cells, and the header has {}",
-                index + 1,
-                row.len(),
-                names.len()
-            );
-            for (column, cell) in values.iter_mut().zip(&row) {
-                column.push(cell.parse().unwrap_or(f64::NAN));
-            }
+        let bytes = std::fs::read(path).with_context(|| format!("{shown} cannot be read"))?;
+        let table = NumberTable::parse(path, &bytes, names)?;
+        for note in &table.notes {
+            warn!("note: {shown}: {note}");
         }
-        let time_s = values[time].clone();
-        ensure!(
-            time_s.iter().filter(|time_s| time_s.is_finite()).count() > 1,
-            "{shown}: fewer than two rows with a time"
-        );
-        let columns = names.into_iter().zip(values).enumerate();
+        match table.other_cells {
+            0 => {}
+            1 => warn!("note: {shown}: 1 cell holds no number, and is not drawn"),
+            count => warn!("note: {shown}: {count} cells hold no number, and are not drawn"),
+        }
         Ok(Self {
             path: path.to_owned(),
-            time_s,
-            columns: columns
-                .filter(|(index, (_, values))| {
-                    *index != time && values.iter().any(|value| value.is_finite())
-                })
-                .map(|(_, column)| column)
-                .collect(),
+            time_s: table.time_s,
+            columns: table.columns,
         })
     }
 

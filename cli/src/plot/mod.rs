@@ -5,10 +5,11 @@ mod columns;
 
 use std::path::{Path, PathBuf};
 
-use anyhow::{bail, ensure};
+use anyhow::{anyhow, bail, ensure};
 use clap::Args;
 use quadrant_cli::output::command_line;
 use quadrant_cli::{say, terminal};
+use quadrant_sim::record::ColumnNames;
 use quadrant_sim::report::{
     Block, Figure, Format, Lines, Page, Plot, Provenance, Section, Series, Style,
 };
@@ -18,10 +19,12 @@ use self::columns::Run;
 /// Options of `quadrant plot`.
 #[derive(Clone, Debug, Args)]
 pub(super) struct Arguments {
-    /// CSV files with a column t_s: a capture, a recording, a table of a run. Several are drawn over each other.
+    /// CSV files with a column t_s: a capture, a recording, a table of a run. Several are drawn over each other. Of those of other
+    /// programs delimiter, decimal comma, lines before the header and a row of units are guessed, and said.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Columns to draw, by name, separated by commas; without it those that every file has.
+    /// Columns to draw, by name, separated by commas; without it those that every file has. time=NAME:UNIT names the column of the time,
+    /// if it is not t_s; so do position, reference, voltage and injection, which are then drawn in mm and V as position_mm and so on.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     columns: Vec<String>,
     /// Time from which it is drawn, s.
@@ -39,9 +42,9 @@ pub(super) struct Arguments {
 const LINES: usize = 12;
 
 pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
-    let runs: anyhow::Result<Vec<Run>> =
-        arguments.files.iter().map(|path| Run::read(path)).collect();
-    let mut runs = runs?;
+    let (named, drawn) = arguments.columns()?;
+    let runs = arguments.files.iter().map(|path| Run::read(path, &named));
+    let mut runs = runs.collect::<anyhow::Result<Vec<Run>>>()?;
     let (from_s, to_s) = (
         arguments.from.unwrap_or(f64::NEG_INFINITY),
         arguments.to.unwrap_or(f64::INFINITY),
@@ -56,7 +59,7 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
             run.path.display()
         );
     }
-    let names = arguments.names(&runs)?;
+    let names = names(&drawn, &runs)?;
     match &arguments.page {
         None => {
             draw(&runs, &names);
@@ -73,35 +76,49 @@ fn ends(time_s: &[f64]) -> (f64, f64) {
 }
 
 impl Arguments {
-    /// Columns to draw: those that are asked for, else those that every run has.
-    fn names(&self, runs: &[Run]) -> anyhow::Result<Vec<String>> {
-        for name in &self.columns {
-            if let Some(run) = runs.iter().find(|run| run.column(name).is_none()) {
-                bail!(
-                    "{}: no column {name:?}; found {}",
-                    run.path.display(),
-                    run.names().join(", ")
-                );
-            }
-        }
-        if !self.columns.is_empty() {
-            return Ok(self.columns.clone());
-        }
-        let in_all = |name: &&str| runs.iter().all(|run| run.column(name).is_some());
-        let names: Vec<String> = (runs.first().map(Run::names).unwrap_or_default().into_iter())
-            .filter(in_all)
-            .map(str::to_owned)
-            .collect();
-        ensure!(
-            !names.is_empty(),
-            "no column is in all of the files: {}",
-            runs.iter()
-                .map(|run| format!("{} has {}", run.path.display(), run.names().join(", ")))
-                .collect::<Vec<_>>()
-                .join("; ")
-        );
-        Ok(names)
+    /// The columns that are named as quantities, and those to draw.
+    fn columns(&self) -> anyhow::Result<(ColumnNames, Vec<String>)> {
+        let (named, drawn): (Vec<String>, Vec<String>) =
+            (self.columns.iter().cloned()).partition(|name| name.contains('='));
+        let named = match named.as_slice() {
+            [] => ColumnNames::default(),
+            _ => named
+                .join(",")
+                .parse()
+                .map_err(|error| anyhow!("--columns: {error}"))?,
+        };
+        Ok((named, drawn))
     }
+}
+
+/// Columns to draw: those that are asked for, else those that every run has.
+fn names(drawn: &[String], runs: &[Run]) -> anyhow::Result<Vec<String>> {
+    for name in drawn {
+        if let Some(run) = runs.iter().find(|run| run.column(name).is_none()) {
+            bail!(
+                "{}: no column {name:?}; found {}",
+                run.path.display(),
+                run.names().join(", ")
+            );
+        }
+    }
+    if !drawn.is_empty() {
+        return Ok(drawn.to_vec());
+    }
+    let in_all = |name: &&str| runs.iter().all(|run| run.column(name).is_some());
+    let names: Vec<String> = (runs.first().map(Run::names).unwrap_or_default().into_iter())
+        .filter(in_all)
+        .map(str::to_owned)
+        .collect();
+    ensure!(
+        !names.is_empty(),
+        "no column is in all of the files: {}",
+        runs.iter()
+            .map(|run| format!("{} has {}", run.path.display(), run.names().join(", ")))
+            .collect::<Vec<_>>()
+            .join("; ")
+    );
+    Ok(names)
 }
 
 /// Draws the columns in the terminal, one below the other.

@@ -1,6 +1,7 @@
 //! The commands `quadrant identify frf`, `plant` and `motion`, from end to end.
 
 use crate::command;
+use std::fs;
 use std::path::Path;
 
 use quadrant::settings::{AxisSettings, StageSettings};
@@ -278,4 +279,57 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
     assert_eq!(written.provenance[0].records, ["a/motion-recording.csv"]);
     let cascade = ["motion", "--axis", "x", "--cascade-kp", "160"];
     assert!(fail(at, &cascade).contains("--cascade-kv"));
+}
+
+/// The share of the voltage that the last line says is explained, %.
+fn explained_percent(said: &str) -> f64 {
+    let line = said.lines().last().unwrap();
+    let (_, share) = line.split_once("explains ").unwrap();
+    share.split(' ').next().unwrap().parse().unwrap()
+}
+
+#[test]
+fn the_last_line_says_what_the_model_explains_of_the_record_that_judges_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let measured = |out: &str, seed: &str| {
+        let words = [
+            "motion", "--axis", "z", "--rounds", "1", "--seed", seed, "--out", out,
+        ];
+        succeed(at, &words)
+    };
+    measured("one", "1");
+    measured("two", "2");
+    let record = ["motion", "--record", "one/motion-recording.csv"];
+    let alone = explained_percent(&succeed(at, &[&record[..], &["--out", "alone"]].concat()));
+    let judged = |other: &str, out: &str| {
+        let more = ["--validate", other, "--out", out];
+        succeed(at, &[&record[..], &more].concat())
+    };
+    let same = explained_percent(&judged("two/motion-recording.csv", "same"));
+    // The other record with half as much voltage again: what is missing is no share of what is explained.
+    let text = fs::read_to_string(at.join("two/motion-recording.csv")).unwrap();
+    let mut lines = text.lines();
+    let header = lines.next().unwrap();
+    let voltage = header
+        .split(',')
+        .position(|name| name == "voltage_v")
+        .unwrap();
+    let mut louder = format!("{header}\n");
+    for line in lines {
+        let cells: Vec<String> = (line.split(',').enumerate())
+            .map(|(index, cell)| match index == voltage {
+                true => (1.1 * cell.parse::<f64>().unwrap()).to_string(),
+                false => cell.to_owned(),
+            })
+            .collect();
+        louder += &cells.join(",");
+        louder.push('\n');
+    }
+    fs::write(at.join("louder.csv"), louder).unwrap();
+    let louder = explained_percent(&judged("louder.csv", "louder"));
+    println!("{alone} % alone, {same} % of another, {louder} % of a louder one");
+    assert!(alone > 90.0 && (alone - same).abs() < 3.0, "{alone} {same}");
+    // A tenth of the voltage, 1/11 of what there is, is not explained.
+    assert!(louder < same - 1.0, "{louder} {same}");
 }

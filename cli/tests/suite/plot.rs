@@ -1,6 +1,7 @@
 //! `quadrant plot`: a recording and two runs over each other, in 80 columns and as a page.
 
 use crate::command;
+use quadrant_chromium::Browser;
 use std::fmt::Write as _;
 use std::fs;
 
@@ -83,4 +84,63 @@ fn what_record_writes_is_drawn() {
     command::succeed(at, &record.split(' ').collect::<Vec<_>>());
     let shown = command::succeed(at, &["plot", "run.csv"]);
     assert!(shown.contains("position_mm"), "{shown}");
+}
+
+#[test]
+fn files_of_other_programs_are_drawn_and_what_is_guessed_and_no_number_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let rows = |row: &dyn Fn(u32) -> String| (0..40).map(row).collect::<String>();
+    let comma = |value: f64| value.to_string().replace('.', ",");
+    let text = rows(&|row| format!("{};{};{row}\n", comma(2.5 * f64::from(row)), comma(0.5)));
+    fs::write(
+        at.join("scope.csv"),
+        format!("Recorder 7\nZeit [ms];Pos;Strom\n{text}"),
+    )
+    .unwrap();
+    let words = ["plot", "scope.csv", "--columns", "time=Zeit:ms,Pos"];
+    let (shown, said) = command::output(at, &words);
+    assert!(shown.contains("Pos") && !shown.contains("Strom"), "{shown}");
+    assert!(shown.contains("0.097500 s"), "{shown}");
+    assert!(
+        said.contains("cells separated by semicolons, a decimal comma"),
+        "{said}"
+    );
+    let text = rows(&|row| format!("{row},{}\n", if row == 7 { "OVER" } else { "1.5" }));
+    fs::write(at.join("gap.csv"), format!("t_s,level\n{text}")).unwrap();
+    let (_, said) = command::output(at, &["plot", "gap.csv"]);
+    assert!(said.contains("gap.csv: 1 cell holds no number"), "{said}");
+    let text = rows(&|row| format!("{row}\t{}\n", 2 * row));
+    fs::write(at.join("bare.txt"), text).unwrap();
+    let said = command::fail(at, &["plot", "bare.txt"]);
+    assert!(said.contains("time=NAME:UNIT; found 1, 2"), "{said}");
+    let (shown, _) = command::output(at, &["plot", "bare.txt", "--columns", "time=1:us"]);
+    assert!(shown.contains("3.900e-5 s"), "{shown}");
+}
+
+#[test]
+fn a_page_of_runs_is_drawn_by_a_browser() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("a.csv"), run(1.0)).unwrap();
+    fs::write(at.join("b.csv"), run(3.0)).unwrap();
+    command::succeed(at, &["plot", "a.csv", "b.csv", "--page", "both.html"]);
+    let Some(mut browser) = Browser::start() else {
+        return;
+    };
+    browser.open(&at.join("both.html"), (900, 1000), false);
+    let curves = browser.evaluate(
+        "(async () => {
+          const found = [];
+          for (const drawing of document.querySelectorAll('.drawing')) {
+            drawing.scrollIntoView({ behavior: 'instant', block: 'center' });
+            for (let waited = 0; !drawing.dataset.drawn && waited < 5000; waited += 20)
+              await new Promise((done) => setTimeout(done, 20));
+            found.push(drawing.querySelectorAll('svg.chart .curve').length);
+          }
+          return found;
+        })()",
+    );
+    assert_eq!(browser.problems(), Vec::<String>::new());
+    assert_eq!(curves, serde_json::json!([2, 2]), "two figures of two runs");
 }

@@ -3,16 +3,22 @@
 
 use std::fs::{File, OpenOptions};
 use std::io::{Read, Write};
+use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::sync::mpsc::{self, Receiver};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use quadrant::settings::StageSettings;
+use quadrant_sim::settings_file::SettingsFile;
 use rustix::pty::{OpenptFlags, grantpt, openpt, ptsname, unlockpt};
-use rustix::termios::{LocalModes, OptionalActions, Termios, tcgetattr, tcsetattr};
+use rustix::termios::{
+    LocalModes, OptionalActions, Termios, Winsize, tcgetattr, tcsetattr, tcsetwinsize,
+};
 
-/// Longest time in which something is said.
+/// Longest time in which something is said, and in which a whole commissioning ends.
 const SAID: Duration = Duration::from_secs(20);
+const COMMISSIONED: Duration = Duration::from_secs(300);
 
 /// A person at a terminal, with a program in front.
 struct Person {
@@ -26,6 +32,18 @@ struct Person {
 impl Person {
     /// Starts the console on a terminal that has these modes.
     fn sits_down(change: impl FnOnce(&mut Termios)) -> Self {
+        let mut person = Self::starts(
+            &["connect", "--simulated=commissioned"],
+            Path::new("."),
+            change,
+        );
+        person.sees("Ctrl-D ends");
+        person.sees("quadrant> ");
+        person
+    }
+
+    /// Starts a command in a folder.
+    fn starts(words: &[&str], folder: &Path, change: impl FnOnce(&mut Termios)) -> Self {
         let keyboard = openpt(OpenptFlags::RDWR | OpenptFlags::NOCTTY).unwrap();
         grantpt(&keyboard).unwrap();
         unlockpt(&keyboard).unwrap();
@@ -36,10 +54,18 @@ impl Person {
         let mut modes = tcgetattr(&terminal).unwrap();
         change(&mut modes);
         tcsetattr(&terminal, OptionalActions::Now, &modes).unwrap();
+        let wide = Winsize {
+            ws_row: 24,
+            ws_col: 1000,
+            ws_xpixel: 0,
+            ws_ypixel: 0,
+        };
+        tcsetwinsize(&terminal, wide).unwrap();
         // It makes the terminal the one whose Ctrl-C is the program's.
         let child = Command::new("setsid")
             .args(["--ctty", env!("CARGO_BIN_EXE_quadrant")])
-            .args(["connect", "--simulated=commissioned"])
+            .args(words)
+            .current_dir(folder)
             .env("TERM", "xterm")
             .stdin(Stdio::from(terminal.try_clone().unwrap()))
             .stdout(Stdio::from(terminal.try_clone().unwrap()))
@@ -57,16 +83,13 @@ impl Person {
                 }
             }
         });
-        let mut person = Self {
+        Self {
             keyboard,
             screen,
             terminal,
             child,
             seen: String::new(),
-        };
-        person.sees("Ctrl-D ends");
-        person.sees("quadrant> ");
-        person
+        }
     }
 
     fn types(&mut self, text: &str) {
@@ -80,7 +103,12 @@ impl Person {
 
     /// Returns the text on the screen from here to `text`.
     fn reads_until(&mut self, text: &str) -> String {
-        let due = Instant::now() + SAID;
+        self.reads_within(SAID, text)
+    }
+
+    /// Returns the text on the screen from here to `text`, which comes within a time.
+    fn reads_within(&mut self, time: Duration, text: &str) -> String {
+        let due = Instant::now() + time;
         loop {
             if let Some(at) = self.seen.find(text) {
                 let read = self.seen[..at].to_owned();
@@ -235,4 +263,133 @@ fn a_tab_completes_what_all_that_is_possible_begins_with() {
     let answer = person.reads_until("quadrant> ");
     assert!(!answer.contains("error"), "{answer}");
     person.leaves();
+}
+
+/// Experiments that a commissioning in a folder has kept.
+fn kept(folder: &Path) -> usize {
+    let files = std::fs::read_dir(folder.join("quadrant-out/x/experiments"));
+    let is_kept = |path: &Path| path.extension().is_some_and(|end| end == "json");
+    files.map_or(0, |files| {
+        files
+            .filter(|file| is_kept(&file.as_ref().unwrap().path()))
+            .count()
+    })
+}
+
+/// Waits until a commissioning has kept a number of experiments, and the next one is under way.
+fn waits_for_experiments(folder: &Path, number: usize) {
+    let due = Instant::now() + SAID;
+    while kept(folder) < number {
+        assert!(Instant::now() < due, "nothing is measured");
+        thread::sleep(Duration::from_millis(10));
+    }
+}
+
+const COMMISSION: [&str; 8] = [
+    "commission",
+    "--axis",
+    "x",
+    "--travel",
+    "15",
+    "--quick",
+    "--seed",
+    "3",
+];
+
+#[test]
+fn a_commissioning_that_is_interrupted_gives_the_old_settings_back_and_is_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let words = [&COMMISSION[..], &["--machine", "simulated"]].concat();
+    let mut person = Person::starts(&words, folder.path(), |_| {});
+    waits_for_experiments(folder.path(), 4);
+    person.types("\x03");
+    person.sees("the machine has its old settings back, its outputs off; with --resume it goes on");
+    person.sees("interrupted");
+    person.sees("the axes have stopped");
+    assert_eq!(person.gives_back(), Some(1));
+    let measured = kept(folder.path());
+    let resumed = [&words[..], &["--resume"]].concat();
+    let mut person = Person::starts(&resumed, folder.path(), |_| {});
+    person.sees(&format!("resuming with the {measured} experiments"));
+    person.reads_within(COMMISSIONED, "settings.toml: the settings of the stage");
+    assert_eq!(person.gives_back(), Some(0));
+    assert_eq!(kept(folder.path()), 0);
+}
+
+#[test]
+fn a_commissioning_in_the_console_that_is_interrupted_leaves_the_old_settings_and_is_resumed() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut person = Person::starts(&["connect", "--simulated"], folder.path(), |_| {});
+    person.sees("quadrant> ");
+    let dumps = |person: &mut Person, name: &str| {
+        person.types(&format!("dump {name}\r"));
+        person.sees("the settings of all axes");
+        person.sees("quadrant> ");
+        let dumped = std::fs::read_to_string(folder.path().join(name)).unwrap();
+        // What follows says when it was written.
+        dumped.split("[[provenance]]").next().unwrap().to_owned()
+    };
+    let before = dumps(&mut person, "before.toml");
+    let line = COMMISSION.join(" ");
+    person.types(&format!("{line}\r"));
+    waits_for_experiments(folder.path(), 4);
+    person.types("\x03");
+    person.sees("the machine has its old settings back, its outputs off");
+    person.sees("quadrant> ");
+    assert_eq!(dumps(&mut person, "after.toml"), before);
+    person.types("status\r");
+    person.sees("disabled");
+    person.sees("quadrant> ");
+    let measured = kept(folder.path());
+    person.types(&format!("{line} --resume\r"));
+    person.sees(&format!("resuming with the {measured} experiments"));
+    waits_for_experiments(folder.path(), measured + 1);
+    person.types("\x03");
+    person.sees("the machine has its old settings back, its outputs off");
+    person.sees("quadrant> ");
+    person.leaves();
+}
+
+#[test]
+fn what_new_asks_is_answered_once_more_where_an_answer_cannot_be() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut person = Person::starts(&["new", "mine.toml"], folder.path(), |_| {});
+    for (question, answers) in [
+        (
+            "encoder: a name of --list-presets",
+            &["rotary-250", "rotary-2500"][..],
+        ),
+        ("lead of the screw, mm a turn", &["none", "-5", "5"]),
+        ("amplifier: a name of --list-presets", &[""]),
+        ("largest velocity, mm/s", &["120"]),
+        ("largest acceleration, mm/s²", &["1500"]),
+        ("travel, mm: 200 for as much either way", &["-60..140"]),
+        ("control rate, Hz", &[""]),
+    ] {
+        for answer in answers {
+            person.sees(question);
+            person.sees(": ");
+            person.types(&format!("{answer}\r"));
+        }
+    }
+    person.sees("quadrant commission --axis x --settings mine.toml");
+    assert_eq!(person.gives_back(), Some(0));
+    let file = SettingsFile::read(&folder.path().join("mine.toml")).unwrap();
+    let axis = &file.stage.axes[0];
+    assert_eq!(axis.encoder.resolution_mm, 5e-4);
+    assert_eq!(axis.limits.max_velocity_mm_s, 120.0);
+    let travel = axis.limits.travel_mm.unwrap();
+    assert_eq!((travel.negative, travel.positive), (-60.0, 140.0));
+    assert_eq!(file.stage.rate_hz, StageSettings::default().rate_hz);
+}
+
+#[test]
+fn answers_that_end_early_write_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut person = Person::starts(&["new", "mine.toml"], folder.path(), |_| {});
+    person.sees("encoder: a name of --list-presets");
+    person.types("\x04");
+    person.sees("the answers ended before --encoder; nothing was written");
+    assert_eq!(person.gives_back(), Some(1));
+    assert!(!folder.path().join("mine.toml").exists());
 }

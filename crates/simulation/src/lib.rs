@@ -2,7 +2,7 @@
 //!
 //! - [`plant`]: the stage, simulated, with friction that the control law does not know exactly;
 //! - [`law_machine`]: the control law and its supervisor, tick by tick;
-//! - [`settings_file`]: a stage's settings with their origin, as TOML;
+//! - [`settings_file`]: a stage's settings with their origin, as TOML; [`toml_file`]: what such files have in common;
 //! - [`stage_file`]: a stage of one's own, as TOML;
 //! - [`setting_value`]: a setting's value as it crosses the link, and as JSON;
 //! - [`held_plant`], [`loop_shape`], [`margins`]: the linear axis behind its converter, the open loop, its margins.
@@ -20,6 +20,7 @@ pub mod plant;
 pub mod setting_value;
 pub mod settings_file;
 pub mod stage_file;
+pub mod toml_file;
 
 #[cfg(test)]
 mod fixtures {

@@ -149,6 +149,12 @@ pub enum ClientError {
         /// The first path that is edited, and how many more there are.
         paths: String,
     },
+    /// Axes are not homed, and nothing homes them.
+    #[error("wait homed: {axes} not homed, and not homing: give `home` first")]
+    NotHoming {
+        /// Their names.
+        axes: String,
+    },
     /// A condition was not met in time.
     #[error("{what}: not after {waited_s} s; {remedy}")]
     TimedOut {

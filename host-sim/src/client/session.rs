@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 use quadrant::link::frame::{self, DELIMITER, DecodeError, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
     AxisName, Body, Event, FaultReport, Identity, Inputs, Learning, LinkError, Message, Notice,
-    Reply, Request, Status,
+    Reply, Request, SettingsRequest, Status,
 };
 use quadrant::link::message::{MachineState, TelemetryBlock};
 use quadrant::safety::FaultCode;
@@ -153,8 +153,11 @@ impl Client {
     pub fn request(&mut self, body: Body) -> Result<Reply, ClientError> {
         let what = body.name();
         let idempotency = idempotency(&body);
+        // Settings that were in force before are to come back.
+        let applies = matches!(body, Body::Settings(SettingsRequest::Apply));
         if let Some(done) = self.interrupted
             && idempotency == Idempotency::NotIdempotent
+            && !applies
         {
             return Err(ClientError::Interrupted { done });
         }

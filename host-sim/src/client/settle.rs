@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadrant::link::message::{AxisMode, AxisSet, MachineState, Status};
+use quadrant::link::message::{AxisMode, AxisName, AxisSet, MachineState, Status};
 
 use super::error::ClientError;
 use super::session::Client;
@@ -31,7 +31,6 @@ pub fn rest(client: &mut Client, timeout: Duration) -> Result<Status, ClientErro
 /// # Errors
 /// A fault, homing that was given up or has not ended after `timeout`, or a connection that is broken.
 pub fn homed(client: &mut Client, axes: AxisSet, timeout: Duration) -> Result<Status, ClientError> {
-    let all_homed = |status: &Status| axes.iter().all(|axis| status.homed.contains(axis));
     // An axis knows where it is before it has moved to where homing ends.
     let homing = |status: &Status| {
         let mut modes = axes.iter().map(|axis| status.axes[axis as usize].mode);
@@ -44,14 +43,13 @@ pub fn homed(client: &mut Client, axes: AxisSet, timeout: Duration) -> Result<St
         "homing has not ended; check that the switch is reached, `stop` ends it",
         |status| !homing(status),
     )?;
-    if all_homed(&status) {
-        Ok(status)
-    } else {
-        Err(ClientError::TimedOut {
-            what: "wait homed",
-            waited_s: 0.0,
-            remedy: "nothing is homing these axes: give `home` first",
-        })
+    let missing = axes.iter().filter(|axis| !status.homed.contains(*axis));
+    let missing: Vec<&str> = missing.map(AxisName::as_str).collect();
+    match missing.is_empty() {
+        true => Ok(status),
+        false => Err(ClientError::NotHoming {
+            axes: missing.join(", "),
+        }),
     }
 }
 

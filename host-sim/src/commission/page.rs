@@ -60,6 +60,11 @@ pub fn gains_table(found: &Commissioned) -> Table {
     }
 }
 
+/// A number without what is less than a hundredth.
+fn hundredths(value: f64) -> f64 {
+    (100.0 * value).round() / 100.0
+}
+
 /// The errors of each law that was tried on the axis, by its own encoder.
 pub fn results_table(verification: &Verification) -> Table {
     let pid = &verification.laws[0];
@@ -102,7 +107,10 @@ pub fn results_table(verification: &Verification) -> Table {
     let sines: Vec<String> = verification
         .sines
         .iter()
-        .map(|sine| format!("{} mm at {} mm/s", sine.amplitude_mm, sine.velocity_mm_s))
+        .map(|sine| {
+            let [mm, mm_s] = [sine.amplitude_mm, sine.velocity_mm_s].map(hundredths);
+            format!("{mm} mm at {mm_s} mm/s")
+        })
         .collect();
     Table {
         id: "verdict".to_owned(),

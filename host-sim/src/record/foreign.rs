@@ -237,6 +237,118 @@ pub(super) fn translate(
     }))
 }
 
+/// Names of a column of the time, the first that is there.
+const TIME_NAMES: [&str; 5] = ["t_s", "time_s", "t", "time", "seconds"];
+
+/// The guess that is not worth a line.
+const TIME_IN_S: &str = "time taken in s";
+
+/// A table of numbers over time, of any program: to be drawn, not to be identified from.
+#[derive(Debug)]
+pub struct NumberTable {
+    /// Time of each row, s.
+    pub time_s: Vec<f64>,
+    /// Name of each other column that holds a number, and its values: NaN where a cell holds none.
+    pub columns: Vec<(String, Vec<f64>)>,
+    /// Cells of these columns that hold no number.
+    pub other_cells: usize,
+    /// Guesses and assumptions, for the user.
+    pub notes: Vec<String>,
+}
+
+impl NumberTable {
+    /// Reads a file's text. Delimiter, decimal comma, lines before the header and a row of units are guessed unless the first line is a
+    /// header with commas; columns are renamed as `names` says, and the time is found by its name where that does not.
+    ///
+    /// # Errors
+    /// No header, no column of the time, a column that is named and not there, or a row of another length.
+    pub fn parse(path: &Path, bytes: &[u8], names: &ColumnNames) -> Result<Self, RecordError> {
+        let text = String::from_utf8_lossy(bytes);
+        let text = text.trim_start_matches('\u{feff}');
+        let lines: Vec<&str> = text.lines().collect();
+        let refused = |message: String| RecordError::Malformed {
+            path: path.to_owned(),
+            message,
+        };
+        let form = Form::of_table(&lines).ok_or_else(|| {
+            refused("no header: the first line must name the columns, t_s for the time in s".into())
+        })?;
+        let names = names.with_time(&lines, form).ok_or_else(|| {
+            refused(format!(
+                "no column of the time: name one t_s, or give --columns time=NAME:UNIT; found {}",
+                form.names(&lines).join(", ")
+            ))
+        })?;
+        let mut translation = Translation::new(path, &lines, form, &names)?;
+        translation.notes.retain(|note| note != TIME_IN_S);
+        let mut values = vec![Vec::new(); translation.header.len()];
+        for (index, line) in lines.iter().enumerate().skip(form.first) {
+            if is_passed_over(line) {
+                continue;
+            }
+            let row = cells(line, form.delimiter);
+            if row.len() != values.len() {
+                return Err(refused(format!(
+                    "line {}: {} cells, and the header has {}",
+                    index + 1,
+                    row.len(),
+                    values.len()
+                )));
+            }
+            for ((column, cell), factor) in values.iter_mut().zip(row).zip(&translation.factors) {
+                let value = number(cell, form.decimal_comma).unwrap_or(f64::NAN);
+                column.push(value * factor.unwrap_or(1.0));
+            }
+        }
+        let time = translation
+            .header
+            .iter()
+            .position(|name| name == QUANTITIES[0].column);
+        let time_s = time.map_or_else(Vec::new, |time| std::mem::take(&mut values[time]));
+        if time_s.iter().filter(|time_s| time_s.is_finite()).count() < 2 {
+            return Err(refused("fewer than two rows with a time".to_owned()));
+        }
+        let columns: Vec<(String, Vec<f64>)> = translation
+            .header
+            .into_iter()
+            .zip(values)
+            .filter(|(_, values)| values.iter().any(|value| value.is_finite()))
+            .collect();
+        let cells = columns.iter().flat_map(|(_, values)| values);
+        Ok(Self {
+            other_cells: cells.filter(|value| value.is_nan()).count(),
+            time_s,
+            columns,
+            notes: translation.notes,
+        })
+    }
+}
+
+impl ColumnNames {
+    /// These names, and that of the time by the header where it is not among them; nothing where there is none.
+    fn with_time(&self, lines: &[&str], form: Form) -> Option<Self> {
+        let mut names = self.clone();
+        if !names.0.iter().any(|name| name.quantity == 0) {
+            let found = form.names(lines);
+            let is = |time: &&str, cell: &&String| name_and_unit(cell).0.eq_ignore_ascii_case(time);
+            let name = TIME_NAMES
+                .iter()
+                .find_map(|time| found.iter().find(|cell| is(time, cell)))?;
+            names.0.push(ColumnName {
+                quantity: 0,
+                name: name.clone(),
+                unit: None,
+            });
+        }
+        Some(names)
+    }
+}
+
+/// True for a line without a row: an empty one, or a comment.
+fn is_passed_over(line: &str) -> bool {
+    line.trim().is_empty() || line.starts_with('#')
+}
+
 /// Cells of a line, without quotation marks.
 fn cells(line: &str, delimiter: char) -> Vec<&str> {
     if delimiter == ' ' {
@@ -269,6 +381,44 @@ impl Form {
         ]
         .into_iter()
         .find_map(|(delimiter, decimal_comma)| Self::with(lines, delimiter, decimal_comma))
+    }
+
+    /// The form of a table to be drawn: the first line that is no comment names its columns, the time among them, or the form is guessed; a
+    /// short one has a header with commas.
+    fn of_table(lines: &[&str]) -> Option<Self> {
+        let header = lines.iter().position(|line| !is_passed_over(line))?;
+        let names = cells(lines[header], ',');
+        let is_time = |cell: &&str| {
+            let name = name_and_unit(cell).0;
+            TIME_NAMES
+                .iter()
+                .any(|time| name.eq_ignore_ascii_case(time))
+        };
+        let plain = Self {
+            delimiter: ',',
+            decimal_comma: false,
+            header: Some(header),
+            units: None,
+            first: header + 1,
+        };
+        if names.len() > 1 && names.iter().any(is_time) {
+            return Some(plain);
+        }
+        let is_named = names.iter().any(|name| number(name, false).is_none());
+        Self::of(lines).or(is_named.then_some(plain))
+    }
+
+    /// Names of the columns in the header, or their numbers.
+    fn names(&self, lines: &[&str]) -> Vec<String> {
+        match self.header {
+            Some(index) => cells(lines[index], self.delimiter)
+                .into_iter()
+                .map(str::to_owned)
+                .collect(),
+            None => (1..=cells(lines[self.first], self.delimiter).len())
+                .map(|number| number.to_string())
+                .collect(),
+        }
     }
 
     /// The form of a table with this delimiter, if there is one: rows of as many cells, two of them numbers at least.
@@ -361,14 +511,8 @@ impl Translation {
         form: Form,
         names: &ColumnNames,
     ) -> Result<Self, RecordError> {
-        let width = cells(lines[form.first], form.delimiter).len();
-        let found: Vec<String> = match form.header {
-            Some(index) => cells(lines[index], form.delimiter)
-                .into_iter()
-                .map(str::to_owned)
-                .collect(),
-            None => (1..=width).map(|number| number.to_string()).collect(),
-        };
+        let found = form.names(lines);
+        let width = found.len();
         let units: Vec<&str> = form
             .units
             .map_or_else(Vec::new, |index| cells(lines[index], form.delimiter));

@@ -30,7 +30,7 @@ mod trace;
 
 pub use error::{RecordError, RecordWarning, TimeFault, UnitFault, UnusableSignal};
 pub use force::ForceRecord;
-pub use foreign::ColumnNames;
+pub use foreign::{ColumnNames, NumberTable};
 pub use limits::AxisLimits;
 pub use motion::Record;
 pub use recording::{MotionOptions, Recording};

@@ -6,7 +6,7 @@ use std::sync::OnceLock;
 
 use quadrant_sim::identify::motion::{
     Candidate, CascadeLoop, MotionFitError, MotionFitSettings, MotionModel, Signals, fit_motion,
-    recommended, refined, replay_closed_loop, replay_open_loop, shuttle, validate,
+    recommended, recommended_by, refined, replay_closed_loop, replay_open_loop, shuttle, validate,
 };
 use quadrant_sim::identify::setting::SettingError;
 use quadrant_sim::machine::SimulatedTestAxis;
@@ -270,6 +270,52 @@ fn another_record_judges_models_that_it_did_not_fit() {
     assert!(other > 2.0 * same, "{other} {same}");
 }
 
+/// The record of the fit is explained best by a model of its own; the one that judges has no more than Coulomb friction.
+#[test]
+fn the_record_that_judges_and_not_that_of_the_fit_decides_which_model_is_recommended() {
+    let settings = MotionFitSettings::default();
+    let truth = &StageParameters::real().axes[0];
+    let fit = simulated(0, truth);
+    let candidates = fitted(&fit, &settings);
+    let own = recommended(&candidates).unwrap();
+    let by = |other: &Recording| {
+        let best = recommended_by(&candidates, other, &settings)
+            .unwrap()
+            .unwrap();
+        let errors = validate(&candidates, other, &settings).unwrap();
+        let place = |one: &Candidate| {
+            candidates
+                .iter()
+                .position(|c| std::ptr::eq(c, one))
+                .unwrap()
+        };
+        (place(best), errors[place(best)], errors[place(own)])
+    };
+    let (_, best, of_own) = by(&fit);
+    assert!(
+        best <= NEARLY * of_own + NEARLY_OF_VOLTAGE,
+        "{best} {of_own}"
+    );
+    let mut smooth = truth.clone();
+    for way in [&mut smooth.friction.positive, &mut smooth.friction.negative] {
+        way.curve.breakaway_v = way.curve.coulomb_v;
+        way.curve.coulomb_v *= 0.6;
+        way.curve.breakaway_v *= 0.6;
+    }
+    let mut axis = SimulatedTestAxis::new(0, smooth, 2);
+    let other = shuttle(&mut axis, 2, &mut |_| {}).unwrap();
+    let (_, best, of_own) = by(&other);
+    println!("error on the other record: {best:.4}, of the fit's own choice {of_own:.4}");
+    assert!(
+        best <= NEARLY * of_own + NEARLY_OF_VOLTAGE,
+        "{best} {of_own}"
+    );
+}
+
+/// Errors over the smallest up to which a simpler model is recommended, and shares of the voltage.
+const NEARLY: f64 = 1.02;
+const NEARLY_OF_VOLTAGE: f64 = 0.0015;
+
 #[test]
 fn records_that_tell_too_little_are_refused_with_what_they_lack() {
     let truth = &StageParameters::real().axes[0];
@@ -393,7 +439,7 @@ fn the_plainest_model_of_an_axis_with_coulomb_friction_or_none_is_recommended() 
         } = &best.model;
         let friction = friction.positive;
         assert!(
-            (inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.12,
+            (inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.05,
             "{inertia_v_s2_per_mm}"
         );
         assert!(

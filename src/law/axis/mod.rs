@@ -63,6 +63,7 @@ use crate::law::safety::oscillation::{
 };
 use crate::law::safety::overload::{Overload, OverloadState};
 use crate::law::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
+use crate::law::safety::standstill::{Standstill, StandstillState};
 use crate::law::safety::travel::{Travel, TravelState};
 use crate::law::safety::{AxisSwitches, FaultCode};
 use crate::law::scalar::{Quantity, Scalar};
@@ -126,8 +127,7 @@ pub struct Axis<S: Scalar, const N: usize> {
     overload: Overload,
     oscillation: Oscillation<S>,
     index_spacing: IndexSpacing,
-    /// Measured speed above which the axis does not stand, 2^-8 counts per tick.
-    standstill: u32,
+    standstill: Standstill,
     generator: ReferenceGenerator<S>,
     commissioning: Commissioning,
     learning: Learning<S>,
@@ -222,7 +222,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
         axis.index_spacing = IndexSpacing::default();
         axis.following = Following::unlimited();
         axis.travel = Travel::UNLIMITED;
-        axis.standstill = u32::MAX;
+        axis.standstill = Standstill::ALWAYS;
         axis.reduced_speed = u32::MAX;
         axis.generator = ReferenceGenerator::default();
         axis.commissioning = Commissioning::Done;
@@ -396,7 +396,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
     /// The measured speed below which the axis stands, counts per tick; half a count is added for the quantisation.
     #[must_use]
     pub fn standstill(self, counts_per_tick: f64) -> Self {
-        self.axis.standstill = speed_limit(counts_per_tick);
+        self.axis.standstill = Standstill::new(counts_per_tick);
         self
     }
 
@@ -677,7 +677,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             index_spacing: IndexSpacing::default(),
             following: Following::default(),
             travel: Travel::UNLIMITED,
-            standstill: u32::MAX,
+            standstill: Standstill::ALWAYS,
             reduced_speed: u32::MAX,
             generator: ReferenceGenerator::default(),
             commissioning: Commissioning::Inert,
@@ -860,7 +860,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
             error: seen.error,
             status,
         };
-        if state.oscillation.takes() {
+        if state.oscillation.is_reduced() {
             self.learning.unsettle(&mut state.learning);
         }
         let gained = self
@@ -906,10 +906,15 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         (self.reduced_speed != u32::MAX) & !state.homed
     }
 
-    /// True if the measured speed is that of an axis that stands.
+    /// True if the measured speed is that of an axis that stands. `begins` where `standstill` was not asked in the tick before.
     #[inline(always)]
-    pub(crate) fn stands(&self, state: &AxisState<S, N>) -> bool {
-        state.speed().unsigned_abs() <= self.standstill
+    pub(crate) fn stands(
+        &self,
+        state: &AxisState<S, N>,
+        standstill: &mut StandstillState,
+        begins: bool,
+    ) -> bool {
+        self.standstill.step(standstill, state.speed(), begins)
     }
 
     /// Prepares to hold the measured position.
@@ -1213,7 +1218,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
                 total = total + self.add_cancelling(state, changed);
             }
         }
-        if state.oscillation.takes() {
+        if state.oscillation.is_reduced() {
             total = self.take_away(state, total);
         }
         let input = FeedbackInput {

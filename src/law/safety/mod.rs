@@ -15,6 +15,7 @@
 //! |----------|---------|-------|
 //! | every reading | [`encoder`](crate::law::encoder), [`monitor`] | jump, both lines at once, stale, overspeed, silent, index |
 //! | every output and reading | [`plausibility`] | encoder dead, or of the wrong sign |
+//! | every reading, outputs off | `standstill` | an axis that moves and is not enabled |
 //! | every output | [`overload`] | load of the motor, I²t |
 //! | every error | [`monitor`] | following error |
 //! | every fourth error | [`oscillation`] | feedforward that harms, hum, a loop that swings by itself |
@@ -28,6 +29,7 @@ mod operation;
 pub mod oscillation;
 pub mod overload;
 pub mod plausibility;
+pub(crate) mod standstill;
 mod state;
 mod switches;
 pub mod travel;

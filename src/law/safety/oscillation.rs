@@ -2,13 +2,13 @@
 //!
 //! It sees the tracking error and the reference in whole counts, every fourth tick, and finds three things:
 //!
-//! - **What is added harms.** While the reference goes to and fro, the error swings by more than the distance that the
-//!   reference goes. A feedforward of friction does so that pushes an axis whose friction is not there, or is
-//!   behind a spring. After three such strokes one after the other, what is added (the friction fed forward) is taken away within 50 ms
-//!   *on trial*. If the error then swings by less than seven eighths in strokes of the same kind, it was what is added: it is reported, and
-//!   comes back slowly after 5 s and eight strokes, or 20 s; after the third time it stays away until the settings change or the outputs are
-//!   off. If not, now or while it is away, the axis is shaken from outside: what was taken away comes back at once, and there is no other trial
-//!   for a minute. It also comes back at once with a stroke more than twice as long, in which it need not harm.
+//! - **The friction feedforward harms.** While the reference goes to and fro, the error swings by more than the distance that the
+//!   reference goes. A friction feedforward does this if it pushes an axis whose friction is smaller than identified, or is behind a
+//!   spring. After three such strokes in a row it is reduced to nothing within 50 ms, *on trial*. If the error then swings by less than 7/8
+//!   in strokes of the same kind, the feedforward was the cause. That is reported, and the feedforward returns slowly after 5 s and eight
+//!   strokes, or 20 s. After the third time it stays off until the settings change or the outputs are off. If it was not the cause, now or
+//!   while it is off, the axis is shaken from outside: the feedforward returns at once, and there is no other trial for a minute. It also
+//!   returns at once with a stroke more than twice as long, in which it need not harm.
 //! - **Hum.** At rest, the error swings evenly at 20 Hz or more for a second. It is reported, and nothing is done.
 //! - **Instability.** The error swings evenly for a second, each time by more than a limit and by more than twice the distance
 //!   that the reference goes meanwhile. That is a fault.
@@ -18,13 +18,16 @@
 use crate::law::rounding;
 use crate::law::scalar::{Quantity, Scalar};
 
-/// Steps in which what is added is taken away; time for all of them, s; and for the way back.
+/// Steps in which the friction feedforward is reduced to nothing.
 const STEPS: u8 = 100;
-const TAKE_S: f64 = 0.05;
+/// Time for all of them, s.
+const REDUCING_S: f64 = 0.05;
+/// Time for the way back, s.
 const RETURN_S: f64 = 2.0;
 
-/// Time for which what is added stays away after it has harmed, s; and after which the next trial may be made.
+/// Time for which the friction feedforward stays off after it has harmed, s.
 const AWAY_S: f64 = 5.0;
+/// Time after which the next trial may be made, s.
 const PATIENCE_S: f64 = 60.0;
 
 /// Strokes for which it stays away, and times [`AWAY_S`] after which it comes back without them.
@@ -40,7 +43,7 @@ const WINDOW_S: f64 = 1.0;
 /// Strokes one after the other at whose ends the error has swung too far, in them or from the one to the other.
 const BAD_STROKES: u8 = 3;
 
-/// Strokes of a trial until neither a stroke nor the one before began with what is taken away.
+/// Strokes of a trial until neither a stroke nor the one before began with the friction feedforward.
 const MIXED_STROKES: u8 = 3;
 
 /// Times after which what is added stays away.
@@ -65,10 +68,10 @@ const LOOK_TICKS: f64 = super::plausibility::DUE_TICKS as f64;
 /// Watches an axis for oscillation.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Oscillation<S: Scalar> {
-    /// Something is added that can be taken away.
-    adds: bool,
-    /// Steps taken in a look, and looks to a step on the way back.
-    take: u8,
+    /// Friction is fed forward, which can be reduced.
+    feeds_friction: bool,
+    /// Steps by which it is reduced in a look, and looks to a step on the way back.
+    steps_per_look: u8,
     return_looks: u32,
     away_looks: u32,
     patience_looks: u32,
@@ -128,8 +131,8 @@ enum Phase {
     /// All of it acts, unless it is on its way back.
     #[default]
     Watching,
-    /// It is taken away.
-    Taking,
+    /// It is being reduced.
+    Reducing,
     /// It is away, and the error is compared with that of before.
     Trial,
     /// It has harmed and stays away.
@@ -141,8 +144,8 @@ enum Phase {
 /// The memory of the monitor.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct OscillationState {
-    /// Steps of what is added that are taken away.
-    taken: u8,
+    /// Steps by which the friction fed forward is reduced.
+    reduced: u8,
     phase: Phase,
     /// Looks in the phase, and until the next trial.
     looks: u32,
@@ -216,15 +219,15 @@ struct Place {
 }
 
 impl<S: Scalar> Oscillation<S> {
-    /// A monitor of an axis to which something is added, or not, and whose error may not swing by `unstable_counts` or more for a
+    /// A monitor of an axis with or without friction fed forward, whose error may not swing by `unstable_counts` or more for a
     /// second. Settings time only.
-    pub fn new(adds: bool, unstable_counts: f64, period_s: f64) -> Self {
+    pub fn new(feeds_friction: bool, unstable_counts: f64, period_s: f64) -> Self {
         let look_s = period_s * LOOK_TICKS;
         let looks = |time_s: f64| rounding::round(time_s / look_s).max(1.0) as u32;
         let steps = f64::from(STEPS);
         Self {
-            adds,
-            take: rounding::ceil(steps * look_s / TAKE_S).clamp(1.0, steps) as u8,
+            feeds_friction,
+            steps_per_look: rounding::ceil(steps * look_s / REDUCING_S).clamp(1.0, steps) as u8,
             return_looks: looks(RETURN_S / steps),
             away_looks: looks(AWAY_S),
             patience_looks: looks(PATIENCE_S),
@@ -244,10 +247,10 @@ impl<S: Scalar> Oscillation<S> {
         }
     }
 
-    /// The share of what is added that acts, a [`Quantity::Multiplier`], while some of it is taken away.
+    /// The share of the friction feedforward that acts, a [`Quantity::Multiplier`], while it is reduced.
     #[inline(always)]
     pub fn share(&self, state: &OscillationState) -> S {
-        S::scale_integer(i32::from(STEPS - state.taken), self.share)
+        S::scale_integer(i32::from(STEPS - state.reduced), self.share)
     }
 
     /// Looks at the axis; returns false if it is not stable.
@@ -266,13 +269,13 @@ impl<S: Scalar> Oscillation<S> {
         }
         let error = input.error.clamp(-MOST_COUNTS, MOST_COUNTS) as i32;
         let reference = input.reference as i32;
-        if self.adds {
+        if self.feeds_friction {
             self.follow(state, error, reference, input.sense);
         }
         self.count(state, error, reference, input.sense != 0)
     }
 
-    /// Follows the strokes of the reference, and what is done with what is added.
+    /// Follows the strokes of the reference, and reduces or restores the friction feedforward.
     #[inline(always)]
     fn follow(&self, state: &mut OscillationState, error: i32, reference: i32, sense: i8) {
         state.looks = state.looks.saturating_add(1);
@@ -295,8 +298,8 @@ impl<S: Scalar> Oscillation<S> {
         });
         match state.phase {
             Phase::Watching => {
-                if state.taken > 0 && state.looks >= self.return_looks {
-                    state.taken -= 1;
+                if state.reduced > 0 && state.looks >= self.return_looks {
+                    state.reduced -= 1;
                     state.looks = 0;
                 }
                 if let Some(strokes) = judged
@@ -304,12 +307,12 @@ impl<S: Scalar> Oscillation<S> {
                     && state.patience == 0
                 {
                     state.before = strokes;
-                    state.enter(Phase::Taking);
+                    state.enter(Phase::Reducing);
                 }
             }
-            Phase::Taking => {
-                state.taken = state.taken.saturating_add(self.take).min(STEPS);
-                if state.taken == STEPS {
+            Phase::Reducing => {
+                state.reduced = state.reduced.saturating_add(self.steps_per_look).min(STEPS);
+                if state.reduced == STEPS {
                     state.enter(Phase::Trial);
                 }
             }
@@ -335,15 +338,15 @@ impl<S: Scalar> Oscillation<S> {
                 }
             }
             Phase::Restoring => {
-                state.taken = state.taken.saturating_sub(self.take);
-                if state.taken == 0 {
+                state.reduced = state.reduced.saturating_sub(self.steps_per_look);
+                if state.reduced == 0 {
                     state.enter(Phase::Watching);
                 }
             }
         }
     }
 
-    /// Judges whether what is taken away was the cause, by the strokes that ended.
+    /// Judges by the strokes that ended whether the friction feedforward was the cause.
     fn judge_trial(&self, state: &mut OscillationState, judged: Option<Strokes>) {
         let Some(now) = judged else {
             if state.looks >= self.trial_looks {
@@ -434,10 +437,10 @@ impl OscillationReading {
 }
 
 impl OscillationState {
-    /// True while some of what is added is taken away.
+    /// True while less than all of the friction feedforward acts.
     #[inline(always)]
-    pub fn takes(&self) -> bool {
-        self.taken > 0
+    pub fn is_reduced(&self) -> bool {
+        self.reduced > 0
     }
 
     /// The oscillation that was found last.

@@ -58,9 +58,6 @@ const LARGEST_WAY: f64 = (1u32 << 15) as f64;
 /// Fraction bits of the force of a speed.
 const THROWN_BITS: u32 = 16;
 
-/// What an axis that is turned around takes up at most, over what the settings say.
-const MOST_TURNED: f64 = 1.5;
-
 /// Fraction bits of a speed that a distance does without.
 const DISTANCE_BITS: u32 = 8;
 
@@ -109,6 +106,8 @@ pub struct PlausibilityModel {
     pub sliding_v: f64,
     /// The same of an axis that was turned around, or has not moved, V.
     pub turned_v: f64,
+    /// The largest that is believed of such an axis, whatever it has shown, V.
+    pub most_turned_v: f64,
     /// Voltage with which the law answers a displacement, V/mm, at most.
     pub answer_v_per_mm: f64,
     /// Voltage with which the law answers a speed, V s/mm, at most.
@@ -285,7 +284,7 @@ impl Plausibility {
             stuck: force(model.stuck_v),
             sliding: force(model.sliding_v),
             turned: force(model.turned_v),
-            most_turned: force(MOST_TURNED * model.turned_v),
+            most_turned: force(model.most_turned_v),
             answer: force(model.answer_v_per_mm * resolution_mm),
             answer_to_speed: answer_to_speed as i32,
             turn: way(model.turn_mm),

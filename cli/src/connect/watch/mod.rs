@@ -7,9 +7,11 @@ mod state;
 mod view;
 
 use std::io::{IsTerminal, stdin, stdout};
+use std::thread;
 use std::time::{Duration, Instant};
 
-use anyhow::{Context, bail};
+use anyhow::{Context, bail, ensure};
+use quadrant_cli::terminal;
 use quadrant_sim::client::Client;
 use ratatui::DefaultTerminal;
 use ratatui::crossterm::event::{self, Event, KeyEventKind};
@@ -21,6 +23,8 @@ use super::command::WatchOptions;
 
 /// Time from one picture to the next.
 const PICTURE: Duration = Duration::from_millis(50);
+/// Time from one look for a key to the next.
+const LOOK: Duration = Duration::from_millis(5);
 
 pub(super) fn run(client: &mut Client, options: &WatchOptions) -> anyhow::Result<Answer> {
     if !(stdin().is_terminal() && stdout().is_terminal()) {
@@ -47,7 +51,7 @@ fn live(
         // A real machine's time has passed by itself.
         let ahead = client.now().saturating_sub(machine_began);
         let mut left = ahead.saturating_sub(began.elapsed());
-        while event::poll(left)? {
+        while waits_for_event(left)? {
             if let Event::Key(key) = event::read()?
                 && key.kind != KeyEventKind::Release
                 && watch.press(client, key)? == Going::Leave
@@ -56,6 +60,25 @@ fn live(
             }
             left = ahead.saturating_sub(began.elapsed());
         }
+    }
+}
+
+/// Waits for an event of the terminal; returns false when time is up.
+///
+/// # Errors
+/// A terminal that is gone: crossterm would read it without an end, and the outputs would stay on.
+fn waits_for_event(time: Duration) -> anyhow::Result<bool> {
+    let due = Instant::now() + time;
+    loop {
+        ensure!(terminal::is_there(), "the terminal is gone");
+        if event::poll(Duration::ZERO)? {
+            return Ok(true);
+        }
+        let left = due.saturating_duration_since(Instant::now());
+        if left.is_zero() {
+            return Ok(false);
+        }
+        thread::sleep(left.min(LOOK));
     }
 }
 

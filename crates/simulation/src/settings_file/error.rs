@@ -4,28 +4,17 @@ use std::path::PathBuf;
 
 use quadrant::settings::SettingsError;
 
+use crate::toml_file::TomlFileError;
+
 /// Form of the file; a file of another form is refused.
 pub(super) const FORM: u32 = 1;
 
 /// Reason why a settings file cannot be used, or written.
 #[derive(Debug, thiserror::Error)]
 pub enum SettingsFileError {
-    /// The file cannot be read or written.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// Path of the file.
-        path: PathBuf,
-        /// Cause.
-        source: std::io::Error,
-    },
-    /// It is no TOML, or has no settings.
-    #[error("{}: {source}", path.display())]
-    Syntax {
-        /// Path of the file.
-        path: PathBuf,
-        /// Line and cause.
-        source: Box<toml::de::Error>,
-    },
+    /// The file cannot be read or written, is no TOML, or has no settings.
+    #[error(transparent)]
+    File(#[from] TomlFileError),
     /// It has a setting that there is not.
     #[error("{}: line {line}: there is no setting {setting}; did you mean {meant}?", path.display())]
     Unknown {

@@ -19,6 +19,7 @@ use self::error::FORM;
 pub use self::error::SettingsFileError;
 pub use self::sparse::defaults_at;
 pub use self::uncommissioned::without_law;
+use crate::toml_file::{TomlFileError, text_of};
 
 /// A stage's settings and their origin.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -143,10 +144,8 @@ impl SettingsFile {
         write: impl FnOnce(&Path, String) -> io::Result<()>,
     ) -> Result<(), SettingsFileError> {
         let text = self.text(path)?;
-        write(path, text).map_err(|source| SettingsFileError::Io {
-            path: path.to_owned(),
-            source,
-        })
+        write(path, text).map_err(|source| TomlFileError::io(path, source))?;
+        Ok(())
     }
 
     /// Checks the file and returns its text; `path` is what messages call it.
@@ -191,13 +190,6 @@ impl SettingsFile {
                 source,
             })
     }
-}
-
-fn text_of(path: &Path) -> Result<String, SettingsFileError> {
-    std::fs::read_to_string(path).map_err(|source| SettingsFileError::Io {
-        path: path.to_owned(),
-        source,
-    })
 }
 
 #[cfg(test)]

@@ -15,6 +15,7 @@ use toml::{Table, Value};
 
 use super::error::{self, SettingsFileError};
 use crate::setting_value::meant;
+use crate::toml_file::TomlFileError;
 
 /// Keys of a file beside the settings.
 const FORM: &str = "form";
@@ -213,10 +214,7 @@ pub(super) fn parsed<File: DeserializeOwned>(
     text: &str,
     path: &Path,
 ) -> Result<File, SettingsFileError> {
-    let syntax = |source| SettingsFileError::Syntax {
-        path: path.to_owned(),
-        source: Box::new(source),
-    };
+    let syntax = |source| TomlFileError::syntax(path, source);
     let mut written: Table = toml::from_str(text).map_err(syntax)?;
     let spans = DeTable::parse(text).map_err(syntax)?;
     for (key, _) in spans.get_ref() {
@@ -235,7 +233,7 @@ pub(super) fn parsed<File: DeserializeOwned>(
     }
     let Some(Value::Table(stage)) = written.get(STAGE) else {
         // Its message says what is missing.
-        return toml::from_str(text).map_err(syntax);
+        return Ok(toml::from_str(text).map_err(syntax)?);
     };
     if let Some(count) = axes_of(stage).filter(|count| *count > AxisName::ALL.len()) {
         return Err(SettingsFileError::Axes {
@@ -271,7 +269,7 @@ pub(super) fn parsed<File: DeserializeOwned>(
                 setting: leaf.shown.clone(),
                 reason: error.message().to_owned(),
             },
-            None => syntax(error),
+            None => syntax(error).into(),
         }
     })
 }

@@ -25,6 +25,7 @@ use crate::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, Imperfections,
     MarkParameters, PLANT_ELEMENTS, StageParameters, virgin_curve_elements,
 };
+use crate::toml_file::{TomlFileError, text_of};
 
 /// Travel where it is left out, from where the axis stands, mm.
 const TRAVEL_MM: [f64; 2] = [-200.0, 200.0];
@@ -104,18 +105,9 @@ struct Text {
 /// Reasons for which a stage file cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum StageFileError {
-    /// The file cannot be read.
-    #[error("{}: {source}", path.display())]
-    Io {
-        path: PathBuf,
-        source: std::io::Error,
-    },
-    /// It is no TOML, a name is misspelt, or a value is of the wrong type.
-    #[error("{}: {source}", path.display())]
-    Syntax {
-        path: PathBuf,
-        source: Box<toml::de::Error>,
-    },
+    /// The file cannot be read, is no TOML, has a name that is misspelt, or a value of the wrong type.
+    #[error(transparent)]
+    File(#[from] TomlFileError),
     /// It describes no axis.
     #[error("{}: no axis: begin with a line `[x]`, `[y]` or `[z]`", path.display())]
     Empty { path: PathBuf },
@@ -145,10 +137,7 @@ impl StageFile {
     /// # Errors
     /// A file that cannot be read or understood, or the first number that is refused.
     pub fn read(path: &Path) -> Result<Self, StageFileError> {
-        let text = std::fs::read_to_string(path).map_err(|source| StageFileError::Io {
-            path: path.to_owned(),
-            source,
-        })?;
+        let text = text_of(path)?;
         Self::parse(&text, path)
     }
 
@@ -157,10 +146,8 @@ impl StageFile {
     /// # Errors
     /// As [`read`](Self::read).
     pub fn parse(text: &str, path: &Path) -> Result<Self, StageFileError> {
-        let Text { x, y, z } = toml::from_str(text).map_err(|source| StageFileError::Syntax {
-            path: path.to_owned(),
-            source: Box::new(source),
-        })?;
+        let Text { x, y, z } =
+            toml::from_str(text).map_err(|source| TomlFileError::syntax(path, source))?;
         let mut truth = StageParameters::real();
         let mut known = [None; 3];
         let mut marks = [MarkParameters::default(); 3];

@@ -106,7 +106,12 @@ impl<'a> ConnectedAxis<'a> {
         .map(|signal| Channel::Axis(self.axis.into(), signal));
         let rate_hz = self.client.identity().rate_hz;
         let wanted = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
-        let every = wanted.max(least_decimation(channels.len(), rate_hz));
+        let least = wanted.max(least_decimation(channels.len(), rate_hz));
+        let every = if experiment.injection_v.is_empty() {
+            least
+        } else {
+            dividing(least, rate_hz)
+        };
         let injects = motion.is_none() || experiment.injection_v.iter().any(|volts| *volts != 0.0);
 
         let mut telemetry = TelemetryRecorder::start(self.client, &channels, every)?;
@@ -285,5 +290,37 @@ impl TestAxis for ConnectedAxis<'_> {
 
     fn interrupted(&self) -> Option<&Recording> {
         self.interrupted.as_ref()
+    }
+}
+
+/// Part of a second of which the samples of an injection make a whole number: the usual period of an excitation, s.
+const WHOLE_S: f64 = 0.25;
+
+/// The fewest control ticks between samples, `least` or up to twice as many, of which a whole number make [`WHOLE_S`]; `least` where there
+/// are none.
+fn dividing(least: u16, rate_hz: f64) -> u16 {
+    let whole = (WHOLE_S * rate_hz).round() as u32;
+    (least..=least.saturating_mul(2))
+        .find(|every| whole.is_multiple_of(u32::from(*every)))
+        .unwrap_or(least)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::dividing;
+
+    #[test]
+    fn samples_of_an_injection_make_a_whole_period_of_the_usual_excitation() {
+        for (least, rate_hz, every) in [
+            (1, 2e3, 1),
+            (2, 1e4, 2),
+            (3, 2e4, 4),
+            (3, 1e4, 4),
+            (7, 4e4, 8),
+            // No number from 3 to 6 divides it.
+            (3, 4.0 * 2503.0, 3),
+        ] {
+            assert_eq!(dividing(least, rate_hz), every, "{least} at {rate_hz} Hz");
+        }
     }
 }

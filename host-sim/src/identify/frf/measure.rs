@@ -289,7 +289,7 @@ fn in_samples(
         return Err(SettingError {
             field: "period",
             value: period as f64 / rate_hz,
-            expected: "it must be a whole number of the samples that the test_axis records",
+            expected: "it must be a whole number of the samples that are recorded",
         });
     }
     let (_, high) = excitation.band_hz;
@@ -368,7 +368,7 @@ fn pass(
         max_jerk_mm_s3: JERK_MM_S3,
     };
     let experiment = Experiment {
-        name: format!("frequency response at {} mm/s", direction * speed),
+        name: format!("frequency response at {:.2} mm/s", direction * speed),
         drive: Drive::ClosedLoop(MotionSettings::PointToPoint(motion)),
         injection_v: settings.excitation.samples(rate_hz, excited),
         decimation: 1,

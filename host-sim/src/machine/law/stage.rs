@@ -10,16 +10,14 @@ use crate::machine::interface::Machine;
 use crate::machine::stage_setup::{BUILT_IN_STAGE, StageSetup};
 use crate::machine::test_axis::TestAxis;
 use crate::machine::travel::Travel;
-use crate::plant::{MarkParameters, StageParameters};
 use crate::settings_file::without_law;
 use crate::stage_file::StageFile;
 
 /// The simulated stage, with everything a real one has, under the control law alone.
 #[derive(Clone, Debug)]
 pub struct LawStage {
-    truth: StageParameters,
+    setup: StageSetup,
     seed: u64,
-    settings: StageSettings,
     travel: [Travel; 3],
     description: String,
 }
@@ -28,9 +26,8 @@ impl LawStage {
     /// A stage on the default settings; `seed` decides its noise.
     pub fn new(seed: u64) -> Self {
         Self {
-            truth: StageParameters::real(),
+            setup: StageSetup::commissioned(),
             seed,
-            settings: StageSettings::simulated(),
             travel: [Travel::either_way(TRAVEL_MM); 3],
             description: BUILT_IN_STAGE.to_owned(),
         }
@@ -38,13 +35,9 @@ impl LawStage {
 
     /// A stage of one's own, which nobody has commissioned.
     pub fn of(file: &StageFile, seed: u64) -> Self {
-        let StageSetup {
-            settings, truth, ..
-        } = StageSetup::of(file);
         Self {
-            truth,
+            setup: StageSetup::of(file),
             seed,
-            settings,
             travel: file.known.map(|known| {
                 known.map_or(Travel::either_way(TRAVEL_MM), |known| {
                     Travel::between(known.travel_mm)
@@ -58,16 +51,7 @@ impl LawStage {
     /// travels.
     #[must_use]
     pub fn started_with(mut self, settings: &StageSettings) -> Self {
-        let setup = StageSetup {
-            settings: self.settings,
-            truth: self.truth,
-            marks: [MarkParameters::default(); 3],
-        };
-        StageSetup {
-            settings: self.settings,
-            truth: self.truth,
-            ..
-        } = setup.started_with(settings);
+        self.setup = self.setup.started_with(settings);
         for (travel, axis) in self.travel.iter_mut().zip(&settings.axes) {
             if let Some(limits) = axis.limits.travel_mm {
                 *travel = Travel::between([limits.negative, limits.positive]);
@@ -81,8 +65,8 @@ impl LawStage {
     pub fn with_law_of(mut self, axis: AxisName) -> Self {
         for other in AxisName::ALL.into_iter().filter(|other| *other != axis) {
             without_law(
-                &mut self.settings.axes[other as usize],
-                self.settings.rate_hz,
+                &mut self.setup.settings.axes[other as usize],
+                self.setup.settings.rate_hz,
             );
         }
         self
@@ -104,7 +88,7 @@ impl Machine for LawStage {
     }
 
     fn settings(&mut self) -> Result<StageSettings, MachineError> {
-        Ok(self.settings.clone())
+        Ok(self.setup.settings.clone())
     }
 
     fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
@@ -117,15 +101,16 @@ impl Machine for LawStage {
         axis: AxisName,
         travel: Travel,
     ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
-        let truth = self.truth.axes[axis as usize].clone();
-        let test_axis = SimulatedTestAxis::under(&self.settings, axis as usize, truth, self.seed)
-            .with_travel(travel);
+        let truth = self.setup.truth.axes[axis as usize].clone();
+        let test_axis =
+            SimulatedTestAxis::under(&self.setup.settings, axis as usize, truth, self.seed)
+                .with_travel(travel);
         Ok(Box::new(test_axis))
     }
 
     fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
         settings.validate(FIRMWARE_ELEMENTS)?;
-        self.settings.copy_from(settings);
+        self.setup.settings.copy_from(settings);
         Ok(())
     }
 
