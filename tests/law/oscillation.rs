@@ -381,6 +381,10 @@ fn a_hum_that_ends_and_begins_again_is_reported_again() {
     bench.shaken = (0.3, 120.0);
     bench.run(3.0);
     assert_eq!(bench.found().number, 2);
+    // Its number is kept with the outputs off: an event is not reported twice.
+    bench.command(Command::Disable);
+    bench.run(0.1);
+    assert_eq!(bench.found().number, 2);
 }
 
 /// The monitor alone, shown strokes of a way and of a swing of the error, in counts, that take 50 ms each.

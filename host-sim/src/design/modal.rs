@@ -33,6 +33,8 @@ pub struct ModalDesign {
 const SHIFTS: [f64; 3] = [1.0, 0.95, 1.05];
 /// Bounds of the peaks for shifted modes, over those for the modes as they are.
 const SHIFTED: f64 = 1.25;
+/// Largest Ki Kd / Kp^2: with more, friction on the other side of a soft spring makes a limit cycle, which no linear bound shows.
+const MOST_INTEGRAL: f64 = 0.3;
 /// Frequencies about each mode, in its widths.
 const ABOUT_A_MODE: [f64; 11] = [0.0, 0.3, 0.6, 1.0, 1.5, 2.2, 3.3, 5.0, 8.0, 13.0, 20.0];
 /// Share by which a filter must lower the error.
@@ -159,7 +161,7 @@ fn search(
         let wider = if shift == 1.0 { 1.0 } else { SHIFTED };
         (process, wider * (1.0 - tighter), about)
     });
-    Search::new(&processes, form, filter_s)
+    Search::new(&processes, form, filter_s).with_integral_within(MOST_INTEGRAL)
 }
 
 /// Frequencies about a mode and its antiresonance, Hz.

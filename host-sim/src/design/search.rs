@@ -62,6 +62,8 @@ struct Table {
 pub(super) struct Search {
     filter_s: f64,
     tables: Vec<Table>,
+    /// Largest Ki Kd / Kp^2.
+    most_integral: f64,
 }
 
 /// A PID of the search.
@@ -97,7 +99,19 @@ impl Search {
                 wider: *wider,
             })
             .collect();
-        Self { filter_s, tables }
+        Self {
+            filter_s,
+            tables,
+            most_integral: INTEGRAL_RATIOS.1,
+        }
+    }
+
+    /// The same with no more than so much integral action, Ki Kd / Kp^2.
+    pub(super) fn with_integral_within(self, most_integral: f64) -> Self {
+        Self {
+            most_integral,
+            ..self
+        }
     }
 
     /// The best PID; none where no loop keeps the bounds.
@@ -109,7 +123,8 @@ impl Search {
             .into_par_iter()
             .flat_map_iter(|index| {
                 let ratio_s = at(RATIOS_S, index / INTEGRALS, RATIOS);
-                let integral = at(INTEGRAL_RATIOS, index % INTEGRALS, INTEGRALS);
+                let range = (INTEGRAL_RATIOS.0, self.most_integral);
+                let integral = at(range, index % INTEGRALS, INTEGRALS);
                 self.largest(&PidGains {
                     kp_v_per_mm: 1.0,
                     ki_v_per_mm_s: integral / ratio_s,
@@ -170,7 +185,10 @@ impl Search {
 
     /// The logarithm of the error after a step of the load, and the price of what exceeds a bound.
     fn cost_of(&self, gains: &PidGains) -> f64 {
-        let (mut excess, mut squares) = (1.0_f64, 0.0);
+        let integral =
+            gains.ki_v_per_mm_s * gains.kd_v_s_per_mm / (gains.kp_v_per_mm * gains.kp_v_per_mm);
+        let mut excess = (integral / self.most_integral).max(1.0).powi(2);
+        let mut squares = 0.0;
         for (index, table) in self.tables.iter().enumerate() {
             let mut before: Option<(f64, f64)> = None;
             let loops = table.rows.iter().map(|row| row.open_loop(gains));

@@ -439,7 +439,8 @@ fn the_plainest_model_of_an_axis_with_coulomb_friction_or_none_is_recommended() 
         } = &best.model;
         let friction = friction.positive;
         assert!(
-            (inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.05,
+            // Without a dead time it takes none, also not half of the hold of 2 ms: as the published model of EMPS is fitted.
+            (inertia_v_s2_per_mm / 2e-5 - 1.0).abs() < 0.12,
             "{inertia_v_s2_per_mm}"
         );
         assert!(

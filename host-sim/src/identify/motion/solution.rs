@@ -57,7 +57,8 @@ impl Solution {
                 Some(known_s) => known_s,
                 None if structure.dead_time => values[0],
                 // A held voltage is late by half its hold, whatever the axis is.
-                None => regression.hold_s(),
+                None if structure.sliding => regression.hold_s(),
+                None => 0.0,
             };
             let velocity = values.last().copied().filter(|_| structure.stribeck);
             (dead_time_s, velocity.unwrap_or(start * fastest))
