@@ -23,8 +23,9 @@ pub(super) struct Arguments {
     /// programs delimiter, decimal comma, lines before the header and a row of units are guessed, and said.
     #[arg(value_name = "FILE", required = true)]
     files: Vec<PathBuf>,
-    /// Columns to draw, by name, separated by commas; without it those that every file has. time=NAME:UNIT names the column of the time,
-    /// if it is not t_s; so do position, reference, voltage and injection, which are then drawn in mm and V as position_mm and so on.
+    /// Columns to draw, by name, separated by commas; without it those that every file has. The column of the time is named by
+    /// time=NAME:UNIT, if it is not t_s; so are position, reference, voltage and injection, which are then drawn in mm and V as
+    /// position_mm and so on.
     #[arg(long, value_name = "NAME,...", value_delimiter = ',')]
     columns: Vec<String>,
     /// Time from which it is drawn, s.
