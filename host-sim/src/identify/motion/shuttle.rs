@@ -68,20 +68,11 @@ pub fn shuttle(
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((index as f64 + share) / motions.len() as f64);
         })?;
-        join(&mut joined, recording);
+        joined.sample_time_s = recording.sample_time_s;
+        joined.reference_mm.extend(recording.reference_mm);
+        joined.position_mm.extend(recording.position_mm);
+        joined.voltage_v.extend(recording.voltage_v);
+        joined.injection_v.extend(recording.injection_v);
     }
     Ok(joined)
-}
-
-/// Joins a recording to those before. The axis creeps while its outputs are off in between: by as much is it shifted, so that the position
-/// does not jump.
-fn join(joined: &mut Recording, next: Recording) {
-    let ends = joined.position_mm.last().zip(next.position_mm.first());
-    let crept_mm = ends.map_or(0.0, |(end, start)| start - end);
-    let shifted = |values: Vec<f64>| values.into_iter().map(move |value| value - crept_mm);
-    joined.sample_time_s = next.sample_time_s;
-    joined.reference_mm.extend(shifted(next.reference_mm));
-    joined.position_mm.extend(shifted(next.position_mm));
-    joined.voltage_v.extend(next.voltage_v);
-    joined.injection_v.extend(next.injection_v);
 }
