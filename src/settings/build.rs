@@ -42,7 +42,7 @@ const HELD_FRICTIONS: f64 = 0.65;
 const STUCK_FRICTIONS: f64 = 0.75;
 const SLIDING_FRICTIONS: f64 = 1.0;
 const TURNED_FRICTIONS: f64 = 3.0;
-/// What an axis that is turned around takes up at most, over what the settings say.
+/// Largest voltage that an axis takes up when it is turned around, over that of the settings.
 const MOST_TURNED: f64 = 1.5;
 /// Voltage with which the law answers a displacement, over its proportional gain: the integral's answer comes to it.
 const ANSWER_ERROR: f64 = 3.0;

@@ -117,7 +117,7 @@ fn fit(mut axis: Lone<f32>) -> Result<Fit, FaultCode> {
             .sum();
         right += row * (output / (SPAN * SPAN) as f64);
     }
-    let found = normal.lu().solve(&right).expect("a sine tells them apart");
+    let found = normal.lu().solve(&right).expect("a sine separates them");
     Ok(Fit {
         gain: 1.0 / found[0] / plant.gain_mm_per_v_s2,
         damping: found[1] / found[0] / plant.damping_per_s,

@@ -637,6 +637,18 @@ mod tests {
         cut_at: Option<&'static str>,
     }
 
+    impl Spoilt {
+        /// A stage on which no law is better than the PID.
+        fn new() -> Self {
+            Self {
+                stage: LawStage::new(1),
+                dead: false,
+                deaf: false,
+                cut_at: None,
+            }
+        }
+    }
+
     impl Machine for Spoilt {
         fn description(&self) -> String {
             self.stage.description()
@@ -755,12 +767,7 @@ mod tests {
     #[test]
     fn where_nothing_beats_the_pid_it_fails_and_its_settings_are_in_the_folder_of_the_axis() {
         let folder = tempfile::tempdir().unwrap();
-        let mut machine = Spoilt {
-            stage: LawStage::new(1),
-            dead: false,
-            deaf: false,
-            cut_at: None,
-        };
+        let mut machine = Spoilt::new();
         let before = machine.settings().unwrap();
         let done = commission_into(folder.path(), &mut machine).unwrap();
         let kept = folder.path().join("x").join(PID_ALONE);
@@ -778,11 +785,9 @@ mod tests {
      {
         let folder = tempfile::tempdir().unwrap();
         let mut machine = Spoilt {
-            stage: LawStage::new(1),
             // Whatever is measured would be an error of its own.
             dead: true,
-            deaf: false,
-            cut_at: None,
+            ..Spoilt::new()
         };
         let before = machine.settings().unwrap();
         let mut said = |change: fn(&mut StageSettings)| {
@@ -809,10 +814,8 @@ mod tests {
     fn nothing_is_to_be_resumed_where_nothing_was_measured() {
         let folder = tempfile::tempdir().unwrap();
         let mut machine = Spoilt {
-            stage: LawStage::new(1),
             dead: true,
-            deaf: false,
-            cut_at: None,
+            ..Spoilt::new()
         };
         let error = commission_into(folder.path(), &mut machine).err().unwrap();
         let said = quadrant_cli::explained(&error);
@@ -825,10 +828,8 @@ mod tests {
     fn what_was_interrupted_is_resumed_with_the_same_options_alone_and_what_has_ended_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let mut machine = Spoilt {
-            stage: LawStage::new(1),
-            dead: false,
-            deaf: false,
             cut_at: Some("frequency response"),
+            ..Spoilt::new()
         };
         let said = |outcome: anyhow::Result<Done>| match outcome {
             Ok(_) => String::new(),
@@ -890,10 +891,9 @@ mod tests {
         for dead in [false, true] {
             let folder = tempfile::tempdir().unwrap();
             let mut machine = Spoilt {
-                stage: LawStage::new(1),
                 dead,
                 deaf: true,
-                cut_at: None,
+                ..Spoilt::new()
             };
             let error = commission_into(folder.path(), &mut machine).err().unwrap();
             let said = quadrant_cli::explained(&error);
@@ -917,10 +917,8 @@ mod tests {
         std::fs::create_dir_all(out.join("x/experiments")).unwrap();
         std::fs::create_dir(&elsewhere).unwrap();
         let mut machine = Spoilt {
-            stage: LawStage::new(1),
             dead: true,
-            deaf: false,
-            cut_at: None,
+            ..Spoilt::new()
         };
         let mut refused = || {
             let error = commission_into(&out, &mut machine).err().unwrap();

@@ -11,11 +11,9 @@ use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
-use super::search::Search;
 pub use super::search::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
+use super::search::{Search, TIGHTER};
 
-/// Shares by which the search keeps away from its bounds, in turn until the loop keeps them: its frequencies may miss a peak.
-pub(super) const TIGHTER: [f64; 4] = [0.0002, 0.001, 0.005, 0.02];
 /// Band over which a disturbance counts, Hz, and the frequencies in it.
 const BAND_HZ: (f64, f64) = (0.1, 2000.0);
 const FREQUENCIES: usize = 400;
@@ -27,16 +25,8 @@ const FREQUENCIES: usize = 400;
 /// As [`design_pid`]: a process that allows no such loop.
 pub fn best_pid(process: &Process, form: Form, filter_s: f64) -> Result<PidDesign, DesignError> {
     let kept = |tighter: f64| {
-        let search = Search::new(
-            &[(process.clone(), 1.0 - tighter, Vec::new())],
-            form,
-            filter_s,
-        );
-        let gains = search.best()?.gains;
-        let margins = process.margins(&gains, form).ok()?;
-        let keeps = margins.sensitivity_peak <= SENSITIVITY_PEAK
-            && margins.complementary_peak <= COMPLEMENTARY_PEAK;
-        keeps.then_some(PidDesign { gains, margins })
+        let processes = [(process.clone(), 1.0 - tighter, Vec::new())];
+        Search::new(&processes, form, filter_s).kept(process, form)
     };
     let best = TIGHTER.into_iter().find_map(kept);
     // The stiffest loop says what stands in the way.

@@ -10,12 +10,11 @@ use quadrant::control::pid::PidGains;
 use quadrant::control::plant_model::PlantModel;
 use quadrant::control::popov::filtered_sector_bound;
 
-use super::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TIGHTER};
 use super::form::Form;
 use super::margins::Margins;
-use super::pid::DesignError;
+use super::pid::{DesignError, PidDesign};
 use super::process::Process;
-use super::search::Search;
+use super::search::{Search, TIGHTER};
 use crate::identify::mode::Mode;
 
 /// A PID, its filters, and what they achieve.
@@ -56,7 +55,7 @@ pub fn modal_pid(
     form: Form,
     filter_s: f64,
 ) -> Result<ModalDesign, DesignError> {
-    let mut best: Option<(f64, PidGains, Vec<FilterSettings>)> = None;
+    let mut best: Option<(f64, Vec<FilterSettings>)> = None;
     for filters in candidates(modes, form) {
         let search = search(plant, modes, &filters, form, filter_s, TIGHTER[0]);
         if let Some(found) = search.best()
@@ -64,7 +63,7 @@ pub fn modal_pid(
         {
             let counted = found.cost + WORTH * filters.len() as f64;
             if best.as_ref().is_none_or(|(least, ..)| counted < *least) {
-                best = Some((counted, found.gains, filters));
+                best = Some((counted, filters));
             }
         }
     }
@@ -74,7 +73,7 @@ pub fn modal_pid(
             .map(|mode| mode.frequency_hz)
             .fold(f64::INFINITY, f64::min),
     };
-    let (_, _, filters) = best.ok_or_else(refused)?;
+    let (_, filters) = best.ok_or_else(refused)?;
     let process = Process::Modelled {
         plant: *plant,
         modes: modes.to_vec(),
@@ -82,12 +81,9 @@ pub fn modal_pid(
     };
     let kept = |tighter: f64| {
         let search = search(plant, modes, &filters, form, filter_s, tighter);
-        let gains = search.best()?.gains;
-        let margins = process.margins(&gains, form).ok()?;
-        let keeps = margins.sensitivity_peak <= SENSITIVITY_PEAK
-            && margins.complementary_peak <= COMPLEMENTARY_PEAK
-            && form.is_accepted(plant, &gains, &filters);
-        keeps.then(|| ModalDesign {
+        let PidDesign { gains, margins } = search.kept(&process, form)?;
+        let accepted = form.is_accepted(plant, &gains, &filters);
+        accepted.then(|| ModalDesign {
             circle_bound: search.circle_bound(&gains),
             gains,
             filters: filters.clone(),
@@ -179,6 +175,7 @@ fn frequencies_about(mode: &Mode) -> Vec<f64> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::search::SENSITIVITY_PEAK;
     use super::*;
     use crate::design::best_pid;
     use crate::design::fixtures::{FILTER_S, X_PLANT};

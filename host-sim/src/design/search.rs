@@ -15,11 +15,14 @@ use rayon::prelude::*;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
+use super::pid::PidDesign;
 use super::process::Process;
 
 /// Bounds on the peaks of `|S|` and `|T|`: usual ones (Åström and Hägglund, *Advanced PID Control*, 2006, ch. 7).
 pub const SENSITIVITY_PEAK: f64 = 1.7;
 pub const COMPLEMENTARY_PEAK: f64 = 1.5;
+/// Shares by which a search keeps away from its bounds, in turn until the loop keeps them.
+pub(super) const TIGHTER: [f64; 4] = [0.0002, 0.001, 0.005, 0.02];
 /// Ratios Kd/Kp, s, and ratios Ki/Kp over the inverse of that, of the grid.
 const RATIOS_S: (f64, f64) = (3e-5, 0.3);
 const RATIOS: usize = 28;
@@ -141,6 +144,15 @@ impl Search {
             .min_by(Found::compared)
     }
 
+    /// The best PID, if its exact margins on a process keep the bounds: the frequencies of the search may miss a peak.
+    pub(super) fn kept(&self, process: &Process, form: Form) -> Option<PidDesign> {
+        let gains = self.best()?.gains;
+        let margins = process.margins(&gains, form).ok()?;
+        let keeps = margins.sensitivity_peak <= SENSITIVITY_PEAK
+            && margins.complementary_peak <= COMPLEMENTARY_PEAK;
+        keeps.then_some(PidDesign { gains, margins })
+    }
+
     fn found(&self, gains: PidGains) -> Found {
         let cost = self.cost_of(&gains);
         Found { gains, cost }
@@ -191,9 +203,9 @@ impl Search {
         let mut squares = 0.0;
         for (index, table) in self.tables.iter().enumerate() {
             let mut before: Option<(f64, f64)> = None;
-            let loops = table.rows.iter().map(|row| row.open_loop(gains));
             let mut winding = Winding::default();
-            for (row, open) in table.rows.iter().zip(loops) {
+            for row in &table.rows {
+                let open = row.open_loop(gains);
                 winding.pass(open);
                 let distance = (open + 1.0).norm_sqr().max(f64::MIN_POSITIVE);
                 let sensitivity = (SENSITIVITY_PEAK * SENSITIVITY_PEAK * distance).recip();

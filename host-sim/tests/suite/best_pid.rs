@@ -1,4 +1,4 @@
-//! The best PID, held against an optimiser of another kind (CMA-ES) on plants that are drawn.
+//! The best PID, compared with what an optimiser of another kind (CMA-ES) finds on plants that are drawn.
 
 use cmaes::{CMAESOptions, DVector};
 use quadrant::control::pid::PidGains;

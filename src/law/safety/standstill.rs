@@ -1,4 +1,4 @@
-//! Whether an axis stands while its outputs are off, by an encoder that may be noisy.
+//! The judgement that an axis stands while its outputs are off, by an encoder that may be noisy.
 //!
 //! The measured speed is filtered over 8 ticks. Noise of three counts RMS leaves 0.4 counts per tick of it, which is more than a slow
 //! motion makes. Noise changes that speed up and down from tick to tick; a motion, and a jump that the filter forgets, change it one way. So
