@@ -246,7 +246,7 @@ fn refuse_faster(stage: &StageSettings, sines: &Sines) -> anyhow::Result<()> {
 }
 
 /// Lines of the reversal's plot.
-const PLOT_LINES: usize = 6;
+const PLOT_LINES: usize = 4;
 /// Most characters of its width.
 const PLOT_WIDTH: usize = 80;
 
@@ -279,7 +279,6 @@ fn show(glance: &Glance, subject: &Subject, output: &Output) -> anyhow::Result<(
     for line in plot::beside(&curves, width, PLOT_LINES) {
         say!("{line}");
     }
-    say!();
     Ok(())
 }
 

@@ -101,7 +101,7 @@ impl Output {
     /// Writes a table where CSV is wanted, and prints it.
     pub fn table(&self, table: &Table) -> anyhow::Result<()> {
         self.keep_table(table)?;
-        say!("{}\n", table.to_text(terminal::output_width()));
+        say!("{}", table.to_text(terminal::output_width()));
         Ok(())
     }
 

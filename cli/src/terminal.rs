@@ -52,9 +52,15 @@ fn width(of: &impl std::os::windows::io::AsHandle) -> usize {
     terminal_size::terminal_size_of(of).map_or(WIDTH, |(width, _)| width.0.into())
 }
 
-/// Prints to standard output, unless that has failed before.
+/// Prints to standard output, unless that has failed before; long lines of prose are folded on a terminal.
 pub fn print(what: Arguments<'_>) {
-    to_output(|out| write_plain(out, what));
+    let out = io::stdout();
+    if out.is_terminal() {
+        let text = folded(&what.to_string(), width(&out));
+        to_output(|out| write_plain(out, format_args!("{text}")));
+    } else {
+        to_output(|out| write_plain(out, what));
+    }
 }
 
 /// Empties the terminal that standard output is.
@@ -74,24 +80,21 @@ fn to_output(write: impl FnOnce(&mut StdoutLock<'static>) -> io::Result<()>) {
 
 /// Prints to standard error, if that can be.
 pub fn print_error(what: Arguments<'_>) {
-    let text = what.to_string();
-    let width = match io::stderr().is_terminal() {
-        true => error_width(),
-        false => 0,
+    let text = match io::stderr().is_terminal() {
+        true => folded(&what.to_string(), error_width()),
+        false => what.to_string(),
     };
-    // There is nowhere left to tell it.
-    let _ = write_plain(
-        &mut io::stderr().lock(),
-        format_args!("{}", folded(&text, width)),
-    );
+    // If this fails, there is nowhere left to say so.
+    let _ = write_plain(&mut io::stderr().lock(), format_args!("{text}"));
 }
 
-/// A text whose long lines are broken between words; not those that are indented, which are to be copied, nor any where the width is not
-/// known.
+/// A text whose long lines of prose are broken between words. Commands to be copied (indented), rows of tables (two spaces in
+/// a row) and data (JSON) stay whole.
 fn folded(text: &str, width: usize) -> String {
     let lines = text.split_inclusive('\n').map(|line| {
         let bare = line.trim_end_matches('\n');
-        if width == 0 || line.starts_with(' ') || bare.chars().count() <= width {
+        let whole = line.starts_with([' ', '{', '[']) || bare.contains("  ");
+        if whole || bare.chars().count() <= width {
             return line.to_owned();
         }
         wrapped(bare, width).join("\n") + &line[bare.len()..]
@@ -231,11 +234,13 @@ mod tests {
     use super::{folded, write_plain};
 
     #[test]
-    fn a_long_line_is_broken_between_words_unless_it_is_to_be_copied_or_the_width_is_not_known() {
+    fn a_long_line_of_prose_is_broken_between_words_and_what_is_to_be_copied_stays_whole() {
         let text = "error: the axis stands\n    quadrant commission --axis x\n\nshort\n";
         let expected = "error: the axis\nstands\n    quadrant commission --axis x\n\nshort\n";
         assert_eq!(folded(text, 16), expected);
-        assert_eq!(folded(text, 0), text);
+        for whole in ["axis  homed  follows\n", "{\"command\": \"status\"}\n"] {
+            assert_eq!(folded(whole, 16), whole);
+        }
     }
 
     #[test]

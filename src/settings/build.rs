@@ -26,8 +26,8 @@ use crate::law::scalar::Scalar;
 use crate::law::stage::{Plan, Stage};
 use crate::law::units::{DacCode, Position};
 
-/// Counts that a step of an axis may have however slow: noise of a count RMS makes up to six in the difference of two readings.
-const LEAST_STEP_COUNTS: i32 = 8;
+/// Counts that a step of an axis may have however slow: noise of 3 counts RMS makes up to 26 in the difference of two readings.
+const LEAST_STEP_COUNTS: i32 = 32;
 /// Counts that an axis shows for certain: those of one dead line, and noise; and what friction takes up before it yields by
 /// them, over what the settings say, at most.
 const HELD_COUNTS: f64 = 5.0;

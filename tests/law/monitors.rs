@@ -152,12 +152,12 @@ fn fault_of_a_slow_axis(counts: i32) -> Option<FaultCode> {
 }
 
 #[test]
-fn noise_of_a_count_is_no_jump_of_an_axis_however_slow() {
-    // Six counts in the difference of two readings are four times its standard deviation.
-    for counts in [1, -1, 6, -6] {
+fn noise_of_three_counts_is_no_jump_of_an_axis_however_slow() {
+    // 26 counts in the difference of two readings are six times its standard deviation.
+    for counts in [1, -1, 26, -26] {
         assert_eq!(fault_of_a_slow_axis(counts), None, "{counts}");
     }
-    for counts in [12, -12] {
+    for counts in [40, -40] {
         let fault = fault_of_a_slow_axis(counts);
         assert_eq!(fault, Some(FaultCode::EncoderJump), "{counts}");
     }

@@ -8,7 +8,7 @@ use quadrant::store::PROVENANCE_BYTES;
 use quadrant_sim::client::settings::{self, Before, Difference, whole_path};
 use quadrant_sim::client::{Client, ClientError};
 use quadrant_sim::report::whole;
-use quadrant_sim::setting_value::{meant, short};
+use quadrant_sim::setting_value::{meant, short, shown};
 use quadrant_sim::settings_file::{Provenance, SettingsFile};
 use serde_json::{Map, Value, json};
 
@@ -98,13 +98,14 @@ pub(super) fn diff(client: &mut Client, file: Option<&Path>) -> anyhow::Result<A
 
 /// A setting with the value that acts, and the other one.
 pub(super) fn difference_line(difference: &Difference) -> String {
-    let shown = |value: &Option<Value>| value.as_ref().map_or("-".to_owned(), Value::to_string);
+    let json = |value: &Option<Value>| value.as_ref().map_or("-".to_owned(), Value::to_string);
     let Difference {
         path,
         acting,
         other,
     } = difference;
-    format!("{path} {} -> {}", shown(acting), shown(other))
+    let [acting, other] = shown(&json(acting), &json(other));
+    format!("{path} {acting} -> {other}")
 }
 
 pub(super) fn dump(client: &mut Client, file: &Path, overwrite: bool) -> anyhow::Result<Answer> {

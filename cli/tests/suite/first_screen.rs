@@ -3,14 +3,15 @@
 use crate::command;
 
 #[test]
-fn the_result_is_a_sentence_a_small_table_and_a_reversal_within_eighty_columns() {
+fn the_result_is_a_sentence_a_small_table_and_a_reversal_on_one_screen_of_80_by_24() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let shown = command::succeed(at, &[]);
     for line in shown.lines() {
         assert!(line.chars().count() <= 80, "{line}\n{shown}");
     }
-    assert!(shown.lines().count() <= 30, "{shown}");
+    // The prompt needs the last line.
+    assert!(shown.lines().count() <= 23, "{shown}");
     let mut parts = shown.split("\n\n");
     let sentence: Vec<&str> = parts.next().unwrap().split_whitespace().collect();
     let sentence = sentence.join(" ");

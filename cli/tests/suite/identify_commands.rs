@@ -281,6 +281,19 @@ fn a_motion_record_is_saved_read_again_and_put_into_settings() {
     assert!(fail(at, &cascade).contains("--cascade-kv"));
 }
 
+/// An axis without a counterweight creeps while its outputs are off between the moves.
+#[test]
+fn the_motion_that_is_recorded_of_any_axis_is_read_again() {
+    for axis in ["x", "y"] {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let words = ["motion", "--axis", axis, "--rounds", "1", "--out", "a"];
+        succeed(at, &words);
+        let words = ["motion", "--record", "a/motion-recording.csv", "--out", "b"];
+        succeed(at, &words);
+    }
+}
+
 /// The share of the voltage that the last line says is explained, %.
 fn explained_percent(said: &str) -> f64 {
     let line = said.lines().last().unwrap();

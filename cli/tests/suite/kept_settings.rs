@@ -5,7 +5,7 @@ use std::path::Path;
 use crate::command::{fail, succeed};
 use quadrant::settings::StageSettings;
 use quadrant_sim::report::whole;
-use quadrant_sim::setting_value::{Change, changes};
+use quadrant_sim::setting_value::changes;
 use quadrant_sim::settings_file::SettingsFile;
 
 /// The file in which a commissioning leaves its settings by default.
@@ -38,15 +38,13 @@ fn assert_keeps(command: &str, meant: &[&str]) {
     let after = SettingsFile::read(&folder.path().join(LEFT)).unwrap();
     let changed = changes(&before.stage, &after.stage);
     assert!(!changed.is_empty(), "{command}");
-    for Change { path, old, new } in changed {
+    for change in changed {
+        let path = &change.path;
         let is_meant = |prefix: &&str| path.starts_with(*prefix);
+        assert!(meant.iter().any(is_meant), "{command}: {change}");
         assert!(
-            meant.iter().any(is_meant),
-            "{command}: {path}: {old} -> {new}"
-        );
-        assert!(
-            said.contains(&format!("{path}: {old} -> {new}\n")),
-            "{command}: {path}: {old} -> {new}\n{said}"
+            said.contains(&format!("{change}\n")),
+            "{command}: {change}\n{said}"
         );
     }
     let kept = &after.provenance[..after.provenance.len() - 1];

@@ -35,7 +35,7 @@ fn the_example_says_what_its_axis_gains_within_eighty_columns() {
     assert!(shown.lines().count() <= 34, "{shown}");
     for part in [
         "commissioned on the x axis of mine.toml, takes",
-        "% off the largest error that the best PID leaves",
+        "% off the best PID's largest error",
         "commissioned: N-PID",
         "friction identified from experiments",
         "quadrant-out/mine-x-settings.toml",

@@ -122,7 +122,29 @@ pub struct Change {
 impl core::fmt::Display for Change {
     fn fmt(&self, f: &mut core::fmt::Formatter<'_>) -> core::fmt::Result {
         let Self { path, old, new } = self;
+        let [old, new] = shown(old, new);
         write!(f, "{path}: {old} -> {new}")
+    }
+}
+
+/// Two values of a setting, as JSON, for a person: numbers in seven digits, or in all where those do not differ.
+pub fn shown(old: &str, new: &str) -> [String; 2] {
+    let brief = [old, new].map(brief);
+    match brief[0] == brief[1] {
+        true => [old, new].map(str::to_owned),
+        false => brief,
+    }
+}
+
+fn brief(json: &str) -> String {
+    match (json, json.parse::<f64>()) {
+        ("null", _) => "absent".to_owned(),
+        ("\"present\"", _) => "present".to_owned(),
+        (_, Ok(number)) => match format!("{number:.6e}").parse::<f64>() {
+            Ok(rounded) => rounded.to_string(),
+            Err(_) => json.to_owned(),
+        },
+        _ => json.to_owned(),
     }
 }
 
@@ -193,6 +215,14 @@ mod tests {
     }
 
     #[test]
+    fn numbers_are_shown_in_as_many_digits_as_they_differ_in() {
+        assert_eq!(shown("0.1", "1.3301234567890123"), ["0.1", "1.330123"]);
+        let close = ["1.3301234567890123", "1.3301234567890125"];
+        assert_eq!(shown(close[0], close[1]), close);
+        assert_eq!(shown("-", "[1.0,2.0]"), ["-", "[1.0,2.0]"]);
+    }
+
+    #[test]
     fn what_differs_is_shown_by_the_short_path_with_both_values() {
         let before = StageSettings::simulated();
         let mut after = before.clone();
@@ -203,9 +233,9 @@ mod tests {
             .iter()
             .map(ToString::to_string)
             .collect();
-        assert_eq!(shown[0], "rate_hz: 10000.0 -> 5000.0");
+        assert_eq!(shown[0], "rate_hz: 10000 -> 5000");
         assert!(
-            shown.contains(&"y/plant: \"present\" -> null".to_owned()),
+            shown.contains(&"y/plant: present -> absent".to_owned()),
             "{shown:?}"
         );
         assert!(

@@ -830,6 +830,7 @@ mod tests {
             position_mm: times.map(error).collect(),
             voltage_v: vec![0.0; 2000],
             injection_v: vec![0.0; 2000],
+            parts: Vec::new(),
         }
     }
 

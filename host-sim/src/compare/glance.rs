@@ -71,10 +71,7 @@ fn sentence(comparison: &Comparison, subject: &Subject) -> String {
         .map(|configuration| largest_um(comparison, configuration, &subject.sines));
     let change = mean_change_percent(&alone, &fed);
     let effect = if change < 0.0 {
-        format!(
-            "takes {:.0} % off the largest error that the best PID leaves",
-            -change
-        )
+        format!("takes {:.0} % off the best PID's largest error", -change)
     } else {
         format!("does not help here: the largest error is {change:.0} % above the best PID's")
     };

@@ -24,6 +24,7 @@ pub(super) struct Columns {
     pub(super) position: Option<Column>,
     pub(super) voltage: Option<Column>,
     pub(super) injection: Option<Column>,
+    pub(super) part: Option<Column>,
     /// Line of each value.
     pub(super) lines: Lines,
 }
@@ -57,6 +58,7 @@ const REFERENCE: &[Name] = &[("reference_m", 1e3), ("reference_mm", 1.0)];
 const POSITION: &[Name] = &[("position_m", 1e3), ("position_mm", 1.0)];
 const VOLTAGE: &[Name] = &[("voltage_v", 1.0)];
 const INJECTION: &[Name] = &[("injection_v", 1.0)];
+const PART: &[Name] = &[("part", 1.0)];
 const FORCES: [&[Name]; 3] = [
     &[("force_x_n", 1.0)],
     &[("force_y_n", 1.0)],
@@ -138,6 +140,7 @@ fn fill(
     let mut position = header.optional("position", POSITION)?;
     let mut voltage = header.optional("voltage", VOLTAGE)?;
     let mut injection = header.optional("injection", INJECTION)?;
+    let mut part = header.optional("part", PART)?;
     let needed = match purpose {
         Purpose::Motion => [("reference_m (or reference_mm)", &reference); 2],
         Purpose::Experiment => [
@@ -155,6 +158,7 @@ fn fill(
         position.as_mut(),
         voltage.as_mut(),
         injection.as_mut(),
+        part.as_mut(),
     ];
     let lines = source.fill(
         &mut columns.into_iter().flatten().collect::<Vec<_>>(),
@@ -167,6 +171,7 @@ fn fill(
         position: position.map(|c| c.0),
         voltage: voltage.map(|c| c.0),
         injection: injection.map(|c| c.0),
+        part: part.map(|c| c.0),
         lines,
     })
 }

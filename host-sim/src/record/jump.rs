@@ -19,6 +19,7 @@ const EDGE_S: f64 = 0.05;
 
 /// Refuses a position that goes further in one row than the rows before and after it allow. A change of velocity stays, and a
 /// jump does not: so a step is compared with the medians of its neighbours on both sides, and counts as far as it is beyond both.
+/// The step from one part of a recording to the next is free: the axis may have moved in between.
 ///
 /// # Errors
 /// The first jump, with its line.
@@ -26,6 +27,7 @@ pub(super) fn refuse(
     path: &Path,
     time_s: &[f64],
     position: &Column,
+    part: Option<&Column>,
     lines: &Lines,
 ) -> Result<(), RecordError> {
     let values = &position.values;
@@ -48,7 +50,9 @@ pub(super) fn refuse(
         .fold(f64::INFINITY, f64::min);
     let most = (JUMP_RATIO * ordinary).max(JUMP_COUNTS * count);
     let inner = time_s[0] + EDGE_S..time_s[time_s.len() - 1] - EDGE_S;
-    let jumps = |step: &usize| beyond[*step] > most && inner.contains(&time_s[*step]);
+    let joined = |step: usize| part.is_some_and(|part| part.values[step] != part.values[step + 1]);
+    let jumps =
+        |step: &usize| beyond[*step] > most && inner.contains(&time_s[*step]) && !joined(*step);
     let mut jumps = (0..beyond.len()).filter(jumps);
     let Some(first) = jumps.next() else {
         return Ok(());

@@ -11,6 +11,7 @@
 //! | `position_m` or `position_mm` | m or mm | optional: the motion measured |
 //! | `voltage_v` | V | optional: the controller's output |
 //! | `injection_v` | V | optional, of an experiment: the part of the voltage that was injected |
+//! | `part` | 1 | optional, of an experiment: another number from where the recording was stopped and begun again |
 //!
 //! Other columns are passed over, and the order is free. A recorded force ([`ForceRecord`]) has `t_s` and at least one of
 //! `force_x_n`, `force_y_n`, `force_z_n`, in N.

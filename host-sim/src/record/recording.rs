@@ -34,6 +34,9 @@ pub struct Recording {
     pub voltage_v: Vec<f64>,
     /// The part of it that was injected, V.
     pub injection_v: Vec<f64>,
+    /// First sample of each part after the first, in order: between parts nothing was recorded, and the axis may have moved.
+    #[serde(default)]
+    pub parts: Vec<usize>,
 }
 
 /// Ways of reading a recorded motion.
@@ -79,14 +82,33 @@ impl Recording {
 
     /// The samples of a range.
     pub fn slice(&self, range: std::ops::Range<usize>) -> Self {
-        let part = |signal: &[f64]| signal[range.clone()].to_vec();
+        let cut = |signal: &[f64]| signal[range.clone()].to_vec();
         Self {
             sample_time_s: self.sample_time_s,
-            reference_mm: part(&self.reference_mm),
-            position_mm: part(&self.position_mm),
-            voltage_v: part(&self.voltage_v),
-            injection_v: part(&self.injection_v),
+            reference_mm: cut(&self.reference_mm),
+            position_mm: cut(&self.position_mm),
+            voltage_v: cut(&self.voltage_v),
+            injection_v: cut(&self.injection_v),
+            parts: (self.parts.iter())
+                .filter(|first| range.start < **first && **first < range.end)
+                .map(|first| first - range.start)
+                .collect(),
         }
+    }
+
+    /// Adds a recording that was begun after this one had ended, of the same sample time.
+    pub fn append(&mut self, next: Self) {
+        let first = self.len();
+        if first > 0 {
+            self.parts.push(first);
+        }
+        self.parts
+            .extend(next.parts.iter().map(|part| first + part));
+        self.sample_time_s = next.sample_time_s;
+        self.reference_mm.extend(next.reference_mm);
+        self.position_mm.extend(next.position_mm);
+        self.voltage_v.extend(next.voltage_v);
+        self.injection_v.extend(next.injection_v);
     }
 
     /// Checks a recording of which the file is no table, as far as one of any experiment can be checked: columns of one length, a
@@ -123,7 +145,7 @@ impl Recording {
         Ok(())
     }
 
-    /// Writes it as CSV: `t_s`, `reference_mm`, `position_mm`, `voltage_v`, `injection_v`.
+    /// Writes it as CSV: `t_s`, `reference_mm`, `position_mm`, `voltage_v`, `injection_v`, and `part` where it has several.
     ///
     /// # Errors
     /// A file that cannot be written.
@@ -131,16 +153,20 @@ impl Recording {
         let time: Vec<f64> = (0..self.len())
             .map(|index| index as f64 * self.sample_time_s)
             .collect();
-        write_trace(
-            path,
-            &[
-                ("t_s", &time),
-                ("reference_mm", &self.reference_mm),
-                ("position_mm", &self.position_mm),
-                ("voltage_v", &self.voltage_v),
-                ("injection_v", &self.injection_v),
-            ],
-        )
+        let part: Vec<f64> = (0..self.len())
+            .map(|index| self.parts.partition_point(|first| *first <= index) as f64)
+            .collect();
+        let mut columns: Vec<(&str, &[f64])> = vec![
+            ("t_s", &time),
+            ("reference_mm", &self.reference_mm),
+            ("position_mm", &self.position_mm),
+            ("voltage_v", &self.voltage_v),
+            ("injection_v", &self.injection_v),
+        ];
+        if !self.parts.is_empty() {
+            columns.push(("part", &part));
+        }
+        write_trace(path, &columns)
     }
 
     /// Reads and checks a recorded experiment: `t_s`, `position_m` or `position_mm`, `voltage_v`; optional `reference_m` or
@@ -263,13 +289,28 @@ impl Recording {
                 .map_or_else(|| vec![0.0; rows], |column| column.values),
             position_mm,
             voltage_v,
+            parts: columns
+                .part
+                .map_or_else(Vec::new, |part| beginnings(&part.values)),
         })
     }
 }
 
+/// Places where a column's value differs from the one before.
+fn beginnings(part: &[f64]) -> Vec<usize> {
+    let differs = |row: &usize| part[row - 1] != part[*row];
+    (1..part.len()).filter(differs).collect()
+}
+
 fn refuse_jumps(path: &Path, columns: &Columns) -> Result<(), RecordError> {
     match &columns.position {
-        Some(position) => jump::refuse(path, &columns.time.values, position, &columns.lines),
+        Some(position) => jump::refuse(
+            path,
+            &columns.time.values,
+            position,
+            columns.part.as_ref(),
+            &columns.lines,
+        ),
         None => Ok(()),
     }
 }
@@ -285,6 +326,10 @@ fn resample_by(grid: &Grid, columns: &mut Columns) {
     ];
     for column in signals.into_iter().flatten() {
         column.values = grid.resampled(time_s, &column.values);
+    }
+    if let Some(part) = &mut columns.part {
+        part.values = grid.resampled(time_s, &part.values);
+        part.values.iter_mut().for_each(|part| *part = part.floor());
     }
 }
 

@@ -95,6 +95,7 @@ fn an_axis_that_stays_slow_and_recordings_that_are_no_test_are_refused() {
         position_mm: vec![0.0; 1000],
         voltage_v: vec![0.0; 1000],
         injection_v: vec![0.0; 1000],
+        parts: Vec::new(),
     };
     let error = evaluate(still, 5e-4).unwrap_err();
     assert!(

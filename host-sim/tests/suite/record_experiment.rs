@@ -44,6 +44,7 @@ fn a_recording_reads_back_what_was_written() {
         position_mm: signal(0.2),
         voltage_v: signal(1e-3),
         injection_v: signal(2e-3),
+        parts: vec![20, 21],
     };
     written.write_csv(&path).unwrap();
     let read = Recording::read_csv(&path).unwrap();

@@ -68,11 +68,7 @@ pub fn shuttle(
         let recording = test_axis.perform(&experiment, &mut |share| {
             progress((index as f64 + share) / motions.len() as f64);
         })?;
-        joined.sample_time_s = recording.sample_time_s;
-        joined.reference_mm.extend(recording.reference_mm);
-        joined.position_mm.extend(recording.position_mm);
-        joined.voltage_v.extend(recording.voltage_v);
-        joined.injection_v.extend(recording.injection_v);
+        joined.append(recording);
     }
     Ok(joined)
 }

@@ -42,6 +42,9 @@ pub fn command_line(program: &Program, memory: &Memory, clock: Clock) -> Command
     let mut qemu = Command::new(QEMU);
     // The libraries of whoever started us are not QEMU's.
     qemu.env_remove("LD_LIBRARY_PATH").stdin(Stdio::null());
+    // Ctrl-C in the terminal is for the host, which stops the axes and ends QEMU itself.
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut qemu, 0);
     qemu.arg("-machine")
         .arg(format!("{},memory-backend=psram", program.machine()));
     qemu.arg("-object").arg(format!(

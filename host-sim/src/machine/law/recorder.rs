@@ -88,6 +88,7 @@ impl Recorder {
             position_mm: all(|period| period.position_mm),
             voltage_v: all(|period| period.voltage_v),
             injection_v: all(|period| period.injection_v),
+            parts: Vec::new(),
         }
     }
 
