@@ -27,23 +27,11 @@ impl Lines {
 
     /// Adds a row.
     pub(super) fn push(&mut self, line: u64) {
-        self.begin_run(self.rows, line);
-        self.rows += 1;
-    }
-
-    /// Adds the rows of a part that follows.
-    pub(super) fn append(&mut self, part: &Self) {
-        for &(row, line) in &part.runs {
-            self.begin_run(self.rows + row, line);
-        }
-        self.rows += part.rows;
-    }
-
-    /// Notes the line of a row behind all others where it does not follow from theirs.
-    fn begin_run(&mut self, row: usize, line: u64) {
+        let row = self.rows;
         let follows = |(first, at): &(usize, u64)| at + (row - first) as u64 == line;
         if !self.runs.last().is_some_and(follows) {
             self.runs.push((row, line));
         }
+        self.rows += 1;
     }
 }
