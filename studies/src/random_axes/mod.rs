@@ -64,6 +64,14 @@ pub struct Line {
     /// The PID's largest error of all judging sines, um.
     #[serde(default)]
     pub pid_um: Option<f64>,
+    /// Largest error over that of the PID: the worst of the small slow sines, with its amplitude and velocity.
+    #[serde(default)]
+    pub small_ratio: Option<f64>,
+    #[serde(default)]
+    pub small_sine: String,
+    /// Small slow sines on which it is worse than the PID.
+    #[serde(default)]
+    pub small_worse: usize,
     /// Error over that of the PID, the worst of the trials by which the commissioning handed its law over.
     #[serde(default)]
     pub trial_worst: Option<f64>,
@@ -97,6 +105,9 @@ const SINES: [SineTest; 3] = [
         velocity_mm_s: 30.0,
     },
 ];
+/// Amplitudes, mm, and velocities, mm/s, of the small slow sines: one of each with each.
+const SMALL_MM: [f64; 6] = [0.02, 0.05, 0.1, 0.2, 0.5, 1.0];
+const SLOW_MM_S: [f64; 5] = [0.2, 0.35, 0.5, 0.8, 1.5];
 /// Largest error over the PID's from which on a result is worse, if it is also larger by a count of the encoder: where errors are a few
 /// counts, their largest scatters by as much.
 const WORSE: f64 = 1.02;
@@ -320,6 +331,9 @@ fn judged(subject: &Subject, path: Path) -> Judged {
         worst_ratio: None,
         mean_ratio: None,
         pid_um: None,
+        small_ratio: None,
+        small_sine: String::new(),
+        small_worse: 0,
         trial_worst: None,
         gain_ratio: None,
         feedforward: String::new(),
@@ -394,20 +408,51 @@ impl Line {
             ..pid.clone()
         };
         let used_s = 60.0 * self.axis_min;
-        let errors_mm: Result<Vec<[f64; 2]>, String> = SINES
-            .iter()
-            .map(|sine| {
-                let (limits, reference) = match largest(&narrow, subject, used_s, sine) {
-                    Ok(reference) => (narrow.limits, reference),
-                    Err(_) => (pid.limits, largest(&pid, subject, used_s, sine)?),
-                };
-                let own = AxisSettings {
-                    limits,
-                    ..found.settings.clone()
-                };
-                Ok([largest(&own, subject, used_s, sine)?, reference])
+        let pair = |sine: &SineTest| {
+            let (limits, reference) = match largest(&narrow, subject, used_s, sine) {
+                Ok(reference) => (narrow.limits, reference),
+                Err(_) => (pid.limits, largest(&pid, subject, used_s, sine)?),
+            };
+            let own = AxisSettings {
+                limits,
+                ..found.settings.clone()
+            };
+            Ok([largest(&own, subject, used_s, sine)?, reference])
+        };
+        let count_mm = subject.parameters.resolution_mm;
+        let is_worse = |[own, pid]: &[f64; 2]| own / pid > WORSE && own - pid > count_mm;
+        let slow = SMALL_MM.iter().flat_map(|&amplitude_mm| {
+            SLOW_MM_S.iter().map(move |&velocity_mm_s| SineTest {
+                amplitude_mm,
+                velocity_mm_s,
             })
-            .collect();
+        });
+        let small: Result<Vec<(SineTest, [f64; 2])>, String> =
+            slow.map(|sine| Ok((sine, pair(&sine)?))).collect();
+        let small = match small {
+            Ok(small) => small,
+            Err(reason) => {
+                self.outcome = Outcome::WorseThanPid;
+                self.reason = reason;
+                return;
+            }
+        };
+        let worse = small.iter().filter(|(_, errors)| is_worse(errors));
+        let worse: Vec<_> = worse.collect();
+        self.small_worse = worse.len();
+        let ratio = |errors: &[f64; 2]| errors[0] / errors[1];
+        let worst = worse.into_iter().max_by(|a, b| ratio(&a.1).total_cmp(&ratio(&b.1)));
+        if let Some((sine, errors)) = worst {
+            self.small_ratio = Some(ratio(errors));
+            self.small_sine = format!(
+                "{} mm at {} mm/s: {:.1} um for {:.1}",
+                sine.amplitude_mm,
+                sine.velocity_mm_s,
+                1e3 * errors[0],
+                1e3 * errors[1]
+            );
+        }
+        let errors_mm: Result<Vec<[f64; 2]>, String> = SINES.iter().map(pair).collect();
         match errors_mm {
             Ok(errors_mm) => {
                 let ratios: Vec<f64> = errors_mm.iter().map(|[own, pid]| own / pid).collect();
@@ -416,10 +461,7 @@ impl Line {
                 self.mean_ratio = Some(mean);
                 let largest_mm = errors_mm.iter().map(|[_, pid]| *pid);
                 self.pid_um = Some(1e3 * largest_mm.fold(0.0, f64::max));
-                let count_mm = subject.parameters.resolution_mm;
-                let worse = errors_mm
-                    .iter()
-                    .any(|[own, pid]| own / pid > WORSE && own - pid > count_mm);
+                let worse = errors_mm.iter().any(is_worse) || self.small_worse > 0;
                 self.outcome = if worse {
                     Outcome::WorseThanPid
                 } else {
