@@ -3,8 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
+use quadrant::axes::AxisName;
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::settings_file::{SettingsFile, SettingsFileError};
+
+use crate::warn;
 
 /// Option that names the settings of the simulated stage's control law.
 #[derive(Clone, Debug, Default, Args)]
@@ -16,15 +19,31 @@ pub struct LawSettings {
 }
 
 impl LawSettings {
-    /// Reads the settings.
+    /// Reads the settings. An axis that nobody has commissioned there has no law: those of the simulated stage stand for its settings,
+    /// with a note.
     ///
     /// # Errors
     /// A file that cannot be read, or settings that the firmware would refuse.
     pub fn read(&self) -> Result<SettingsFile, SettingsFileError> {
-        match &self.path {
-            Some(path) => SettingsFile::read(path),
-            None => identified_settings(),
+        let identified = identified_settings()?;
+        let Some(path) = &self.path else {
+            return Ok(identified);
+        };
+        let mut file = SettingsFile::read(path)?;
+        for axis in AxisName::ALL {
+            let own = &mut file.stage.axes[axis as usize];
+            if own.commissioned || own.feedback.pid.kp_v_per_mm != 0.0 {
+                continue;
+            }
+            *own = identified.stage.axes[axis as usize].clone();
+            warn!(
+                "note: {axis} is not commissioned in {}: it runs under the settings that came of commissioning the simulated stage",
+                path.display()
+            );
         }
+        // As if it had been read so.
+        file.check(path)?;
+        Ok(file)
     }
 
     /// Returns the option as a command line repeats it, with a space before it; empty without a file.

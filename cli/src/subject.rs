@@ -326,6 +326,10 @@ mod tests {
             self.0.settings()
         }
 
+        fn position_mm(&mut self, axis: AxisName) -> Result<f64, MachineError> {
+            self.0.position_mm(axis)
+        }
+
         fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
             self.0.free_travel(axis)
         }

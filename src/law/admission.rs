@@ -36,6 +36,8 @@ pub struct StageView {
     ///
     /// [`StageRef::is_commissioned`]: crate::law::stage::StageRef::is_commissioned
     pub commissioned: bool,
+    /// The axes that nobody has commissioned and that have no law: they do not move.
+    pub inert: PerAxis<bool>,
     /// The holding brake is being released or applied.
     pub brake_moves: bool,
     /// The stations that may enable the outputs.
@@ -107,7 +109,7 @@ impl Refusal {
             }
             Self::Injecting => "a voltage is being injected; stop it or wait until it ends",
             Self::NotCommissioned => {
-                "not commissioned: no axis is, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
+                "not commissioned: no axis is, or this one is not, or one with a law is not; run `quadrant commission`, or load a settings file with `commissioned = true`"
             }
             Self::BrakeMoves => "the brake is being released or applied; ask again",
             Self::HostOnly => "the host alone may enable (operation.enabled_by)",
@@ -211,6 +213,11 @@ pub fn refusal(view: StageView, command: Command) -> Option<Refusal> {
             let awaiting = view.awaiting_homing;
             let first = awaiting.named().find(|(_, awaiting)| **awaiting);
             first.map(|(axis, _)| Refusal::NotHomed(axis))
+        }
+        Command::Home(axis) | Command::StartMove(axis) | Command::Jog(axis, _)
+            if view.inert[axis] =>
+        {
+            Some(Refusal::NotCommissioned)
         }
         Command::StartMove(axis) if view.awaiting_homing[axis] => Some(Refusal::NotHomed(axis)),
         Command::StartStream if !view.stream_ready => Some(Refusal::NoStream),

@@ -304,6 +304,7 @@ impl<S: Scalar, const N: usize> StageRef<'_, S, N> {
             injection_ready: state.is_injection_ready() && self.may_inject(state),
             injecting: state.is_injecting(),
             commissioned: self.is_commissioned(),
+            inert: (self.axes).map(|axis| axis.commissioning() == Commissioning::Inert),
             brake_moves: state.brake.is_moving(),
             enabled_by: self.operation.enabled_by,
             locked: state.locked,

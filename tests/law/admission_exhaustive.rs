@@ -33,7 +33,7 @@ const MODES: [MotionMode; 7] = [
     MotionMode::OpenLoop,
 ];
 /// Flags of a view that are enumerated as bits.
-const FLAGS: u32 = 13;
+const FLAGS: u32 = 14;
 
 fn commands() -> [Command; 10] {
     let scale = MotionScale {
@@ -89,6 +89,7 @@ fn views() -> impl Iterator<Item = StageView> {
                     injection_ready: flag(7),
                     injecting: flag(8),
                     commissioned: flag(9),
+                    inert: on_axis(flag(13)),
                     locked: flag(12),
                     settings_invalid: flag(10),
                     brake_moves: flag(11),
@@ -148,7 +149,7 @@ fn no_motion_starts_but_on_an_enabled_stage_at_rest_whose_brake_is_released() {
             assert!(!view.brake_moves, "{command:?} {view:?}");
             match command {
                 Command::Jog(axis, _) => {
-                    assert!(!view.injecting, "{view:?}");
+                    assert!(!view.injecting && !view.inert[axis], "{view:?}");
                     assert!(
                         matches!(view.modes[axis], MotionMode::Hold | MotionMode::Jog),
                         "{view:?}"
@@ -156,7 +157,7 @@ fn no_motion_starts_but_on_an_enabled_stage_at_rest_whose_brake_is_released() {
                 }
                 Command::Home(axis) | Command::StartMove(axis) => {
                     assert_eq!(view.modes[axis], MotionMode::Hold, "{view:?}");
-                    assert!(!view.injecting, "{view:?}");
+                    assert!(!view.injecting && !view.inert[axis], "{view:?}");
                     assert!(
                         matches!(command, Command::Home(_)) || !view.awaiting_homing[axis],
                         "{view:?}"
@@ -254,6 +255,7 @@ fn an_axis_that_brakes_is_waited_for_before_a_reset_and_one_that_is_driven_moves
     let driven = StageView {
         safety: SafetyState::Enabled,
         commissioned: true,
+        inert: PerAxis::splat(false),
         moving: Some(AXIS),
         ..StageView::default()
     };

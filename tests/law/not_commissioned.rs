@@ -4,7 +4,7 @@ use quadrant::admission::Refusal;
 use quadrant::admission::StageView;
 use quadrant::admission::refusal;
 use quadrant::app::supervisor::{Event, Supervisor};
-use quadrant::axes::PerAxis;
+use quadrant::axes::{AxisName, PerAxis};
 use quadrant::command::Command;
 use quadrant::control::feedback::LawKind;
 use quadrant::feedforward::FeedforwardKind;
@@ -26,6 +26,7 @@ const READY: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: false,
+    inert: PerAxis::splat(false),
     brake_moves: false,
     enabled_by: EnabledBy::Any,
     locked: false,
@@ -58,6 +59,23 @@ fn the_law_itself_enables_nothing_on_the_default_settings() {
         let outputs = rig.tick();
         assert_eq!(outputs.codes.map(|code| code.0), [0; 3]);
         assert!(!outputs.enabled);
+    }
+}
+
+#[test]
+fn an_axis_without_a_law_does_not_move_beside_one_that_is_commissioned() {
+    let view = StageView {
+        safety: SafetyState::Enabled,
+        commissioned: true,
+        inert: PerAxis::from_fn(|axis| axis == AxisName::Y),
+        ..READY
+    };
+    let motions = |axis| [Command::Home(axis), Command::StartMove(axis)];
+    for command in motions(AxisName::Y) {
+        assert_eq!(refusal(view, command), Some(Refusal::NotCommissioned));
+    }
+    for command in motions(AxisName::X) {
+        assert_eq!(refusal(view, command), None);
     }
 }
 

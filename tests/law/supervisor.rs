@@ -28,6 +28,7 @@ const DISABLED: StageView = StageView {
     injection_ready: false,
     injecting: false,
     commissioned: true,
+    inert: PerAxis::splat(false),
     brake_moves: false,
     enabled_by: EnabledBy::Any,
     locked: false,

@@ -19,7 +19,7 @@ use quadrant_sim::design::Target;
 use quadrant_sim::identify::pages::friction::{friction_table, gms_table};
 use quadrant_sim::identify::pages::linear::{motor_constant_table, plant_tables};
 use quadrant_sim::identify::pages::revise::revise_table;
-use quadrant_sim::machine::{Journal, Machine, TestAxis, Travel};
+use quadrant_sim::machine::{Begun, Journal, Machine, TestAxis, Travel};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::report::{Table, wrapped};
 use quadrant_sim::setting_value::{Change, changes};
@@ -271,7 +271,7 @@ fn refuse_restart(
 }
 
 /// Checks that a folder holds experiments of the commissioning that `words` are of, and says what is adopted from there.
-fn resumed(experiments: &Path, words: &str) -> anyhow::Result<String> {
+fn resumed(experiments: &Path, words: &str) -> anyhow::Result<(String, Begun)> {
     let folder = experiments.display();
     let count = Journal::count(experiments);
     if count == 0 {
@@ -280,18 +280,40 @@ fn resumed(experiments: &Path, words: &str) -> anyhow::Result<String> {
              --resume; leave it out to begin"
         );
     }
-    match Journal::request(experiments) {
-        Some(begun) if begun != words => bail!(
-            "the commissioning in {folder} was begun with {begun}, and this is {words}: resume it with the same, or leave out --resume \
-             to begin again"
+    match Journal::begun(experiments) {
+        Some(begun) if begun.words != words => bail!(
+            "the commissioning in {folder} was begun with {}, and this is {words}: resume it with the same, or leave out --resume \
+             to begin again",
+            begun.words
         ),
-        Some(begun) => Ok(format!(
-            "resuming with the {count} experiments in {folder}, which were begun with {begun}"
+        Some(begun) => Ok((
+            format!(
+                "resuming with the {count} experiments in {folder}, which were begun with {words}"
+            ),
+            begun,
         )),
         None => bail!(
             "{folder} does not say with which options it was begun: leave out --resume to begin again"
         ),
     }
+}
+
+/// The travel that was given at the beginning, of an axis that has moved since.
+fn again(axis: AxisName, given: Travel, began_mm: f64, at_mm: f64) -> anyhow::Result<Travel> {
+    let moved_mm = at_mm - began_mm;
+    let travel = Travel {
+        negative_mm: given.negative_mm + moved_mm,
+        positive_mm: given.positive_mm - moved_mm,
+    };
+    if travel.nearer_mm() < 0.0 {
+        bail!(
+            "{axis} stands at {at_mm:.3} mm, and was to stay between {:.3} and {:.3} mm when this was begun: move it back to \
+             {began_mm:.3} mm, then --resume; or leave out --resume",
+            began_mm - given.negative_mm,
+            began_mm + given.positive_mm
+        );
+    }
+    Ok(travel)
 }
 
 impl Job<'_> {
@@ -300,7 +322,7 @@ impl Job<'_> {
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
         output.ready()?;
-        let travel = known_travel(machine, axis, self.travel)?;
+        let mut travel = known_travel(machine, axis, self.travel)?;
         let before = machine.settings()?;
         let mut file = match self.start {
             Some(file) => {
@@ -321,15 +343,27 @@ impl Job<'_> {
         let words = self
             .request
             .words(output.seed, self.travel, self.stage, &base);
+        let mut start_mm = travel.start_mm();
+        let mut begun = Begun {
+            words,
+            at_mm: machine.position_mm(axis)?,
+        };
         if self.request.resume {
-            warn!("{}", resumed(&experiments, &words)?);
+            let (text, first) = resumed(&experiments, &begun.words)?;
+            warn!("{text}");
+            if let Some(given) = self.travel {
+                start_mm = given.start_mm();
+                travel = again(axis, given, first.at_mm, begun.at_mm)?;
+            }
+            begun = first;
         }
         let outcome = {
             let mut test_axis = machine.test_axis(axis, travel)?;
             let mut journal = Journal::open(&mut *test_axis, &experiments, self.request.resume)
-                .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?;
+                .with_context(|| format!("cannot keep experiments in {}", experiments.display()))?
+                .begun_at(start_mm);
             journal
-                .keep_request(&words)
+                .keep_begun(&begun)
                 .with_context(|| format!("cannot write into {}", experiments.display()))?;
             for path in journal.foreign() {
                 warn!("{} was not written here, and stays", path.display());
@@ -369,8 +403,16 @@ impl Job<'_> {
         };
         let mut text = found.keep(&folder, &mut file, &path, axis, &who)?;
         Journal::remove(&experiments)?;
-        and_restored(Ok(()), restored)
-            .with_context(|| format!("what was found is in {}", path.display()))?;
+        if let Err(error) = and_restored(Ok(()), restored) {
+            return Ok(Done {
+                text,
+                data: json!({ "settings": path, "better_than_pid": better }),
+                failure: Some(format!(
+                    "{}; `reboot` gives it those that it has stored",
+                    quadrant_cli::explained(&error)
+                )),
+            });
+        }
         if self.apply && better {
             machine
                 .load(&file.stage)
@@ -629,12 +671,15 @@ mod tests {
         deaf: bool,
         /// The beginning of the name of experiments at which the line is cut.
         cut_at: Option<&'static str>,
+        /// The same of experiments that a person interrupts.
+        interrupted_at: Option<&'static str>,
     }
 
     struct SpoiltAxis<'a> {
         axis: Box<dyn TestAxis + 'a>,
         dead: bool,
         cut_at: Option<&'static str>,
+        interrupted_at: Option<&'static str>,
     }
 
     impl Spoilt {
@@ -645,6 +690,7 @@ mod tests {
                 dead: false,
                 deaf: false,
                 cut_at: None,
+                interrupted_at: None,
             }
         }
     }
@@ -662,6 +708,10 @@ mod tests {
             self.stage.settings()
         }
 
+        fn position_mm(&mut self, axis: AxisName) -> Result<f64, MachineError> {
+            self.stage.position_mm(axis)
+        }
+
         fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
             self.stage.free_travel(axis)
         }
@@ -671,9 +721,12 @@ mod tests {
             axis: AxisName,
             travel: Travel,
         ) -> Result<Box<dyn TestAxis + '_>, MachineError> {
-            let (dead, cut_at) = (self.dead, self.cut_at);
-            let axis = self.stage.test_axis(axis, travel)?;
-            Ok(Box::new(SpoiltAxis { axis, dead, cut_at }))
+            Ok(Box::new(SpoiltAxis {
+                dead: self.dead,
+                cut_at: self.cut_at,
+                interrupted_at: self.interrupted_at,
+                axis: self.stage.test_axis(axis, travel)?,
+            }))
         }
 
         fn load(&mut self, settings: &StageSettings) -> Result<(), MachineError> {
@@ -711,6 +764,12 @@ mod tests {
                 return Err(ExperimentError::Impossible {
                     experiment: experiment.name.clone(),
                     reason: "the line is cut".to_owned(),
+                });
+            }
+            if self.interrupted_at.is_some_and(is_cut) {
+                return Err(ExperimentError::Interrupted {
+                    experiment: experiment.name.clone(),
+                    done: "the axes have stopped",
                 });
             }
             let mut recording = self.axis.perform(experiment, progress)?;
@@ -825,6 +884,22 @@ mod tests {
     }
 
     #[test]
+    fn an_interruption_among_the_trials_is_no_verdict_and_keeps_the_experiments() {
+        for at in ["PID on", "N-PID on", "N-PID + static on"] {
+            let folder = tempfile::tempdir().unwrap();
+            let mut machine = Spoilt {
+                interrupted_at: Some(at),
+                ..Spoilt::new()
+            };
+            let error = commission_into(folder.path(), &mut machine).err().unwrap();
+            let said = quadrant_cli::explained(&error);
+            assert!(said.contains("interrupted in"), "{at}: {said}");
+            assert!(said.contains("--resume"), "{at}: {said}");
+            assert!(Journal::count(&folder.path().join("x").join(EXPERIMENTS)) > 100);
+        }
+    }
+
+    #[test]
     fn what_was_interrupted_is_resumed_with_the_same_options_alone_and_what_has_ended_is_not() {
         let folder = tempfile::tempdir().unwrap();
         let mut machine = Spoilt {
@@ -860,8 +935,8 @@ mod tests {
             kept
         );
         let experiments = folder.path().join("x").join(EXPERIMENTS);
-        let begun = Journal::request(&experiments).unwrap();
-        let adopted = resumed(&experiments, &begun).unwrap();
+        let begun = Journal::begun(&experiments).unwrap();
+        let (adopted, _) = resumed(&experiments, &begun.words).unwrap();
         assert!(
             adopted.contains(&format!("{kept} experiments in")),
             "{adopted}"
@@ -869,6 +944,27 @@ mod tests {
         Journal::remove(&experiments).unwrap();
         let ended = said(commission_with(folder.path(), &mut machine, &["--resume"]));
         assert!(ended.contains("has ended is not begun again"), "{ended}");
+    }
+
+    #[test]
+    fn a_resumed_axis_keeps_the_travel_that_it_was_begun_with_wherever_it_stands() {
+        let given = Travel {
+            negative_mm: 3.0,
+            positive_mm: 20.0,
+        };
+        // Begun at 100 mm, interrupted at 106: from 97 to 120 mm as before.
+        let travel = again(AxisName::X, given, 100.0, 106.0).unwrap();
+        assert_eq!((travel.negative_mm, travel.positive_mm), (9.0, 14.0));
+        let refused = again(AxisName::X, given, 100.0, 0.0)
+            .unwrap_err()
+            .to_string();
+        for part in [
+            "stands at 0.000 mm",
+            "97.000 and 120.000",
+            "back to 100.000 mm",
+        ] {
+            assert!(refused.contains(part), "{part}: {refused}");
+        }
     }
 
     #[test]
@@ -895,8 +991,13 @@ mod tests {
                 deaf: true,
                 ..Spoilt::new()
             };
-            let error = commission_into(folder.path(), &mut machine).err().unwrap();
-            let said = quadrant_cli::explained(&error);
+            let said = match commission_into(folder.path(), &mut machine) {
+                Ok(done) => {
+                    assert!(done.text.contains("pid-alone"), "{}", done.text);
+                    done.failure.unwrap()
+                }
+                Err(error) => quadrant_cli::explained(&error),
+            };
             assert!(said.contains("the cable is out"), "{said}");
             assert_eq!(said.contains("the line is cut"), dead, "{said}");
             let kept = folder.path().join("x").join(PID_ALONE);

@@ -6,6 +6,7 @@ use anyhow::{Context, bail};
 use quadrant::axes::AxisName;
 use quadrant::link::message::{self, AxisSet, Body, Status};
 use quadrant::safety::FaultCode;
+use quadrant_sim::client::settings::{self, whole_path};
 use quadrant_sim::client::{Client, settle, with_reset};
 use quadrant_sim::machine::serial_ports;
 use quadrant_sim::report::fixed;
@@ -186,7 +187,7 @@ pub(super) fn order(client: &mut Client, command: &Command) -> anyhow::Result<An
         Command::Enable => Body::Enable,
         Command::Disable => Body::Disable,
         Command::Stop => Body::Stop,
-        Command::Home { axes } => Body::Home(some_or_all(axes)),
+        Command::Home { axes } => Body::Home(to_home(client, axes)?),
         Command::Move {
             axis,
             target_mm,
@@ -232,12 +233,23 @@ fn homing(axes: &[Axis]) -> String {
     )
 }
 
-fn some_or_all(axes: &[Axis]) -> AxisSet {
-    if axes.is_empty() {
-        AxisSet::ALL
-    } else {
-        axes.iter().copied().map(Into::into).collect()
+/// The axes that are to be homed; where none is named, those that are commissioned and have a homing.
+fn to_home(client: &mut Client, axes: &[Axis]) -> anyhow::Result<AxisSet> {
+    if !axes.is_empty() {
+        return Ok(axes.iter().copied().map(Into::into).collect());
     }
+    let mut ready = Vec::new();
+    for axis in AxisName::ALL {
+        let mut get = |part: &str| settings::get(client, &whole_path(&format!("{axis}/{part}")));
+        if get("commissioned")? == json!(true) && get("homing")? != json!(null) {
+            ready.push(axis);
+        }
+    }
+    // The machine says why none of them can.
+    Ok(match ready.is_empty() {
+        true => AxisSet::ALL,
+        false => ready.into_iter().map(Into::into).collect(),
+    })
 }
 
 pub(super) fn wait(
@@ -255,7 +267,8 @@ pub(super) fn wait(
             settle::rest(client, timeout)?;
         }
         "homed" => {
-            settle::homed(client, some_or_all(axes), timeout)?;
+            let axes = to_home(client, axes)?;
+            settle::homed(client, axes, timeout)?;
         }
         number => match number.parse() {
             Ok(time_s) => settle::time(client, seconds("wait", time_s)?)?,

@@ -49,6 +49,9 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
         if echo {
             say!("> {line}");
         }
+        if ends(&line) {
+            break;
+        }
         let succeeded = one(session, &line, &format!("line {}", index + 1));
         all &= succeeded;
         if session.client.is_interrupted() || !(succeeded || keep_going) {
@@ -56,6 +59,11 @@ pub(super) fn run(session: &mut Session, echo: bool, keep_going: bool) -> anyhow
         }
     }
     Ok(all && !session.client.is_interrupted())
+}
+
+/// True for a line that ends the session.
+fn ends(line: &str) -> bool {
+    matches!(line.trim(), "quit" | "exit")
 }
 
 fn one(session: &mut Session, line: &str, source: &str) -> bool {
@@ -193,7 +201,7 @@ fn prompt(session: &mut Session) -> anyhow::Result<()> {
         match line {
             Some(Ok(line)) => {
                 interrupts = 0;
-                if matches!(line.trim(), "quit" | "exit") {
+                if ends(&line) {
                     return leave(session);
                 }
                 one(session, &line, "");

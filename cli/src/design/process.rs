@@ -147,7 +147,16 @@ impl Model {
         change: impl FnOnce(&mut AxisSettings),
     ) -> anyhow::Result<()> {
         let start = file.stage.clone();
-        change(&mut file.stage.axes[self.axis.index()]);
+        let axis = &mut file.stage.axes[self.axis.index()];
+        let feedback = axis.feedback.clone();
+        change(axis);
+        if axis.commissioned && axis.feedback != feedback {
+            warn!(
+                "note: {name} was commissioned under the other gains, and its feedforward was tried with them; `quadrant commission \
+                 --axis {name}` tries it with these",
+                name = self.axis.name()
+            );
+        }
         file.add_provenance(command, self.axis.name(), records, &[sets]);
         let path = output.file(SETTINGS)?;
         kept::refuse_loss(&path, &start, &file.stage)?;

@@ -68,14 +68,15 @@ pub(crate) struct Arguments {
     /// Velocity gain kv of that cascade, V s/m.
     #[arg(long, value_name = "V_S_PER_M", requires = "cascade_kp")]
     cascade_kv: Option<f64>,
-    /// Times that the axis is moved to and fro.
+    /// Times that the axis is moved to and fro, 1 to 100.
     #[arg(
         long,
         default_value_t = 2,
         value_name = "TIMES",
+        value_parser = clap::value_parser!(u16).range(1..=100),
         conflicts_with = "record"
     )]
-    rounds: usize,
+    rounds: u16,
     #[command(flatten)]
     destination: Destination,
     #[command(flatten)]
@@ -265,7 +266,7 @@ fn recording(arguments: &Arguments) -> anyhow::Result<(Recording, String, Option
             if start.is_some() {
                 test_axis.apply(base)?;
             }
-            let recording = move_to_and_fro(test_axis, arguments.rounds)?;
+            let recording = move_to_and_fro(test_axis, arguments.rounds.into())?;
             recording.write_csv(&output.file("motion-recording.csv")?)?;
             Ok(recording)
         },

@@ -1,5 +1,7 @@
 //! Files of TOML: reading their text, and the errors that all of them have.
 
+use std::fs::File;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 
 /// Reason why the text of a file cannot be read, written or understood.
@@ -39,10 +41,24 @@ impl TomlFileError {
     }
 }
 
+/// Longest file, bytes: some twenty times what all settings take.
+const MOST_BYTES: u64 = 1 << 20;
+
 /// Reads a file's text.
 ///
 /// # Errors
-/// A file that cannot be read.
+/// A file that cannot be read, or that is longer than any of settings: a device, say, that never ends.
 pub(crate) fn text_of(path: &Path) -> Result<String, TomlFileError> {
-    std::fs::read_to_string(path).map_err(|source| TomlFileError::io(path, source))
+    let read = || {
+        let mut text = String::new();
+        let mut file = File::open(path)?.take(MOST_BYTES + 1);
+        if file.read_to_string(&mut text)? as u64 > MOST_BYTES {
+            return Err(io::Error::new(
+                io::ErrorKind::FileTooLarge,
+                "it is longer than 1 MiB, and no file of settings or of a stage is",
+            ));
+        }
+        Ok(text)
+    };
+    read().map_err(|source| TomlFileError::io(path, source))
 }

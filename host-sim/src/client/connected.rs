@@ -28,6 +28,11 @@ impl Machine for Client {
         settings::in_force(self).map_err(connection)
     }
 
+    fn position_mm(&mut self, axis: AxisName) -> Result<f64, MachineError> {
+        let status = self.status().map_err(connection)?;
+        Ok(status.axes[axis as usize].position_mm)
+    }
+
     /// The ways to the soft limits; `None` while the axis is not homed, has no soft limits, or stands beyond one.
     fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
         let status = self.status().map_err(connection)?;

@@ -27,8 +27,11 @@ pub struct CrossCheck {
 
 /// RMS of the excitation at rest over the friction at breakaway: enough to slide most of the time.
 const EXCITATION: f64 = 2.6;
-/// Band, Hz, and period, s, of the excitation, and its periods.
-const BAND_HZ: (f64, f64) = (4.0, 400.0);
+/// Lowest frequencies of the excitation, Hz, one after the other until the axis stays within its bounds of way and velocity.
+const LOWEST_HZ: [f64; 3] = [4.0, 10.0, 25.0];
+/// Highest frequency of the excitation, Hz.
+const HIGHEST_HZ: f64 = 400.0;
+/// Period of the excitation, s, and its periods.
 const PERIOD_S: f64 = 0.5;
 const PERIODS: usize = 12;
 
@@ -48,19 +51,38 @@ impl CrossCheck {
         let sliding = &settings.friction.sliding;
         let breakaway_v =
             0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
-        let excitation = Excitation {
+        let excitation = |lowest_hz| Excitation {
             waveform: Waveform::Multisine,
             rms_v: EXCITATION * breakaway_v,
-            band_hz: BAND_HZ,
+            band_hz: (lowest_hz, HIGHEST_HZ),
             rise_hz: 0.0,
             period_s: PERIOD_S,
             seed,
         };
-        test_axis.apply(&measuring_settings(settings))?;
-        approach(test_axis, 0.0)?;
-        let at_rest = AtRest::measure(test_axis, settings, excitation, PERIODS, &mut |share| {
-            progress("response at rest", share);
-        })?;
+        let mut measure = |lowest_hz| {
+            test_axis.apply(&measuring_settings(settings))?;
+            approach(test_axis, 0.0)?;
+            AtRest::measure(
+                test_axis,
+                settings,
+                excitation(lowest_hz),
+                PERIODS,
+                &mut |share| {
+                    progress("response at rest", share);
+                },
+            )
+        };
+        let [first_hz, others @ ..] = LOWEST_HZ;
+        let mut at_rest = measure(first_hz);
+        for lowest_hz in others {
+            match &at_rest {
+                Err(ReviseError::Experiment(error)) if error.strayed() => {
+                    at_rest = measure(lowest_hz);
+                }
+                _ => break,
+            }
+        }
+        let at_rest = at_rest?;
 
         approach(test_axis, 0.0)?;
         let moved = shuttle(test_axis, 1, &mut |share| {

@@ -321,7 +321,18 @@ pub fn verify(
         done: 0.0,
         used_s: 0.0,
         listens: true,
+        interrupted: None,
     };
+    let verdict = choose(&mut bench, settings);
+    match bench.interrupted {
+        // Laws that a person kept from running are no worse for it.
+        Some(error) => Err(error.into()),
+        None => verdict,
+    }
+}
+
+/// [`verify`], unless a person ends it.
+fn choose(bench: &mut Bench<'_>, settings: &AxisSettings) -> Result<Verification, VerifyError> {
     let pid = measuring_settings(settings);
     let npid = AxisSettings {
         feedback: settings.feedback.clone(),
@@ -449,7 +460,7 @@ pub fn verify(
     // The others are shown, too, after those that ran on every sine.
     laws.extend(kinds.into_iter().chain(jumping).map(|(_, law)| law));
     Ok(Verification {
-        sines,
+        sines: bench.sines.to_vec(),
         laws,
         chosen,
         drift,
@@ -548,6 +559,8 @@ struct Bench<'a> {
     used_s: f64,
     /// True while oscillations are looked for, which takes longer than anything else here: of the PID alone.
     listens: bool,
+    /// The interruption by a person, after which nothing more runs.
+    interrupted: Option<ExperimentError>,
 }
 
 impl Bench<'_> {
@@ -729,6 +742,9 @@ impl Bench<'_> {
     /// The same of one that was just put into force.
     fn run(&mut self, result: &mut LawResult, count: usize) -> Option<ExperimentError> {
         for index in result.scores.len()..count {
+            if self.interrupted.is_some() {
+                return None;
+            }
             let done = self.done;
             let progress = &mut *self.progress;
             let outcome = approach(self.test_axis, 0.0).and_then(|()| {
@@ -756,6 +772,10 @@ impl Bench<'_> {
                     if index == 0 {
                         result.recording = recording;
                     }
+                }
+                Err(error @ ExperimentError::Interrupted { .. }) => {
+                    self.interrupted = Some(error);
+                    return None;
                 }
                 Err(error) => {
                     result.stopped = Some(error.to_string());
@@ -792,7 +812,7 @@ pub fn run_sine(
     );
     let recording = test_axis.perform(
         &Experiment {
-            name: format!("{law} on a sine of {} mm", sine_test.amplitude_mm),
+            name: format!("{law} on a sine of {:.2} mm", sine_test.amplitude_mm),
             drive: Drive::ClosedLoop(MotionSettings::Harmonic(sine)),
             injection_v: Vec::new(),
             decimation: 1,

@@ -21,6 +21,12 @@ pub trait Machine {
     /// A connection that is broken.
     fn settings(&mut self) -> Result<StageSettings, MachineError>;
 
+    /// Returns the position of an axis as the machine counts it, mm.
+    ///
+    /// # Errors
+    /// A connection that is broken.
+    fn position_mm(&mut self, axis: AxisName) -> Result<f64, MachineError>;
+
     /// Returns the travel that an axis has from where it stands; `None` if it is not known.
     ///
     /// # Errors

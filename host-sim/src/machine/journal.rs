@@ -10,8 +10,9 @@ use quadrant::safety::{Fault, FaultCode};
 use quadrant::settings::AxisSettings;
 use serde::{Deserialize, Serialize};
 
+use super::approach::approach;
 use super::error::MachineError;
-use super::test_axis::{AxisInfo, Experiment, ExperimentError, TestAxis};
+use super::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;
 use crate::report::whole;
 
@@ -35,8 +36,21 @@ pub struct Journal<'a> {
     pending: bool,
     /// The recording of the last experiment, if that was stopped.
     interrupted: Option<Recording>,
+    /// Position at the end of the last experiment that was in the folder, mm.
+    left_at_mm: Option<f64>,
+    /// Position at which the axis stood when the series was begun, mm from the middle of its travel.
+    start_mm: f64,
     /// Files in the folder that no journal has written: they stay.
     foreign: Vec<PathBuf>,
+}
+
+/// The beginning of a series of experiments.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Begun {
+    /// Its options, in words.
+    pub words: String,
+    /// The machine's position of the axis, mm.
+    pub at_mm: f64,
 }
 
 /// An experiment that has ended.
@@ -191,14 +205,23 @@ impl<'a> Journal<'a> {
         is_there(folder)?;
         Ok(Self {
             settings: axis.settings().clone(),
+            start_mm: axis.info().start_mm,
             axis,
             folder: folder.to_owned(),
             next: 0,
             known: resume,
             pending: false,
             interrupted: None,
+            left_at_mm: None,
             foreign,
         })
+    }
+
+    /// The same series for an axis that stood at `start_mm` from the middle of its travel when it was begun.
+    #[must_use]
+    pub fn begun_at(mut self, start_mm: f64) -> Self {
+        self.start_mm = start_mm;
+        self
     }
 
     /// Files that were in the folder, and that no journal has written: they were not deleted.
@@ -241,17 +264,24 @@ impl<'a> Journal<'a> {
         fs::read_dir(folder).map_or(0, |entries| entries.flatten().filter(kept).count())
     }
 
-    /// Keeps the words that say what the experiments are of, for [`request`](Self::request).
+    /// Keeps what the experiments are of, for [`begun`](Self::begun).
     ///
     /// # Errors
     /// A file that cannot be written.
-    pub fn keep_request(&self, words: &str) -> io::Result<()> {
-        whole::replace(&self.folder.join(REQUEST), words.to_owned().into_bytes())
+    pub fn keep_begun(&self, begun: &Begun) -> io::Result<()> {
+        let Begun { words, at_mm } = begun;
+        let text = format!("{words}\n{at_mm}\n");
+        whole::replace(&self.folder.join(REQUEST), text.into_bytes())
     }
 
-    /// The words that say what the experiments in a folder are of, if they were kept.
-    pub fn request(folder: &Path) -> Option<String> {
-        fs::read_to_string(folder.join(REQUEST)).ok()
+    /// What the experiments in a folder are of, if it was kept.
+    pub fn begun(folder: &Path) -> Option<Begun> {
+        let text = fs::read_to_string(folder.join(REQUEST)).ok()?;
+        let (words, at_mm) = text.trim_end().rsplit_once('\n')?;
+        Some(Begun {
+            words: words.to_owned(),
+            at_mm: at_mm.parse().ok()?,
+        })
     }
 
     fn key(&self, experiment: &Experiment) -> u64 {
@@ -355,7 +385,10 @@ fn keep(path: &Path, entry: &Entry) -> io::Result<()> {
 
 impl TestAxis for Journal<'_> {
     fn info(&self) -> AxisInfo {
-        self.axis.info()
+        AxisInfo {
+            start_mm: self.start_mm,
+            ..self.axis.info()
+        }
     }
 
     fn settings(&self) -> &AxisSettings {
@@ -391,6 +424,9 @@ impl TestAxis for Journal<'_> {
             if let Some(outcome) = kept {
                 self.next += 1;
                 progress(1.0);
+                let recording = outcome.as_ref().ok().or(self.interrupted.as_ref());
+                let end_mm = recording.and_then(|recording| recording.position_mm.last());
+                self.left_at_mm = end_mm.copied().or(self.left_at_mm);
                 return outcome;
             }
         }
@@ -403,6 +439,12 @@ impl TestAxis for Journal<'_> {
                 .apply(&settings)
                 .map_err(|error| impossible(error.to_string()))?;
             self.pending = false;
+        }
+        // What holds its axis goes on where the series was interrupted.
+        if let Some(left_at_mm) = self.left_at_mm.take()
+            && matches!(experiment.drive, Drive::ClosedLoop(_))
+        {
+            approach(self.axis, left_at_mm)?;
         }
         let entry = |recording, stopped| Entry::new(&experiment.name, key, recording, stopped);
         match self.axis.perform(experiment, progress) {
@@ -432,7 +474,7 @@ impl TestAxis for Journal<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::machine::{Drive, SimulatedTestAxis, approach};
+    use crate::machine::SimulatedTestAxis;
     use crate::plant::StageParameters;
 
     fn hold(ticks: usize) -> Experiment {
@@ -507,6 +549,27 @@ mod tests {
         let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
         assert!(journal.perform(&too_far(), &mut |_| {}).is_err());
         assert_ne!(again.plant().position_mm(), axis().plant().position_mm());
+    }
+
+    #[test]
+    fn a_series_goes_on_where_it_left_its_axis() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut first, mut again) = (axis(), axis());
+        let mut journal = Journal::open(&mut first, folder.path(), false).unwrap();
+        approach(&mut journal, 5.0).unwrap();
+        let left_mm = first.plant().position_mm();
+        // The axis of the next session stands at the middle again.
+        let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
+        approach(&mut journal, 5.0).unwrap();
+        let mut hold = hold(50);
+        hold.drive = Drive::ClosedLoop(quadrant::reference::MotionSettings::Hold);
+        hold.injection_v = vec![0.0; 50];
+        journal.perform(&hold, &mut |_| {}).unwrap();
+        let difference_mm = (again.plant().position_mm() - left_mm).abs();
+        assert!(
+            left_mm > 4.0 && difference_mm < 0.2,
+            "{left_mm} {difference_mm}"
+        );
     }
 
     #[test]

@@ -59,7 +59,7 @@ pub use approach::{approach, approach_from, approach_mm_s};
 pub use emulated_link::EmulatedLink;
 pub use error::MachineError;
 pub use interface::Machine;
-pub use journal::Journal;
+pub use journal::{Begun, Journal};
 pub use law::{LawMachine, LawStage, Operator, SimulatedTestAxis};
 pub use loopback::{Loopback, SimulatedPeer};
 pub use serial::{BAUD, SerialTransport, serial_ports};

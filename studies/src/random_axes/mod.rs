@@ -441,7 +441,9 @@ impl Line {
         let worse: Vec<_> = worse.collect();
         self.small_worse = worse.len();
         let ratio = |errors: &[f64; 2]| errors[0] / errors[1];
-        let worst = worse.into_iter().max_by(|a, b| ratio(&a.1).total_cmp(&ratio(&b.1)));
+        let worst = worse
+            .into_iter()
+            .max_by(|a, b| ratio(&a.1).total_cmp(&ratio(&b.1)));
         if let Some((sine, errors)) = worst {
             self.small_ratio = Some(ratio(errors));
             self.small_sine = format!(

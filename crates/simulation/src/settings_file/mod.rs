@@ -182,7 +182,11 @@ impl SettingsFile {
         })
     }
 
-    fn check(&self, path: &Path) -> Result<(), SettingsFileError> {
+    /// Checks the settings as a whole; `path` is what messages call the file.
+    ///
+    /// # Errors
+    /// Settings that the firmware would refuse.
+    pub fn check(&self, path: &Path) -> Result<(), SettingsFileError> {
         self.stage
             .validate(FIRMWARE_ELEMENTS)
             .map_err(|source| SettingsFileError::Refused {

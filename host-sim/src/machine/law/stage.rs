@@ -91,6 +91,10 @@ impl Machine for LawStage {
         Ok(self.setup.settings.clone())
     }
 
+    fn position_mm(&mut self, _: AxisName) -> Result<f64, MachineError> {
+        Ok(0.0)
+    }
+
     fn free_travel(&mut self, axis: AxisName) -> Result<Option<Travel>, MachineError> {
         Ok(Some(self.travel(axis)))
     }
