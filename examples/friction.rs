@@ -1,6 +1,6 @@
 //! A friction model alone: the hysteresis of GMS friction as it is pushed 50 um to and fro.
 
-use quadrant::friction::{Direction, gms, stribeck::SlidingTable};
+use quadrant_law::friction::{Direction, gms, stribeck::SlidingTable};
 
 fn main() {
     const PERIOD_S: f64 = 1e-3;

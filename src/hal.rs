@@ -7,9 +7,9 @@
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::law::encoder::EncoderReading;
-use crate::law::safety;
-use crate::law::stage::Outputs;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety;
+use quadrant_law::stage::Outputs;
 
 /// The three axes' encoders.
 pub trait Encoders {

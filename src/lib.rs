@@ -38,11 +38,11 @@
 //! # An axis in ten lines
 //!
 //! ```
-//! use quadrant::axes::PerAxis;
-//! use quadrant::command::Command;
-//! use quadrant::reference::Motion;
+//! use quadrant_law::axes::PerAxis;
+//! use quadrant_law::command::Command;
+//! use quadrant_law::reference::Motion;
 //! use quadrant::settings::StageSettings;
-//! use quadrant::stage::{Inputs, Stage, StageState};
+//! use quadrant_law::stage::{Inputs, Stage, StageState};
 //!
 //! let stage: Stage<f32> = StageSettings::simulated().build()?;
 //! let plan = PerAxis::from_fn(|_| Motion::Hold);
@@ -60,16 +60,9 @@
 pub mod app;
 pub mod drivers;
 pub mod hal;
-pub mod law;
 pub mod lockstep;
 pub mod settings;
 pub mod store;
 
 /// The messages of the link, a crate of their own.
 pub use quadrant_link as link;
-
-#[doc(inline)]
-pub use law::{
-    admission, axes, axis, cancelling, command, control, decimal, encoder, feedforward, friction,
-    homing, injection, learning, motion, reference, safety, scalar, stage, table, telemetry, units,
-};

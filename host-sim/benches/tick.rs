@@ -5,11 +5,11 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use quadrant::command::Command;
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, MAX_ELEMENTS};
 use quadrant::lockstep::InputRecord;
-use quadrant::safety::SafetyState;
-use quadrant::scalar::{Fixed, Scalar};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, MAX_ELEMENTS};
+use quadrant_law::safety::SafetyState;
+use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};

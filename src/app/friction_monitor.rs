@@ -6,9 +6,9 @@
 //! fills neither log nor link.
 
 use super::Snapshot;
-use crate::law::axes::AxisName;
-use crate::law::learning::{LearningReading, LearningStatus};
-use crate::law::scalar::Scalar;
+use quadrant_law::axes::AxisName;
+use quadrant_law::learning::{LearningReading, LearningStatus};
+use quadrant_law::scalar::Scalar;
 
 /// Change of a scale that has settled.
 const STEADY: f32 = 0.03;

@@ -19,8 +19,8 @@ use micromath::F32Ext;
 use quadrant_link::message::AxisName;
 
 use super::Snapshot;
-use crate::law::scalar::{Quantity, Scalar};
-use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
+use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// Longest window after a reversal, ticks: 0.5 s at 10 kHz.
 const MAX_WINDOW_TICKS: u32 = 5_000;

@@ -3,9 +3,9 @@
 //! It runs in the supervising task on the snapshots.
 
 use super::Snapshot;
-use crate::law::axes::AxisName;
-use crate::law::safety::oscillation::{OscillationKind, OscillationReading};
-use crate::law::scalar::Scalar;
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::oscillation::{OscillationKind, OscillationReading};
+use quadrant_law::scalar::Scalar;
 
 /// An oscillation of an axis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -5,8 +5,8 @@ use super::friction_monitor::FrictionMonitor;
 use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
 use super::oscillation_report::OscillationReport;
 use crate::app::supervisor::{Decision, Event, Supervisor};
-use crate::law::command::Command;
-use crate::law::scalar::Scalar;
+use quadrant_law::command::Command;
+use quadrant_law::scalar::Scalar;
 
 /// The result of one run of the supervising task.
 #[derive(Clone, Debug, Default, PartialEq)]

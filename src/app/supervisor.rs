@@ -5,11 +5,11 @@
 
 use super::friction_monitor::FrictionChange;
 use super::oscillation_report::Oscillated;
-use crate::law::axes::AxisName;
-use crate::law::command::Command;
-use crate::law::safety::{Fault, SafetyState, Station};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::safety::{Fault, SafetyState, Station};
 
-pub use crate::law::admission::{Refusal, StageView, refusal, refusal_from};
+pub use quadrant_law::admission::{Refusal, StageView, refusal, refusal_from};
 
 /// Control ticks between two runs of the supervisor: 1 kHz at a control rate of 10 kHz.
 pub const PERIOD_TICKS: u32 = 10;

@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 use super::feedback::FeedbackSettings;
 use super::homing::HomingSettings;
 use super::limits::LimitSettings;
-use crate::law::cancelling::CancellingSettings;
-use crate::law::control::plant_model::PlantModel;
-use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::law::friction::FrictionSettings;
-use crate::law::learning::LearningSettings;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::learning::LearningSettings;
 
 /// Everything one axis' control law is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]

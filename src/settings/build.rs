@@ -3,28 +3,28 @@
 use super::{
     AmplifierSettings, AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings,
 };
-use crate::law::axes::{AxisName, PerAxis};
-use crate::law::axis::{Axis, AxisBuilder, Commissioning};
-use crate::law::cancelling::{CancellingLoop, CancellingSettings};
-use crate::law::control::feedback::LawKind;
-use crate::law::control::pid::PidGains;
-use crate::law::encoder::Encoder;
-use crate::law::feedforward::FeedforwardKind;
-use crate::law::friction::PerDirection;
-use crate::law::friction::stribeck::StribeckCurve;
-use crate::law::learning::{Learning, LearningLoop};
-use crate::law::motion::ReferenceGenerator;
-use crate::law::reference::{Motion, MotionScale, Ramp, Velocity};
-use crate::law::rounding;
-use crate::law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
-use crate::law::safety::oscillation::Oscillation;
-use crate::law::safety::overload::Overload;
-use crate::law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
-use crate::law::safety::travel::Travel;
-use crate::law::safety::{Brake, Operation};
-use crate::law::scalar::Scalar;
-use crate::law::stage::{Plan, Stage};
-use crate::law::units::{DacCode, Position};
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::axis::{Axis, AxisBuilder, Commissioning};
+use quadrant_law::cancelling::{CancellingLoop, CancellingSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::encoder::Encoder;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::stribeck::StribeckCurve;
+use quadrant_law::learning::{Learning, LearningLoop};
+use quadrant_law::motion::ReferenceGenerator;
+use quadrant_law::reference::{Motion, MotionScale, Ramp, Velocity};
+use quadrant_law::rounding;
+use quadrant_law::safety::monitor::{Following, IndexSpacing, Overspeed, SignalLoss};
+use quadrant_law::safety::oscillation::Oscillation;
+use quadrant_law::safety::overload::Overload;
+use quadrant_law::safety::plausibility::{Plausibility, PlausibilityModel, Words};
+use quadrant_law::safety::travel::Travel;
+use quadrant_law::safety::{Brake, Operation};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Plan, Stage};
+use quadrant_law::units::{DacCode, Position};
 
 /// Counts that a step of an axis may have however slow: noise of a count RMS makes up to six in the difference of two readings.
 const LEAST_STEP_COUNTS: i32 = 8;
@@ -92,7 +92,7 @@ impl StageSettings {
     }
 
     /// Builds one axis of settings that [`validate`](Self::validate) has accepted, to be put in the place of another in a
-    /// [`StageRef`](crate::law::stage::StageRef). How long an axis waits at the start of a motion depends on the longest preview
+    /// [`StageRef`](quadrant_law::stage::StageRef). How long an axis waits at the start of a motion depends on the longest preview
     /// of all: a change of that concerns every axis. Slow, as the build of the stage.
     pub fn build_axis<S: Scalar, const N: usize>(&self, axis: AxisName) -> Axis<S, N> {
         let mut built = Axis::blank();

@@ -2,13 +2,13 @@
 
 use super::axis::AxisSettings;
 use super::homing::HomeSwitch;
-use crate::law::friction::Direction;
-use crate::law::homing::{Homing, HomingParameters};
-use crate::law::reference::{Approach, MotionScale, Velocity};
-use crate::law::rounding;
-use crate::law::safety::AxisSwitches;
-use crate::law::scalar::Scalar;
-use crate::law::units::{EncoderCount, POSITION_UNITS_PER_COUNT, Position};
+use quadrant_law::friction::Direction;
+use quadrant_law::homing::{Homing, HomingParameters};
+use quadrant_law::reference::{Approach, MotionScale, Velocity};
+use quadrant_law::rounding;
+use quadrant_law::safety::AxisSwitches;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::units::{EncoderCount, POSITION_UNITS_PER_COUNT, Position};
 
 /// Rest of an axis before its origin is defined, s: many times the longest preview at the usual control rates.
 const SETTLE_S: f64 = 0.02;

@@ -10,18 +10,16 @@ use super::operation::{
     BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
 };
 use super::stage::StageSettings;
-use crate::law::axis::Commissioning;
-use crate::law::cancelling::CancellingSettings;
-use crate::law::control::feedback::LawKind;
-use crate::law::control::pid::PidGains;
-use crate::law::feedforward::{FeedforwardGains, FeedforwardKind};
-use crate::law::friction::FrictionSettings;
-use crate::law::friction::PerDirection;
-use crate::law::friction::gms::{GmsElement, GmsParameters};
-use crate::law::friction::smoothed_gms::SmoothedGmsParameters;
-use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
-use crate::law::learning::LearningSettings;
-use crate::law::safety::{EnabledBy, HostNeeded};
+use quadrant_law::axis::Commissioning;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::safety::{EnabledBy, HostNeeded};
 
 impl StageSettings {
     /// Takes the [default](Self::default) settings over, in place.
@@ -117,7 +115,7 @@ impl Default for AxisSettings {
             encoder: EncoderSettings::default(),
             amplifier: AmplifierSettings::default(),
             feedback: FeedbackSettings::default(),
-            friction: FrictionSettings::default(),
+            friction: friction(),
             feedforward: FeedforwardSettings::default(),
             limits: LimitSettings::default(),
             homing: None,
@@ -175,53 +173,43 @@ impl Default for FeedbackSettings {
     }
 }
 
-impl Default for FrictionSettings {
-    /// As little friction as there can be.
-    fn default() -> Self {
-        Self {
-            sliding: PerDirection {
-                positive: StaticFriction {
-                    curve: StribeckCurve {
-                        coulomb_v: default!("friction.sliding.positive.curve.coulomb_v"),
-                        breakaway_v: default!("friction.sliding.positive.curve.breakaway_v"),
-                        stribeck_velocity_mm_s: default!(
-                            "friction.sliding.positive.curve.stribeck_velocity_mm_s"
-                        ),
-                        exponent: default!("friction.sliding.positive.curve.exponent"),
-                    },
-                    viscous_v_s_per_mm: default!("friction.sliding.positive.viscous_v_s_per_mm"),
+/// As little friction as there can be.
+pub(super) fn friction() -> FrictionSettings {
+    FrictionSettings {
+        sliding: PerDirection {
+            positive: StaticFriction {
+                curve: StribeckCurve {
+                    coulomb_v: default!("friction.sliding.positive.curve.coulomb_v"),
+                    breakaway_v: default!("friction.sliding.positive.curve.breakaway_v"),
+                    stribeck_velocity_mm_s: default!(
+                        "friction.sliding.positive.curve.stribeck_velocity_mm_s"
+                    ),
+                    exponent: default!("friction.sliding.positive.curve.exponent"),
                 },
-                negative: StaticFriction {
-                    curve: StribeckCurve {
-                        coulomb_v: default!("friction.sliding.negative.curve.coulomb_v"),
-                        breakaway_v: default!("friction.sliding.negative.curve.breakaway_v"),
-                        stribeck_velocity_mm_s: default!(
-                            "friction.sliding.negative.curve.stribeck_velocity_mm_s"
-                        ),
-                        exponent: default!("friction.sliding.negative.curve.exponent"),
-                    },
-                    viscous_v_s_per_mm: default!("friction.sliding.negative.viscous_v_s_per_mm"),
+                viscous_v_s_per_mm: default!("friction.sliding.positive.viscous_v_s_per_mm"),
+            },
+            negative: StaticFriction {
+                curve: StribeckCurve {
+                    coulomb_v: default!("friction.sliding.negative.curve.coulomb_v"),
+                    breakaway_v: default!("friction.sliding.negative.curve.breakaway_v"),
+                    stribeck_velocity_mm_s: default!(
+                        "friction.sliding.negative.curve.stribeck_velocity_mm_s"
+                    ),
+                    exponent: default!("friction.sliding.negative.curve.exponent"),
                 },
+                viscous_v_s_per_mm: default!("friction.sliding.negative.viscous_v_s_per_mm"),
             },
-            gms: GmsParameters {
-                elements: Vec::from_iter([GmsElement {
-                    stiffness_v_per_mm: default!("friction.gms.elements.stiffness_v_per_mm"),
-                    weight: default!("friction.gms.elements.weight"),
-                }]),
-                attraction_v_s: default!("friction.gms.attraction_v_s"),
-            },
-            smoothed_gms: SmoothedGmsParameters::default(),
-            dahl: None,
-            lugre: None,
-        }
-    }
-}
-
-impl Default for SmoothedGmsParameters {
-    fn default() -> Self {
-        Self {
-            width: default!("friction.smoothed_gms.width"),
-        }
+        },
+        gms: GmsParameters {
+            elements: Vec::from_iter([GmsElement {
+                stiffness_v_per_mm: default!("friction.gms.elements.stiffness_v_per_mm"),
+                weight: default!("friction.gms.elements.weight"),
+            }]),
+            attraction_v_s: default!("friction.gms.attraction_v_s"),
+        },
+        smoothed_gms: SmoothedGmsParameters::default(),
+        dahl: None,
+        lugre: None,
     }
 }
 
@@ -239,28 +227,6 @@ impl Default for FeedforwardSettings {
             preview_s: default!("feedforward.preview_s"),
             learning: None,
             cancelling: None,
-        }
-    }
-}
-
-impl Default for LearningSettings {
-    fn default() -> Self {
-        Self {
-            memory_s: default!("feedforward.learning.memory_s"),
-            vibration_mm_s: default!("feedforward.learning.vibration_mm_s"),
-        }
-    }
-}
-
-impl Default for CancellingSettings {
-    fn default() -> Self {
-        Self {
-            spindle_rpm: default!("feedforward.cancelling.spindle_rpm"),
-            ramp_rpm_s: default!("feedforward.cancelling.ramp_rpm_s"),
-            teeth: default!("feedforward.cancelling.teeth") as u8,
-            harmonics: default!("feedforward.cancelling.harmonics") as u8,
-            rate_per_s: default!("feedforward.cancelling.rate_per_s"),
-            limit_v: default!("feedforward.cancelling.limit_v"),
         }
     }
 }

@@ -6,12 +6,12 @@ use core::fmt;
 use super::axis::AxisSettings;
 use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
-use crate::law::axes::AxisName;
-use crate::law::decimal::Decimal;
-use crate::law::reference::{
+use quadrant_law::axes::AxisName;
+use quadrant_law::decimal::Decimal;
+use quadrant_law::reference::{
     MotionScale, MotionSettings, PointToPointSettings, StreamLimits, Velocity,
 };
-use crate::law::units::Position;
+use quadrant_law::units::Position;
 
 /// Reason why an axis is not moved.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -170,7 +170,7 @@ impl StageSettings {
 
     /// The move of a homed axis from rest at `from` to `target_mm` at `velocity_mm_s`, within the axis' acceleration and
     /// jerk. [`PlanSettings::validate`](super::PlanSettings::validate) refuses one that takes too long. Hand it to the axis as its
-    /// plan's motion and start it with [`Command::StartMove`](crate::law::command::Command::StartMove).
+    /// plan's motion and start it with [`Command::StartMove`](quadrant_law::command::Command::StartMove).
     ///
     /// # Errors
     /// The axis is not homed, the target beyond its travel, or the velocity out of its range.
@@ -218,7 +218,7 @@ impl StageSettings {
         })
     }
 
-    /// The velocity of a jog, for [`Command::Jog`](crate::law::command::Command::Jog).
+    /// The velocity of a jog, for [`Command::Jog`](quadrant_law::command::Command::Jog).
     ///
     /// # Errors
     /// A speed above the axis' largest, or no number.
@@ -236,7 +236,7 @@ impl StageSettings {
         Ok(Velocity::from_mm_s(velocity_mm_s, self.scale_of(axis)))
     }
 
-    /// Checks that an axis can be homed, before [`Command::Home`](crate::law::command::Command::Home), which an axis without
+    /// Checks that an axis can be homed, before [`Command::Home`](quadrant_law::command::Command::Home), which an axis without
     /// homing ignores.
     ///
     /// # Errors

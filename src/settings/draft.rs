@@ -10,7 +10,7 @@ use super::error::{PathOf, SettingsError};
 use super::leaves::rules::{SAFETY_OF_AN_AXIS, SAFETY_OF_THE_STAGE};
 use super::stage::StageSettings;
 use super::tree::{MAX_VALUE_BYTES, TreeError, same_in};
-use crate::law::axes::{AxisName, PerAxis};
+use quadrant_law::axes::{AxisName, PerAxis};
 
 /// A set of settings that is edited leaf by leaf, and the one in force.
 #[derive(Debug)]

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-use crate::law::axes::AxisName;
-use crate::law::decimal::Decimal;
+use quadrant_law::axes::AxisName;
+use quadrant_law::decimal::Decimal;
 
 /// Reason why a value is refused.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,17 +4,17 @@ use heapless::Vec;
 use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 
-use crate::law::control::cascade::{Cascade, CascadeGains};
-use crate::law::control::feedback::{Feedback, LawKind};
-use crate::law::control::filter::{FilterList, Filters};
-use crate::law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
-use crate::law::control::npid::{NonlinearGain, NonlinearGainTable, NonlinearPid};
-use crate::law::control::pid::Pid;
-use crate::law::control::pid::PidGains;
-use crate::law::control::schedule::{GainSchedule, MAX_POINTS, SchedulePoint, ScheduledPid};
-use crate::law::control::sliding_mode::{SlidingMode, SlidingModeGains};
-use crate::law::control::surface::SurfaceGains;
-use crate::law::scalar::Scalar;
+use quadrant_law::control::cascade::{Cascade, CascadeGains};
+use quadrant_law::control::feedback::{Feedback, LawKind};
+use quadrant_law::control::filter::{FilterList, Filters};
+use quadrant_law::control::nctf::{CharacteristicPoint, Nctf, NctfGains};
+use quadrant_law::control::npid::{NonlinearGain, NonlinearGainTable, NonlinearPid};
+use quadrant_law::control::pid::Pid;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::schedule::{GainSchedule, MAX_POINTS, SchedulePoint, ScheduledPid};
+use quadrant_law::control::sliding_mode::{SlidingMode, SlidingModeGains};
+use quadrant_law::control::surface::SurfaceGains;
+use quadrant_law::scalar::Scalar;
 
 /// The feedback law, and the parameters of every law that the axis has some for: the law can be changed without losing
 /// them, but only to one that has its own.

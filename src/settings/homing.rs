@@ -4,7 +4,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use crate::law::friction::Direction;
+use quadrant_law::friction::Direction;
 
 /// The switch that homing looks for.
 #[derive(

@@ -3,10 +3,10 @@
 use super::error::{Reason, SettingsError};
 use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
-use crate::law::axes::AxisName;
-use crate::law::injection::{Coupling, Injection};
-use crate::law::scalar::Scalar;
-use crate::law::units::{DacCode, Position};
+use quadrant_law::axes::AxisName;
+use quadrant_law::injection::{Coupling, Injection};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::units::{DacCode, Position};
 
 /// A request to inject a voltage, and the bounds that end it.
 #[derive(Clone, Copy, Debug, PartialEq)]

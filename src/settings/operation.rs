@@ -4,7 +4,7 @@ use miniconf::{TreeAny, TreeSchema};
 use serde::{Deserialize, Serialize};
 use strum::{AsRefStr, EnumString, VariantNames};
 
-use crate::law::safety::{EnabledBy, HostNeeded, Reaction};
+use quadrant_law::safety::{EnabledBy, HostNeeded, Reaction};
 
 /// The stations that may enable the stage, the motions that need their host, and the reaction to the emergency stop.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, TreeSchema, TreeAny)]

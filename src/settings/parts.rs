@@ -6,18 +6,18 @@ use super::axis::AxisSettings;
 use super::homing::{HomeSwitch, HomingSettings};
 use super::leaves::default;
 use super::limits::TravelSettings;
-use crate::law::cancelling::CancellingSettings;
-use crate::law::control::cascade::CascadeGains;
-use crate::law::control::filter::FilterSettings;
-use crate::law::control::nctf::{CharacteristicPoint, NctfGains};
-use crate::law::control::npid::NonlinearGain;
-use crate::law::control::plant_model::PlantModel;
-use crate::law::control::schedule::SchedulePoint;
-use crate::law::control::sliding_mode::SlidingModeGains;
-use crate::law::friction::Direction;
-use crate::law::friction::dahl::DahlParameters;
-use crate::law::friction::lugre::LugreParameters;
-use crate::law::learning::LearningSettings;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::cascade::CascadeGains;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::nctf::{CharacteristicPoint, NctfGains};
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::schedule::SchedulePoint;
+use quadrant_law::control::sliding_mode::SlidingModeGains;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::learning::LearningSettings;
 
 /// A part of an axis that may be left out.
 pub(crate) struct Part {

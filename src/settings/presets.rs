@@ -6,20 +6,21 @@
 use heapless::Vec;
 
 use super::axis::{AmplifierSettings, AxisSettings, EncoderSettings, FeedforwardSettings};
+use super::defaults::friction;
 use super::feedback::FeedbackSettings;
 use super::homing::{HomeSwitch, HomingSettings};
 use super::limits::{LimitSettings, TravelSettings};
 use super::stage::StageSettings;
-use crate::law::control::npid::NonlinearGain;
-use crate::law::control::pid::PidGains;
-use crate::law::control::plant_model::PlantModel;
-use crate::law::feedforward::FeedforwardKind;
-use crate::law::friction::FrictionSettings;
-use crate::law::friction::dahl::DahlParameters;
-use crate::law::friction::gms::{GmsElement, GmsParameters};
-use crate::law::friction::lugre::LugreParameters;
-use crate::law::friction::stribeck::{StaticFriction, StribeckCurve};
-use crate::law::friction::{Direction, PerDirection};
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::friction::{Direction, PerDirection};
 
 /// Linear model of the x axis, chosen so that the thesis' printed margins come out.
 pub const X_PLANT: PlantModel = PlantModel {
@@ -132,7 +133,7 @@ fn axis(parameters: &Parameters) -> AxisSettings {
                 // As much damping before sliding as in it.
                 damping_v_s_per_mm: viscous_v_s_per_mm,
             }),
-            ..FrictionSettings::default()
+            ..friction()
         },
         feedforward: FeedforwardSettings {
             kind: FeedforwardKind::Combined,

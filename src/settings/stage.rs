@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::axis::AxisSettings;
 use super::operation::{BrakeSettings, OperationSettings, StreamingSettings};
-use crate::law::reference::MotionSettings;
+use quadrant_law::reference::MotionSettings;
 
 /// Everything the stage's control law is made from.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]

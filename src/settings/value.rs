@@ -7,14 +7,14 @@ use core::any::Any;
 
 use super::homing::HomeSwitch;
 use super::operation::{EmergencyReaction, LossReaction};
-use crate::law::control::feedback::LawKind;
-use crate::law::control::filter::FilterList;
-use crate::law::control::nctf::Characteristic;
-use crate::law::control::schedule::GainSchedule;
-use crate::law::feedforward::FeedforwardKind;
-use crate::law::friction::Direction;
-use crate::law::friction::gms::GmsElements;
-use crate::law::safety::{EnabledBy, HostNeeded};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::FilterList;
+use quadrant_law::control::nctf::Characteristic;
+use quadrant_law::control::schedule::GainSchedule;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::gms::GmsElements;
+use quadrant_law::safety::{EnabledBy, HostNeeded};
 
 /// The longest value in bytes: a list of 16 points of two numbers takes 257.
 pub const MAX_VALUE_BYTES: usize = 320;

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
 use quadrant::lockstep::{BASE, InputRecord, Job, Mode, OutputRecord, RECORDED_OUTPUTS};
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 use quadrant_sim::machine::emulator::Memory;
 
 use crate::hosted;

@@ -7,7 +7,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::lockstep::{
     InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 use quadrant_sim::machine::emulator::{Clock, Emulator, Lockstep, Memory};
 
 use crate::ahead;

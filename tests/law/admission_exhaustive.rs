@@ -3,12 +3,12 @@
 //! A view is finite. Of the three axes y stands for all: what is asked of an axis depends on that axis and on what holds for
 //! the whole stage.
 
-use quadrant::admission::{Refusal, StageView, refusal, refusal_from};
-use quadrant::axes::{AxisName, PerAxis};
-use quadrant::command::Command;
-use quadrant::motion::MotionMode;
-use quadrant::reference::{MotionScale, Velocity};
-use quadrant::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState, Station};
+use quadrant_law::admission::{Refusal, StageView, refusal, refusal_from};
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{MotionScale, Velocity};
+use quadrant_law::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState, Station};
 
 const AXIS: AxisName = AxisName::Y;
 const FAULT: Fault = Fault {

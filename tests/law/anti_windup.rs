@@ -1,15 +1,15 @@
 //! Recovery from a load that the output limit cannot hold.
 
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::control::feedback::{Feedback, LawKind};
-use quadrant::control::pid::PidGains;
-use quadrant::control::surface::SurfaceGains;
-use quadrant::control::terms::FeedbackInput;
-use quadrant::control::terms::FeedbackState;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::reference::Velocity;
 use quadrant::settings::presets::x_axis;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::{Feedback, LawKind};
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::surface::SurfaceGains;
+use quadrant_law::control::terms::FeedbackInput;
+use quadrant_law::control::terms::FeedbackState;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::reference::Velocity;
 
 use crate::common::{Rig, with_x};
 

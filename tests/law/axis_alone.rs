@@ -1,18 +1,18 @@
 //! One axis by itself: what it cannot be made with, what a tick of it does, and what of it is seen.
 
-use quadrant::axes::AxisName;
-use quadrant::axis::{Axis, AxisBuilder, AxisError, AxisState};
-use quadrant::command::Command;
-use quadrant::control::feedback::{Feedback, LawKind};
-use quadrant::control::pid::{Pid, PidGains};
-use quadrant::encoder::EncoderReading;
-use quadrant::injection::{Coupling, Injection};
-use quadrant::reference::Motion;
-use quadrant::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::stage::StageState;
-use quadrant::telemetry::LimitedBy;
-use quadrant::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::axis::telemetry::LimitedBy;
+use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState};
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::{Feedback, LawKind};
+use quadrant_law::control::pid::{Pid, PidGains};
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::injection::{Coupling, Injection};
+use quadrant_law::reference::Motion;
+use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
+use quadrant_law::stage::StageState;
+use quadrant_law::units::Position;
 
 use crate::common::{Rig, sine_on_x, with_x, x_alone};
 
@@ -89,7 +89,7 @@ fn an_axis_is_not_made_of_parts_that_cannot_be_and_the_first_is_named() {
             |builder| {
                 let gains = StageSettings::simulated().axes[0].feedforward.gains;
                 builder.amplifier(10.0, 10.0, 0.0, false).feedforward(
-                    quadrant::feedforward::FeedforwardKind::None,
+                    quadrant_law::feedforward::FeedforwardKind::None,
                     &gains,
                     &StageSettings::simulated().axes[0].friction,
                     1000,
@@ -401,7 +401,7 @@ fn of_two_faults_that_hold_the_axes_the_first_is_shown_and_of_one_that_stops_the
 fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_that_follows() {
     let settings = with_x(|x| {
         x.feedback.law = LawKind::Cascade;
-        x.feedforward.kind = quadrant::feedforward::FeedforwardKind::None;
+        x.feedforward.kind = quadrant_law::feedforward::FeedforwardKind::None;
     });
     let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
     rig.start();
@@ -423,7 +423,7 @@ fn a_law_that_needs_the_velocity_of_the_reference_has_nothing_to_do_on_an_axis_t
 
 #[test]
 fn the_feedback_follows_the_reference_by_the_longest_preview_that_there_is() {
-    let longest = quadrant::axis::MAX_PREVIEW_TICKS;
+    let longest = quadrant_law::axis::MAX_PREVIEW_TICKS;
     let mut axis = Axis::<f64, 4>::blank();
     let settings = StageSettings::simulated();
     let x = &settings.axes[0];
@@ -431,7 +431,7 @@ fn the_feedback_follows_the_reference_by_the_longest_preview_that_there_is() {
         .amplifier(10.0, 10.0, 0.0, false)
         .feedback(pid())
         .feedforward(
-            quadrant::feedforward::FeedforwardKind::None,
+            quadrant_law::feedforward::FeedforwardKind::None,
             &x.feedforward.gains,
             &x.friction,
             longest,
@@ -456,7 +456,7 @@ fn the_feedback_follows_the_reference_by_the_longest_preview_that_there_is() {
 
 #[test]
 fn the_inputs_of_counts_have_them() {
-    let inputs = quadrant::stage::Inputs::of_counts([1, 2, 3]);
+    let inputs = quadrant_law::stage::Inputs::of_counts([1, 2, 3]);
     assert_eq!(inputs.readings.map(|reading| reading.count), [1, 2, 3]);
 }
 

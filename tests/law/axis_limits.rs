@@ -1,13 +1,13 @@
 //! Whatever the encoders say, the outputs stay within their limits and the memory stays sound.
 
 use proptest::prelude::*;
-use quadrant::axes::PerAxis;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant::telemetry::LimitedBy;
+use quadrant_law::axes::PerAxis;
+use quadrant_law::axis::telemetry::LimitedBy;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{Rig, repeatable, sine_on_x, with_x};
 

@@ -1,8 +1,8 @@
 //! The meaning of the reference board's words: the board's own file, on the host.
 
-use quadrant::axes::AxisName;
 use quadrant::hal::ResetCause;
-use quadrant::safety::{AxisSwitches, Switches};
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::{AxisSwitches, Switches};
 
 #[path = "../../src/board/nucleo_f446re/wiring.rs"]
 mod wiring;

@@ -1,14 +1,14 @@
 //! The holding brake: an axis that hangs on it never falls between brake and law.
 
 use proptest::prelude::*;
-use quadrant::admission::{Refusal, refusal};
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
 use quadrant::link::message::{AxisName as WireAxis, Body, LinkError, Provenance, SettingsRequest};
-use quadrant::reference::{MotionScale, Velocity};
-use quadrant::safety::{FaultCode, SafetyState, Switches};
 use quadrant::settings::{EmergencyReaction, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::admission::{Refusal, refusal};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::reference::{MotionScale, Velocity};
+use quadrant_law::safety::{FaultCode, SafetyState, Switches};
+use quadrant_law::stage::Outputs;
 
 use crate::common::{Rig, repeatable, sine_on_x};
 use crate::preemption;

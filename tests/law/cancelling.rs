@@ -2,14 +2,16 @@
 //! nothing where it is left out.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
-use quadrant::cancelling::{CancellingLoop, CancellingSettings, LEAST_MARGIN_DEG, SpindleSpeed};
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
-use quadrant::units::DacCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::cancelling::{
+    CancellingLoop, CancellingSettings, LEAST_MARGIN_DEG, SpindleSpeed,
+};
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_law::units::DacCode;
 
 use crate::common::{Rig, repeatable};
 use crate::learning::{Axis, fixed};

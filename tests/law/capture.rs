@@ -4,11 +4,11 @@ use proptest::prelude::*;
 use quadrant::app::capture::{Capture, CaptureError};
 use quadrant::app::glitch_monitor::GlitchReadings;
 use quadrant::app::telemetry::{Observation, Selection};
-use quadrant::command::Command;
 use quadrant::link::message::{
     CaptureCause, CapturePhase, Channel, Edge, Level, MAX_CHANNELS, Trigger,
 };
 use quadrant::settings::StageSettings;
+use quadrant_law::command::Command;
 
 use crate::common::{Rig, repeatable, sine_on_x};
 

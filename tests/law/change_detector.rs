@@ -1,11 +1,11 @@
 //! Changes of state that the board's own log reports.
 
-use quadrant::admission::StageView;
 use quadrant::app::{
     ChangeDetector, MAX_STATE_CHANGES, ServerStatistics, StateChange, TimingStatistics,
 };
-use quadrant::axes::{AxisName, PerAxis};
-use quadrant::motion::MotionMode;
+use quadrant_law::admission::StageView;
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::motion::MotionMode;
 
 /// A machine that somebody else changes between looks.
 #[derive(Default)]

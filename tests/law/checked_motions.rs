@@ -2,18 +2,18 @@
 
 use std::collections::BTreeMap;
 
-use quadrant::axes::AxisName as LawAxis;
-use quadrant::command::Command;
-use quadrant::friction::Direction;
 use quadrant::link::message::{
     AxisName, AxisPoint, Body, InjectRequest, Motion, Plan, PointToPoint, Reply, SetPoint,
     SettingsRequest, StreamRequest,
 };
-use quadrant::reference::Velocity;
-use quadrant::safety::{AxisSwitches, Switches};
 use quadrant::settings::draft::Draft;
 use quadrant::settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
 use quadrant_fault_bench::tasks::Tasks;
+use quadrant_law::axes::AxisName as LawAxis;
+use quadrant_law::command::Command;
+use quadrant_law::friction::Direction;
+use quadrant_law::reference::Velocity;
+use quadrant_law::safety::{AxisSwitches, Switches};
 
 use crate::common::Noise;
 use crate::preemption::{refused, set, settings};

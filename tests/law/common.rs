@@ -2,15 +2,15 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
-use quadrant::axes::PerAxis;
-use quadrant::axis::AxisState;
-use quadrant::command::Command;
-use quadrant::encoder::EncoderReading;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
 pub(crate) use quadrant_fault_bench::noise::Noise;
+use quadrant_law::axes::PerAxis;
+use quadrant_law::axis::AxisState;
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
 
 /// A property test of `cases` cases that is the same on every run.
 pub(crate) fn repeatable(cases: u32) -> Config {

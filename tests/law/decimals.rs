@@ -1,7 +1,7 @@
 //! Tests of the decimals in messages.
 
 use proptest::prelude::*;
-use quadrant::decimal::Decimal;
+use quadrant_law::decimal::Decimal;
 
 #[test]
 fn numbers_are_shown_as_a_person_writes_them() {

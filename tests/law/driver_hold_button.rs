@@ -1,8 +1,8 @@
 //! The dead man's switch.
 
 use proptest::prelude::*;
-use quadrant::command::Command;
 use quadrant::drivers::hold_button::{DEBOUNCE_TICKS, HoldButton};
+use quadrant_law::command::Command;
 
 const LONG: usize = DEBOUNCE_TICKS as usize;
 

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 
 const ALL: [NoiseShaper; 3] = [
     NoiseShaper::Rounded,

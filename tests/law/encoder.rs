@@ -1,8 +1,8 @@
 //! Counters that wrap, counts that do not.
 
 use proptest::prelude::*;
-use quadrant::encoder::{Encoder, EncoderState};
-use quadrant::units::EncoderCount;
+use quadrant_law::encoder::{Encoder, EncoderState};
+use quadrant_law::units::EncoderCount;
 
 use crate::common::repeatable;
 

@@ -3,19 +3,19 @@
 
 use std::collections::VecDeque;
 
-use quadrant::axes::AxisName;
-use quadrant::cancelling::CancellingSettings;
-use quadrant::command::Command;
-use quadrant::injection::Injection;
-use quadrant::reference::{
+use quadrant::settings::{AxisSettings, InjectionSettings, PlanSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::command::Command;
+use quadrant_law::injection::Injection;
+use quadrant_law::reference::{
     AxisPoint, MotionSettings, PointToPointSettings, ReferenceSample, SetPoint, StreamLimits,
     StreamPlanner, Velocity,
 };
-use quadrant::safety::FaultCode;
-use quadrant::safety::oscillation::{OscillationKind, OscillationReading};
-use quadrant::scalar::{Fixed, Scalar};
-use quadrant::settings::{AxisSettings, InjectionSettings, PlanSettings, StageSettings};
-use quadrant::units::Position;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::safety::oscillation::{OscillationKind, OscillationReading};
+use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_law::units::Position;
 
 use crate::common::{Noise, Rig, sine_on_x, with_x};
 use quadrant_fault_bench::plant::{
@@ -90,7 +90,7 @@ struct Bench<S: Scalar> {
     encoder: Encoder,
     activity: Activity,
     planner: Option<StreamPlanner>,
-    segments: VecDeque<[quadrant::reference::Segment; 3]>,
+    segments: VecDeque<[quadrant_law::reference::Segment; 3]>,
     points: u32,
     words: u32,
     /// Tick in which the encoder dies.
@@ -613,7 +613,7 @@ fn budget_ticks<S: Scalar>(volts: f64) -> u32 {
     let settings = with_x(|axis: &mut AxisSettings| {
         axis.plant = None;
         axis.feedback.nonlinear = None;
-        axis.feedback.law = quadrant::control::feedback::LawKind::Pid;
+        axis.feedback.law = quadrant_law::control::feedback::LawKind::Pid;
     });
     let activity = Activity::OpenLoop(volts, 0.0);
     let mut bench = Bench::<S>::new(&settings, &MODEL, activity, Death::Frozen, 0);

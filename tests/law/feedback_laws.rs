@@ -1,11 +1,11 @@
 //! Promises of every feedback law, whichever it is.
 
 use proptest::prelude::*;
-use quadrant::control::feedback::{Feedback, LawKind};
-use quadrant::control::terms::FeedbackInput;
-use quadrant::control::terms::FeedbackState;
-use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::presets::x_axis;
+use quadrant_law::control::feedback::{Feedback, LawKind};
+use quadrant_law::control::terms::FeedbackInput;
+use quadrant_law::control::terms::FeedbackState;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{any_f32, repeatable};
 

@@ -1,15 +1,15 @@
 //! Friction feedforward: nothing when off, each effect once, at the right time.
 
 use proptest::prelude::*;
-use quadrant::feedforward::{
+use quadrant::settings::presets::x_axis;
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::feedforward::{
     Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
     ReferenceStep,
 };
-use quadrant::friction::FrictionSettings;
-use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::presets::x_axis;
-use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::units::{DacCode, Position};
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::units::{DacCode, Position};
 
 use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x, x_alone};
 
@@ -235,8 +235,8 @@ fn preview_shifts_the_feedbacks_reference_by_whole_ticks() {
         let settings = x_alone(|axis| axis.feedforward.preview_s = preview_s);
         let mut rig = Rig::<f64>::new(&settings, &sine_on_x(1.0, 10.0));
         rig.tick();
-        rig.command(quadrant::command::Command::Enable);
-        rig.inputs.command = Some(quadrant::command::Command::Run);
+        rig.command(quadrant_law::command::Command::Enable);
+        rig.inputs.command = Some(quadrant_law::command::Command::Run);
         (0..300)
             .map(|_| {
                 rig.tick();
@@ -280,8 +280,8 @@ fn a_stage_at_rest_feeds_nothing_forward() {
 /// A stage on three axes stays within the memory of a small target.
 #[test]
 fn a_stage_of_any_kind_is_small() {
-    let stage = size_of::<quadrant::stage::Stage<f32>>();
-    let state = size_of::<quadrant::stage::StageState<f32>>();
+    let stage = size_of::<quadrant_law::stage::Stage<f32>>();
+    let state = size_of::<quadrant_law::stage::StageState<f32>>();
     println!("stage {stage} bytes, its state {state} bytes");
     assert!(stage + state < 30 << 10, "{stage} + {state} bytes");
 }

@@ -1,7 +1,7 @@
 //! Fixed point: saturating arithmetic and accurate gains.
 
 use proptest::prelude::*;
-use quadrant::scalar::{Fixed, FixedGain, Quantity, Scalar};
+use quadrant_law::scalar::{Fixed, FixedGain, Quantity, Scalar};
 
 use crate::common::repeatable;
 

@@ -1,10 +1,10 @@
 //! Dahl's model: its closed form, its bounds, its losses.
 
 use proptest::prelude::*;
-use quadrant::friction::PerDirection;
-use quadrant::friction::bristle::Bristle;
-use quadrant::friction::dahl::{Dahl, DahlParameters};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::bristle::Bristle;
+use quadrant_law::friction::dahl::{Dahl, DahlParameters};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{any_f32, repeatable};
 

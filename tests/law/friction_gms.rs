@@ -1,10 +1,10 @@
 //! The GMS model's branches: sticking, slipping, reversal; its bounds and its losses.
 
 use proptest::prelude::*;
-use quadrant::friction::gms::{Gms, GmsElement, GmsState};
-use quadrant::friction::stribeck::{Sliding, SlidingTable, StribeckCurve};
-use quadrant::friction::{Direction, PerDirection};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::friction::gms::{Gms, GmsElement, GmsState};
+use quadrant_law::friction::stribeck::{Sliding, SlidingTable, StribeckCurve};
+use quadrant_law::friction::{Direction, PerDirection};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{any_f32, repeatable};
 

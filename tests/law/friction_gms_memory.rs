@@ -1,8 +1,8 @@
 //! The GMS model's hysteresis: virgin curve, doubled reversal curves, return points, and no drift.
 
 use proptest::prelude::*;
-use quadrant::friction::gms::{Gms, GmsElement, GmsParameters, GmsState};
-use quadrant::friction::stribeck::Sliding;
+use quadrant_law::friction::gms::{Gms, GmsElement, GmsParameters, GmsState};
+use quadrant_law::friction::stribeck::Sliding;
 
 use crate::common::repeatable;
 use crate::friction_gms::elements;

@@ -1,11 +1,11 @@
 //! LuGre: its exact step, its bounds, its losses.
 
 use proptest::prelude::*;
-use quadrant::friction::PerDirection;
-use quadrant::friction::bristle::Bristle;
-use quadrant::friction::lugre::{Lugre, LugreParameters};
-use quadrant::friction::stribeck::StribeckCurve;
-use quadrant::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::bristle::Bristle;
+use quadrant_law::friction::lugre::{Lugre, LugreParameters};
+use quadrant_law::friction::stribeck::StribeckCurve;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{any_f32, repeatable};
 

@@ -2,8 +2,8 @@
 
 use quadrant::app::Snapshot;
 use quadrant::app::friction_monitor::{FrictionChange, FrictionMonitor};
-use quadrant::axes::AxisName;
-use quadrant::learning::{LearningReading, LearningStatus};
+use quadrant_law::axes::AxisName;
+use quadrant_law::learning::{LearningReading, LearningStatus};
 
 /// Runs of the supervising task in a second.
 const RUNS_PER_S: usize = 1_000;

@@ -1,9 +1,9 @@
 //! The Stribeck curve, the static model, and their tables.
 
 use proptest::prelude::*;
-use quadrant::friction::stribeck::{SlidingTable, StaticFriction, StribeckCurve};
-use quadrant::friction::{Direction, PerDirection};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::friction::stribeck::{SlidingTable, StaticFriction, StribeckCurve};
+use quadrant_law::friction::{Direction, PerDirection};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::repeatable;
 

@@ -4,8 +4,8 @@ use quadrant::app::Snapshot;
 use quadrant::app::glitch_monitor::{GlitchEvent, GlitchMonitor, degrees, root};
 use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::link::message::AxisName;
-use quadrant::safety::SafetyState;
-use quadrant::units::Position;
+use quadrant_law::safety::SafetyState;
+use quadrant_law::units::Position;
 
 /// Length of a count, mm.
 const RESOLUTION_MM: f64 = 5e-4;

@@ -2,13 +2,13 @@
 //! nor on a switch that scatters, bounces and has play.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::friction::Direction;
-use quadrant::motion::MotionMode;
-use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant::settings::{AxisSettings, HomeSwitch, HomingSettings, PlanSettings};
-use quadrant::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::friction::Direction;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
+use quadrant_law::units::Position;
 
 use crate::common::{Noise, Rig, repeatable, with_x};
 
@@ -216,7 +216,7 @@ fn a_limit_switch_serves_as_the_home_switch() {
     // As a limit it works otherwise.
     machine.tick(Some(Command::Jog(
         AxisName::X,
-        quadrant::reference::Velocity::from_displacement(Position(-(2 << 16))),
+        quadrant_law::reference::Velocity::from_displacement(Position(-(2 << 16))),
     )));
     for _ in 0..60_000 {
         machine.tick(None);

@@ -1,12 +1,12 @@
 //! The homing routine by itself, tick by tick: how long it looks, what it takes for bounce, and where a mark is trusted.
 
-use quadrant::friction::Direction;
-use quadrant::homing::{Homing, HomingEvent, HomingInput, HomingParameters, HomingState};
-use quadrant::reference::{
+use quadrant_law::friction::Direction;
+use quadrant_law::homing::{Homing, HomingEvent, HomingInput, HomingParameters, HomingState};
+use quadrant_law::reference::{
     Approach, MotionScale, MotionState, Ramp, RampState, ReferenceSample, Velocity,
 };
-use quadrant::safety::{AxisSwitches, FaultCode};
-use quadrant::units::Position;
+use quadrant_law::safety::{AxisSwitches, FaultCode};
+use quadrant_law::units::Position;
 
 const SCALE: MotionScale = MotionScale {
     resolution_mm: 5e-4,

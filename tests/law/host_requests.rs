@@ -1,13 +1,13 @@
 //! Requests of a host on their whole way: from the link through server and queues to the tick, and back.
 
-use quadrant::command::Command;
 use quadrant::link::message::{
     AxisName, AxisPoint, AxisSet, AxisSignal, Body, CapturePhase, CaptureRequest, CaptureStatus,
     Channel, Inputs, Reply, SetPoint, StreamRequest, TelemetryRequest, Trigger,
 };
-use quadrant::motion::MotionMode;
-use quadrant::safety::{AxisSwitches, FaultCode, HostNeeded, Switches};
 use quadrant_fault_bench::tasks::Tasks;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::safety::{AxisSwitches, FaultCode, HostNeeded, Switches};
 
 use crate::preemption::{LINK_TIMEOUT_TICKS, safety, settings};
 
@@ -244,8 +244,11 @@ fn a_capture_is_armed_waits_for_its_trigger_fills_and_comes_back() {
 fn the_inputs_are_shown_as_they_are() {
     let mut tasks = Tasks::new(&settings(), 1);
     let pressed = Switches::NONE
-        .with_axis(quadrant::axes::AxisName::Y, AxisSwitches::HOME)
-        .with_axis(quadrant::axes::AxisName::X, AxisSwitches::POSITIVE_LIMIT);
+        .with_axis(quadrant_law::axes::AxisName::Y, AxisSwitches::HOME)
+        .with_axis(
+            quadrant_law::axes::AxisName::X,
+            AxisSwitches::POSITIVE_LIMIT,
+        );
     tasks.upper.borrow_mut().inputs.switches = pressed;
     tasks.run(40);
     let Ok(Reply::Inputs(Inputs {

@@ -1,18 +1,18 @@
 //! A host's voltage through the whole tick: what it adds up to, and when it is taken.
 
 use proptest::prelude::*;
-use quadrant::admission::Refusal;
-use quadrant::admission::StageView;
-use quadrant::admission::refusal;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::injection::Injection;
-use quadrant::motion::MotionMode;
-use quadrant::reference::Velocity;
-use quadrant::safety::FaultCode;
-use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{InjectionSettings, PlanSettings, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::admission::Refusal;
+use quadrant_law::admission::StageView;
+use quadrant_law::admission::refusal;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::injection::Injection;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::Velocity;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_law::stage::Outputs;
 
 use crate::common::{Rig, any_f32, repeatable, sine_on_x};
 

@@ -1,12 +1,12 @@
 //! Jogging: at the velocity asked for, within acceleration and jerk, and never past the end of the travel.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::motion::MotionMode;
-use quadrant::reference::{JogState, MotionScale, Ramp, RampState, Velocity};
 use quadrant::settings::{PlanSettings, StageSettings, TravelSettings};
-use quadrant::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{JogState, MotionScale, Ramp, RampState, Velocity};
+use quadrant_law::units::Position;
 
 use crate::common::{Rig, repeatable, with_x};
 

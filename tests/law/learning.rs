@@ -2,15 +2,15 @@
 //! to be learnt.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
-use quadrant::motion::MotionMode;
-use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::{InjectionSettings, PlanSettings, Reason, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
+use quadrant_law::motion::MotionMode;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 use quadrant_fault_bench::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
@@ -103,7 +103,7 @@ impl<S: Scalar> Axis<S> {
         sum / ticks as f64
     }
 
-    pub(crate) fn seen(&self) -> quadrant::telemetry::AxisTelemetry<S> {
+    pub(crate) fn seen(&self) -> quadrant_law::axis::telemetry::AxisTelemetry<S> {
         *self.rig.state.axes()[0].telemetry()
     }
 

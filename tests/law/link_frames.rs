@@ -1,6 +1,7 @@
 //! Frames, and the port's manners.
 
 use heapless::Vec as Bounded;
+use quadrant::app::Translated;
 use quadrant::app::supervisor;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{
@@ -12,7 +13,7 @@ use quadrant::link::message::{
     text,
 };
 use quadrant::link::server::LinkServer;
-use quadrant::safety::FaultCode;
+use quadrant_law::safety::FaultCode;
 
 use crate::link_traffic::framed;
 
@@ -221,21 +222,24 @@ fn a_text_that_is_too_long_is_cut_between_characters() {
 
 #[test]
 fn the_supervisors_events_have_their_notice() {
-    let fault = quadrant::safety::Fault {
+    let fault = quadrant_law::safety::Fault {
         code: FaultCode::EncoderJump,
-        axis: Some(AxisName::Y.into()),
+        axis: Some(quadrant_law::axes::AxisName::Y),
         tick: 5,
     };
     let expected = Event::Fault {
         code: 2,
         axis: Some(AxisName::Y),
     };
-    assert_eq!(Event::from(supervisor::Event::Faulted(fault)), expected);
+    assert_eq!(
+        Event::translated(supervisor::Event::Faulted(fault)),
+        expected
+    );
     let refused = supervisor::Event::Refused(
-        quadrant::command::Command::Run,
+        quadrant_law::command::Command::Run,
         supervisor::Refusal::NotEnabled,
     );
-    let Event::Refused(text) = Event::from(refused) else {
+    let Event::Refused(text) = Event::translated(refused) else {
         panic!("a refusal");
     };
     assert_eq!(text, "the outputs are off; enable them first");

@@ -1,13 +1,14 @@
 //! The wire format, byte for byte: a change of it is a change of the protocol's version.
 
 use heapless::Vec as Bounded;
+use quadrant::app::Translated;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::message::AxisName::{X, Y, Z};
 use quadrant::link::message::Channel;
 use quadrant::link::message::*;
 use quadrant::link::message::{Edge, Level, Trigger};
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::settings::PlanSettings;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 
 use crate::link_traffic::framed;
 
@@ -84,27 +85,24 @@ fn requests() -> Vec<(Body, &'static str)> {
         ),
         (Body::Run, "0a"),
         (
-            Body::SetPlan(
-                PlanSettings {
-                    motions: [
-                        MotionSettings::Hold,
-                        MotionSettings::Harmonic(HarmonicSettings {
-                            amplitude_mm: 1.0,
-                            frequency_hz: 2.0,
-                            phase_rad: 0.0,
-                            cycles: Some(1.0),
-                            lead_s: 0.5,
-                        }),
-                        MotionSettings::PointToPoint(PointToPointSettings {
-                            distance_mm: 1.0,
-                            max_velocity_mm_s: 2.0,
-                            max_acceleration_mm_s2: 0.5,
-                            max_jerk_mm_s3: 1.0,
-                        }),
-                    ],
-                }
-                .into(),
-            ),
+            Body::SetPlan(Translated::translated(PlanSettings {
+                motions: [
+                    MotionSettings::Hold,
+                    MotionSettings::Harmonic(HarmonicSettings {
+                        amplitude_mm: 1.0,
+                        frequency_hz: 2.0,
+                        phase_rad: 0.0,
+                        cycles: Some(1.0),
+                        lead_s: 0.5,
+                    }),
+                    MotionSettings::PointToPoint(PointToPointSettings {
+                        distance_mm: 1.0,
+                        max_velocity_mm_s: 2.0,
+                        max_acceleration_mm_s2: 0.5,
+                        max_jerk_mm_s3: 1.0,
+                    }),
+                ],
+            })),
             "0b00\
              01000000000000f03f0000000000000040000000000000000001000000000000f03f000000000000e03f\
              02000000000000f03f0000000000000040000000000000e03f000000000000f03f",

@@ -1,6 +1,7 @@
 //! The room that the largest messages need.
 
 use heapless::{String, Vec as Bounded};
+use quadrant::app::Translated;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{self, FRAME_BYTES, FrameCounters};
 use quadrant::link::message::AxisName;
@@ -13,9 +14,9 @@ use quadrant::link::message::{
 use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
 use quadrant::link::message::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
 use quadrant::link::server::LinkServer;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::FaultCode;
 use quadrant::settings::PlanSettings;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::FaultCode;
 
 use crate::link_model::there_and_back;
 
@@ -62,12 +63,9 @@ fn largest_requests() -> Vec<Body> {
     let mut points = Bounded::new();
     while points.push(SetPoint { axes: [point; 3] }).is_ok() {}
     vec![
-        Body::SetPlan(
-            PlanSettings {
-                motions: [harmonic; 3],
-            }
-            .into(),
-        ),
+        Body::SetPlan(Translated::translated(PlanSettings {
+            motions: [harmonic; 3],
+        })),
         Body::Stream(StreamRequest::Points {
             sequence: u32::MAX,
             points,

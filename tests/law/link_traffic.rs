@@ -1,5 +1,6 @@
 //! Traffic for the link: any request, and what a bad line makes of it.
 
+use quadrant::app::Translated;
 use std::ops::{Deref, DerefMut};
 
 use heapless::{String, Vec as Bounded};
@@ -11,8 +12,8 @@ use quadrant::link::message::{
     StreamRequest, TelemetryRequest, Value, Voltages,
 };
 use quadrant::link::message::{Edge, Level, Trigger};
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::settings::PlanSettings;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 
 use crate::common::Noise;
 
@@ -206,12 +207,9 @@ impl Requests<'_> {
                 velocity_mm_s: self.real(),
             },
             10 => Body::Run,
-            11 => Body::SetPlan(
-                PlanSettings {
-                    motions: std::array::from_fn(|_| self.motion()),
-                }
-                .into(),
-            ),
+            11 => Body::SetPlan(Translated::translated(PlanSettings {
+                motions: std::array::from_fn(|_| self.motion()),
+            })),
             12 => Body::Stream(self.stream()),
             13 => Body::Settings(self.settings()),
             14 => Body::Telemetry(match self.below(2) {

@@ -1,17 +1,17 @@
 //! The records of the lockstep channel survive the way there and back.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::encoder::EncoderReading;
 use quadrant::lockstep::{
     BootBlock, InjectedFault, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Reset, held,
 };
-use quadrant::reference::Velocity;
-use quadrant::safety::{AxisSwitches, Switches};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::reference::Velocity;
+use quadrant_law::safety::{AxisSwitches, Switches};
+use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
 
 use crate::common::{repeatable, sine_on_x};
 

@@ -1,14 +1,14 @@
 //! The monitors of an axis at their very limits.
 
-use quadrant::admission::{Refusal, refusal};
 use quadrant::app::Snapshot;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::safety::FaultCode;
-use quadrant::safety::monitor::{Following, FollowingState, SignalLoss, SignalLossState};
 use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::stage::{Inputs, Stage, StageState};
+use quadrant_law::admission::{Refusal, refusal};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::safety::monitor::{Following, FollowingState, SignalLoss, SignalLossState};
+use quadrant_law::stage::{Inputs, Stage, StageState};
 
 use crate::common::{Noise, Rig, with_x};
 

@@ -1,17 +1,17 @@
 //! The motion modes of the axes: stops, single moves and streams through the whole tick.
 
-use quadrant::admission::Refusal;
 use quadrant::app::supervisor::{Event, Supervisor};
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::motion::MotionMode;
-use quadrant::reference::{
+use quadrant::settings::{LossReaction, PlanSettings, StageSettings};
+use quadrant_law::admission::Refusal;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{
     AxisPoint, HarmonicSettings, MotionSettings, PointToPointSettings, ReferenceSample, Segment,
     SetPoint, StreamLimits, StreamPlanner, Velocity,
 };
-use quadrant::safety::{FaultCode, Reaction, SafetyState};
-use quadrant::settings::{LossReaction, PlanSettings, StageSettings};
-use quadrant::units::Position;
+use quadrant_law::safety::{FaultCode, Reaction, SafetyState};
+use quadrant_law::units::Position;
 
 use crate::common::Rig;
 

@@ -1,8 +1,8 @@
 //! k(e) = cosh(ko sat(e, emax)) and its table.
 
 use proptest::prelude::*;
-use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::control::npid::{NonlinearGain, NonlinearGainTable};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::repeatable;
 

@@ -1,15 +1,15 @@
 //! A board with nothing in its flash has no law: its outputs stay off, and a person learns what to do.
 
-use quadrant::admission::Refusal;
-use quadrant::admission::StageView;
-use quadrant::admission::refusal;
 use quadrant::app::supervisor::{Event, Supervisor};
-use quadrant::axes::PerAxis;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::safety::{EnabledBy, SafetyState};
 use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::admission::Refusal;
+use quadrant_law::admission::StageView;
+use quadrant_law::admission::refusal;
+use quadrant_law::axes::PerAxis;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::safety::{EnabledBy, SafetyState};
 
 use crate::common::Rig;
 
@@ -20,7 +20,7 @@ const READY: StageView = StageView {
     moving: None,
     awaiting_homing: PerAxis::splat(false),
     held: None,
-    modes: PerAxis::splat(quadrant::motion::MotionMode::Hold),
+    modes: PerAxis::splat(quadrant_law::motion::MotionMode::Hold),
     homed: PerAxis::splat(false),
     stream_ready: false,
     injection_ready: false,

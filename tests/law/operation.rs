@@ -1,14 +1,14 @@
 //! The rules of operation: enabling, motions that need their host, and the emergency stop.
 
 use quadrant::app::supervisor::{Event, StageView, Supervisor};
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
 use quadrant::link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
-use quadrant::safety::{
+use quadrant::settings::{EmergencyReaction, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::safety::{
     AxisSwitches, EnabledBy, FaultCode, HostNeeded, Operation, Reaction, SafetyState, Switches,
 };
-use quadrant::settings::{EmergencyReaction, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 
 use crate::common::Rig;
 use crate::preemption::{LINK_TIMEOUT_TICKS, endless, plan, refused, safety, settings};

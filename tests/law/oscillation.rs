@@ -3,17 +3,17 @@
 use quadrant::app::oscillation_report::Oscillated;
 use quadrant::app::supervisor::Event;
 use quadrant::app::{Snapshot, Supervision};
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::FaultCode;
-use quadrant::safety::oscillation::{
+use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::FaultCode;
+use quadrant_law::safety::oscillation::{
     Oscillation, OscillationInput, OscillationKind, OscillationReading, OscillationState,
 };
-use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 use quadrant_simulation::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, SimulatedAxis,
     StageParameters,

@@ -1,11 +1,11 @@
 //! The load of a motor, I²t: against the time that the rating gives, worked out here.
 
 use proptest::prelude::*;
-use quadrant::command::Command;
-use quadrant::safety::overload::{Overload, OverloadState};
-use quadrant::safety::{FaultCode, SafetyState};
-use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::StageSettings;
+use quadrant_law::command::Command;
+use quadrant_law::safety::overload::{Overload, OverloadState};
+use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_law::scalar::{Fixed, Scalar};
 
 use crate::common::{Rig, repeatable, with_x};
 

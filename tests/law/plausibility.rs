@@ -2,16 +2,16 @@
 //!
 //! The expectation is integrated here in f64 from the description: no line of it is shared with the law.
 
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::reference::Velocity;
-use quadrant::safety::FaultCode;
-use quadrant::safety::plausibility::{
-    Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
-};
 use quadrant::settings::StageSettings;
 use quadrant_fault_bench::noise::Noise;
 use quadrant_fault_bench::plant::{MODEL, Plant, Truth};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::reference::Velocity;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::safety::plausibility::{
+    Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
+};
 
 use crate::common::Rig;
 

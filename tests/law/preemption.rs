@@ -1,15 +1,15 @@
 //! The tasks' agreements in every interleaving of them: nothing is decided on a state that has passed.
 
 use quadrant::app::link_timeout_ticks;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
 use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::{
     AxisName, Body, Harmonic, LinkError, Motion, Plan, PointToPoint, Provenance, Reply, Request,
     SettingsRequest,
 };
-use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::StageSettings;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::safety::{FaultCode, SafetyState};
 
 use crate::common::Noise;
 use quadrant_fault_bench::flash::Flash;
@@ -448,7 +448,7 @@ fn stop_and_disable_wait_for_no_other_request() {
         let acted = |tasks: &Tasks| {
             let upper = tasks.upper.borrow();
             !upper.outputs.enabled
-                || upper.snapshot().view.modes[1] == quadrant::motion::MotionMode::Stopping
+                || upper.snapshot().view.modes[1] == quadrant_law::motion::MotionMode::Stopping
         };
         let mut ticks = 0;
         while !acted(&tasks) {
@@ -610,18 +610,18 @@ fn invalid_settings_outlast_a_reset_until_others_are_stored() {
 
 #[test]
 fn a_crash_does_not_hide_invalid_settings() {
-    let mut state = quadrant::stage::StageState::<f32>::with_fault(FaultCode::Panic);
+    let mut state = quadrant_law::stage::StageState::<f32>::with_fault(FaultCode::Panic);
     state.start_faulted(FaultCode::SettingsInvalid);
     assert_eq!(
         state.safety().fault().expect("latched").code,
         FaultCode::Panic
     );
-    let stage: quadrant::stage::Stage<f32> = settings().build().expect("valid");
+    let stage: quadrant_law::stage::Stage<f32> = settings().build().expect("valid");
     let view = stage.as_ref().view(&state);
     assert!(view.settings_invalid);
     assert_eq!(
-        quadrant::admission::refusal(view, Command::ResetFault),
-        Some(quadrant::admission::Refusal::SettingsInvalid)
+        quadrant_law::admission::refusal(view, Command::ResetFault),
+        Some(quadrant_law::admission::Refusal::SettingsInvalid)
     );
 }
 
@@ -699,7 +699,9 @@ fn a_stop_and_a_living_host_are_found_behind_a_full_queue_of_bytes() {
         tasks.run(2 * WORST_DELAY_TICKS);
         let upper = tasks.upper.borrow();
         let acted = match body {
-            Body::Stop => upper.snapshot().view.modes[1] == quadrant::motion::MotionMode::Stopping,
+            Body::Stop => {
+                upper.snapshot().view.modes[1] == quadrant_law::motion::MotionMode::Stopping
+            }
             _ => !upper.outputs.enabled,
         };
         assert!(acted, "{body:?}");

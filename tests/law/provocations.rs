@@ -1,9 +1,9 @@
 //! Provocations of the monitors' parameters: short runs that end in a fault, or would with other parameters.
 
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::safety::{AxisSwitches, Operation, SafetyState, Switches};
 use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::safety::{AxisSwitches, Operation, SafetyState, Switches};
 
 use crate::common::Rig;
 use crate::parameter_trace::{Trace, plan, tick_of};
@@ -111,7 +111,7 @@ fn run(settings: &StageSettings, axis: usize, moves: bool, run: Run) -> Trace {
         rig.start();
     } else {
         rig.tick();
-        rig.command(quadrant::command::Command::Enable);
+        rig.command(quadrant_law::command::Command::Enable);
     }
     let mut trace = vec![];
     for tick in 1..LONGEST {

@@ -2,11 +2,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use quadrant::reference::{
+use quadrant_law::reference::{
     HarmonicSettings, Motion, MotionScale, MotionSettings, MotionState, Plane, Sense, circle,
 };
-use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::units::Position;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::units::Position;
 
 const SCALE: MotionScale = MotionScale {
     resolution_mm: 5e-4,

@@ -1,9 +1,11 @@
 //! Jerk-limited moves: within their limits, exactly onto their target.
 
 use proptest::prelude::*;
-use quadrant::reference::{Motion, MotionScale, MotionSettings, MotionState, PointToPointSettings};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::units::Position;
+use quadrant_law::reference::{
+    Motion, MotionScale, MotionSettings, MotionState, PointToPointSettings,
+};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::units::Position;
 
 use crate::common::repeatable;
 

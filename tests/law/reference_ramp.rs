@@ -1,9 +1,9 @@
 //! Velocity ramps: within their limits, exactly onto their target, and to rest within the promised distance.
 
 use proptest::prelude::*;
-use quadrant::reference::{MotionScale, Ramp, RampState, Velocity};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::units::Position;
+use quadrant_law::reference::{MotionScale, Ramp, RampState, Velocity};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::units::Position;
 
 use crate::common::repeatable;
 

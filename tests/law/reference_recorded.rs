@@ -1,8 +1,8 @@
 //! Recorded tables: through every sample, without a step of velocity.
 
 use proptest::prelude::*;
-use quadrant::reference::{Motion, MotionScale, MotionState, RecordedTable};
-use quadrant::units::Position;
+use quadrant_law::reference::{Motion, MotionScale, MotionState, RecordedTable};
+use quadrant_law::units::Position;
 
 use crate::common::repeatable;
 

@@ -3,12 +3,12 @@
 use core::f64::consts::TAU;
 
 use proptest::prelude::*;
-use quadrant::reference::{
+use quadrant_law::reference::{
     AxisPoint, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, Segment, SetPoint, Stream,
     StreamLimits, StreamPlanner, StreamState, StreamStep,
 };
-use quadrant::scalar::{Fixed, Quantity, Scalar};
-use quadrant::units::Position;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::units::Position;
 
 use crate::common::repeatable;
 

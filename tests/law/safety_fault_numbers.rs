@@ -1,6 +1,6 @@
 //! The numbers and names by which hosts and people know faults never change.
 
-use quadrant::safety::FaultCode;
+use quadrant_law::safety::FaultCode;
 
 #[test]
 fn numbers_and_names_are_stable() {

@@ -1,13 +1,13 @@
 //! Whatever comes in: nothing is driven unasked, and what a fault promises is kept.
 
 use proptest::prelude::*;
-use quadrant::command::Command;
-use quadrant::encoder::EncoderReading;
-use quadrant::safety::monitor::{IndexSpacing, IndexState};
-use quadrant::safety::{Reaction, SafetyState, Switches};
-use quadrant::scalar::{Fixed, Scalar};
 use quadrant::settings::{LossReaction, StageSettings};
-use quadrant::stage::{Inputs, Outputs};
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety::monitor::{IndexSpacing, IndexState};
+use quadrant_law::safety::{Reaction, SafetyState, Switches};
+use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_law::stage::{Inputs, Outputs};
 
 use crate::common::{Rig, repeatable};
 use crate::safety_faults::{follow, moving, sines};
@@ -88,7 +88,7 @@ fn promises<S: Scalar>(
         axis.limits.following_error_max_mm = 0.2;
     }
     let mut rig = Rig::<S>::new(&settings, &sines());
-    for (axis, homed) in quadrant::axes::AxisName::ALL.into_iter().zip(homed) {
+    for (axis, homed) in quadrant_law::axes::AxisName::ALL.into_iter().zip(homed) {
         rig.state.set_homed(axis, homed);
     }
     let mut enabled = 0;
@@ -244,7 +244,7 @@ proptest! {
         if hold {
             prop_assert!(rig.state.safety().is_enabled());
             let held = rig.state.held().expect("told");
-            prop_assert_eq!(held.code, quadrant::safety::FaultCode::LinkLost);
+            prop_assert_eq!(held.code, quadrant_law::safety::FaultCode::LinkLost);
         } else {
             prop_assert!(matches!(rig.state.safety(), SafetyState::Faulted(_)));
         }

@@ -1,14 +1,14 @@
 //! Ends of the travel: limit switches and soft limits stop an axis on its way out, and let it come back.
 
 use proptest::prelude::*;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::encoder::EncoderReading;
-use quadrant::reference::{MotionSettings, PointToPointSettings, Ramp, Velocity};
-use quadrant::safety::travel::{Travel, TravelState};
-use quadrant::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant::settings::{LossReaction, PlanSettings, StageSettings, TravelSettings};
-use quadrant::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::reference::{MotionSettings, PointToPointSettings, Ramp, Velocity};
+use quadrant_law::safety::travel::{Travel, TravelState};
+use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
+use quadrant_law::units::Position;
 
 use crate::common::{Rig, repeatable, with_x};
 use crate::safety_faults::{follow, moving, sines};

@@ -1,9 +1,9 @@
 //! Every number out of its range is refused by name, with the value and what is allowed.
 
-use quadrant::axes::AxisName;
-use quadrant::control::pid::PidGains;
-use quadrant::decimal::Decimal;
 use quadrant::settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::decimal::Decimal;
 
 use crate::common::with_x;
 use crate::settings_fields::{FIELDS, Field};

@@ -1,16 +1,16 @@
 //! Relations that the fields of the settings must keep.
 
-use quadrant::axes::AxisName;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::friction::gms::GmsElement;
 use quadrant::settings::presets::X_PLANT;
 use quadrant::settings::{AxisSettings, Reason, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::gms::GmsElement;
 
 use crate::common::with_x;
 use crate::settings::{ROOM, check_message, refusal};
 use crate::settings_fields::nonlinear;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::nctf::CharacteristicPoint;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::nctf::CharacteristicPoint;
 
 fn reason(change: impl FnOnce(&mut AxisSettings)) -> (&'static str, Reason, String) {
     let error = refusal(&with_x(change));

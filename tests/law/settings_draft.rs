@@ -1,11 +1,11 @@
 //! Settings that are edited leaf by leaf and take effect as a whole.
 
-use quadrant::axes::AxisName;
-use quadrant::feedforward::FeedforwardKind;
 use quadrant::settings::StageSettings;
 use quadrant::settings::draft::{ApplyError, Draft};
 use quadrant::settings::leaves::{Exchange, all};
-use quadrant::stage::Stage;
+use quadrant_law::axes::AxisName;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::stage::Stage;
 
 fn draft_of(settings: StageSettings) -> Draft<'static> {
     let room = || Box::leak(Box::new(StageSettings::simulated()));

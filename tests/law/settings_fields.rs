@@ -1,7 +1,7 @@
 //! Every number of an axis' settings, with values just outside its range.
 
-use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::AxisSettings;
+use quadrant_law::control::plant_model::PlantModel;
 
 pub(crate) type Field = fn(&mut AxisSettings) -> &mut f64;
 
@@ -359,11 +359,11 @@ pub(crate) const FIELDS: &[(&str, Field, f64, f64)] = &[
     ),
 ];
 
-fn dahl(axis: &mut AxisSettings) -> &mut quadrant::friction::dahl::DahlParameters {
+fn dahl(axis: &mut AxisSettings) -> &mut quadrant_law::friction::dahl::DahlParameters {
     axis.friction.dahl.as_mut().expect("a model by default")
 }
 
-fn lugre(axis: &mut AxisSettings) -> &mut quadrant::friction::lugre::LugreParameters {
+fn lugre(axis: &mut AxisSettings) -> &mut quadrant_law::friction::lugre::LugreParameters {
     axis.friction.lugre.as_mut().expect("a model by default")
 }
 
@@ -379,7 +379,9 @@ fn plant(axis: &mut AxisSettings) -> &mut PlantModel {
     axis.plant.as_mut().expect("a plant by default")
 }
 
-pub(crate) fn nonlinear(axis: &mut AxisSettings) -> &mut quadrant::control::npid::NonlinearGain {
+pub(crate) fn nonlinear(
+    axis: &mut AxisSettings,
+) -> &mut quadrant_law::control::npid::NonlinearGain {
     axis.feedback
         .nonlinear
         .as_mut()

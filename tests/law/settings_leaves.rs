@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use quadrant::cancelling::CancellingSettings;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::filter::{FilterList, FilterSettings};
-use quadrant::learning::LearningSettings;
 use quadrant::settings::leaves::{LeafInfo, Range, all, find};
 use quadrant::settings::tree::{TreeError, is_part};
 use quadrant::settings::{Reason, SettingsError, StageSettings};
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::{FilterList, FilterSettings};
+use quadrant_law::learning::LearningSettings;
 use serde_json::Value;
 
 use crate::settings_tree::{get, paths};

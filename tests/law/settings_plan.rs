@@ -1,8 +1,8 @@
 //! Motions are held to their ranges and to what their axis can do.
 
-use quadrant::axes::AxisName;
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 
 use crate::common::with_x;
 use crate::settings::check_message;

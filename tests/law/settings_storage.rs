@@ -1,8 +1,8 @@
 //! Stored settings come back as they were.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 
 use crate::common::with_x;
 

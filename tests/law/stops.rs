@@ -1,14 +1,14 @@
 //! A controlled stop has an end; and what must be so before an axis is driven.
 
-use quadrant::admission::{Refusal, StageView, refusal};
-use quadrant::axes::{AxisName, PerAxis};
-use quadrant::axis::{Axis, AxisBuilder};
-use quadrant::command::Command;
-use quadrant::motion::ReferenceGenerator;
-use quadrant::reference::{MotionScale, Ramp, Velocity};
-use quadrant::safety::{AxisSwitches, FaultCode, Operation, SafetyState, Switches};
 use quadrant::settings::{AxisSettings, HomeSwitch, PlanSettings, StageSettings};
-use quadrant::stage::{Outputs, Stage};
+use quadrant_law::admission::{Refusal, StageView, refusal};
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::axis::{Axis, AxisBuilder};
+use quadrant_law::command::Command;
+use quadrant_law::motion::ReferenceGenerator;
+use quadrant_law::reference::{MotionScale, Ramp, Velocity};
+use quadrant_law::safety::{AxisSwitches, FaultCode, Operation, SafetyState, Switches};
+use quadrant_law::stage::{Outputs, Stage};
 
 use crate::common::{Rig, with_x};
 

@@ -2,17 +2,17 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::Config;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::nctf::CharacteristicPoint;
-use quadrant::control::schedule::SchedulePoint;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::friction::gms::GmsElement;
 use quadrant::settings::StageSettings;
 use quadrant::settings::leaves::{Range, find};
 use quadrant::settings::tree::{Path, is_part};
 use quadrant::store::{
     BUFFER_BYTES, DecodeError, FORMAT, PROVENANCE_BYTES, Provenance, decode, encode,
 };
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::nctf::CharacteristicPoint;
+use quadrant_law::control::schedule::SchedulePoint;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::gms::GmsElement;
 use serde::{Deserialize, Serialize};
 
 use crate::common::{Noise, repeatable};

@@ -1,10 +1,10 @@
 //! Set points that ask for too much are refused by their number, with the value and the limit.
 
-use quadrant::axes::AxisName;
-use quadrant::reference::{
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::{
     AxisPoint, SetPoint, StreamError, StreamFlaw, StreamLimits, StreamPlanner,
 };
-use quadrant::units::Position;
+use quadrant_law::units::Position;
 
 use crate::reference_stream::{LIMITS, mm, on_x, point};
 

@@ -3,12 +3,12 @@
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::filter::{FilterList, FilterSettings, Filters, FiltersState};
-use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::Reason;
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant::telemetry::LimitedBy;
+use quadrant_law::axis::telemetry::LimitedBy;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::{FilterList, FilterSettings, Filters, FiltersState};
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 

@@ -1,13 +1,13 @@
 //! The commands that the supervising task lets through, and the events that it tells.
 
-use quadrant::admission::Refusal;
-use quadrant::admission::StageView;
 use quadrant::app::supervisor::{Decision, Event, Supervisor};
-use quadrant::axes::AxisName;
-use quadrant::axes::PerAxis;
-use quadrant::command::Command;
-use quadrant::motion::MotionMode;
-use quadrant::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState};
+use quadrant_law::admission::Refusal;
+use quadrant_law::admission::StageView;
+use quadrant_law::axes::AxisName;
+use quadrant_law::axes::PerAxis;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState};
 
 const FAULT: Fault = Fault {
     code: FaultCode::DeadlineMissed,

@@ -1,7 +1,7 @@
 //! Sets of digital inputs, bit by bit.
 
-use quadrant::axes::AxisName;
-use quadrant::safety::{AxisSwitches, Switches};
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::{AxisSwitches, Switches};
 
 const EACH: [AxisSwitches; 5] = [
     AxisSwitches::NEGATIVE_LIMIT,

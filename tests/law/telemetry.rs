@@ -5,13 +5,13 @@ use quadrant::app::glitch_monitor::{CircleReading, GlitchReadings};
 use quadrant::app::telemetry::{
     Observation, Packer, Sample, Sampler, SamplerState, Selection, SelectionError, read,
 };
-use quadrant::command::Command;
 use quadrant::link::message::{
     AxisName, AxisSignal, Channel, MAX_CHANNELS, MachineState, StageSignal, TelemetryBlock,
     UnknownChannel, WordKind,
 };
-use quadrant::scalar::{Fixed, Quantity, Scalar};
 use quadrant::settings::StageSettings;
+use quadrant_law::command::Command;
+use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 
 use crate::common::{Rig, repeatable, sine_on_x};
 

@@ -3,10 +3,10 @@
 use crate::command;
 use std::path::Path;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::popov::filtered_sector_bound;
 use quadrant::settings::StageSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::popov::filtered_sector_bound;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
 use quadrant_sim::report::whole;

@@ -3,14 +3,14 @@
 use std::collections::VecDeque;
 
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
-use quadrant::axes::{AxisName, PerAxis};
-use quadrant::cancelling::SpindleSpeed;
-use quadrant::command::Command;
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{Motion, Segment};
-use quadrant::scalar::Scalar;
 use quadrant::settings::SettingsError;
-use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::cancelling::SpindleSpeed;
+use quadrant_law::command::Command;
+use quadrant_law::reference::{Motion, Segment};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
 
 /// Control law, supervisor, and what passes between them.
 #[derive(Clone, Debug)]

@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
-use quadrant::control::{pid::PidGains, plant_model::PlantModel};
+use quadrant_law::control::{pid::PidGains, plant_model::PlantModel};
 
 use crate::held_plant::HeldPlant;
 

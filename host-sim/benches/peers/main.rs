@@ -11,17 +11,17 @@ use std::time::Instant;
 use std::{array, fs, io};
 
 use parameters::{ELEMENTS, NODES, Parameters, node, surface_end};
-use quadrant::control::feedback::Feedback;
-use quadrant::control::terms::{FeedbackInput, FeedbackState};
-use quadrant::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
-use quadrant::friction::Direction;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::friction::stribeck::SlidingTable;
 use quadrant::lockstep::InputRecord;
-use quadrant::scalar::Scalar;
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
+use quadrant_law::control::feedback::Feedback;
+use quadrant_law::control::terms::{FeedbackInput, FeedbackState};
+use quadrant_law::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::friction::stribeck::SlidingTable;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{

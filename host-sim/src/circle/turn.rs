@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use quadrant::lockstep::Job;
-use quadrant::reference::{Plane, Sense, circle};
 use quadrant::settings::PlanSettings;
+use quadrant_law::reference::{Plane, Sense, circle};
 
 use crate::circle::path::Point;
 use crate::circle::roundness::{LeastSquares, range};

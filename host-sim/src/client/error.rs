@@ -129,7 +129,7 @@ pub enum ClientError {
         /// Name of the fault code.
         name: String,
         /// Axis of the fault, if it has one.
-        axis: Option<quadrant::axes::AxisName>,
+        axis: Option<quadrant_law::axes::AxisName>,
         /// Control tick of the fault.
         tick: u32,
         /// Cause, as the machine words it.

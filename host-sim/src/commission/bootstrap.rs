@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::control::filter::{FilterList, FilterSettings};
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
-use quadrant::friction::PerDirection;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::AxisSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::{FilterList, FilterSettings};
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use crate::design::{Form, Process};
 

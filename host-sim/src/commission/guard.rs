@@ -240,8 +240,8 @@ impl TestAxis for Guard<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::reference::{MotionSettings, PointToPointSettings};
     use quadrant::settings::StageSettings;
+    use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
     use super::*;
     use crate::machine::SimulatedTestAxis;

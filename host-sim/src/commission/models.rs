@@ -1,18 +1,18 @@
 //! From the measurements of a commissioning to its models and settings: without an axis.
 
 use heapless::Vec as ShortVec;
-use quadrant::axis::MAX_PREVIEW_TICKS;
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::filtered_sector_bound;
-use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
-use quadrant::friction::stribeck::StaticFriction;
-use quadrant::friction::{FrictionSettings, PerDirection};
 use quadrant::settings::leaves::LEAST_STIFFNESS_V_PER_MM;
 use quadrant::settings::{AxisSettings, FeedbackSettings};
+use quadrant_law::axis::MAX_PREVIEW_TICKS;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::popov::filtered_sector_bound;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_law::friction::{FrictionSettings, PerDirection};
 
 use super::bootstrap::rough_sliding;
 use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};

@@ -3,9 +3,9 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
 use quadrant::settings::AxisSettings;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 
 use super::bootstrap::measuring_settings;
 use super::drift::Drift;

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{SectorProof, filtered_sector_bound, sector_proof};
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::popov::{SectorProof, filtered_sector_bound, sector_proof};
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;

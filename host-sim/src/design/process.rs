@@ -1,7 +1,7 @@
 //! Process that a controller is designed on: a model of the axis or its measured response, closed in continuous time or
 //! as it runs.
 
-use quadrant::control::{filter::FilterSettings, pid::PidGains, plant_model::PlantModel};
+use quadrant_law::control::{filter::FilterSettings, pid::PidGains, plant_model::PlantModel};
 
 use super::form::Form;
 use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};

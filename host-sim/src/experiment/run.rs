@@ -1,9 +1,9 @@
 //! One run: a machine on a simulated stage, and the traces of its axes.
 
 use quadrant::lockstep::InputRecord;
-use quadrant::safety::SafetyState;
-use quadrant::scalar::Scalar;
-use quadrant::telemetry::AxisTelemetry;
+use quadrant_law::axis::telemetry::AxisTelemetry;
+use quadrant_law::safety::SafetyState;
+use quadrant_law::scalar::Scalar;
 
 use crate::machine::{LawMachine, Operator};
 use crate::plant::SimulatedStage;
@@ -47,9 +47,9 @@ pub enum RunError {
     Settings(#[from] quadrant::settings::SettingsError),
     /// The stage switched off.
     #[error("fault {number} on {axis} at tick {tick}: {cause}; {remedy}", number = .0.code.number(),
-        axis = .0.axis.map_or("the stage", quadrant::axes::AxisName::as_str), tick = .0.tick,
+        axis = .0.axis.map_or("the stage", quadrant_law::axes::AxisName::as_str), tick = .0.tick,
         cause = .0.code.cause(), remedy = .0.code.remedy())]
-    Fault(quadrant::safety::Fault),
+    Fault(quadrant_law::safety::Fault),
     /// The motion did not end.
     #[error("the motion has not ended after {0} ticks")]
     Endless(usize),

@@ -13,7 +13,7 @@ use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
+use quadrant_law::control::plant_model::PlantModel;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
 use super::mode::{self, Mode, TRANSMITS};

@@ -3,20 +3,21 @@
 
 use std::collections::VecDeque;
 
+use quadrant::app::Translated;
 use quadrant::app::{
     Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
     TimingStatistics,
 };
-use quadrant::command::Command;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
 use quadrant::lockstep::InputRecord;
-use quadrant::safety::FaultCode;
-use quadrant::scalar::Scalar;
 use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::{Outputs, StageState};
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Outputs, StageState};
 
 use super::memory_flash::MemoryFlash;
 
@@ -171,7 +172,8 @@ impl<S: Scalar> Running<S> {
         self.control
             .show_glitches(self.supervision.glitch_readings());
         for event in supervised.events {
-            self.server.push_event(seen.tick, event);
+            self.server
+                .push_event(seen.tick, Translated::translated(event));
         }
         let after = self
             .server

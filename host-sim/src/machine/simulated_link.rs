@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::lockstep::FLASH_BYTES;
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 
 use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};

@@ -3,16 +3,16 @@
 use std::fmt;
 
 use heapless::Vec as ShortVec;
-use quadrant::axes::AxisName;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::{GmsElement, GmsParameters};
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::reference::{Motion, MotionScale, RecordedTable};
 use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::reference::{Motion, MotionScale, RecordedTable};
+use quadrant_law::units::Position;
 use rayon::prelude::*;
 
 use crate::design::best::set_best_pid;

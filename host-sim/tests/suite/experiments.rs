@@ -1,11 +1,11 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
 use quadrant::app::supervisor::Event;
-use quadrant::command::Command;
 use quadrant::lockstep::Job;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{FaultCode, SafetyState};
 use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::command::Command;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::{FaultCode, SafetyState};
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;

@@ -16,7 +16,7 @@ use quadrant::link::message::{
 };
 use quadrant::link::server::LinkServer;
 use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::application::{BoardIdentity, Running, Start};
 use quadrant_sim::machine::memory_flash::MemoryFlash;

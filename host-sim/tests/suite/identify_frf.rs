@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::plant_model::PlantModel;
 use quadrant::settings::AxisSettings;
+use quadrant_law::control::plant_model::PlantModel;
 use quadrant_sim::commission::bootstrap::bootstrap_settings;
 use quadrant_sim::identify::excitation::Waveform;
 use quadrant_sim::identify::frf::{

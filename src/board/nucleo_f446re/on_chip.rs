@@ -5,7 +5,7 @@
 
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::hal;
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 use stm32f4xx_hal::gpio::{Output, PA4, PA5, PB5, PC9};
 use stm32f4xx_hal::pac::{self, DAC};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};

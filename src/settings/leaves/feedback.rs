@@ -4,11 +4,11 @@ use strum::VariantNames;
 
 use super::row::{LeafInfo, UNSET, at, list, name, number, period_s, point, times};
 use super::stage::full_scale_v;
-use crate::law::control::feedback::LawKind;
-use crate::law::control::{filter, nctf, schedule};
 use crate::settings::axis::AxisSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::{filter, nctf, schedule};
 
-/// Largest share of a schedule: what [`crate::law::scalar::Quantity::Multiplier`] holds.
+/// Largest share of a schedule: what [`quadrant_law::scalar::Quantity::Multiplier`] holds.
 const MOST_SHARE: f64 = 30.0;
 
 fn output_limit_v(axis: &AxisSettings, _: f64) -> f64 {

@@ -3,10 +3,13 @@
 use strum::VariantNames;
 
 use super::row::{Exchange, LeafInfo, UNSET, at, list, name, number, period_s, point, times};
-use crate::law::axis::MAX_PREVIEW_TICKS;
-use crate::law::cancelling::{HARMONICS, MOST_RPM};
-use crate::law::feedforward::FeedforwardKind;
-use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::axis::MAX_PREVIEW_TICKS;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::cancelling::{HARMONICS, MOST_RPM};
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
+use quadrant_law::learning::LearningSettings;
 
 /// The softest spring of a block of the GMS model, V/mm.
 pub const LEAST_STIFFNESS_V_PER_MM: f64 = 1e-6;
@@ -45,7 +48,7 @@ pub(super) const LEAVES: &[LeafInfo] = &[
         "alpha, its share of the load."),
     number("friction.gms.attraction_v_s", "V/s", at(0.0), at(1e6), 0.0,
         "C, the rate at which sliding friction follows the Stribeck effect; at most the lowest level per control period."),
-    number("friction.smoothed_gms.width", "", at(1e-3), at(1.0), 0.25,
+    number("friction.smoothed_gms.width", "", at(1e-3), at(1.0), SmoothedGmsParameters::DEFAULT.width,
         "Width of the smoothed GMS' transition over each block's breakaway level."),
     number("friction.dahl.stiffness_v_per_mm", "V/mm", at(1e-6), at(1e5), UNSET,
         "sigma0 of Dahl's model, the stiffness at zero force."),
@@ -68,23 +71,23 @@ pub(super) const LEAVES: &[LeafInfo] = &[
     number("feedforward.preview_s", "s",
         at(0.0), times(MAX_PREVIEW_TICKS as f64, "the control period", period_s), 0.0,
         "Look-ahead of the feedforward over the feedback's reference: the plant's delay."),
-    number("feedforward.learning.memory_s", "s", at(1.0), at(100.0), 7.0,
+    number("feedforward.learning.memory_s", "s", at(1.0), at(100.0), LearningSettings::DEFAULT.memory_s,
         "Time constant with which learning of the friction's scale forgets; left out with its part, nothing is learnt."),
-    number("feedforward.learning.vibration_mm_s", "mm/s", at(0.1), at(1000.0), 2.0,
+    number("feedforward.learning.vibration_mm_s", "mm/s", at(0.1), at(1000.0), LearningSettings::DEFAULT.vibration_mm_s,
         "Amplitude of the axis' vibration between 40 and 150 Hz, as a velocity, that halves the feedforward of all friction but the viscous."),
-    number("feedforward.cancelling.spindle_rpm", "rpm", at(0.0), at(MOST_RPM), 0.0,
+    number("feedforward.cancelling.spindle_rpm", "rpm", at(0.0), at(MOST_RPM), CancellingSettings::DEFAULT.spindle_rpm,
         "Speed of the spindle until the link tells another; 0 if it stands. Left out with its part, no vibration is cancelled."),
-    number("feedforward.cancelling.ramp_rpm_s", "rpm/s", at(1.0), at(1e6), 1e4,
+    number("feedforward.cancelling.ramp_rpm_s", "rpm/s", at(1.0), at(1e6), CancellingSettings::DEFAULT.ramp_rpm_s,
         "Largest rate at which cancelling follows a change of the spindle's speed."),
-    number("feedforward.cancelling.teeth", "", at(1.0), at(64.0), 2.0,
+    number("feedforward.cancelling.teeth", "", at(1.0), at(64.0), CancellingSettings::DEFAULT.teeth as f64,
         "Teeth of the cutter."),
-    number("feedforward.cancelling.harmonics", "", at(1.0), at(HARMONICS as f64), 3.0,
+    number("feedforward.cancelling.harmonics", "", at(1.0), at(HARMONICS as f64), CancellingSettings::DEFAULT.harmonics as f64,
         "Frequencies that are cancelled: 1 is that of the teeth, 2 adds the spindle's, 3 twice the teeth's; of a single tooth once, twice and three times."),
-    number("feedforward.cancelling.rate_per_s", "1/s", at(0.1), at(20.0), 6.0,
+    number("feedforward.cancelling.rate_per_s", "1/s", at(0.1), at(20.0), CancellingSettings::DEFAULT.rate_per_s,
         "Rate at which the vibration's part of the error falls."),
     LeafInfo {
         exchange: Exchange::Disabled,
-        ..number("feedforward.cancelling.limit_v", "V", at(0.0), at(10.0), 0.3,
+        ..number("feedforward.cancelling.limit_v", "V", at(0.0), at(10.0), CancellingSettings::DEFAULT.limit_v,
             "Largest voltage that cancelling adds.")
     },
 ];

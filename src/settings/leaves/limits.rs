@@ -5,10 +5,10 @@ use strum::VariantNames;
 use super::row::{
     Exchange, LeafInfo, UNSET, at, at_most, exchanged, flag, name, number, period_s, times,
 };
-use crate::law::friction::Direction;
-use crate::law::units::FASTEST_MM_S;
 use crate::settings::axis::AxisSettings;
 use crate::settings::homing::HomeSwitch;
+use quadrant_law::friction::Direction;
+use quadrant_law::units::FASTEST_MM_S;
 
 /// The longest travel of an axis and of a motion, mm.
 pub(in crate::settings) const LONGEST_TRAVEL_MM: f64 = 1e4;

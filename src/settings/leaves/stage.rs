@@ -3,9 +3,9 @@
 use strum::VariantNames;
 
 use super::row::{Exchange, LeafInfo, UNSET, at, exchanged, flag, name, number, of_stage, times};
-use crate::law::safety::{EnabledBy, HostNeeded};
 use crate::settings::axis::AxisSettings;
 use crate::settings::operation::{EmergencyReaction, LossReaction};
+use quadrant_law::safety::{EnabledBy, HostNeeded};
 
 pub(super) fn full_scale_v(axis: &AxisSettings, _: f64) -> f64 {
     axis.amplifier.full_scale_v

@@ -2,12 +2,12 @@
 //! the kind of feedforward has its model.
 
 use super::Place;
-use crate::law::control::feedback::LawKind;
-use crate::law::feedforward::FeedforwardKind;
-use crate::law::friction::stribeck::StaticFriction;
-use crate::law::learning::MAX_DELAY_TICKS;
 use crate::settings::axis::AxisSettings;
 use crate::settings::error::{Reason, SettingsError};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_law::learning::MAX_DELAY_TICKS;
 
 /// The tables' largest error over the breakaway level.
 const TABLE_TOLERANCE: f64 = 1e-3;

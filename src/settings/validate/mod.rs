@@ -9,8 +9,8 @@ use super::error::{Reason, SettingsError};
 use super::leaves::rules::{Limit, OF_AN_AXIS, OF_THE_STAGE, Rule};
 use super::stage::StageSettings;
 use super::tree::number_at;
-use crate::law::axes::AxisName;
-use crate::law::control::feedback::LawKind;
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::feedback::LawKind;
 
 /// The axis that a check is about, or the stage.
 #[derive(Clone, Copy)]

@@ -1,15 +1,15 @@
 //! Checks of motions against their axes' limits.
 
 use super::Place;
-use crate::law::axes::AxisName;
-use crate::law::reference::MotionSettings;
-use crate::law::units::FASTEST_MM_S;
 use crate::settings::axis::AxisSettings;
 use crate::settings::error::SettingsError;
 use crate::settings::leaves::limits::{
     LONGEST_TRAVEL_MM, MOST_ACCELERATION_MM_S2, MOST_JERK_MM_S3,
 };
 use crate::settings::stage::{PlanSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::MotionSettings;
+use quadrant_law::units::FASTEST_MM_S;
 
 /// The longest travel of a motion, in counts: what the references' products hold.
 const MOST_TRAVEL_COUNTS: f64 = 1_073_741_824.0;

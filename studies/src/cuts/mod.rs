@@ -10,15 +10,15 @@ pub mod command;
 
 use std::path::Path;
 
-use quadrant::cancelling::CancellingSettings;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::learning::LearningSettings;
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::SafetyState;
 use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_cli::warn;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::SafetyState;
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::{LawMachine, Operator};

@@ -4,12 +4,12 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::Direction;
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, Gms, GmsState};
-use quadrant::friction::stribeck::SlidingTable;
 use quadrant::settings::AxisSettings;
-use quadrant::telemetry::AxisTelemetry;
+use quadrant_law::axis::telemetry::AxisTelemetry;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, Gms, GmsState};
+use quadrant_law::friction::stribeck::SlidingTable;
 use quadrant_sim::design::{OpenLoop, SampledLoop};
 
 use super::run::Addition;

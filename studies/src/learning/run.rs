@@ -1,17 +1,17 @@
 //! A run of one axis: motions one after the other, on an axis that changes between them, while a tool may cut.
 
-use quadrant::axes::AxisName;
-use quadrant::cancelling::SpindleSpeed;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::learning::LearningSettings;
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
-use quadrant::safety::SafetyState;
 use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant::telemetry::AxisTelemetry;
-use quadrant::units::DacCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::axis::telemetry::AxisTelemetry;
+use quadrant_law::cancelling::SpindleSpeed;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
+use quadrant_law::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
+use quadrant_law::safety::SafetyState;
+use quadrant_law::units::DacCode;
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::machine::LawMachine;
 use quadrant_sim::plant::load::Load;

@@ -9,7 +9,7 @@ pub mod page;
 
 use indicatif::ProgressBar;
 use quadrant::lockstep::InputRecord;
-use quadrant::scalar::{Fixed, Scalar};
+use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_configuration};
 use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
 use quadrant_sim::experiment::run::RunError;
@@ -118,7 +118,7 @@ fn differ<S: Scalar>(
     let axes = exact.state().axes().iter().zip(other.state().axes());
     for (exact, other) in axes {
         let (exact, other) = (exact.telemetry(), other.telemetry());
-        let output_v = other.output.to_f64(quadrant::scalar::Quantity::Voltage);
+        let output_v = other.output.to_f64(quadrant_law::scalar::Quantity::Voltage);
         deviation.output_v = deviation.output_v.max((output_v - exact.output).abs());
         deviation.words.0 += u64::from(exact.code != other.code);
         deviation.words.1 += 1;

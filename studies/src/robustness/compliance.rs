@@ -3,11 +3,11 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_sim::design::{OpenLoop, SampledLoop};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, Imperfections};

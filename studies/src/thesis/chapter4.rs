@@ -96,7 +96,7 @@ fn data_rows(rate_hz: f64, x: &AxisSettings, truth: &AxisParameters, seeds: u64)
         same(
             "converter step",
             "mV",
-            1e3 * truth.full_scale_v / quadrant::units::DacCode::FULL_SCALE,
+            1e3 * truth.full_scale_v / quadrant_law::units::DacCode::FULL_SCALE,
             3,
         ),
         imperfect(

@@ -1,7 +1,7 @@
 //! The laws' comparison: equal robustness, knobs that were really tried, and the same again.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::identify::characteristic::{CharacteristicSettings, measure};

@@ -1,12 +1,12 @@
 //! The simulated stage: three axes that share nothing but the clock.
 
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
 use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::lockstep::InputRecord;
-use quadrant::safety::Switches;
-use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::safety::Switches;
+use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
 
 use super::{MarkParameters, Marks, SUBSTEPS, SimulatedAxis, StageParameters};
 

@@ -1,7 +1,7 @@
 //! From the channels of a connected axis to the recording of an experiment.
 
 use quadrant::settings::AxisSettings;
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 
 use super::stop::Injected;
 use crate::client::samples::Samples;

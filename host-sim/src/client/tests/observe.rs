@@ -6,7 +6,7 @@ use quadrant::link::message::AxisName;
 use quadrant::link::message::Trigger;
 use quadrant::link::message::{AxisSignal, Channel, StageSignal};
 use quadrant::link::message::{Body, SetPoint};
-use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
 use super::connected;
 use crate::client::samples::{Samples, TelemetryRecorder, arm, least_decimation, read_capture};
@@ -258,7 +258,7 @@ fn a_connected_axis_runs_experiments_in_closed_loop() {
     let (mut client, bench) = connected();
     let mut test_axis = ConnectedAxis::new(
         &mut client,
-        quadrant::axes::AxisName::X,
+        quadrant_law::axes::AxisName::X,
         crate::machine::Travel::either_way(200.0),
     )
     .unwrap();
