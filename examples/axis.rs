@@ -6,7 +6,7 @@ use quadrant_law::reference::{HarmonicSettings, Motion, MotionScale, MotionSetti
 use quadrant_law::{command::Command, encoder::EncoderReading, feedforward::FeedforwardKind};
 
 fn largest_error_um(kind: FeedforwardKind) -> Result<f32, AxisError> {
-    let x = quadrant::settings::presets::x_axis();
+    let x = quadrant_settings::presets::x_axis();
     let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(10.0, 5.0, 1.0, 0.5));
     let motion = Motion::build(&sine, MotionScale::new(0.5e-3, 1e4));
     let mut axis = Axis::<f32, 8>::blank();

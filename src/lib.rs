@@ -41,7 +41,7 @@
 //! use quadrant_law::axes::PerAxis;
 //! use quadrant_law::command::Command;
 //! use quadrant_law::reference::Motion;
-//! use quadrant::settings::StageSettings;
+//! use quadrant_settings::StageSettings;
 //! use quadrant_law::stage::{Inputs, Stage, StageState};
 //!
 //! let stage: Stage<f32> = StageSettings::simulated().build()?;
@@ -52,7 +52,7 @@
 //! // One count (0.5 um) away from where it was enabled, the stage pushes back.
 //! let moved = Inputs::of_counts([1, 0, 0]);
 //! assert!(stage.tick(&plan, &mut state, &moved).codes[0].0 < 0);
-//! # Ok::<(), quadrant::settings::SettingsError>(())
+//! # Ok::<(), quadrant_settings::SettingsError>(())
 //! ```
 #![no_std]
 #![forbid(unsafe_code)]
@@ -61,7 +61,6 @@ pub mod app;
 pub mod drivers;
 pub mod hal;
 pub mod lockstep;
-pub mod settings;
 pub mod store;
 
 /// The messages of the link, a crate of their own.

@@ -12,12 +12,12 @@
 use serde::{Deserialize, Serialize};
 use strum::FromRepr;
 
-use crate::settings::{PlanSettings, StageSettings};
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::safety::Switches;
 use quadrant_law::stage::{Inputs, Outputs};
 use quadrant_law::units::DacCode;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 /// Address of the memory on the target: its PSRAM, which the host backs by a shared file.
 pub const BASE: usize = 0x2100_0000;

@@ -12,13 +12,13 @@ use quadrant::app::rate_limiter::RateLimiter;
 use quadrant::app::supervisor::Event;
 use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
 use quadrant::hal::ResetCause;
-use quadrant::settings::StageSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::Fault;
 use quadrant_law::safety::oscillation::OscillationKind;
 use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_settings::StageSettings;
 
 use crate::board::{self, SettingsFlash};
 

@@ -4,7 +4,7 @@ use quadrant::link::heapless::{String as Bounded, Vec as BoundedList};
 use quadrant::link::message::{
     AxisName, Body, Channel, MAX_CHANNELS, SERIAL_VALUES_PER_S, SettingsRequest, TelemetryRequest,
 };
-use quadrant::settings::tree::expand;
+use quadrant_settings::tree::expand;
 use quadrant_simulation::setting_value;
 use serde::Deserialize;
 use serde_json::Value;

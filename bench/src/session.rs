@@ -9,7 +9,7 @@ use quadrant::link::message::{
     Body, Channel, LinkError, Message, Notice, Reply, Request, SettingsRequest, TelemetryBlock,
     TelemetryRequest, Value as LeafValue,
 };
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_simulation::setting_value;
 use serde_json::{Value, json};
 

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{Bound, Exchange, LeafInfo, Range, UNSET, all};
-use quadrant::settings::tree::is_part;
+use quadrant_settings::StageSettings;
+use quadrant_settings::leaves::{Bound, Exchange, LeafInfo, Range, UNSET, all};
+use quadrant_settings::tree::is_part;
 use serde_json::Value;
 
 /// A row of the reference: a leaf, or a number of a list's points.

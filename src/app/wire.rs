@@ -3,7 +3,6 @@
 use quadrant_link::message::{self as wire, text};
 
 use super::supervisor;
-use crate::settings::{self, PlanSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::telemetry::LimitedBy;
 use quadrant_law::learning::LearningStatus;
@@ -11,6 +10,7 @@ use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::SafetyState;
 use quadrant_law::safety::oscillation::OscillationKind;
+use quadrant_settings::{self as settings, PlanSettings};
 
 /// A type of the link made of the law's or of the settings', or the other way. All of them are other crates', so this cannot be
 /// `From`.

@@ -3,11 +3,11 @@
 use quadrant::app::start_record::StartRecord;
 use quadrant::link::message::Provenance;
 use quadrant::lockstep::Job;
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Plan;
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 
 use crate::board::{self, SettingsFlash};
 use crate::log;

@@ -3,11 +3,11 @@
 
 use anyhow::{Result, ensure};
 use quadrant::lockstep::Job;
-use quadrant::settings::AxisSettings;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
+use quadrant_settings::AxisSettings;
 
 use crate::reference_model::{self, ReferenceModel};
 use crate::{count, lockstep};

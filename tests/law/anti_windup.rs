@@ -1,6 +1,5 @@
 //! Recovery from a load that the output limit cannot hold.
 
-use quadrant::settings::presets::x_axis;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::{Feedback, LawKind};
@@ -10,6 +9,7 @@ use quadrant_law::control::terms::FeedbackInput;
 use quadrant_law::control::terms::FeedbackState;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::reference::Velocity;
+use quadrant_settings::presets::x_axis;
 
 use crate::common::{Rig, with_x};
 

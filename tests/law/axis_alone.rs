@@ -1,6 +1,5 @@
 //! One axis by itself: what it cannot be made with, what a tick of it does, and what of it is seen.
 
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::telemetry::LimitedBy;
 use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState};
@@ -13,6 +12,7 @@ use quadrant_law::reference::Motion;
 use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
 use quadrant_law::stage::StageState;
 use quadrant_law::units::Position;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{Rig, sine_on_x, with_x, x_alone};
 
@@ -350,7 +350,7 @@ fn an_axis_at_rest_on_a_limit_switch_is_no_fault_and_may_leave_it() {
 #[test]
 fn a_fault_that_held_the_axes_is_shown_until_something_moves_and_not_until_somebody_enables() {
     let mut settings = StageSettings::simulated();
-    settings.streaming.link_lost = quadrant::settings::LossReaction::Hold;
+    settings.streaming.link_lost = quadrant_settings::LossReaction::Hold;
     let mut rig = Rig::<f32>::new(&settings, &PlanSettings::default());
     rig.start();
     let velocity = settings.jog_at(AxisName::X, 1.0).expect("slow enough");
@@ -373,10 +373,10 @@ fn a_fault_that_held_the_axes_is_shown_until_something_moves_and_not_until_someb
 fn of_two_faults_that_hold_the_axes_the_first_is_shown_and_of_one_that_stops_them_none() {
     for (reaction, expected) in [
         (
-            quadrant::settings::LossReaction::Hold,
+            quadrant_settings::LossReaction::Hold,
             Some(FaultCode::LinkLost),
         ),
-        (quadrant::settings::LossReaction::Stop, None),
+        (quadrant_settings::LossReaction::Stop, None),
     ] {
         let mut settings = StageSettings::simulated();
         settings.streaming.link_lost = reaction;

@@ -1,13 +1,13 @@
 //! Whatever the encoders say, the outputs stay within their limits and the memory stays sound.
 
 use proptest::prelude::*;
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_law::axes::PerAxis;
 use quadrant_law::axis::telemetry::LimitedBy;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::common::{Rig, repeatable, sine_on_x, with_x};
 

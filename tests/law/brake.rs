@@ -2,13 +2,13 @@
 
 use proptest::prelude::*;
 use quadrant::link::message::{AxisName as WireAxis, Body, LinkError, Provenance, SettingsRequest};
-use quadrant::settings::{EmergencyReaction, StageSettings};
 use quadrant_law::admission::{Refusal, refusal};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::reference::{MotionScale, Velocity};
 use quadrant_law::safety::{FaultCode, SafetyState, Switches};
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{EmergencyReaction, StageSettings};
 
 use crate::common::{Rig, repeatable, sine_on_x};
 use crate::preemption;

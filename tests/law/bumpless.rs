@@ -1,11 +1,11 @@
 //! A change of settings in motion does not jolt the machine.
 
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 use quadrant_law::units::Position;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 
 use crate::common::{Rig, x_alone};
 

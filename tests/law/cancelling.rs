@@ -2,16 +2,15 @@
 //! nothing where it is left out.
 
 use proptest::prelude::*;
-use quadrant::settings::{AxisSettings, Reason, StageSettings};
 use quadrant_law::axes::AxisName;
-use quadrant_law::cancelling::{
-    CancellingLoop, CancellingSettings, LEAST_MARGIN_DEG, SpindleSpeed,
-};
+use quadrant_law::cancelling::{CancellingSettings, LEAST_MARGIN_DEG, SpindleSpeed};
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::units::DacCode;
+use quadrant_settings::cancelling::NominalLoop;
+use quadrant_settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::{Rig, repeatable};
 use crate::learning::{Axis, fixed};
@@ -403,7 +402,7 @@ fn margin_deg(delay_s: f64, largest_gain: f64, hz: f64) -> f64 {
     let x = &fixed().axes[0];
     let mut plant = x.plant.expect("by default");
     plant.delay_s = delay_s;
-    let of = CancellingLoop {
+    let of = NominalLoop {
         plant: &plant,
         pid: &x.feedback.pid,
         friction: &x.friction.gms,

@@ -7,8 +7,8 @@ use quadrant::app::telemetry::{Observation, Selection};
 use quadrant::link::message::{
     CaptureCause, CapturePhase, Channel, Edge, Level, MAX_CHANNELS, Trigger,
 };
-use quadrant::settings::StageSettings;
 use quadrant_law::command::Command;
+use quadrant_settings::StageSettings;
 
 use crate::common::{Rig, repeatable, sine_on_x};
 

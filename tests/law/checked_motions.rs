@@ -6,14 +6,14 @@ use quadrant::link::message::{
     AxisName, AxisPoint, Body, InjectRequest, Motion, Plan, PointToPoint, Reply, SetPoint,
     SettingsRequest, StreamRequest,
 };
-use quadrant::settings::draft::Draft;
-use quadrant::settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
 use quadrant_fault_bench::tasks::Tasks;
 use quadrant_law::axes::AxisName as LawAxis;
 use quadrant_law::command::Command;
 use quadrant_law::friction::Direction;
 use quadrant_law::reference::Velocity;
 use quadrant_law::safety::{AxisSwitches, Switches};
+use quadrant_settings::draft::Draft;
+use quadrant_settings::{HomeSwitch, HomingSettings, StageSettings, TravelSettings};
 
 use crate::common::Noise;
 use crate::preemption::{refused, set, settings};
@@ -337,7 +337,7 @@ fn nothing_that_motions_are_checked_against_changes_while_the_outputs_are_on() {
         .expect("lists");
     let mut bounding = 0;
     for path in paths {
-        let mut bytes = [0; quadrant::settings::MAX_VALUE_BYTES];
+        let mut bytes = [0; quadrant_settings::MAX_VALUE_BYTES];
         let Ok((kind, length)) = tighter.get_bytes(&path, &mut bytes) else {
             continue;
         };

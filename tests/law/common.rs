@@ -2,7 +2,6 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::{Config, RngSeed};
-use quadrant::settings::{PlanSettings, StageSettings};
 pub(crate) use quadrant_fault_bench::noise::Noise;
 use quadrant_law::axes::PerAxis;
 use quadrant_law::axis::AxisState;
@@ -11,6 +10,7 @@ use quadrant_law::encoder::EncoderReading;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
+use quadrant_settings::{PlanSettings, StageSettings};
 
 /// A property test of `cases` cases that is the same on every run.
 pub(crate) fn repeatable(cases: u32) -> Config {
@@ -43,14 +43,14 @@ pub(crate) fn any_f32() -> impl Strategy<Value = f32> {
 }
 
 /// The default stage with one change to its x axis.
-pub(crate) fn with_x(change: impl FnOnce(&mut quadrant::settings::AxisSettings)) -> StageSettings {
+pub(crate) fn with_x(change: impl FnOnce(&mut quadrant_settings::AxisSettings)) -> StageSettings {
     let mut settings = StageSettings::simulated();
     change(&mut settings.axes[0]);
     settings
 }
 
 /// The same, the other axes with x's preview, so that x waits for none.
-pub(crate) fn x_alone(change: impl FnOnce(&mut quadrant::settings::AxisSettings)) -> StageSettings {
+pub(crate) fn x_alone(change: impl FnOnce(&mut quadrant_settings::AxisSettings)) -> StageSettings {
     let mut settings = with_x(change);
     let [x, y, z] = &mut settings.axes;
     for axis in [y, z] {

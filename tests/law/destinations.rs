@@ -1,9 +1,9 @@
 //! Requests to move are checked against the settings, and refused with what was asked and what is allowed.
 
-use quadrant::settings::{MoveFlaw, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::Velocity;
 use quadrant_law::units::Position;
+use quadrant_settings::{MoveFlaw, StageSettings};
 
 use crate::common::with_x;
 

@@ -3,19 +3,17 @@
 
 use std::collections::VecDeque;
 
-use quadrant::settings::{AxisSettings, InjectionSettings, PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::command::Command;
 use quadrant_law::injection::Injection;
-use quadrant_law::reference::{
-    AxisPoint, MotionSettings, PointToPointSettings, ReferenceSample, SetPoint, StreamLimits,
-    StreamPlanner, Velocity,
-};
+use quadrant_law::reference::{MotionSettings, PointToPointSettings, ReferenceSample, Velocity};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::oscillation::{OscillationKind, OscillationReading};
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::units::Position;
+use quadrant_settings::stream_planner::{AxisPoint, SetPoint, StreamLimits, StreamPlanner};
+use quadrant_settings::{AxisSettings, InjectionSettings, PlanSettings, StageSettings};
 
 use crate::common::{Noise, Rig, sine_on_x, with_x};
 use quadrant_fault_bench::plant::{

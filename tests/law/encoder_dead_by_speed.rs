@@ -1,13 +1,13 @@
 //! An encoder that dies in a jog, by speed and way of dying, also with counts of its own; and axes that are healthy, drawn by
 //! the thousand, which are left alone. Prints the tables of `docs/safety.md`.
 
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_fault_bench::lone::{BEFORE, Lone, Order};
 use quadrant_fault_bench::plant::{Death, Encoder, FLICKERS, MODEL, Plant, Presliding, Truth};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::common::Noise;
 

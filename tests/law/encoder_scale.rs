@@ -2,13 +2,13 @@
 //! of `docs/safety.md`.
 
 use nalgebra::{Matrix4, Vector4};
-use quadrant::settings::StageSettings;
 use quadrant_fault_bench::lone::{BEFORE, Lone, Order};
 use quadrant_fault_bench::plant::{
     COUNT_MM, Death, Encoder, MODEL, PERIOD_S, Plant, Presliding, Truth,
 };
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::FaultCode;
+use quadrant_settings::StageSettings;
 
 /// Ticks from enabling until the sine has risen, and those that are looked at.
 const RISEN: u32 = 5000;

@@ -1,13 +1,13 @@
 //! No stored parameter is inert: each changes the outputs, brings about a fault, or decides whether settings and plan
 //! are accepted.
 
-use quadrant::settings::{HomingSettings, StageSettings, TravelSettings};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter::FilterSettings;
-use quadrant_law::control::popov::filtered_sector_bound;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::safety::SafetyState;
 use quadrant_law::scalar::Scalar;
+use quadrant_settings::popov::filtered_sector_bound;
+use quadrant_settings::{HomingSettings, StageSettings, TravelSettings};
 use serde_json::Value;
 
 use crate::common::{Noise, Rig};

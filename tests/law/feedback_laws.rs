@@ -1,11 +1,11 @@
 //! Promises of every feedback law, whichever it is.
 
 use proptest::prelude::*;
-use quadrant::settings::presets::x_axis;
 use quadrant_law::control::feedback::{Feedback, LawKind};
 use quadrant_law::control::terms::FeedbackInput;
 use quadrant_law::control::terms::FeedbackState;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::presets::x_axis;
 
 use crate::common::{any_f32, repeatable};
 
@@ -123,7 +123,7 @@ fn an_error_that_is_not_a_number_counts_as_none() {
 fn the_default_laws_are_one_pid_at_small_errors() {
     let settings = x_axis().feedback;
     for kind in LawKind::ALL {
-        let of = quadrant::settings::FeedbackSettings {
+        let of = quadrant_settings::FeedbackSettings {
             law: kind,
             ..settings.clone()
         };

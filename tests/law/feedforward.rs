@@ -1,8 +1,6 @@
 //! Friction feedforward: nothing when off, each effect once, at the right time.
 
 use proptest::prelude::*;
-use quadrant::settings::presets::x_axis;
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::feedforward::{
     Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
     ReferenceStep,
@@ -10,6 +8,8 @@ use quadrant_law::feedforward::{
 use quadrant_law::friction::FrictionSettings;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 use quadrant_law::units::{DacCode, Position};
+use quadrant_settings::presets::x_axis;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{Noise, Rig, any_f32, repeatable, sine_on_x, with_x, x_alone};
 
@@ -291,7 +291,7 @@ fn a_stage_of_any_kind_is_small() {
 fn axes_with_different_previews_keep_one_time() {
     let mut settings = StageSettings::simulated();
     for (axis, preview_s) in settings.axes.iter_mut().zip([1.2e-3, 0.0, 1.3e-3]) {
-        *axis = quadrant::settings::presets::x_axis();
+        *axis = quadrant_settings::presets::x_axis();
         axis.feedforward.preview_s = preview_s;
     }
     let sine = sine_on_x(1.0, 10.0).motions[0];

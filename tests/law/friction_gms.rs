@@ -263,7 +263,7 @@ fn slipping_follows_the_exact_exponential() {
 
 #[test]
 fn sinusoidal_cycles_on_the_stribeck_curve_take_work() {
-    let elements = quadrant::settings::presets::x_axis().friction.gms.elements;
+    let elements = quadrant_settings::presets::x_axis().friction.gms.elements;
     let table = surface::<f64>();
     for amplitude_mm in [0.001, 0.003, 0.01, 0.03, 0.1, 1.0, 10.0] {
         for frequency_hz in [0.1, 1.0, 10.0] {
@@ -337,7 +337,7 @@ fn entry_to_slip_is_clipped_to_the_share() {
 
 #[test]
 fn each_direction_slides_at_its_own_level() {
-    let elements = quadrant::settings::presets::x_axis().friction.gms.elements;
+    let elements = quadrant_settings::presets::x_axis().friction.gms.elements;
     let gms = Gms::<f64, 10>::build(&elements);
     let table = surface::<f64>();
     let mut state = GmsState::default();
@@ -361,7 +361,7 @@ fn each_direction_slides_at_its_own_level() {
 
 #[test]
 fn unused_room_for_elements_does_not_act() {
-    let elements = quadrant::settings::presets::x_axis().friction.gms.elements;
+    let elements = quadrant_settings::presets::x_axis().friction.gms.elements;
     let sliding = Sliding::constant(0.15, 5.0, PERIOD_S);
     let (four, ten) = (
         Gms::<f32, 4>::build(&elements),

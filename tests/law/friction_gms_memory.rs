@@ -157,7 +157,7 @@ fn ten_elements_give_ten_break_points() {
 fn mean_place(bias_v: f64, vibration_v: f64, seconds: [f64; 2]) -> [f64; 2] {
     const STEP_S: f64 = 2e-5;
     const GAIN: f64 = 69_390.0;
-    let elements = quadrant::settings::presets::x_axis().friction.gms.elements;
+    let elements = quadrant_settings::presets::x_axis().friction.gms.elements;
     let gms = Gms::<f64, 10>::build(&elements);
     let mut state = GmsState::default();
     let (mut velocity, mut place, mut friction) = (0.0, 0.0, 0.0);

@@ -1,12 +1,12 @@
 //! The smoothed GMS: smooth, bounded, and GMS in the limit.
 
 use proptest::prelude::*;
-use quadrant::settings::presets::x_axis;
 use quadrant_law::friction::gms::{Gms, GmsElement, GmsState};
 use quadrant_law::friction::smoothed_gms::{SmoothedGms, SmoothedGmsParameters};
 use quadrant_law::friction::stribeck::{Sliding, SlidingTable};
 use quadrant_law::friction::{Direction, PerDirection};
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::presets::x_axis;
 
 use crate::common::{any_f32, repeatable};
 use crate::friction_gms::elements;

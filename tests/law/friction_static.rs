@@ -141,7 +141,7 @@ fn a_curve_without_a_drop_is_flat() {
 
 #[test]
 fn default_tables_err_by_far_less_than_allowed() {
-    for axis in quadrant::settings::StageSettings::simulated().axes {
+    for axis in quadrant_settings::StageSettings::simulated().axes {
         let curve = axis.friction.sliding.positive.curve;
         let error = worst::<f32>(&curve);
         println!("worst error of s(v) over Fs: {error:.1e}");

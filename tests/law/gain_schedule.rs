@@ -1,11 +1,11 @@
 //! Gain scheduling: at any speed the PID of that speed.
 
 use proptest::prelude::*;
-use quadrant::settings::presets::x_axis;
 use quadrant_law::control::pid::{Pid, PidGains};
 use quadrant_law::control::schedule::{GainSchedule, SchedulePoint, ScheduledPid};
 use quadrant_law::control::terms::FeedbackInput;
 use quadrant_law::control::terms::FeedbackState;
+use quadrant_settings::presets::x_axis;
 
 use crate::common::repeatable;
 

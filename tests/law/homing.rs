@@ -2,13 +2,13 @@
 //! nor on a switch that scatters, bounces and has play.
 
 use proptest::prelude::*;
-use quadrant::settings::{AxisSettings, HomeSwitch, HomingSettings, PlanSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::friction::Direction;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::units::Position;
+use quadrant_settings::{AxisSettings, HomeSwitch, HomingSettings, PlanSettings};
 
 use crate::common::{Noise, Rig, repeatable, with_x};
 

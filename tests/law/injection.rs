@@ -1,7 +1,6 @@
 //! A host's voltage through the whole tick: what it adds up to, and when it is taken.
 
 use proptest::prelude::*;
-use quadrant::settings::{InjectionSettings, PlanSettings, StageSettings};
 use quadrant_law::admission::Refusal;
 use quadrant_law::admission::StageView;
 use quadrant_law::admission::refusal;
@@ -13,6 +12,7 @@ use quadrant_law::reference::Velocity;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{InjectionSettings, PlanSettings, StageSettings};
 
 use crate::common::{Rig, any_f32, repeatable, sine_on_x};
 

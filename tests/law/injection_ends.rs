@@ -1,11 +1,11 @@
 //! The ends of an injected voltage: their causes, their ticks, and the axes' reactions.
 
-use quadrant::settings::{InjectionSettings, PlanSettings, TravelSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{InjectionSettings, PlanSettings, TravelSettings};
 
 use crate::common::with_x;
 use crate::injection::{Bench, bench, request};

@@ -1,12 +1,12 @@
 //! Jogging: at the velocity asked for, within acceleration and jerk, and never past the end of the travel.
 
 use proptest::prelude::*;
-use quadrant::settings::{PlanSettings, StageSettings, TravelSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::{JogState, MotionScale, Ramp, RampState, Velocity};
 use quadrant_law::units::Position;
+use quadrant_settings::{PlanSettings, StageSettings, TravelSettings};
 
 use crate::common::{Rig, repeatable, with_x};
 
@@ -86,7 +86,7 @@ fn an_axis_beyond_its_travel_jogs_back_only() {
     assert!(state.position() < mm(1.0));
 }
 
-fn travel(settings: &mut quadrant::settings::AxisSettings) {
+fn travel(settings: &mut quadrant_settings::AxisSettings) {
     settings.limits.travel_mm = Some(TravelSettings {
         negative: -2.0,
         positive: 2.0,

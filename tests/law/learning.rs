@@ -2,7 +2,6 @@
 //! to be learnt.
 
 use proptest::prelude::*;
-use quadrant::settings::{InjectionSettings, PlanSettings, Reason, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
@@ -11,6 +10,7 @@ use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::learning::{LearningSettings, LearningStatus, MAX_DELAY_TICKS};
 use quadrant_law::motion::MotionMode;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::{InjectionSettings, PlanSettings, Reason, StageSettings};
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 use quadrant_fault_bench::plant::{Death, Encoder, MODEL, PERIOD_S, Plant, Truth};
@@ -499,7 +499,7 @@ fn without_an_integral_nothing_is_taken_from_it() {
 
 #[test]
 fn learning_needs_a_plant_with_a_dead_time_that_it_holds_and_a_pid() {
-    let refusal = |change: fn(&mut quadrant::settings::AxisSettings)| {
+    let refusal = |change: fn(&mut quadrant_settings::AxisSettings)| {
         let mut settings = learning();
         change(&mut settings.axes[0]);
         let error = settings.validate(FIRMWARE_ELEMENTS).expect_err("refused");

@@ -7,8 +7,8 @@ use quadrant::link::message::AxisName::{X, Y, Z};
 use quadrant::link::message::Channel;
 use quadrant::link::message::*;
 use quadrant::link::message::{Edge, Level, Trigger};
-use quadrant::settings::PlanSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_settings::PlanSettings;
 
 use crate::link_traffic::framed;
 

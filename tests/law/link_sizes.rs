@@ -14,9 +14,9 @@ use quadrant::link::message::{
 use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord, Edge, Level, Trigger};
 use quadrant::link::message::{Channel, LimitedBy, MachineState, TelemetryBlock, Words};
 use quadrant::link::server::LinkServer;
-use quadrant::settings::PlanSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::FaultCode;
+use quadrant_settings::PlanSettings;
 
 use crate::link_model::there_and_back;
 

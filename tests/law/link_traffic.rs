@@ -12,8 +12,8 @@ use quadrant::link::message::{
     StreamRequest, TelemetryRequest, Value, Voltages,
 };
 use quadrant::link::message::{Edge, Level, Trigger};
-use quadrant::settings::PlanSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_settings::PlanSettings;
 
 use crate::common::Noise;
 

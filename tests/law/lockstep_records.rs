@@ -4,7 +4,6 @@ use proptest::prelude::*;
 use quadrant::lockstep::{
     BootBlock, InjectedFault, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Reset, held,
 };
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
@@ -12,6 +11,7 @@ use quadrant_law::reference::Velocity;
 use quadrant_law::safety::{AxisSwitches, Switches};
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::DacCode;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{repeatable, sine_on_x};
 

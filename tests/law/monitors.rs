@@ -1,7 +1,6 @@
 //! The monitors of an axis at their very limits.
 
 use quadrant::app::Snapshot;
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::admission::{Refusal, refusal};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
@@ -9,6 +8,7 @@ use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::monitor::{Following, FollowingState, SignalLoss, SignalLossState};
 use quadrant_law::stage::{Inputs, Stage, StageState};
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{Noise, Rig, with_x};
 

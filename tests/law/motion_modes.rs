@@ -1,17 +1,17 @@
 //! The motion modes of the axes: stops, single moves and streams through the whole tick.
 
 use quadrant::app::supervisor::{Event, Supervisor};
-use quadrant::settings::{LossReaction, PlanSettings, StageSettings};
 use quadrant_law::admission::Refusal;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::{
-    AxisPoint, HarmonicSettings, MotionSettings, PointToPointSettings, ReferenceSample, Segment,
-    SetPoint, StreamLimits, StreamPlanner, Velocity,
+    HarmonicSettings, MotionSettings, PointToPointSettings, ReferenceSample, Segment, Velocity,
 };
 use quadrant_law::safety::{FaultCode, Reaction, SafetyState};
 use quadrant_law::units::Position;
+use quadrant_settings::stream_planner::{AxisPoint, SetPoint, StreamLimits, StreamPlanner};
+use quadrant_settings::{LossReaction, PlanSettings, StageSettings};
 
 use crate::common::Rig;
 

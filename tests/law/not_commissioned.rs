@@ -1,7 +1,6 @@
 //! A board with nothing in its flash has no law: its outputs stay off, and a person learns what to do.
 
 use quadrant::app::supervisor::{Event, Supervisor};
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_law::admission::Refusal;
 use quadrant_law::admission::StageView;
 use quadrant_law::admission::refusal;
@@ -10,6 +9,7 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::safety::{EnabledBy, SafetyState};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::common::Rig;
 

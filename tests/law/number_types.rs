@@ -1,8 +1,8 @@
 //! The law on `f32` and in fixed point differs from the law on `f64` by microvolts.
 
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{Noise, Rig, sine_on_x};
 

@@ -2,13 +2,13 @@
 
 use quadrant::app::supervisor::{Event, StageView, Supervisor};
 use quadrant::link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
-use quadrant::settings::{EmergencyReaction, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::safety::{
     AxisSwitches, EnabledBy, FaultCode, HostNeeded, Operation, Reaction, SafetyState, Switches,
 };
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{EmergencyReaction, StageSettings};
 
 use crate::common::Rig;
 use crate::preemption::{LINK_TIMEOUT_TICKS, endless, plan, refused, safety, settings};

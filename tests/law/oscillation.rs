@@ -3,7 +3,6 @@
 use quadrant::app::oscillation_report::Oscillated;
 use quadrant::app::supervisor::Event;
 use quadrant::app::{Snapshot, Supervision};
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
@@ -14,6 +13,7 @@ use quadrant_law::safety::oscillation::{
     Oscillation, OscillationInput, OscillationKind, OscillationReading, OscillationState,
 };
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_simulation::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, SimulatedAxis,
     StageParameters,

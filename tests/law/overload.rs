@@ -1,11 +1,11 @@
 //! The load of a motor, I²t: against the time that the rating gives, worked out here.
 
 use proptest::prelude::*;
-use quadrant::settings::StageSettings;
 use quadrant_law::command::Command;
 use quadrant_law::safety::overload::{Overload, OverloadState};
 use quadrant_law::safety::{FaultCode, SafetyState};
 use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_settings::StageSettings;
 
 use crate::common::{Rig, repeatable, with_x};
 

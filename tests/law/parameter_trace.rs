@@ -1,9 +1,9 @@
 //! The trace of a run, which shows if a parameter counts: outputs bit by bit, and the plan that all runs follow.
 
-use quadrant::settings::PlanSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
 use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_settings::PlanSettings;
 
 use crate::common::Rig;
 

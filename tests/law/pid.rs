@@ -1,11 +1,11 @@
 //! The PID: bounds, filter, and its start.
 
 use proptest::prelude::*;
-use quadrant::settings::presets::x_axis;
 use quadrant_law::control::npid::{NonlinearGain, NonlinearGainTable};
 use quadrant_law::control::pid::{Pid, PidGains};
 use quadrant_law::control::terms::FeedbackState;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::presets::x_axis;
 
 use crate::common::{any_f32, repeatable};
 

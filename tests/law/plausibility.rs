@@ -2,7 +2,6 @@
 //!
 //! The expectation is integrated here in f64 from the description: no line of it is shared with the law.
 
-use quadrant::settings::StageSettings;
 use quadrant_fault_bench::noise::Noise;
 use quadrant_fault_bench::plant::{MODEL, Plant, Truth};
 use quadrant_law::axes::AxisName;
@@ -12,6 +11,7 @@ use quadrant_law::safety::FaultCode;
 use quadrant_law::safety::plausibility::{
     Plausibility, PlausibilityModel, PlausibilityState, Shown, Words,
 };
+use quadrant_settings::StageSettings;
 
 use crate::common::Rig;
 

@@ -6,10 +6,10 @@ use quadrant::link::message::{
     AxisName, Body, Harmonic, LinkError, Motion, Plan, PointToPoint, Provenance, Reply, Request,
     SettingsRequest,
 };
-use quadrant::settings::StageSettings;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_settings::StageSettings;
 
 use crate::common::Noise;
 use quadrant_fault_bench::flash::Flash;
@@ -108,7 +108,7 @@ fn slower() -> Body {
 
 /// Sets a leaf as it is in some settings.
 pub(crate) fn set(path: &str, settings: &StageSettings) -> Body {
-    let mut bytes = [0; quadrant::settings::MAX_VALUE_BYTES];
+    let mut bytes = [0; quadrant_settings::MAX_VALUE_BYTES];
     let (kind, length) = settings.get_bytes(path, &mut bytes).expect("a leaf");
     Body::Settings(SettingsRequest::Set {
         path: path.try_into().expect("fits"),

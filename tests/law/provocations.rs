@@ -1,9 +1,9 @@
 //! Provocations of the monitors' parameters: short runs that end in a fault, or would with other parameters.
 
-use quadrant::settings::StageSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::safety::{AxisSwitches, Operation, SafetyState, Switches};
+use quadrant_settings::StageSettings;
 
 use crate::common::Rig;
 use crate::parameter_trace::{Trace, plan, tick_of};

@@ -4,11 +4,13 @@ use core::f64::consts::TAU;
 
 use proptest::prelude::*;
 use quadrant_law::reference::{
-    AxisPoint, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, Segment, SetPoint, Stream,
-    StreamLimits, StreamPlanner, StreamState, StreamStep,
+    MotionScale, ReferenceSample, Segment, Stream, StreamState, StreamStep,
 };
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
 use quadrant_law::units::Position;
+use quadrant_settings::stream_planner::{
+    AxisPoint, MOST_SEGMENT_TICKS, SetPoint, StreamLimits, StreamPlanner,
+};
 
 use crate::common::repeatable;
 

@@ -1,12 +1,12 @@
 //! An axis that has stood sets off with the friction that it has then.
 
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_law::command::Command;
 use quadrant_law::control::filter::{FilterList, FilterSettings};
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
 use quadrant_law::safety::SafetyState;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::learning::{Axis, fixed};
 use quadrant_fault_bench::plant::PERIOD_S;

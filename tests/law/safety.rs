@@ -1,12 +1,12 @@
 //! The stage's states: who drives the outputs, and what ends it.
 
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::axes::PerAxis;
 use quadrant_law::command::Command;
 use quadrant_law::safety::{Fault, FaultCode, SafetyState};
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::DacCode;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{Rig, sine_on_x};
 

@@ -1,11 +1,11 @@
 //! The faults as `docs/safety.md` has them, written by hand: what the law does is held against this, not against the law's
 //! own tables.
 
-use quadrant::settings::StageSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::safety::{FaultCode, SafetyState, Switches};
 use quadrant_law::stage::{Outputs, StageState};
+use quadrant_settings::StageSettings;
 
 use crate::common::Rig;
 use crate::safety_faults::{CASES, End, provoke};

@@ -1,12 +1,12 @@
 //! Every fault provoked: in which tick it is found, and what the outputs are in that tick. Prints the table of
 //! `docs/safety.md`.
 
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::{AxisSwitches, Fault, FaultCode, Reaction, SafetyState, Switches};
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::Rig;
 

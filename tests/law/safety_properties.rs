@@ -1,13 +1,13 @@
 //! Whatever comes in: nothing is driven unasked, and what a fault promises is kept.
 
 use proptest::prelude::*;
-use quadrant::settings::{LossReaction, StageSettings};
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
 use quadrant_law::safety::monitor::{IndexSpacing, IndexState};
 use quadrant_law::safety::{Reaction, SafetyState, Switches};
 use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_law::stage::{Inputs, Outputs};
+use quadrant_settings::{LossReaction, StageSettings};
 
 use crate::common::{Rig, repeatable};
 use crate::safety_faults::{follow, moving, sines};

@@ -1,11 +1,11 @@
 //! The stage at work: one axis can be exchanged for another between two ticks, and says how near its limit it comes.
 
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::{Quantity, Scalar};
 use quadrant_law::stage::{Inputs, Outputs, Stage, StageRef, StageState};
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{Rig, with_x, without_plant};
 use crate::safety_faults::{OF_OTHERS, follow, moving, push, sines, standing};

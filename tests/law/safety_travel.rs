@@ -1,7 +1,6 @@
 //! Ends of the travel: limit switches and soft limits stop an axis on its way out, and let it come back.
 
 use proptest::prelude::*;
-use quadrant::settings::{LossReaction, PlanSettings, StageSettings, TravelSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::encoder::EncoderReading;
@@ -9,6 +8,7 @@ use quadrant_law::reference::{MotionSettings, PointToPointSettings, Ramp, Veloci
 use quadrant_law::safety::travel::{Travel, TravelState};
 use quadrant_law::safety::{AxisSwitches, FaultCode, SafetyState, Switches};
 use quadrant_law::units::Position;
+use quadrant_settings::{LossReaction, PlanSettings, StageSettings, TravelSettings};
 
 use crate::common::{Rig, repeatable, with_x};
 use crate::safety_faults::{follow, moving, sines};

@@ -1,9 +1,9 @@
 //! Every number out of its range is refused by name, with the value and what is allowed.
 
-use quadrant::settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::decimal::Decimal;
+use quadrant_settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
 
 use crate::common::with_x;
 use crate::settings_fields::{FIELDS, Field};
@@ -48,7 +48,7 @@ fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
             for value in [below, above] {
                 let mut settings = StageSettings::simulated();
                 // Below breakaway is above x's coulomb level; other axes have other levels.
-                settings.axes[index] = quadrant::settings::presets::x_axis();
+                settings.axes[index] = quadrant_settings::presets::x_axis();
                 // An end that another setting decides is that of the law in force.
                 if let Some(law) = law_of(field) {
                     settings.axes[index].feedback.law = law;
@@ -87,7 +87,7 @@ fn the_list_of_fields_is_complete() {
             _ => 0,
         }
     }
-    let axis = quadrant::settings::presets::x_axis();
+    let axis = quadrant_settings::presets::x_axis();
     let elements = axis.friction.gms.elements.len();
     let stored = numbers(&serde_json::to_value(&axis).expect("plain data"));
     let points = axis.feedback.schedule.expect("by default").len();

@@ -1,10 +1,10 @@
 //! Relations that the fields of the settings must keep.
 
-use quadrant::settings::presets::X_PLANT;
-use quadrant::settings::{AxisSettings, Reason, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::friction::gms::GmsElement;
+use quadrant_settings::presets::X_PLANT;
+use quadrant_settings::{AxisSettings, Reason, StageSettings};
 
 use crate::common::with_x;
 use crate::settings::{ROOM, check_message, refusal};

@@ -1,11 +1,11 @@
 //! Settings that are edited leaf by leaf and take effect as a whole.
 
-use quadrant::settings::StageSettings;
-use quadrant::settings::draft::{ApplyError, Draft};
-use quadrant::settings::leaves::{Exchange, all};
 use quadrant_law::axes::AxisName;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::stage::Stage;
+use quadrant_settings::StageSettings;
+use quadrant_settings::draft::{ApplyError, Draft};
+use quadrant_settings::leaves::{Exchange, all};
 
 fn draft_of(settings: StageSettings) -> Draft<'static> {
     let room = || Box::leak(Box::new(StageSettings::simulated()));
@@ -142,7 +142,7 @@ fn settings_made_in_place_are_the_default_ones_and_copies_are_the_same() {
         rate_hz: 5e3,
         ..StageSettings::simulated()
     };
-    settings.streaming.link_lost = quadrant::settings::LossReaction::Hold;
+    settings.streaming.link_lost = quadrant_settings::LossReaction::Hold;
     settings.axes[2].homing = None;
     settings.axes[0].feedback.pid.kp_v_per_mm = 7.0;
     let mut copy = StageSettings::simulated();

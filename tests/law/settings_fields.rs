@@ -1,7 +1,7 @@
 //! Every number of an axis' settings, with values just outside its range.
 
-use quadrant::settings::AxisSettings;
 use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::AxisSettings;
 
 pub(crate) type Field = fn(&mut AxisSettings) -> &mut f64;
 
@@ -367,11 +367,11 @@ fn lugre(axis: &mut AxisSettings) -> &mut quadrant_law::friction::lugre::LugrePa
     axis.friction.lugre.as_mut().expect("a model by default")
 }
 
-fn travel(axis: &mut AxisSettings) -> &mut quadrant::settings::TravelSettings {
+fn travel(axis: &mut AxisSettings) -> &mut quadrant_settings::TravelSettings {
     axis.limits.travel_mm.as_mut().expect("by default")
 }
 
-fn homing(axis: &mut AxisSettings) -> &mut quadrant::settings::HomingSettings {
+fn homing(axis: &mut AxisSettings) -> &mut quadrant_settings::HomingSettings {
     axis.homing.as_mut().expect("by default")
 }
 

@@ -1,8 +1,8 @@
 //! Every number of the feedback laws beside PID and N-PID, with values just outside its range.
 
-use quadrant::settings::AxisSettings;
 use quadrant_law::control::nctf::NctfGains;
 use quadrant_law::control::schedule::SchedulePoint;
+use quadrant_settings::AxisSettings;
 
 use crate::settings_fields::Field;
 

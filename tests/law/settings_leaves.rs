@@ -2,13 +2,13 @@
 
 use std::collections::BTreeSet;
 
-use quadrant::settings::leaves::{LeafInfo, Range, all, find};
-use quadrant::settings::tree::{TreeError, is_part};
-use quadrant::settings::{Reason, SettingsError, StageSettings};
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter::{FilterList, FilterSettings};
 use quadrant_law::learning::LearningSettings;
+use quadrant_settings::leaves::{LeafInfo, Range, all, find};
+use quadrant_settings::tree::{TreeError, is_part};
+use quadrant_settings::{Reason, SettingsError, StageSettings};
 use serde_json::Value;
 
 use crate::settings_tree::{get, paths};

@@ -3,8 +3,8 @@
 use std::collections::BTreeSet;
 
 use miniconf::{Internal, Schema, TreeSchema};
-use quadrant::settings::tree::{MAX_PATH, expand, is_part};
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::tree::{MAX_PATH, expand, is_part};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::settings_tree::{get, paths};
 

@@ -1,8 +1,8 @@
 //! Motions are held to their ranges and to what their axis can do.
 
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 
 use crate::common::with_x;
 use crate::settings::check_message;

@@ -1,8 +1,8 @@
 //! Stored settings come back as they were.
 
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::with_x;
 

@@ -1,10 +1,10 @@
 //! Settings by path, as JSON values.
 
 use proptest::prelude::*;
-use quadrant::settings::StageSettings;
-use quadrant::settings::tree::{MAX_VALUE_BYTES, TreeError, is_part};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::StageSettings;
+use quadrant_settings::tree::{MAX_VALUE_BYTES, TreeError, is_part};
 
 use crate::common::repeatable;
 

@@ -1,6 +1,5 @@
 //! A controlled stop has an end; and what must be so before an axis is driven.
 
-use quadrant::settings::{AxisSettings, HomeSwitch, PlanSettings, StageSettings};
 use quadrant_law::admission::{Refusal, StageView, refusal};
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::axis::{Axis, AxisBuilder};
@@ -9,6 +8,7 @@ use quadrant_law::motion::ReferenceGenerator;
 use quadrant_law::reference::{MotionScale, Ramp, Velocity};
 use quadrant_law::safety::{AxisSwitches, FaultCode, Operation, SafetyState, Switches};
 use quadrant_law::stage::{Outputs, Stage};
+use quadrant_settings::{AxisSettings, HomeSwitch, PlanSettings, StageSettings};
 
 use crate::common::{Rig, with_x};
 

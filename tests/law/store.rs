@@ -1,10 +1,10 @@
 //! Settings in a flash: what it may hold before, and what becomes of a set.
 
-use quadrant::settings::{Reason, StageSettings};
 use quadrant::store::{
     BUFFER_BYTES, DecodeError, Finding, LoadError, LogError, Provenance, SaveError, Store,
 };
 use quadrant_law::friction::gms::GmsElement;
+use quadrant_settings::{Reason, StageSettings};
 
 use crate::common::Noise;
 use quadrant_fault_bench::flash::{Flash, FlashError, SECTOR};

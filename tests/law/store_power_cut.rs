@@ -1,8 +1,8 @@
 //! A power cut at any operation of the flash leaves the settings that were stored last, or those that were being stored.
 
-use quadrant::settings::StageSettings;
 use quadrant::store::{BUFFER_BYTES, LoadError, LogError, Provenance, SaveError, Store, Stored};
 use quadrant_law::control::feedback::LawKind;
+use quadrant_settings::StageSettings;
 
 use crate::common::Noise;
 use quadrant_fault_bench::flash::{Damage, Flash, FlashError};

@@ -2,9 +2,6 @@
 
 use proptest::prelude::*;
 use proptest::test_runner::Config;
-use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{Range, find};
-use quadrant::settings::tree::{Path, is_part};
 use quadrant::store::{
     BUFFER_BYTES, DecodeError, FORMAT, PROVENANCE_BYTES, Provenance, decode, encode,
 };
@@ -13,6 +10,9 @@ use quadrant_law::control::nctf::CharacteristicPoint;
 use quadrant_law::control::schedule::SchedulePoint;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::friction::gms::GmsElement;
+use quadrant_settings::StageSettings;
+use quadrant_settings::leaves::{Range, find};
+use quadrant_settings::tree::{Path, is_part};
 use serde::{Deserialize, Serialize};
 
 use crate::common::{Noise, repeatable};

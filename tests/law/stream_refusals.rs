@@ -1,10 +1,10 @@
 //! Set points that ask for too much are refused by their number, with the value and the limit.
 
 use quadrant_law::axes::AxisName;
-use quadrant_law::reference::{
+use quadrant_law::units::Position;
+use quadrant_settings::stream_planner::{
     AxisPoint, SetPoint, StreamError, StreamFlaw, StreamLimits, StreamPlanner,
 };
-use quadrant_law::units::Position;
 
 use crate::reference_stream::{LIMITS, mm, on_x, point};
 

@@ -1,14 +1,15 @@
 //! Filters behind the feedback law: the response of their definition, in every number type, without a jolt.
 
+use quadrant_settings::response::{LinearResponse, sampled_filter_response};
 use std::f64::consts::TAU;
 
 use proptest::prelude::*;
-use quadrant::settings::Reason;
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_law::axis::telemetry::LimitedBy;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter::{FilterList, FilterSettings, Filters, FiltersState};
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::Reason;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 
 use crate::common::{Rig, repeatable, sine_on_x, x_alone};
 
@@ -50,7 +51,7 @@ fn pair() -> [FilterSettings; 2] {
 fn the_filters_have_the_response_of_their_definition() {
     for frequency_hz in [10.0, 60.0, 120.0, 200.0, 900.0, 3000.0] {
         let omega = TAU * frequency_hz;
-        let sampled = pair().map(|filter| filter.sampled_response(omega, PERIOD_S));
+        let sampled = pair().map(|filter| sampled_filter_response(&filter, omega, PERIOD_S));
         let expected = sampled[0] * sampled[1];
         let (gain, phase) = measured(&pair(), frequency_hz);
         assert!(

@@ -1,12 +1,12 @@
 //! Cascade, sliding mode and NCTF: a PID at small errors, and each its own beyond.
 
-use quadrant::settings::{FeedbackSettings, presets::x_axis};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::nctf::CharacteristicPoint;
 use quadrant_law::control::pid::{Pid, PidGains};
 use quadrant_law::control::surface::SurfaceGains;
 use quadrant_law::control::terms::FeedbackInput;
 use quadrant_law::control::terms::FeedbackState;
+use quadrant_settings::{FeedbackSettings, presets::x_axis};
 
 const PERIOD_S: f64 = 1e-4;
 

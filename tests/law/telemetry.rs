@@ -9,9 +9,9 @@ use quadrant::link::message::{
     AxisName, AxisSignal, Channel, MAX_CHANNELS, MachineState, StageSignal, TelemetryBlock,
     UnknownChannel, WordKind,
 };
-use quadrant::settings::StageSettings;
 use quadrant_law::command::Command;
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_settings::StageSettings;
 
 use crate::common::{Rig, repeatable, sine_on_x};
 

@@ -96,12 +96,12 @@ mod tests {
                 "quadrant::law::axis",
             ),
             (
-                "quadrant::settings::tree::canonical",
-                "quadrant::settings::tree",
+                "quadrant_settings::tree::canonical",
+                "quadrant_settings::tree",
             ),
             (
-                "<quadrant::settings::stage::StageSettings>::validate",
-                "quadrant::settings::stage",
+                "<quadrant_settings::stage::StageSettings>::validate",
+                "quadrant_settings::stage",
             ),
             (
                 "<&quadrant::store::LoadError<F> as core::fmt::Display>::fmt",
@@ -111,7 +111,7 @@ mod tests {
             ("core::fmt::write", "core"),
             ("CONTROL_TICK", "handlers, and what is in no module"),
             (
-                "<quadrant::settings::axis::AxisSettings as miniconf::tree::TreeAny>::ref_any_by_key",
+                "<quadrant_settings::axis::AxisSettings as miniconf::tree::TreeAny>::ref_any_by_key",
                 "leaves of the settings by path (miniconf)",
             ),
         ] {

@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_law::axes::AxisName;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
 use quadrant_sim::commission::{
     CommissionError, CommissionSettings, Commissioned, CrossCheck, commission, plan, plan_table,

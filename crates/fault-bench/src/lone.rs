@@ -1,6 +1,5 @@
 //! One axis of the law on a plant, behind an encoder that may die.
 
-use quadrant::settings::StageSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::{Axis, AxisState};
 use quadrant_law::command::Command;
@@ -8,6 +7,7 @@ use quadrant_law::encoder::EncoderReading;
 use quadrant_law::reference::{Motion, MotionSettings, Velocity};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::Scalar;
+use quadrant_settings::StageSettings;
 
 use crate::plant::{Encoder, Plant};
 

@@ -234,7 +234,7 @@ impl<S: Scalar, const N: usize> FeedforwardState<S, N> {
 /// ```
 /// use quadrant_law::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
 ///
-/// let x = quadrant::settings::presets::x_axis();
+/// let x = quadrant_settings::presets::x_axis();
 /// let gains = &x.feedforward.gains;
 /// let feedforward = Feedforward::<f64, 10>::build(FeedforwardKind::Static, gains, &x.friction, 1e-4);
 /// let mut state = FeedforwardState::default();

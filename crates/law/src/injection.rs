@@ -55,6 +55,7 @@ impl VoltageBlock {
 /// A word to inject, and its place in the injection.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InjectedValue {
+    /// The word.
     pub word: i16,
     /// The injection ends with it.
     pub last: bool,

@@ -4,7 +4,7 @@
 //! use quadrant_law::axes::PerAxis;
 //! use quadrant_law::command::Command;
 //! use quadrant_law::reference::Motion;
-//! use quadrant::settings::StageSettings;
+//! use quadrant_settings::StageSettings;
 //! use quadrant_law::stage::{Inputs, Stage, StageState};
 //!
 //! let stage: Stage<f32> = StageSettings::simulated().build()?;
@@ -12,7 +12,7 @@
 //! let mut state = StageState::default();
 //! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
 //! assert!(stage.tick(&plan, &mut state, &enable).enabled);
-//! # Ok::<(), quadrant::settings::SettingsError>(())
+//! # Ok::<(), quadrant_settings::SettingsError>(())
 //! ```
 
 use crate::admission::{self, StageView};

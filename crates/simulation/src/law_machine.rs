@@ -4,13 +4,13 @@ use std::collections::VecDeque;
 
 use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::settings::SettingsError;
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::cancelling::SpindleSpeed;
 use quadrant_law::command::Command;
 use quadrant_law::reference::{Motion, Segment};
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
+use quadrant_settings::SettingsError;
 
 /// Control law, supervisor, and what passes between them.
 #[derive(Clone, Debug)]

@@ -1,5 +1,6 @@
 //! The open loop of an axis: plant times controller, seen by its frequency response.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::PI;
 
 use num_complex::Complex64;

@@ -1,9 +1,9 @@
 //! A setting's value as it crosses the link, and as JSON; and what differs between settings.
 
 use quadrant::link::message::{MAX_VALUE_BYTES, Value};
-use quadrant::settings::StageSettings;
-use quadrant::settings::tree::{TreeError, is_part};
 use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
+use quadrant_settings::tree::{TreeError, is_part};
 
 /// Room for every value as JSON.
 const JSON_BYTES: usize = 2048;

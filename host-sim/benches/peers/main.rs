@@ -12,7 +12,6 @@ use std::{array, fs, io};
 
 use parameters::{ELEMENTS, NODES, Parameters, node, surface_end};
 use quadrant::lockstep::InputRecord;
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_law::control::feedback::Feedback;
 use quadrant_law::control::terms::{FeedbackInput, FeedbackState};
 use quadrant_law::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
@@ -22,6 +21,7 @@ use quadrant_law::friction::stribeck::SlidingTable;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::DacCode;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{

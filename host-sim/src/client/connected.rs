@@ -4,8 +4,8 @@ use quadrant::app::Translated;
 use std::error::Error;
 
 use quadrant::link::message::Body;
-use quadrant::settings::StageSettings;
 use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
 
 use super::session::Client;
 use super::settings;

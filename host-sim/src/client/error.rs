@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::message::LinkError;
-use quadrant::settings::tree::TreeError;
+use quadrant_settings::tree::TreeError;
 
 /// Reason why a request was not carried out.
 #[derive(Debug, thiserror::Error)]

@@ -2,8 +2,8 @@
 
 use heapless::String as Bounded;
 use quadrant::link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
-use quadrant::settings::StageSettings;
-use quadrant::settings::tree::{expand, is_part};
+use quadrant_settings::StageSettings;
+use quadrant_settings::tree::{expand, is_part};
 use quadrant_simulation::setting_value::{self, short};
 use serde::Serialize;
 use serde_json::Value;

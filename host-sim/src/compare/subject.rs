@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn a_commissioned_axis_is_compared_as_commissioning_left_it_or_fed_where_that_kept_the_pid() {
         let mut stage = identified_settings().unwrap().stage;
-        let subject = |stage: &quadrant::settings::StageSettings| {
+        let subject = |stage: &quadrant_settings::StageSettings| {
             let setup = RunConfiguration::commissioned(
                 stage.clone(),
                 StageParameters::real(),

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::pid::PidGains;
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;

@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 use quadrant_law::control::pid::PidGains;
+use quadrant_settings::response::LinearResponse;
 
 use super::loop_shape::controller_response;
 

@@ -102,7 +102,7 @@ pub fn largest_integral_gain(
 ///
 /// ```
 /// # use quadrant_law::control::pid::PidGains;
-/// # use quadrant::settings::presets::{X_GAINS, X_PLANT};
+/// # use quadrant_settings::presets::{X_GAINS, X_PLANT};
 /// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
 /// # let gains = PidGains { ki_v_per_mm_s: 0.0, ..X_GAINS };
 /// let process = Process::Model(X_PLANT);

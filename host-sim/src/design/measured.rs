@@ -1,5 +1,6 @@
 //! A loop closed around a measured frequency response, without a model.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;

@@ -8,7 +8,7 @@
 use quadrant_law::control::filter::FilterSettings;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_law::control::popov::filtered_sector_bound;
+use quadrant_settings::popov::filtered_sector_bound;
 
 use super::form::Form;
 use super::margins::Margins;

@@ -4,7 +4,7 @@ use nalgebra::{Matrix4, Vector4};
 use quadrant_law::control::filter::FilterSettings;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_law::control::popov::filtered_sector_bound;
+use quadrant_settings::popov::filtered_sector_bound;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_law::control::popov::sector_bound;
+use quadrant_settings::popov::sector_bound;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

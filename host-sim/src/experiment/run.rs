@@ -44,7 +44,7 @@ impl AxisTrace {
 pub enum RunError {
     /// The settings are refused.
     #[error("settings refused: {0}")]
-    Settings(#[from] quadrant::settings::SettingsError),
+    Settings(#[from] quadrant_settings::SettingsError),
     /// The stage switched off.
     #[error("fault {number} on {axis} at tick {tick}: {cause}; {remedy}", number = .0.code.number(),
         axis = .0.axis.map_or("the stage", quadrant_law::axes::AxisName::as_str), tick = .0.tick,

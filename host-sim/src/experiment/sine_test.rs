@@ -1,10 +1,10 @@
 //! An axis on a sine, scored over its last whole cycles.
 
 use quadrant::lockstep::Job;
-use quadrant::settings::{
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_settings::{
     AxisSettings, BrakeSettings, OperationSettings, PlanSettings, StageSettings, StreamingSettings,
 };
-use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 
 use crate::experiment::configuration::ELEMENTS;
 use crate::experiment::metrics::{Score, score};

@@ -9,6 +9,7 @@
 //! handful of parameters would by chance ([`LEAST_DROP`]), and if its own parameters are determined; starts are tried over
 //! the band. Friction bends a response, too, but slowly over the frequency: no fit calls that a lightly damped mode.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};

@@ -158,8 +158,8 @@ fn residuals(
 
 #[cfg(test)]
 mod tests {
-    use quadrant::settings::StageSettings;
     use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+    use quadrant_settings::StageSettings;
 
     use super::{fit_dahl, fit_lugre, with_all_models};
 

@@ -11,13 +11,13 @@ use quadrant::app::{
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
 use quadrant::lockstep::InputRecord;
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Outputs, StageState};
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 
 use super::memory_flash::MemoryFlash;
 

@@ -11,9 +11,9 @@ use quadrant::lockstep::{
     FLASH, FLASH_BYTES, InputRecord, Job, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN,
     LINK_OUT, LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
 };
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::safety::Switches;
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use super::emulator::{EmulatorError, Lockstep, Memory, Program};
 use super::stage_setup::StageSetup;

@@ -5,9 +5,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use quadrant::settings::AxisSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::safety::{Fault, FaultCode};
+use quadrant_settings::AxisSettings;
 use serde::{Deserialize, Serialize};
 
 use super::error::MachineError;

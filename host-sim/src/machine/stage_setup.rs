@@ -1,9 +1,9 @@
 //! Parts of a simulated machine that a person chooses: the stage that it drives, and its settings while nothing is stored.
 
-use quadrant::settings::{
+use quadrant_law::friction::Direction;
+use quadrant_settings::{
     AxisSettings, HomeSwitch, HomingSettings, LimitSettings, StageSettings, TravelSettings,
 };
-use quadrant_law::friction::Direction;
 
 use crate::plant::{AxisParameters, MarkParameters, StageParameters};
 use crate::stage_file::{DataSheet, LIMIT_BEYOND_MM, StageFile};

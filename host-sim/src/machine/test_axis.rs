@@ -5,9 +5,9 @@
 
 use std::ops::Range;
 
-use quadrant::settings::{AxisSettings, SettingsError};
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::safety::{Fault, FaultCode};
+use quadrant_settings::{AxisSettings, SettingsError};
 
 use super::error::MachineError;
 use crate::record::Recording;

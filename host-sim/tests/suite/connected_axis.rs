@@ -114,7 +114,7 @@ fn left_alone(client: &mut Client) -> Status {
         max_jerk_mm_s3: 1e4,
     });
     let motions = [motion, MotionSettings::Hold, MotionSettings::Hold];
-    let plan = quadrant::settings::PlanSettings { motions };
+    let plan = quadrant_settings::PlanSettings { motions };
     client
         .order(Body::SetPlan(Translated::translated(plan)))
         .unwrap();

@@ -2,10 +2,10 @@
 
 use quadrant::app::supervisor::Event;
 use quadrant::lockstep::Job;
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::command::Command;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;

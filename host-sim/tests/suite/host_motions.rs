@@ -3,11 +3,11 @@
 
 use quadrant::app::Translated;
 use quadrant::link::message::{self, AxisPoint, AxisSet, Body, SetPoint, StreamRequest};
-use quadrant::settings::PlanSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::units::{POSITION_FRACTION_BITS, Position};
+use quadrant_settings::PlanSettings;
 
 use crate::common::Noise;
 use crate::hostile_link::{Bench, whole};

@@ -15,8 +15,8 @@ use quadrant::link::message::{
     AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
 };
 use quadrant::link::server::LinkServer;
-use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant_law::stage::Outputs;
+use quadrant_settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::application::{BoardIdentity, Running, Start};
 use quadrant_sim::machine::memory_flash::MemoryFlash;

@@ -1,11 +1,11 @@
 //! x alone, without y and z: the same as with them, to the bit.
 
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::MAX_ELEMENTS;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedAxis, StageParameters};
 

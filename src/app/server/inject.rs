@@ -6,11 +6,11 @@ use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::app::supervisor::PERIOD_TICKS;
 use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
-use crate::settings::InjectionSettings;
 use quadrant_law::command::Command;
 use quadrant_law::injection::{BLOCK_VALUES, VoltageBlock};
 use quadrant_law::scalar::Scalar;
 use quadrant_link::message::{InjectRequest, InjectStatus, LinkError, Reply, Voltages};
+use quadrant_settings::InjectionSettings;
 
 /// Blocks that must wait before the injection begins: the host is that far ahead.
 const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;

@@ -33,8 +33,6 @@ use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};
 use crate::app::telemetry::Packer;
 use crate::hal::{Serial, SettingsFlash};
-use crate::settings::StageSettings;
-use crate::settings::draft::Draft;
 use crate::store::{BUFFER_BYTES, Store};
 use quadrant_law::admission::Refusal;
 use quadrant_law::axes::{AxisName, PerAxis};
@@ -45,6 +43,8 @@ use quadrant_link::message::{
     SettingsRequest, text,
 };
 use quadrant_link::server::LinkServer;
+use quadrant_settings::StageSettings;
+use quadrant_settings::draft::Draft;
 
 pub use self::statistics::ServerStatistics;
 

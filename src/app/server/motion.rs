@@ -6,7 +6,6 @@ use crate::app::queues::Order;
 use crate::app::supervisor;
 use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
-use crate::settings::{PlanSettings, StageSettings, reach_mm};
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::cancelling::{MOST_RPM, SpindleSpeed};
 use quadrant_law::command::Command;
@@ -15,6 +14,7 @@ use quadrant_law::reference::{Motion, MotionSettings};
 use quadrant_law::safety::Station;
 use quadrant_law::scalar::Scalar;
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
+use quadrant_settings::{PlanSettings, StageSettings, reach_mm};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Requests that are commands of the control law.

@@ -1,7 +1,7 @@
 //! Streams and injections that a host has opened.
 
 use quadrant_law::injection::InjectionProgress;
-use quadrant_law::reference::StreamPlanner;
+use quadrant_settings::stream_planner::StreamPlanner;
 
 /// A stream that a host has opened.
 #[derive(Debug)]

@@ -5,8 +5,6 @@ use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::AxisSwap;
 use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
-use crate::settings::draft::ApplyError;
-use crate::settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::decimal::Decimal;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
@@ -15,6 +13,8 @@ use quadrant_link::message::{
     Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,
     Value, text,
 };
+use quadrant_settings::draft::ApplyError;
+use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// The memory for settings.

@@ -11,7 +11,6 @@ pub mod command;
 use std::path::Path;
 
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_cli::warn;
 use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
@@ -19,6 +18,7 @@ use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::learning::LearningSettings;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 use quadrant_law::safety::SafetyState;
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::{LawMachine, Operator};

@@ -1,7 +1,6 @@
 //! A run of one axis: motions one after the other, on an axis that changes between them, while a tool may cut.
 
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::telemetry::AxisTelemetry;
 use quadrant_law::cancelling::SpindleSpeed;
@@ -12,6 +11,7 @@ use quadrant_law::learning::LearningSettings;
 use quadrant_law::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
 use quadrant_law::safety::SafetyState;
 use quadrant_law::units::DacCode;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::machine::LawMachine;
 use quadrant_sim::plant::load::Load;

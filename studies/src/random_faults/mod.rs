@@ -10,9 +10,9 @@ use quadrant::link::message::{
     AxisName, AxisSet, Body, Harmonic, InjectRequest, Motion, Plan, PointToPoint, Reply,
     SettingsRequest, Voltages,
 };
-use quadrant::settings::StageSettings;
 use quadrant_law::command::Command;
 use quadrant_law::safety::{SafetyState, Switches};
+use quadrant_settings::StageSettings;
 
 use quadrant_fault_bench::flash::{Damage, SECTOR};
 use quadrant_fault_bench::noise::Noise;

@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use quadrant::lockstep::{InputRecord, Job};
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::{Fault, SafetyState};
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_sim::compare::sine::AMPLITUDE_MM;
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::metrics::{Score, largest, rms, score};

@@ -11,7 +11,7 @@ use quadrant_studies::laws::comparison::compare_laws;
 use quadrant_studies::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw, tune_all};
 use quadrant_studies::wrong_model::{Competitor, Wrong, feedback, with_wrong_model};
 
-fn tuned() -> (quadrant::settings::AxisSettings, Vec<TunedLaw>) {
+fn tuned() -> (quadrant_settings::AxisSettings, Vec<TunedLaw>) {
     let settings = identified_settings().unwrap().stage.axes[0].clone();
     let mut rig = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let characteristic =

@@ -2,11 +2,11 @@
 
 use anyhow::{Result, anyhow, ensure};
 use quadrant::lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
-use quadrant::settings::StageSettings;
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
 use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
 use quadrant_law::safety::FaultCode;
 use quadrant_law::stage::Outputs;
+use quadrant_settings::StageSettings;
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 
 use super::approach::moving;

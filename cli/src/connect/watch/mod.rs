@@ -87,8 +87,8 @@ fn waits_for_event(time: Duration) -> anyhow::Result<bool> {
 mod tests {
     use clap::Parser;
     use quadrant::link::message::{Body, MachineState};
-    use quadrant::settings::PlanSettings;
     use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+    use quadrant_settings::PlanSettings;
     use quadrant_sim::machine::{SimulatedLink, StageSetup};
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;

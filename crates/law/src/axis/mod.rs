@@ -363,7 +363,7 @@ impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
 
     /// Cancelling of a cut's vibration.
     #[must_use]
-    pub fn cancelling(self, parts: Option<(&CancellingSettings, &CancellingLoop<'_>)>) -> Self {
+    pub fn cancelling(self, parts: Option<(&CancellingSettings, &impl CancellingLoop)>) -> Self {
         if let Some((settings, of)) = parts {
             self.axis.cancelling.build_over(settings, of, self.period_s);
         }

@@ -24,14 +24,12 @@
 //! **Slip.** The vector of the teeth turns against its own frequency where the spindle is not as fast as it is told. The speed
 //! follows that rotation, within 1.2 % of what was told.
 
-mod response;
+mod nodes;
 
 use core::f64::consts::TAU;
 
-use num_complex::Complex64;
-
-pub use self::response::{CancellingLoop, LEAST_MARGIN_DEG, STEP_TICKS};
-use self::response::{NODES, node_turns};
+pub use self::nodes::{CancellingLoop, LEAST_MARGIN_DEG, Node, STEP_TICKS};
+use self::nodes::{NODES, node_turns};
 use crate::reference::sine::{SINE_BITS, SinePolynomial};
 use crate::rounding;
 use crate::scalar::{Quantity, Scalar};
@@ -286,7 +284,7 @@ impl<S: Scalar> Cancelling<S> {
     pub fn build_over(
         &mut self,
         settings: &CancellingSettings,
-        axis: &CancellingLoop,
+        axis: &impl CancellingLoop,
         period_s: f64,
     ) {
         let step_s = period_s * f64::from(STEP_TICKS);
@@ -313,11 +311,11 @@ impl<S: Scalar> Cancelling<S> {
         let nodes = self.growth.iter_mut().zip(&mut self.response);
         for (index, (growth, response)) in nodes.enumerate() {
             let found = axis.node(node_turns(index) / step_s, settings.rate_per_s, period_s);
-            let parts = |value: Complex64| {
-                [value.re, value.im].map(|part| S::quantise(part, Quantity::Multiplier))
-            };
+            let parts = |value: [f64; 2]| value.map(|part| S::quantise(part, Quantity::Multiplier));
             *growth = found.map_or([S::ZERO; 2], |node| parts(node.growth));
-            *response = found.map_or([S::ZERO; 2], |node| parts(node.response * PER_UNIT));
+            *response = found.map_or([S::ZERO; 2], |node| {
+                parts(node.response.map(|part| part * PER_UNIT))
+            });
         }
         let number = |value| S::quantise(value, Quantity::Multiplier);
         let floor = FLOOR_MM * PER_UNIT;
@@ -610,7 +608,7 @@ impl<S: Scalar> Cancelling<S> {
     /// Growth and response at a frequency, 2^-32 turns in a step; none where nothing is cancelled.
     #[inline(always)]
     fn nodes_at(&self, turns: u32) -> Option<([S; 2], [S; 2])> {
-        let (index, place) = response::interval(turns)?;
+        let (index, place) = nodes::interval(turns)?;
         let place = S::scale_integer(place, self.unit);
         let between = |table: &[[S; 2]; NODES]| {
             let [low, high] = table.get(index..)?.first_chunk::<2>()?;

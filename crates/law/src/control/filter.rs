@@ -21,7 +21,6 @@
 //! Design*, 2018, ch. 4.
 
 use heapless::Vec;
-use num_complex::Complex64;
 
 use crate::scalar::{Quantity, Scalar};
 
@@ -70,55 +69,13 @@ impl FilterSettings {
         }
     }
 
-    /// Numerator and denominator at `s = j ratio w`.
-    pub fn polynomials(&self, ratio: f64) -> (Complex64, Complex64) {
-        let (square, width) = (ratio * ratio, 2.0 * self.damping * ratio);
-        (
-            Complex64::new(
-                1.0 - self.high_frequency_gain * square,
-                self.centre_gain * width,
-            ),
-            Complex64::new(1.0 - square, width),
-        )
-    }
-
-    /// Numerator and denominator of the continuous form at a frequency in rad/s.
-    pub(crate) fn at(&self, omega_rad_s: f64) -> (Complex64, Complex64) {
-        self.polynomials(omega_rad_s / (core::f64::consts::TAU * self.frequency_hz))
-    }
-
-    /// The response of the continuous form at a frequency in rad/s.
-    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
-        let (numerator, denominator) = self.at(omega_rad_s);
-        numerator / denominator
-    }
-
-    /// The response of the filter as it runs, at a frequency in rad/s below half the control rate.
-    pub fn sampled_response(&self, omega_rad_s: f64, period_s: f64) -> Complex64 {
-        let ratio = libm::tan(0.5 * omega_rad_s * period_s) / self.warped(period_s);
-        let (numerator, denominator) = self.polynomials(ratio);
-        numerator / denominator
-    }
-
-    /// An upper bound of the gain at any frequency.
-    pub(crate) fn largest_gain(&self) -> f64 {
-        let (d, h) = (self.damping, self.high_frequency_gain);
-        let low_pass = if d * d >= 0.5 {
-            1.0
-        } else {
-            1.0 / (2.0 * d * libm::sqrt(1.0 - d * d))
-        };
-        // F is a notch of gain h far from its frequency, and 1 - h of the low-pass.
-        self.centre_gain.max(h) + (1.0 - h) * low_pass
-    }
-
     /// `tan(w T / 2)`.
-    fn warped(&self, period_s: f64) -> f64 {
+    pub fn warped(&self, period_s: f64) -> f64 {
         libm::tan(core::f64::consts::PI * self.frequency_hz * period_s)
     }
 
     /// True if every number is finite and above zero where it must be.
-    pub(crate) fn is_valid(&self) -> bool {
+    pub fn is_valid(&self) -> bool {
         let share = |x: f64| (0.0..=1.0).contains(&x);
         let positive = |x: f64| x.is_finite() && x > 0.0;
         positive(self.frequency_hz)

@@ -1,4 +1,4 @@
-//! Feedback: the laws, the model they are designed on, and the bound that keeps the nonlinear one stable.
+//! Feedback: the laws, and the model they are designed on.
 //!
 //! An axis runs one law of [`feedback::LawKind`], chosen in its settings and exchanged without a jolt. All of them close
 //! in the same way (one integrator, held back by what the output limit leaves) and keep the same memory
@@ -14,8 +14,8 @@
 //! | sliding mode | [`sliding_mode`] | the distance from a line in the phase plane, saturated |
 //! | NCTF | [`nctf`] | the distance from a measured trajectory in the phase plane |
 //!
-//! [`terms`] are the input, the output and the memory of a law, [`surface`] is the PI that the last three have in common, [`plant_model`] the linear model of the axis, and [`popov`] the
-//! bound of the nonlinear gain on it. [`filter`] is behind any law: notch and low-pass for axes with a resonance.
+//! [`terms`] are the input, the output and the memory of a law, [`surface`] is the PI that the last three have in common and [`plant_model`] the linear
+//! model of the axis. [`filter`] is behind any law: notch and low-pass for axes with a resonance.
 
 pub mod cascade;
 mod derivative;
@@ -26,7 +26,6 @@ pub mod nctf;
 pub mod npid;
 pub mod pid;
 pub mod plant_model;
-pub mod popov;
 pub mod schedule;
 pub mod sliding_mode;
 pub mod surface;

@@ -3,8 +3,6 @@
 //! `u = Kp f + Ki int(f) + Kd s / (1 + tau s) f` of the scaled error `f`. The integral adds the present error. PD is the
 //! same without an integral.
 
-use num_complex::Complex64;
-
 use super::derivative::Derivative;
 use super::integrator::Integrator;
 use super::terms::{FeedbackState, FeedbackTerms};
@@ -30,18 +28,6 @@ pub struct PidGains {
 }
 
 impl PidGains {
-    /// The response at `s = j omega`, V/mm, of the continuous form. Infinite at zero frequency unless Ki is zero.
-    pub fn response(&self, omega_rad_s: f64) -> Complex64 {
-        let s = Complex64::new(0.0, omega_rad_s);
-        let derivative = s * self.kd_v_s_per_mm / (s * self.derivative_filter_s + 1.0);
-        let proportional = derivative + self.kp_v_per_mm;
-        if self.ki_v_per_mm_s == 0.0 {
-            proportional
-        } else {
-            proportional + s.inv() * self.ki_v_per_mm_s
-        }
-    }
-
     /// True if every gain is finite and within the range its field states.
     pub fn is_valid(&self) -> bool {
         let not_negative = |x: f64| x.is_finite() && x >= 0.0;

@@ -16,7 +16,6 @@ mod recorded;
 mod sample;
 pub(crate) mod sine;
 mod stream;
-mod stream_planner;
 
 pub use approach::Approach;
 pub use circle::{Plane, Sense, circle};
@@ -25,11 +24,7 @@ pub use jog::JogState;
 pub use motion::{Motion, MotionSettings};
 pub use motion_state::MotionState;
 pub use point_to_point::{PointToPoint, PointToPointSettings};
-pub use ramp::{Ramp, RampState, Velocity};
+pub use ramp::{Ramp, RampState, Velocity, steps_per_mm};
 pub use recorded::RecordedTable;
 pub use sample::{MotionScale, ReferenceSample};
 pub use stream::{Segment, Stream, StreamState, StreamStep};
-pub use stream_planner::{
-    AxisPoint, LEAST_PERIOD_TICKS, MOST_MISSING, MOST_SEGMENT_TICKS, SetPoint, StreamError,
-    StreamFlaw, StreamLimits, StreamPlanner,
-};

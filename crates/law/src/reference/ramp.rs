@@ -47,7 +47,7 @@ impl Velocity {
     }
 
     /// The velocity in its smallest steps, 2^-32 units per tick.
-    pub(super) const fn steps(self) -> i64 {
+    pub const fn steps(self) -> i64 {
         self.0
     }
 
@@ -79,7 +79,7 @@ impl Neg for Velocity {
 }
 
 /// Steps of a [`Velocity`] that make one mm per tick.
-pub(super) fn steps_per_mm(scale: MotionScale) -> f64 {
+pub fn steps_per_mm(scale: MotionScale) -> f64 {
     libm::scalbn(
         POSITION_UNITS_PER_COUNT / scale.resolution_mm,
         FRACTION_BITS as i32,

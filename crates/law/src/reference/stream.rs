@@ -1,6 +1,6 @@
 //! Motion from set points that a host sends: position, velocity and acceleration at equal times.
 //!
-//! The slow half ([`StreamPlanner`](super::StreamPlanner)) makes a [`Segment`] of each two set points; the tick only
+//! The slow half (`StreamPlanner` of the settings) makes a [`Segment`] of each two set points; the tick only
 //! adds. A segment is the one polynomial of fifth degree that meets both set points with velocity and acceleration,
 //! written as forward differences, so position, velocity and acceleration are continuous over the whole stream and
 //! every set point is met to the unit.
@@ -9,8 +9,6 @@ use super::sample::{MotionScale, ReferenceSample};
 use crate::scalar::{Quantity, Scalar};
 use crate::units::{POSITION_UNITS_PER_COUNT, Position};
 
-/// Fraction bits of the differences beyond those of a [`Position`].
-pub(super) const FRACTION_BITS: u32 = 64;
 /// Bits dropped from the differences before they become a velocity and an acceleration.
 const VELOCITY_SHIFT: u32 = 56;
 const ACCELERATION_SHIFT: u32 = 48;
@@ -19,18 +17,21 @@ const ACCELERATION_SHIFT: u32 = 48;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Segment {
     /// Position at the start of the segment.
-    pub(super) start: Position,
+    pub start: Position,
     /// The forward differences of the position at the start, first to fifth.
-    pub(super) differences: [i128; 5],
+    pub differences: [i128; 5],
     /// Ticks left of it; at least one when it is handed over.
-    pub(super) ticks: u32,
+    pub ticks: u32,
     /// It begins a stream.
-    pub(super) first: bool,
+    pub first: bool,
     /// It ends a stream, at rest.
-    pub(super) last: bool,
+    pub last: bool,
 }
 
 impl Segment {
+    /// Fraction bits of the differences beyond those of a [`Position`].
+    pub const FRACTION_BITS: u32 = 64;
+
     /// Position at the start of the segment.
     pub const fn start(&self) -> Position {
         self.start
@@ -54,7 +55,7 @@ impl Segment {
 
     /// Advances the differences by a tick; the displacement since the segment's start goes into `position`.
     #[inline(always)]
-    pub(super) fn advance(&mut self, position: &mut i128) {
+    pub fn advance(&mut self, position: &mut i128) {
         let [first, second, third, fourth, fifth] = &mut self.differences;
         *position = position.wrapping_add(*first);
         *first = first.wrapping_add(*second);
@@ -144,7 +145,10 @@ impl<S: Scalar> Stream<S> {
     pub fn new(scale: MotionScale) -> Self {
         let unit_mm = scale.resolution_mm / POSITION_UNITS_PER_COUNT;
         let gain = |shift: u32, per_tick: f64, to| {
-            let value = libm::scalbn(unit_mm * per_tick, shift as i32 - FRACTION_BITS as i32);
+            let value = libm::scalbn(
+                unit_mm * per_tick,
+                shift as i32 - Segment::FRACTION_BITS as i32,
+            );
             S::gain(value, Quantity::Integer, to)
         };
         Self {
@@ -174,7 +178,10 @@ impl<S: Scalar> Stream<S> {
         let [before, second, ..] = segment.differences;
         segment.advance(&mut state.displacement);
         let [after, ..] = segment.differences;
-        let rounded = state.displacement.wrapping_add(1 << (FRACTION_BITS - 1)) >> FRACTION_BITS;
+        let rounded = state
+            .displacement
+            .wrapping_add(1 << (Segment::FRACTION_BITS - 1))
+            >> Segment::FRACTION_BITS;
         // The differences around this tick's position: centred, so free of half a tick's lag.
         let velocity = before.wrapping_add(after) >> VELOCITY_SHIFT;
         let sample = ReferenceSample {

@@ -10,9 +10,9 @@ mod uncommissioned;
 use std::io;
 use std::path::Path;
 
-use quadrant::settings::StageSettings;
 use quadrant_law::axes::AxisName;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_settings::StageSettings;
 use serde::{Deserialize, Serialize};
 
 use self::error::FORM;

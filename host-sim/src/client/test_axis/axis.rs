@@ -4,10 +4,10 @@ use quadrant::app::Translated;
 use std::time::Duration;
 
 use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::safety::FaultCode;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 
 use super::injection::Injection;
 use super::recording::Shape;

@@ -6,7 +6,7 @@ use quadrant_law::control::filter::FilterSettings;
 use quadrant_law::control::npid::NonlinearGain;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::control::plant_model::PlantModel;
-use quadrant_law::control::popov::SectorProof;
+use quadrant_settings::popov::SectorProof;
 
 use crate::design::pages::loop_figures::step_blocks;
 use crate::design::pages::pid::{step_name, step_table};

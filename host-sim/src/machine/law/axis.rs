@@ -2,13 +2,13 @@
 
 use quadrant::app::supervisor::Event;
 use quadrant::lockstep::InputRecord;
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::safety::SafetyState;
 use quadrant_law::units::DacCode;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_simulation::law_machine::{LawMachine, Operator};
 
 use super::recorder::{Period, Recorder};

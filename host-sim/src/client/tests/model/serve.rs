@@ -6,7 +6,7 @@ use quadrant::app::telemetry::{Packer, Selection};
 use quadrant::link::message::*;
 use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
 use quadrant::link::message::{LimitedBy, MachineState, Words};
-use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
+use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 use super::{Model, ROOM, read};
 

@@ -37,16 +37,16 @@ pub fn find(path: &str) -> Option<&'static LeafInfo> {
 /// The default of the number with this field, a constant.
 macro_rules! default {
     ($field:literal) => {
-        const { $crate::settings::leaves::default_of($field) }
+        const { $crate::leaves::default_of($field) }
     };
 }
-pub(in crate::settings) use default;
+pub(crate) use default;
 
 /// The default of the number `field`, while the program is compiled.
 ///
 /// # Panics
 /// Without such a number: the program does not compile then.
-pub(in crate::settings) const fn default_of(field: &str) -> f64 {
+pub(crate) const fn default_of(field: &str) -> f64 {
     let mut group = 0;
     while group < OF_AXIS.len() {
         if let Some(default) = default_in(OF_AXIS[group], field) {

@@ -3,8 +3,8 @@
 use strum::VariantNames;
 
 use super::row::{Exchange, LeafInfo, UNSET, at, exchanged, flag, name, number, of_stage, times};
-use crate::settings::axis::AxisSettings;
-use crate::settings::operation::{EmergencyReaction, LossReaction};
+use crate::axis::AxisSettings;
+use crate::operation::{EmergencyReaction, LossReaction};
 use quadrant_law::safety::{EnabledBy, HostNeeded};
 
 pub(super) fn full_scale_v(axis: &AxisSettings, _: f64) -> f64 {

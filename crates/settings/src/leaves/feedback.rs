@@ -4,7 +4,7 @@ use strum::VariantNames;
 
 use super::row::{LeafInfo, UNSET, at, list, name, number, period_s, point, times};
 use super::stage::full_scale_v;
-use crate::settings::axis::AxisSettings;
+use crate::axis::AxisSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::{filter, nctf, schedule};
 

@@ -2,8 +2,8 @@
 //! the kind of feedforward has its model.
 
 use super::Place;
-use crate::settings::axis::AxisSettings;
-use crate::settings::error::{Reason, SettingsError};
+use crate::axis::AxisSettings;
+use crate::error::{Reason, SettingsError};
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::friction::stribeck::StaticFriction;

@@ -1,8 +1,8 @@
 //! A row of the table.
 
-use crate::settings::axis::AxisSettings;
-use crate::settings::path::{ANY_AXIS, Path};
-use crate::settings::stage::StageSettings;
+use crate::axis::AxisSettings;
+use crate::path::{ANY_AXIS, Path};
+use crate::stage::StageSettings;
 
 /// A leaf of the settings, or a number of a list's points.
 #[derive(Clone, Copy, Debug)]
@@ -44,7 +44,7 @@ pub(super) enum Place {
 }
 
 /// Reads a number of a list's point; `None` beyond the last.
-pub(in crate::settings) type PointNumber = fn(&AxisSettings, usize) -> Option<f64>;
+pub(crate) type PointNumber = fn(&AxisSettings, usize) -> Option<f64>;
 
 /// The values that a leaf may have.
 #[derive(Clone, Copy, Debug)]
@@ -218,7 +218,7 @@ impl LeafInfo {
 
 /// An end of a range, without its words.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::settings) enum Limit {
+pub(crate) enum Limit {
     /// A number.
     At(f64),
     /// So many times a quantity of the axis.
@@ -229,7 +229,7 @@ pub(in crate::settings) enum Limit {
 
 impl Limit {
     /// The limit, if no other setting decides it.
-    pub(in crate::settings) const fn constant(&self) -> Option<f64> {
+    pub(crate) const fn constant(&self) -> Option<f64> {
         match *self {
             Self::At(value) => Some(value),
             Self::Times(..) | Self::AtMost(..) => None,
@@ -237,7 +237,7 @@ impl Limit {
     }
 
     /// The limit for an axis at a control period.
-    pub(in crate::settings) fn value(&self, axis: &AxisSettings, period_s: f64) -> f64 {
+    pub(crate) fn value(&self, axis: &AxisSettings, period_s: f64) -> f64 {
         match *self {
             Self::At(value) => value,
             Self::Times(factor, quantity) => factor * quantity(axis, period_s),

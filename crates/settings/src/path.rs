@@ -11,7 +11,7 @@ pub const MAX_PATH: usize = 96;
 pub type Path = String<MAX_PATH>;
 
 /// The beginning of a path that holds for every axis.
-pub(crate) const ANY_AXIS: &str = "/axes/*";
+pub const ANY_AXIS: &str = "/axes/*";
 
 /// The beginning of every axis' path, without the axis.
 const AXES: &str = "/axes/";
@@ -53,7 +53,7 @@ pub fn expand(written: &str) -> Option<Path> {
 }
 
 /// The axis of a canonical path, and what follows it.
-pub(crate) fn below_axis(path: &str) -> Option<(usize, &str)> {
+pub fn below_axis(path: &str) -> Option<(usize, &str)> {
     let rest = path.strip_prefix(AXES)?;
     let below = rest.get(1..)?;
     let axis = NAMES
@@ -63,12 +63,12 @@ pub(crate) fn below_axis(path: &str) -> Option<(usize, &str)> {
 }
 
 /// The path for every axis of something below one.
-pub(crate) fn of_any_axis(below: &str) -> Option<Path> {
+pub fn of_any_axis(below: &str) -> Option<Path> {
     joined([ANY_AXIS, below, ""])
 }
 
 /// The canonical path for one axis of a path for every axis; others stay as they are.
-pub(crate) fn of_axis(path: &str, index: usize) -> Path {
+pub fn of_axis(path: &str, index: usize) -> Path {
     let path = match path.strip_prefix(ANY_AXIS) {
         Some(below) => joined([AXES, number(index), below]),
         None => joined([path, "", ""]),

@@ -1,30 +1,29 @@
 //! The part of the table that the firmware carries: fields and ranges of all numbers, and the fields that change only
 //! while the outputs are off.
 
-pub(in crate::settings) use super::row::Limit;
+pub(crate) use super::row::Limit;
 use super::row::{Exchange, LeafInfo, Place, PointNumber, Range};
 use super::stage;
 use super::table::OF_AXIS;
 
 /// The range of a number.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::settings) struct Rule {
+pub(crate) struct Rule {
     /// The number's name in messages, and with its points its way below the axis.
-    pub(in crate::settings) field: &'static str,
+    pub(crate) field: &'static str,
     /// Smallest allowed value.
-    pub(in crate::settings) least: Limit,
+    pub(crate) least: Limit,
     /// Largest allowed value.
-    pub(in crate::settings) most: Limit,
+    pub(crate) most: Limit,
     /// Reads the number of a list's point; `None` for a leaf.
-    pub(in crate::settings) point: Option<PointNumber>,
+    pub(crate) point: Option<PointNumber>,
 }
 
 /// The numbers of the stage.
-pub(in crate::settings) static OF_THE_STAGE: [Rule; numbers(&[stage::OF_STAGE])] =
-    rules(&[stage::OF_STAGE]);
+pub(crate) static OF_THE_STAGE: [Rule; numbers(&[stage::OF_STAGE])] = rules(&[stage::OF_STAGE]);
 
 /// The numbers of an axis.
-pub(in crate::settings) static OF_AN_AXIS: [Rule; numbers(&OF_AXIS)] = rules(&OF_AXIS);
+pub(crate) static OF_AN_AXIS: [Rule; numbers(&OF_AXIS)] = rules(&OF_AXIS);
 
 const fn numbers(groups: &[&[LeafInfo]]) -> usize {
     let (mut count, mut group) = (0, 0);
@@ -74,12 +73,11 @@ const fn rules<const N: usize>(groups: &[&[LeafInfo]]) -> [Rule; N] {
 }
 
 /// The fields of the stage that change only while the outputs are off.
-pub(in crate::settings) static SAFETY_OF_THE_STAGE: [&str; safety(&[stage::OF_STAGE])] =
+pub(crate) static SAFETY_OF_THE_STAGE: [&str; safety(&[stage::OF_STAGE])] =
     safety_fields(&[stage::OF_STAGE]);
 
 /// The fields of an axis that change only while the outputs are off.
-pub(in crate::settings) static SAFETY_OF_AN_AXIS: [&str; safety(&OF_AXIS)] =
-    safety_fields(&OF_AXIS);
+pub(crate) static SAFETY_OF_AN_AXIS: [&str; safety(&OF_AXIS)] = safety_fields(&OF_AXIS);
 
 const fn safety(groups: &[&[LeafInfo]]) -> usize {
     let (mut count, mut group) = (0, 0);

@@ -6,11 +6,10 @@ use core::fmt;
 use super::axis::AxisSettings;
 use super::leaves::limits::LONGEST_TRAVEL_MM;
 use super::stage::StageSettings;
+use crate::stream_planner::StreamLimits;
 use quadrant_law::axes::AxisName;
 use quadrant_law::decimal::Decimal;
-use quadrant_law::reference::{
-    MotionScale, MotionSettings, PointToPointSettings, StreamLimits, Velocity,
-};
+use quadrant_law::reference::{MotionScale, MotionSettings, PointToPointSettings, Velocity};
 use quadrant_law::units::Position;
 
 /// Reason why an axis is not moved.

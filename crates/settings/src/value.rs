@@ -20,7 +20,7 @@ use quadrant_law::safety::{EnabledBy, HostNeeded};
 pub const MAX_VALUE_BYTES: usize = 320;
 
 /// Kind of a value that says whether a part that may be left out is there.
-pub(crate) const KIND_PART: u8 = 0;
+pub const KIND_PART: u8 = 0;
 
 /// A leaf whose value is a number, a flag or a list is written by serde; a name by its text.
 trait Value: Any {
@@ -93,19 +93,19 @@ macro_rules! name {
 macro_rules! each {
     ($($type:ty),+) => {
         /// The kind of a leaf.
-        pub(crate) fn kind(leaf: &dyn Any) -> Option<u8> {
+        pub fn kind(leaf: &dyn Any) -> Option<u8> {
             $(if leaf.is::<$type>() { return Some(<$type as Value>::KIND); })+
             None
         }
 
         /// Writes a leaf's bytes and returns their length.
-        pub(crate) fn to_bytes(leaf: &dyn Any, room: &mut [u8]) -> Option<usize> {
+        pub fn to_bytes(leaf: &dyn Any, room: &mut [u8]) -> Option<usize> {
             $(if let Some(leaf) = leaf.downcast_ref::<$type>() { return leaf.to_bytes(room); })+
             None
         }
 
         /// Takes a leaf's value from bytes of this kind; false, and nothing has changed, if they are none.
-        pub(crate) fn take_bytes(leaf: &mut dyn Any, kind: u8, bytes: &[u8]) -> bool {
+        pub fn take_bytes(leaf: &mut dyn Any, kind: u8, bytes: &[u8]) -> bool {
             $(if let Some(leaf) = leaf.downcast_mut::<$type>() {
                 let value = if kind == <$type as Value>::KIND { Value::from_bytes(bytes) } else { None };
                 return value.map(|value| *leaf = value).is_some();

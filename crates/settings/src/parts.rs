@@ -20,15 +20,15 @@ use quadrant_law::friction::lugre::LugreParameters;
 use quadrant_law::learning::LearningSettings;
 
 /// A part of an axis that may be left out.
-pub(crate) struct Part {
+pub struct Part {
     /// Its path below the axis.
-    pub(crate) path: &'static str,
+    pub path: &'static str,
     /// True if an axis has it.
-    pub(crate) is_present: fn(&AxisSettings) -> bool,
+    pub is_present: fn(&AxisSettings) -> bool,
     /// Makes it with its default values. Those that must be given are not valid before they are.
-    pub(crate) make: fn(&mut AxisSettings),
+    pub make: fn(&mut AxisSettings),
     /// Removes it.
-    pub(crate) remove: fn(&mut AxisSettings),
+    pub remove: fn(&mut AxisSettings),
 }
 
 macro_rules! part {
@@ -43,7 +43,7 @@ macro_rules! part {
 }
 
 /// Every part that may be left out.
-pub(crate) static PARTS: [Part; 15] = [
+pub static PARTS: [Part; 15] = [
     part!(
         "/encoder/counts_per_index",
         encoder.counts_per_index,
@@ -177,12 +177,12 @@ pub(crate) static PARTS: [Part; 15] = [
 ];
 
 /// The part with exactly this path below an axis.
-pub(crate) fn part_below_axis(path: &str) -> Option<&'static Part> {
+pub fn part_below_axis(path: &str) -> Option<&'static Part> {
     PARTS.iter().find(|part| part.path == path)
 }
 
 /// The part that may be left out in which a leaf below an axis is, or which it is.
-pub(crate) fn part_of(below: &str) -> Option<&'static Part> {
+pub fn part_of(below: &str) -> Option<&'static Part> {
     PARTS.iter().find(|part| {
         below
             .strip_prefix(part.path)

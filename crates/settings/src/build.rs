@@ -3,9 +3,10 @@
 use super::{
     AmplifierSettings, AxisSettings, LimitSettings, PlanSettings, SettingsError, StageSettings,
 };
+use crate::cancelling::NominalLoop;
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::axis::{Axis, AxisBuilder, Commissioning};
-use quadrant_law::cancelling::{CancellingLoop, CancellingSettings};
+use quadrant_law::cancelling::CancellingSettings;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::pid::PidGains;
 use quadrant_law::encoder::Encoder;
@@ -341,11 +342,11 @@ impl AxisSettings {
     fn cancelling<'a>(
         &'a self,
         gains: Option<&'a PidGains>,
-    ) -> Option<(CancellingSettings, CancellingLoop<'a>)> {
+    ) -> Option<(CancellingSettings, NominalLoop<'a>)> {
         let (settings, plant) = (self.feedforward.cancelling?, self.plant.as_ref()?);
         let feedback = &self.feedback;
         let nonlinear = feedback.nonlinear.filter(|_| feedback.law == LawKind::NPid);
-        let of = CancellingLoop {
+        let of = NominalLoop {
             plant,
             pid: gains.unwrap_or(&feedback.pid),
             friction: &self.friction.gms,

@@ -5,13 +5,11 @@
 
 use core::fmt;
 
-use super::ramp::{Velocity, steps_per_mm};
-use super::sample::{MotionScale, ReferenceSample};
-use super::stream::{FRACTION_BITS, Segment};
-use crate::axes::AxisName;
-use crate::decimal::Decimal;
-use crate::rounding;
-use crate::units::{POSITION_UNITS_PER_COUNT, Position};
+use quadrant_law::axes::AxisName;
+use quadrant_law::decimal::Decimal;
+use quadrant_law::reference::{MotionScale, ReferenceSample, Segment, Velocity, steps_per_mm};
+use quadrant_law::rounding;
+use quadrant_law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// The longest segment, in ticks: up to it the differences meet a set point to the unit.
 pub const MOST_SEGMENT_TICKS: u32 = 1000;
@@ -177,13 +175,13 @@ fn connect(
     let quartic = -15 * distance + 8 * speeds[0] + 7 * speeds[1] + 3 * bends[0] - 2 * bends[1];
     let quintic = 6 * distance - 3 * (speeds[0] + speeds[1]) - bends[0] + bends[1];
     // To 2^-64 units: the limits on the inputs leave room for these shifts.
-    let shift = FRACTION_BITS - 33;
+    let shift = Segment::FRACTION_BITS - 33;
     let cube = ticks * ticks * ticks;
     let third = (cubic << shift) / cube;
     let fourth = (quartic << shift) / (cube * ticks);
     let fifth = (quintic << shift) / (cube * ticks * ticks);
-    let velocity = i128::from(from.velocity.steps()) << (FRACTION_BITS - 32);
-    let acceleration = i128::from(from.acceleration.0) << (FRACTION_BITS - 32);
+    let velocity = i128::from(from.velocity.steps()) << (Segment::FRACTION_BITS - 32);
+    let acceleration = i128::from(from.acceleration.0) << (Segment::FRACTION_BITS - 32);
     segment.start = from.position;
     segment.differences = [
         velocity + acceleration / 2 + third + fourth + fifth,
@@ -210,7 +208,7 @@ struct Bounds<'a> {
 }
 
 /// One unit of a position, 2^-16 counts, in 2^-33 units.
-const UNIT: i128 = 1 << FRACTION_BITS;
+const UNIT: i128 = 1 << Segment::FRACTION_BITS;
 
 impl<'a> Bounds<'a> {
     fn new(limits: &'a StreamLimits, axis: AxisName, ticks: u32) -> Self {
@@ -218,7 +216,7 @@ impl<'a> Bounds<'a> {
         let scaled = |value: f64| {
             libm::scalbn(
                 value * steps_per_mm(limits.scale),
-                FRACTION_BITS as i32 - 32,
+                Segment::FRACTION_BITS as i32 - 32,
             ) as i128
         };
         let ticks_wide = i128::from(ticks);
@@ -244,8 +242,8 @@ impl<'a> Bounds<'a> {
         // A mean; saturated, because a hostile distance has no bound.
         let mean = distance.clamp(-(1 << 60), 1 << 60) * UNIT / i128::from(self.ticks);
         self.check_velocity(mean)?;
-        self.check_velocity(i128::from(to.velocity.steps()) << (FRACTION_BITS - 32))?;
-        self.check_acceleration(i128::from(to.acceleration.0) << (FRACTION_BITS - 32))
+        self.check_velocity(i128::from(to.velocity.steps()) << (Segment::FRACTION_BITS - 32))?;
+        self.check_acceleration(i128::from(to.acceleration.0) << (Segment::FRACTION_BITS - 32))
     }
 
     fn check_tick(&self, way: &Segment, displacement: i128) -> Result<(), StreamFlaw> {
@@ -256,7 +254,7 @@ impl<'a> Bounds<'a> {
             return Ok(());
         };
         let next = displacement + velocity + UNIT / 2;
-        let position = way.start + Position((next >> FRACTION_BITS) as i64);
+        let position = way.start + Position((next >> Segment::FRACTION_BITS) as i64);
         let limit = if position < lowest {
             lowest
         } else if position > highest {
@@ -276,7 +274,7 @@ impl<'a> Bounds<'a> {
         if displacement.abs() <= self.velocity {
             return Ok(());
         }
-        let units = libm::scalbn(displacement as f64, -(FRACTION_BITS as i32));
+        let units = libm::scalbn(displacement as f64, -(Segment::FRACTION_BITS as i32));
         Err(StreamFlaw::Velocity {
             axis: self.axis,
             value_mm_s: units * self.unit_mm() * self.limits.scale.rate_hz,
@@ -288,7 +286,7 @@ impl<'a> Bounds<'a> {
         if change.abs() <= self.acceleration {
             return Ok(());
         }
-        let units = libm::scalbn(change as f64, -(FRACTION_BITS as i32));
+        let units = libm::scalbn(change as f64, -(Segment::FRACTION_BITS as i32));
         let rate = self.limits.scale.rate_hz;
         Err(StreamFlaw::Acceleration {
             axis: self.axis,

@@ -5,17 +5,17 @@ use strum::VariantNames;
 use super::row::{
     Exchange, LeafInfo, UNSET, at, at_most, exchanged, flag, name, number, period_s, times,
 };
-use crate::settings::axis::AxisSettings;
-use crate::settings::homing::HomeSwitch;
+use crate::axis::AxisSettings;
+use crate::homing::HomeSwitch;
 use quadrant_law::friction::Direction;
 use quadrant_law::units::FASTEST_MM_S;
 
 /// The longest travel of an axis and of a motion, mm.
-pub(in crate::settings) const LONGEST_TRAVEL_MM: f64 = 1e4;
+pub(crate) const LONGEST_TRAVEL_MM: f64 = 1e4;
 /// The largest acceleration that an axis may be allowed, mm/s^2.
-pub(in crate::settings) const MOST_ACCELERATION_MM_S2: f64 = 3e4;
+pub(crate) const MOST_ACCELERATION_MM_S2: f64 = 3e4;
 /// The largest jerk that an axis may be allowed, mm/s^3.
-pub(in crate::settings) const MOST_JERK_MM_S3: f64 = 1e9;
+pub(crate) const MOST_JERK_MM_S3: f64 = 1e9;
 /// The fastest reference, in counts per tick: what the formats of the moves' velocity and of the displacement hold.
 const MOST_COUNTS_PER_TICK: f64 = 4096.0;
 /// The largest acceleration of a reference, in counts per tick squared: what the format of the moves' holds.

@@ -1,13 +1,13 @@
 //! Cross-checks of the feedback law: its lists rise, its parameters are there, and its loop is stable.
 
 use super::Place;
-use crate::settings::axis::AxisSettings;
-use crate::settings::error::{Reason, SettingsError};
+use crate::axis::AxisSettings;
+use crate::error::{Reason, SettingsError};
+use crate::popov::filtered_sector_bound;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::control::filter;
 use quadrant_law::control::nctf::{self, CharacteristicPoint};
 use quadrant_law::control::npid::NonlinearGain;
-use quadrant_law::control::popov::filtered_sector_bound;
 use quadrant_law::control::schedule::{self, SchedulePoint};
 
 /// Paths of the lists and of their numbers that must rise.

@@ -90,10 +90,10 @@ fn canonical(written: &str) -> Result<Path, TreeError> {
 const DEPTH: usize = StageSettings::SCHEMA.max_depth();
 
 /// The canonical paths of all leaves, those in parts that may be left out too; in the order of the fields.
-pub(crate) struct Leaves(NodeIter<ConstPath<Path, '/'>, DEPTH>);
+pub struct Leaves(NodeIter<ConstPath<Path, '/'>, DEPTH>);
 
 /// All leaves of the tree.
-pub(crate) fn leaves() -> Leaves {
+pub fn leaves() -> Leaves {
     Leaves(NodeIter::new(StageSettings::SCHEMA))
 }
 
@@ -107,7 +107,7 @@ impl Iterator for Leaves {
 }
 
 /// True if there is a leaf at a canonical path.
-pub(crate) fn is_leaf(path: &str) -> bool {
+pub fn is_leaf(path: &str) -> bool {
     StageSettings::SCHEMA
         .get(path)
         .is_ok_and(|found| found.schema.is_leaf())
@@ -124,7 +124,7 @@ fn axis_leaf_by<'a>(
 }
 
 /// The leaf at a path below an axis.
-pub(crate) fn axis_leaf<'a>(axis: &'a AxisSettings, below: &str) -> Result<&'a dyn Any, TreeError> {
+pub fn axis_leaf<'a>(axis: &'a AxisSettings, below: &str) -> Result<&'a dyn Any, TreeError> {
     Ok(axis_leaf_by(axis, &mut below.into_keys())?)
 }
 
@@ -197,7 +197,7 @@ enum Found<'a> {
 
 impl StageSettings {
     /// The leaf at a canonical path.
-    pub(crate) fn leaf(&self, path: &str) -> Result<&dyn Any, TreeError> {
+    pub fn leaf(&self, path: &str) -> Result<&dyn Any, TreeError> {
         match below_axis(path) {
             Some((axis, below)) => {
                 axis_leaf(self.axes.get(axis).ok_or(TreeError::NotFound)?, below)
@@ -207,7 +207,7 @@ impl StageSettings {
     }
 
     /// The leaf at a canonical path, to be written.
-    pub(crate) fn leaf_mut(&mut self, path: &str) -> Result<&mut dyn Any, TreeError> {
+    pub fn leaf_mut(&mut self, path: &str) -> Result<&mut dyn Any, TreeError> {
         match below_axis(path) {
             Some((axis, below)) => {
                 axis_leaf_mut(self.axes.get_mut(axis).ok_or(TreeError::NotFound)?, below)

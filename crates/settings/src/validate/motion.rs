@@ -1,12 +1,10 @@
 //! Checks of motions against their axes' limits.
 
 use super::Place;
-use crate::settings::axis::AxisSettings;
-use crate::settings::error::SettingsError;
-use crate::settings::leaves::limits::{
-    LONGEST_TRAVEL_MM, MOST_ACCELERATION_MM_S2, MOST_JERK_MM_S3,
-};
-use crate::settings::stage::{PlanSettings, StageSettings};
+use crate::axis::AxisSettings;
+use crate::error::SettingsError;
+use crate::leaves::limits::{LONGEST_TRAVEL_MM, MOST_ACCELERATION_MM_S2, MOST_JERK_MM_S3};
+use crate::stage::{PlanSettings, StageSettings};
 use quadrant_law::axes::AxisName;
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::units::FASTEST_MM_S;

@@ -28,9 +28,10 @@ use core::f64::consts::{FRAC_PI_2, PI};
 
 use num_complex::Complex64;
 
-use super::filter::FilterSettings;
-use super::pid::PidGains;
-use super::plant_model::PlantModel;
+use crate::response::{delayed_gain, denominator, filter_at, largest_filter_gain};
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
 
 /// k_max: the largest nonlinear gain `k(emax)` for which the Popov criterion proves the loop of `plant` and `gains`
 /// stable. From 1 to a million, which stands for no limit.
@@ -144,14 +145,14 @@ impl Loop<'_> {
         let s = Complex64::new(0.0, omega);
         let filter = s * self.gains.derivative_filter_s + 1.0;
         let mut numerator = filter * self.gains.kp_v_per_mm + s * self.gains.kd_v_s_per_mm;
-        let mut denominator = self.plant.denominator(omega) * filter;
+        let mut denominator = denominator(&self.plant, omega) * filter;
         if self.integrates() {
             numerator = numerator * s + filter * self.gains.ki_v_per_mm_s;
             denominator *= s;
         }
-        numerator *= self.plant.delayed_gain(omega);
+        numerator *= delayed_gain(&self.plant, omega);
         for filter in self.filters {
-            let (above, below) = filter.at(omega);
+            let (above, below) = filter_at(filter, omega);
             numerator *= above;
             denominator *= below;
         }
@@ -164,10 +165,10 @@ impl Loop<'_> {
 
     /// The angle of the common denominator, followed continuously from zero frequency, rad.
     fn denominator_angle(&self, omega: f64) -> f64 {
-        let plant = self.plant.denominator(omega);
+        let plant = denominator(&self.plant, omega);
         let integrator = if self.integrates() { FRAC_PI_2 } else { 0.0 };
         let filters = self.filters.iter().map(|filter| {
-            let (_, denominator) = filter.at(omega);
+            let (_, denominator) = filter_at(filter, omega);
             libm::atan2(denominator.im, denominator.re)
         });
         integrator
@@ -187,7 +188,7 @@ impl Loop<'_> {
         let filter = libm::hypot(1.0, omega * self.gains.derivative_filter_s);
         let proportional = self.gains.kp_v_per_mm + self.gains.ki_v_per_mm_s / omega;
         let derivative = self.gains.kd_v_s_per_mm * omega / filter;
-        let filters = self.filters.iter().map(FilterSettings::largest_gain);
+        let filters = self.filters.iter().map(largest_filter_gain);
         self.plant.gain_mm_per_v_s2
             * (proportional / damped + derivative / inertia)
             * filters.product::<f64>()

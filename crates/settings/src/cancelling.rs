@@ -1,20 +1,15 @@
-//! The response of the nominal closed loop at the spindle's frequencies, and the margin that its phase has. Settings time only.
+//! The response of the nominal closed loop at the spindle's frequencies, and the margin that its phase has.
 
 use core::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use num_complex::Complex64;
 
-use crate::control::filter::FilterSettings;
-use crate::control::pid::PidGains;
-use crate::control::plant_model::PlantModel;
-use crate::friction::gms::GmsParameters;
-
-/// Control periods in a step.
-pub const STEP_TICKS: u32 = 4;
-
-/// Least margin of phase, degrees: a harmonic is left out where the loop's phase may be wrong by more than the rest of a
-/// right angle.
-pub const LEAST_MARGIN_DEG: f64 = 30.0;
+use crate::response::{LinearResponse, delayed_gain, denominator};
+use quadrant_law::cancelling::{CancellingLoop, LEAST_MARGIN_DEG, Node, STEP_TICKS};
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::gms::GmsParameters;
 
 /// Largest gain of one harmonic's growth on slow errors, over the law's proportional gain: the rate is lower where it would be
 /// larger.
@@ -33,36 +28,9 @@ const MOST_LEAD: f64 = 45.0 * PI / 180.0;
 /// Places at which the virgin curve is integrated.
 const PLACES: u32 = 16;
 
-/// The table's first octave begins at 2^FIRST units, 2^-9 turns in a step: 4.9 Hz at 10 kHz. There are eight, of four intervals.
-const FIRST: u32 = 23;
-const INTERVAL_BITS: u32 = 2;
-
-/// Nodes of the table: the last one, at 7/16 of a turn in a step, is 1094 Hz at 10 kHz.
-pub(super) const NODES: usize = 8 << INTERVAL_BITS;
-
-/// The frequency of a node, turns in a step.
-pub(super) fn node_turns(index: usize) -> f64 {
-    let intervals = 1usize << INTERVAL_BITS;
-    let place = (index % intervals) as f64 / intervals as f64;
-    let octave = (index / intervals) as i32 + FIRST as i32 - 32;
-    libm::scalbn(1.0 + place, octave)
-}
-
-/// The interval of the table that holds a frequency, 2^-32 turns in a step, and the place in it with 30 fraction bits; none
-/// below the first.
-#[inline(always)]
-pub(super) fn interval(turns: u32) -> Option<(usize, i32)> {
-    let leading = turns.leading_zeros();
-    let octave = (31 - FIRST).checked_sub(leading)?;
-    let normal = turns << (leading & 31);
-    let within = (normal << 1) >> (32 - INTERVAL_BITS);
-    let place = ((normal << (1 + INTERVAL_BITS)) >> 2) as i32;
-    Some((((octave << INTERVAL_BITS) + within) as usize, place))
-}
-
 /// The loop that is cancelled in.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct CancellingLoop<'a> {
+pub struct NominalLoop<'a> {
     /// The axis' plant.
     pub plant: &'a PlantModel,
     /// Its law at small errors.
@@ -77,15 +45,6 @@ pub struct CancellingLoop<'a> {
     pub largest_gain: f64,
 }
 
-/// A vector at a frequency.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Node {
-    /// Its growth by the error of one step, V/mm.
-    pub(super) growth: Complex64,
-    /// The error of the last tick that it takes away, mm/V.
-    pub(super) response: Complex64,
-}
-
 /// `sin(x) / x` of a positive number.
 fn sinc(x: f64) -> f64 {
     libm::sin(x) / x
@@ -96,9 +55,8 @@ fn cis(angle: f64) -> Complex64 {
     Complex64::new(cosine, sine)
 }
 
-impl CancellingLoop<'_> {
-    /// A vector at a frequency; none where the margin is too small.
-    pub(super) fn node(&self, frequency_hz: f64, rate_per_s: f64, period_s: f64) -> Option<Node> {
+impl CancellingLoop for NominalLoop<'_> {
+    fn node(&self, frequency_hz: f64, rate_per_s: f64, period_s: f64) -> Option<Node> {
         if self.margin_deg(frequency_hz, period_s) < LEAST_MARGIN_DEG {
             return None;
         }
@@ -114,12 +72,15 @@ impl CancellingLoop<'_> {
         let line = sinc(0.5 * omega * step_s);
         // The error is that of the tick before.
         let response = response * line * line * cis(lead - omega * period_s);
+        let parts = |value: Complex64| [value.re, value.im];
         Some(Node {
-            growth: response.inv() * (2.0 * rate_per_s * step_s),
-            response,
+            growth: parts(response.inv() * (2.0 * rate_per_s * step_s)),
+            response: parts(response),
         })
     }
+}
 
+impl NominalLoop<'_> {
     /// Angle that the response is taken to be ahead of the one while the axis slides: half way to the one before sliding.
     fn lead(&self, sliding: Complex64, omega: f64, period_s: f64) -> f64 {
         let mut most = 0.0;
@@ -166,12 +127,12 @@ impl CancellingLoop<'_> {
         period_s: f64,
     ) -> Complex64 {
         let half = 0.5 * omega * period_s;
-        let driven = plant.delayed_gain(omega) * cis(-half) * sinc(half);
+        let driven = delayed_gain(plant, omega) * cis(-half) * sinc(half);
         let mut law = self.pid.response(omega) * gain;
         for filter in self.filters {
             law *= filter.response(omega);
         }
-        driven / (plant.denominator(omega) + spring + driven * law)
+        driven / (denominator(plant, omega) + spring + driven * law)
     }
 
     /// A right angle less the largest error of the response's phase on plants with other masses and dead times, and with the law's

@@ -1,7 +1,7 @@
 //! The table of all settings: field, unit, range, default and meaning of each, written once.
 //!
-//! [`StageSettings::validate`](crate::settings::StageSettings::validate) walks its ranges, the
-//! [default settings](crate::settings::StageSettings::default) and those of files that lack a field take its defaults,
+//! [`StageSettings::validate`](crate::StageSettings::validate) walks its ranges, the
+//! [default settings](crate::StageSettings::default) and those of files that lack a field take its defaults,
 //! `quadrant settings` and `docs/settings.md` are made from it. The firmware carries fields and ranges alone
 //! (`rules`); words and units stay on the host. Defaults of flags, names and lists stand in `settings::defaults`, where
 //! they are typed.
