@@ -5,11 +5,8 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use quadrant::app::friction_monitor::FrictionChange;
 use quadrant::app::glitch_monitor::GlitchEvent;
-use quadrant::app::oscillation_report::Oscillated;
 use quadrant::app::rate_limiter::RateLimiter;
-use quadrant::app::supervisor::Event;
 use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
 use quadrant::hal::ResetCause;
 use quadrant_law::axes::AxisName;
@@ -18,6 +15,9 @@ use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::Fault;
 use quadrant_law::safety::oscillation::OscillationKind;
 use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_law::supervisor::Event;
+use quadrant_law::supervisor::FrictionChange;
+use quadrant_law::supervisor::Oscillated;
 use quadrant_settings::StageSettings;
 
 use crate::board::{self, SettingsFlash};

@@ -52,7 +52,6 @@ mod app {
     use quadrant::app::Translated;
     use quadrant::app::glitch_monitor::GlitchReadings;
     use quadrant::app::start_record::LASTING_RUNS;
-    use quadrant::app::supervisor::Event;
     use quadrant::app::{
         Control, Inputs, Intake, Liveness, Poll, Server, Snapshot, Supervision, TimingStatistics,
     };
@@ -61,6 +60,7 @@ mod app {
     use quadrant_law::axes::AxisName;
     use quadrant_law::command::Command;
     use quadrant_law::safety::AxisSwitches;
+    use quadrant_law::supervisor::Event;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,

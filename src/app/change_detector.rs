@@ -1,6 +1,6 @@
 //! The change detector: events of the slow half for the log, found by comparing the machine with its last state.
 //!
-//! Changes of the safety state, refusals and faults are found by the [`supervisor`](crate::app::supervisor).
+//! Changes of the safety state, refusals and faults are found by the [`supervisor`](quadrant_law::supervisor).
 
 use heapless::Vec;
 

@@ -1,7 +1,7 @@
 //! The quadrant-glitch monitor: height of the error spike at each reversal, and the worst radial deviation of a circle.
 //!
 //! It runs in the supervising task on the snapshots, once every
-//! [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS), so the control interrupt pays for no more than the copy of three
+//! [`PERIOD_TICKS`](quadrant_law::supervisor::PERIOD_TICKS), so the control interrupt pays for no more than the copy of three
 //! reference positions in a snapshot. Its results are shown, in the log and as telemetry channels, and never fed back.
 //!
 //! - **Reversal**: the reference of an axis changes its direction, after a rest of 0.5 s at most. The *level* is the mean magnitude of the tracking error

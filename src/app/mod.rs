@@ -35,7 +35,6 @@ mod server;
 mod snapshot;
 pub mod start_record;
 mod supervision;
-pub mod supervisor;
 pub mod telemetry;
 mod wire;
 

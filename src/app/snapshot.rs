@@ -1,4 +1,4 @@
-//! The slow half's view of the fast one, taken once every [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS).
+//! The slow half's view of the fast one, taken once every [`PERIOD_TICKS`](quadrant_law::supervisor::PERIOD_TICKS).
 
 use quadrant_law::admission::StageView;
 use quadrant_law::axes::PerAxis;

@@ -2,7 +2,6 @@
 
 use quadrant_link::message::{self as wire, text};
 
-use super::supervisor;
 use quadrant_law::axes::AxisName;
 use quadrant_law::axis::telemetry::LimitedBy;
 use quadrant_law::learning::LearningStatus;
@@ -10,6 +9,7 @@ use quadrant_law::motion::MotionMode;
 use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 use quadrant_law::safety::SafetyState;
 use quadrant_law::safety::oscillation::OscillationKind;
+use quadrant_law::supervisor;
 use quadrant_settings::{self as settings, PlanSettings};
 
 /// A type of the link made of the law's or of the settings', or the other way. All of them are other crates', so this cannot be

@@ -2,11 +2,11 @@
 
 use quadrant::app::start_record::StartRecord;
 use quadrant::link::message::Provenance;
-use quadrant::lockstep::Job;
 use quadrant::store::{BUFFER_BYTES, Finding, Store};
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::Plan;
+use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 
 use crate::board::{self, SettingsFlash};

@@ -1,7 +1,7 @@
 //! The 12-bit output: exact in the mean, bounded, never out of range.
 
 use proptest::prelude::*;
-use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant_law::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant_law::units::DacCode;
 
 const ALL: [NoiseShaper; 3] = [

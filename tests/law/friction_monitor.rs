@@ -1,9 +1,10 @@
 //! The friction monitor: what has settled away from what was commissioned is reported once, and nothing else is.
 
 use quadrant::app::Snapshot;
-use quadrant::app::friction_monitor::{FrictionChange, FrictionMonitor};
+use quadrant::app::friction_monitor::FrictionMonitor;
 use quadrant_law::axes::AxisName;
 use quadrant_law::learning::{LearningReading, LearningStatus};
+use quadrant_law::supervisor::FrictionChange;
 
 /// Runs of the supervising task in a second.
 const RUNS_PER_S: usize = 1_000;

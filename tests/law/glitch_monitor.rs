@@ -2,9 +2,9 @@
 
 use quadrant::app::Snapshot;
 use quadrant::app::glitch_monitor::{GlitchEvent, GlitchMonitor, degrees, root};
-use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::link::message::AxisName;
 use quadrant_law::safety::SafetyState;
+use quadrant_law::supervisor::PERIOD_TICKS;
 use quadrant_law::units::Position;
 
 /// Length of a count, mm.

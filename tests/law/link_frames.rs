@@ -2,7 +2,6 @@
 
 use heapless::Vec as Bounded;
 use quadrant::app::Translated;
-use quadrant::app::supervisor;
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::frame::{
     self, DecodeError, EncodeError, FRAME_BYTES, FrameCounters, PAYLOAD_BYTES, Receiver,
@@ -14,6 +13,7 @@ use quadrant::link::message::{
 };
 use quadrant::link::server::LinkServer;
 use quadrant_law::safety::FaultCode;
+use quadrant_law::supervisor;
 
 use crate::link_traffic::framed;
 
@@ -237,7 +237,7 @@ fn the_supervisors_events_have_their_notice() {
     );
     let refused = supervisor::Event::Refused(
         quadrant_law::command::Command::Run,
-        supervisor::Refusal::NotEnabled,
+        quadrant_law::admission::Refusal::NotEnabled,
     );
     let Event::Refused(text) = Event::translated(refused) else {
         panic!("a refusal");

@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 use quadrant::lockstep::{
-    BootBlock, InjectedFault, InputRecord, JOB_BYTES, Job, Mode, OutputRecord, Reset, held,
+    BootBlock, InjectedFault, InputRecord, JOB_BYTES, Mode, OutputRecord, Reset, held,
 };
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
@@ -11,6 +11,7 @@ use quadrant_law::reference::Velocity;
 use quadrant_law::safety::{AxisSwitches, Switches};
 use quadrant_law::stage::Outputs;
 use quadrant_law::units::DacCode;
+use quadrant_settings::Job;
 use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::common::{repeatable, sine_on_x};

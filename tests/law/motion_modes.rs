@@ -1,6 +1,5 @@
 //! The motion modes of the axes: stops, single moves and streams through the whole tick.
 
-use quadrant::app::supervisor::{Event, Supervisor};
 use quadrant_law::admission::Refusal;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
@@ -9,6 +8,7 @@ use quadrant_law::reference::{
     HarmonicSettings, MotionSettings, PointToPointSettings, ReferenceSample, Segment, Velocity,
 };
 use quadrant_law::safety::{FaultCode, Reaction, SafetyState};
+use quadrant_law::supervisor::{Event, Supervisor};
 use quadrant_law::units::Position;
 use quadrant_settings::stream_planner::{AxisPoint, SetPoint, StreamLimits, StreamPlanner};
 use quadrant_settings::{LossReaction, PlanSettings, StageSettings};

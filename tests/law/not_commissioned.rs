@@ -1,6 +1,5 @@
 //! A board with nothing in its flash has no law: its outputs stay off, and a person learns what to do.
 
-use quadrant::app::supervisor::{Event, Supervisor};
 use quadrant_law::admission::Refusal;
 use quadrant_law::admission::StageView;
 use quadrant_law::admission::refusal;
@@ -9,6 +8,7 @@ use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::safety::{EnabledBy, SafetyState};
+use quadrant_law::supervisor::{Event, Supervisor};
 use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::common::Rig;

@@ -1,13 +1,14 @@
 //! The rules of operation: enabling, motions that need their host, and the emergency stop.
 
-use quadrant::app::supervisor::{Event, StageView, Supervisor};
 use quadrant::link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
+use quadrant_law::admission::StageView;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
 use quadrant_law::safety::{
     AxisSwitches, EnabledBy, FaultCode, HostNeeded, Operation, Reaction, SafetyState, Switches,
 };
 use quadrant_law::stage::Outputs;
+use quadrant_law::supervisor::{Event, Supervisor};
 use quadrant_settings::{EmergencyReaction, StageSettings};
 
 use crate::common::Rig;

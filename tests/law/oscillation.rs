@@ -1,7 +1,5 @@
 //! The monitor for oscillation: what is added and harms is taken away, hum is reported, a loop that swings is stopped, and a
 //! healthy axis is left alone.
-use quadrant::app::oscillation_report::Oscillated;
-use quadrant::app::supervisor::Event;
 use quadrant::app::{Snapshot, Supervision};
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
@@ -13,6 +11,8 @@ use quadrant_law::safety::oscillation::{
     Oscillation, OscillationInput, OscillationKind, OscillationReading, OscillationState,
 };
 use quadrant_law::scalar::{Fixed, Quantity, Scalar};
+use quadrant_law::supervisor::Event;
+use quadrant_law::supervisor::Oscillated;
 use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_simulation::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, SimulatedAxis,

@@ -1,6 +1,5 @@
 //! The commands that the supervising task lets through, and the events that it tells.
 
-use quadrant::app::supervisor::{Decision, Event, Supervisor};
 use quadrant_law::admission::Refusal;
 use quadrant_law::admission::StageView;
 use quadrant_law::axes::AxisName;
@@ -8,6 +7,7 @@ use quadrant_law::axes::PerAxis;
 use quadrant_law::command::Command;
 use quadrant_law::motion::MotionMode;
 use quadrant_law::safety::{EnableInterlock, EnabledBy, Fault, FaultCode, SafetyState};
+use quadrant_law::supervisor::{Decision, Event, Supervisor};
 
 const FAULT: Fault = Fault {
     code: FaultCode::DeadlineMissed,

@@ -45,5 +45,5 @@ pub use limits::{LimitSettings, TravelSettings};
 pub use operation::{
     BrakeSettings, EmergencyReaction, LossReaction, OperationSettings, StreamingSettings,
 };
-pub use stage::{PlanSettings, StageSettings};
+pub use stage::{Job, PlanSettings, StageSettings};
 pub use value::MAX_VALUE_BYTES;

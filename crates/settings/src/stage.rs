@@ -33,3 +33,12 @@ pub struct PlanSettings {
     /// One motion an axis.
     pub motions: [MotionSettings; 3],
 }
+
+/// Settings and motions of a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// The settings.
+    pub stage: StageSettings,
+    /// The plan's motions.
+    pub plan: PlanSettings,
+}

@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::lockstep::Job;
 use quadrant_law::reference::{Plane, Sense, circle};
+use quadrant_settings::Job;
 use quadrant_settings::PlanSettings;
 
 use crate::circle::path::Point;

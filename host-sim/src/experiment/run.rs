@@ -1,9 +1,9 @@
 //! One run: a machine on a simulated stage, and the traces of its axes.
 
-use quadrant::lockstep::InputRecord;
 use quadrant_law::axis::telemetry::AxisTelemetry;
 use quadrant_law::safety::SafetyState;
 use quadrant_law::scalar::Scalar;
+use quadrant_simulation::law_machine::TickInput;
 
 use crate::machine::{LawMachine, Operator};
 use crate::plant::SimulatedStage;
@@ -70,7 +70,7 @@ pub fn run<S: Scalar, const N: usize>(
     let mut traces: [AxisTrace; 3] = Default::default();
     let mut started = false;
     for tick in 0..most_ticks {
-        let outputs = machine.tick(&InputRecord::of_counts(
+        let outputs = machine.tick(&TickInput::of_counts(
             plant.read_counters(),
             operator.request(tick as u32),
         ));

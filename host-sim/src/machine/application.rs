@@ -10,7 +10,6 @@ use quadrant::app::{
 };
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
-use quadrant::lockstep::InputRecord;
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
 use quadrant_law::command::Command;
 use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
@@ -18,6 +17,7 @@ use quadrant_law::safety::FaultCode;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::stage::{Outputs, StageState};
 use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_simulation::law_machine::TickInput;
 
 use super::memory_flash::MemoryFlash;
 
@@ -144,7 +144,7 @@ impl<S: Scalar> Running<S> {
     }
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
-    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
+    pub fn tick(&mut self, inputs: &TickInput, serial: &mut impl Serial) -> (Outputs, Poll) {
         self.control.hear(self.intake.frames());
         let outputs = self.control.tick(&mut Inputs {
             command: self.commands.pop_front(),

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use quadrant::app::supervisor::PERIOD_TICKS;
+use quadrant_law::supervisor::PERIOD_TICKS;
 use quadrant_settings::StageSettings;
 
 /// Bytes that the port carries in a second: 921 600 baud.

@@ -3,12 +3,12 @@
 use super::opened::OpenInjection;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
-use crate::app::supervisor::PERIOD_TICKS;
 use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
 use quadrant_law::command::Command;
 use quadrant_law::injection::{BLOCK_VALUES, VoltageBlock};
 use quadrant_law::scalar::Scalar;
+use quadrant_law::supervisor::PERIOD_TICKS;
 use quadrant_link::message::{InjectRequest, InjectStatus, LinkError, Reply, Voltages};
 use quadrant_settings::InjectionSettings;
 

@@ -3,9 +3,9 @@
 use super::deferred::Work;
 use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::Order;
-use crate::app::supervisor;
 use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
+use quadrant_law::admission;
 use quadrant_law::axes::{AxisName, PerAxis};
 use quadrant_law::cancelling::{MOST_RPM, SpindleSpeed};
 use quadrant_law::command::Command;
@@ -100,7 +100,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     /// Checks that the control law would take a command, as far as the last snapshot tells.
     pub(super) fn check(&self, command: Command) -> Result<(), LinkError> {
-        match supervisor::refusal_from(Station::Host, self.seen.view, command) {
+        match admission::refusal_from(Station::Host, self.seen.view, command) {
             Some(reason) => Err(refused(format_args!("{reason}"))),
             None => Ok(()),
         }

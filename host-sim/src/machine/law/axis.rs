@@ -1,14 +1,14 @@
 //! One axis of the simulated stage as a test_axis: its truth is on the other side of encoder and converter.
 
-use quadrant::app::supervisor::Event;
-use quadrant::lockstep::InputRecord;
 use quadrant_law::command::Command;
 use quadrant_law::control::feedback::LawKind;
 use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_law::reference::MotionSettings;
 use quadrant_law::safety::SafetyState;
+use quadrant_law::supervisor::Event;
 use quadrant_law::units::DacCode;
 use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant_simulation::law_machine::TickInput;
 use quadrant_simulation::law_machine::{LawMachine, Operator};
 
 use super::recorder::{Period, Recorder};
@@ -299,10 +299,7 @@ impl Law {
                 motion_ended: true,
             }));
         };
-        let outputs = machine.tick(&InputRecord::of_counts(
-            [raw, 0, 0],
-            operator.request(*tick),
-        ));
+        let outputs = machine.tick(&TickInput::of_counts([raw, 0, 0], operator.request(*tick)));
         *tick += 1;
         let state = machine.state();
         if let SafetyState::Faulted(fault) = state.safety() {

@@ -3,13 +3,11 @@
 //! Runs every [`PERIOD_TICKS`] control ticks, below the control interrupt. Pure, so that the firmware and the host's
 //! run of the same job decide alike.
 
-use super::friction_monitor::FrictionChange;
-use super::oscillation_report::Oscillated;
-use quadrant_law::axes::AxisName;
-use quadrant_law::command::Command;
-use quadrant_law::safety::{Fault, SafetyState, Station};
-
-pub use quadrant_law::admission::{Refusal, StageView, refusal, refusal_from};
+use crate::admission::{Refusal, StageView, refusal_from};
+use crate::axes::AxisName;
+use crate::command::Command;
+use crate::safety::oscillation::OscillationKind;
+use crate::safety::{Fault, SafetyState, Station};
 
 /// Control ticks between two runs of the supervisor: 1 kHz at a control rate of 10 kHz.
 pub const PERIOD_TICKS: u32 = 10;
@@ -39,6 +37,30 @@ pub enum Event {
     Oscillated(Oscillated),
     /// A request was refused.
     Refused(Command, Refusal),
+}
+
+/// A friction that has settled away from the last one reported.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FrictionChange {
+    /// The axis.
+    pub axis: AxisName,
+    /// Its friction over what was commissioned, percent.
+    pub percent: u16,
+    /// True if the change asks for maintenance: beyond 67 to 150 %.
+    pub needs_maintenance: bool,
+}
+
+/// An oscillation of an axis.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Oscillated {
+    /// The axis.
+    pub axis: AxisName,
+    /// The finding, and the action taken.
+    pub kind: OscillationKind,
+    /// Frequency, 0.1 Hz.
+    pub decihertz: u16,
+    /// Amplitude, um.
+    pub micrometres: u16,
 }
 
 /// Runs at rest with the outputs off after which a motion is told: 0.1 s at 10 kHz.

@@ -15,7 +15,7 @@
 //! and R. W. Hallock, "Oversampled, linear predictive and noise-shaping coders of order N > 1", IEEE Trans. Circuits
 //! Syst. 25 (1978).
 
-use quadrant_law::units::DacCode;
+use crate::units::DacCode;
 
 /// Bits that the converter lacks.
 const MISSING_BITS: u32 = 4;
