@@ -4,7 +4,7 @@
 
 use super::Snapshot;
 use quadrant_law::axes::AxisName;
-use quadrant_law::safety::oscillation::{OscillationKind, OscillationReading};
+use quadrant_law::safety::oscillation::OscillationReading;
 use quadrant_law::scalar::Scalar;
 use quadrant_law::supervisor::Oscillated;
 

@@ -9,8 +9,8 @@ use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSett
 use quadrant_law::units::{POSITION_FRACTION_BITS, Position};
 use quadrant_settings::PlanSettings;
 
-use crate::common::Noise;
 use crate::hostile_link::{Bench, whole};
+use quadrant_test_support::Noise;
 
 /// Requests that are made.
 const REQUESTS: u32 = 20_000;

@@ -6,7 +6,6 @@
 mod state;
 mod view;
 
-use quadrant::app::Translated;
 use std::io::{IsTerminal, stdin, stdout};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -86,6 +85,7 @@ fn waits_for_event(time: Duration) -> anyhow::Result<bool> {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use quadrant::app::Translated;
     use quadrant::link::message::{Body, MachineState};
     use quadrant_law::reference::{MotionSettings, PointToPointSettings};
     use quadrant_settings::PlanSettings;
