@@ -13,7 +13,7 @@
 //!   one relative to the micrometres shown.
 //!
 //! Root and arctangent are `micromath`'s. One Newton step brings its root (6 %) to 0.2 %; its arctangent errs by 0.2
-//! degrees at most (`tests/law/glitch_monitor.rs` measures both).
+//! degrees at most (`tests/firmware/glitch_monitor.rs` measures both).
 
 use micromath::F32Ext;
 use quadrant_link::message::AxisName;

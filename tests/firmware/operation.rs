@@ -2,9 +2,7 @@
 
 use quadrant::link::message::{AxisName as WireAxis, Body, InjectRequest, Voltages};
 use quadrant_law::command::Command;
-use quadrant_law::safety::{
-    EnabledBy, FaultCode, HostNeeded, SafetyState,
-};
+use quadrant_law::safety::{EnabledBy, FaultCode, HostNeeded, SafetyState};
 use quadrant_settings::StageSettings;
 
 use crate::preemption::{LINK_TIMEOUT_TICKS, endless, plan, refused, safety, settings};

@@ -27,6 +27,32 @@
 //! when one fails. A check returns the fault it found ([`safety::FaultCode`]); what follows from it is the stage's to
 //! decide, by the fault's [`safety::Reaction`].
 //!
+//! [`safety`] decides whether any of this reaches the amplifiers: the stage starts disabled, and a fault switches it off
+//! in the tick that finds it, or brakes it under control where that is safer. [`supervisor`] stands between a person's
+//! requests and the tick.
+//!
+//! # An axis in ten lines
+//!
+//! ```
+//! use quadrant_law::axes::PerAxis;
+//! use quadrant_law::command::Command;
+//! use quadrant_law::reference::Motion;
+//! use quadrant_law::stage::{Inputs, Stage, StageState};
+//! use quadrant_settings::StageSettings;
+//!
+//! let stage: Stage<f32> = StageSettings::simulated().build()?;
+//! let plan = PerAxis::from_fn(|_| Motion::Hold);
+//! let mut state = StageState::default();
+//! let enable = Inputs { command: Some(Command::Enable), ..Inputs::default() };
+//! assert!(stage.tick(&plan, &mut state, &enable).enabled);
+//! // One count (0.5 um) away from where it was enabled, the stage pushes back.
+//! let moved = Inputs::of_counts([1, 0, 0]);
+//! assert!(stage.tick(&plan, &mut state, &moved).codes[0].0 < 0);
+//! # Ok::<(), quadrant_settings::SettingsError>(())
+//! ```
+//!
+//! One axis without settings is in [`axis`].
+//!
 //! # Three kinds of type
 //!
 //! - Parameters as a person writes them, in SI units and millimetres, `f64`: [`control::pid::PidGains`],
@@ -35,8 +61,12 @@
 //!   made by `build`, `new` or `try_build` at settings time, which may be slow: tables are filled, divisions done.
 //! - Memory, which a tick changes: [`control::terms::FeedbackState`], [`axis::AxisState`].
 //!
-//! Everything for the tick is generic over the number type ([`scalar::Scalar`]): `f32`, fixed point, or `f64` on a host.
-//! Curves are tabulated ([`table`]); what there is one of for each axis is a [`axes::PerAxis`]; [`decimal`] writes numbers into messages.
+//! Everything for the tick is generic over the number type ([`scalar::Scalar`]): `f32` on a target with a floating-point unit,
+//! [`scalar::Fixed`] on one without, `f64` on a host as the reference for numeric error. `f32` results are the same to the bit on
+//! host and target: plain IEEE operations in one order, no fused multiply-add, and `libm` for what is tabulated.
+//!
+//! Curves are tabulated ([`table`]); what there is one of for each axis is a [`axes::PerAxis`]; [`decimal`] writes numbers into
+//! messages, [`rounding`] rounds at settings time, and [`noise_shaper`] makes 12 bits of a word do better than 12 bits.
 #![no_std]
 #![forbid(unsafe_code)]
 

@@ -209,7 +209,7 @@ fn healthy(seed: u64) -> (Lone<f32>, f64, u32, String) {
     (lone, load_v, every, what)
 }
 
-/// `QUADRANT_HEALTHY_AXES=20000 cargo test --test law healthy_axes -- --nocapture`: as many as one likes.
+/// `QUADRANT_HEALTHY_AXES=20000 cargo test -p quadrant-law --test suite healthy_axes -- --nocapture`: as many as one likes.
 #[test]
 fn healthy_axes_of_every_kind_are_left_alone_at_every_output_limit() {
     let count = std::env::var("QUADRANT_HEALTHY_AXES").map_or(1500, |count| {

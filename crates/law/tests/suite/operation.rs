@@ -3,9 +3,7 @@
 use quadrant_law::admission::StageView;
 use quadrant_law::axes::AxisName;
 use quadrant_law::command::Command;
-use quadrant_law::safety::{
-    AxisSwitches, FaultCode, Operation, Reaction, SafetyState, Switches,
-};
+use quadrant_law::safety::{AxisSwitches, FaultCode, Operation, Reaction, SafetyState, Switches};
 use quadrant_law::stage::Outputs;
 use quadrant_law::supervisor::{Event, Supervisor};
 use quadrant_settings::{EmergencyReaction, StageSettings};

@@ -7,8 +7,7 @@ use quadrant_link::frame::{
 };
 use quadrant_link::message::AxisName;
 use quadrant_link::message::{
-    AxisPoint, AxisSet, Body, LinkError, Reply, Request, Response, SetPoint, StreamRequest,
-    text,
+    AxisPoint, AxisSet, Body, LinkError, Reply, Request, Response, SetPoint, StreamRequest, text,
 };
 use quadrant_link::server::LinkServer;
 

@@ -86,7 +86,7 @@ fn over_a_bad_line_every_intact_request_is_heard_and_nothing_else() {
     assert_only_the_intact_were_heard(&bad_line(1, 50_000));
 }
 
-/// `cargo test -p quadrant --test law ten_million -- --ignored --nocapture`
+/// `cargo test -p quadrant-link --test suite ten_million -- --ignored --nocapture`
 #[test]
 #[ignore = "ten million frames take minutes"]
 fn ten_million_frames_over_a_bad_line() {

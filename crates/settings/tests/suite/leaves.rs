@@ -62,7 +62,7 @@ fn every_leaf_has_its_entry_and_every_entry_its_leaf() {
     let without_leaf: Vec<_> = entries.difference(&leaves).collect();
     assert!(
         without_entry.is_empty() && without_leaf.is_empty(),
-        "leaves without an entry in src/settings/leaves: {without_entry:?}; entries without a leaf: {without_leaf:?}"
+        "leaves without an entry in crates/settings/src/leaves: {without_entry:?}; entries without a leaf: {without_leaf:?}"
     );
     assert_eq!(all().count(), entries.len(), "an entry twice");
 }
