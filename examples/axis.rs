@@ -1,12 +1,12 @@
 //! One axis under PID against a simulated mass with friction: the largest error, without feedforward and with it.
-use quadrant::axis::{Axis, AxisBuilder, AxisError, AxisState};
-use quadrant::control::{feedback::Feedback, pid::Pid};
-use quadrant::friction::{Direction, gms, stribeck::SlidingTable};
-use quadrant::reference::{HarmonicSettings, Motion, MotionScale, MotionSettings};
-use quadrant::{command::Command, encoder::EncoderReading, feedforward::FeedforwardKind};
+use quadrant_law::axis::{Axis, AxisBuilder, AxisError, AxisState};
+use quadrant_law::control::{feedback::Feedback, pid::Pid};
+use quadrant_law::friction::{Direction, gms, stribeck::SlidingTable};
+use quadrant_law::reference::{HarmonicSettings, Motion, MotionScale, MotionSettings};
+use quadrant_law::{command::Command, encoder::EncoderReading, feedforward::FeedforwardKind};
 
 fn largest_error_um(kind: FeedforwardKind) -> Result<f32, AxisError> {
-    let x = quadrant::settings::presets::x_axis();
+    let x = quadrant_settings::presets::x_axis();
     let sine = MotionSettings::Harmonic(HarmonicSettings::with_velocity(10.0, 5.0, 1.0, 0.5));
     let motion = Motion::build(&sine, MotionScale::new(0.5e-3, 1e4));
     let mut axis = Axis::<f32, 8>::blank();

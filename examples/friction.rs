@@ -1,10 +1,10 @@
 //! A friction model alone: the hysteresis of GMS friction as it is pushed 50 um to and fro.
 
-use quadrant::friction::{Direction, gms, stribeck::SlidingTable};
+use quadrant_law::friction::{Direction, gms, stribeck::SlidingTable};
 
 fn main() {
     const PERIOD_S: f64 = 1e-3;
-    let friction = quadrant::settings::presets::x_axis().friction;
+    let friction = quadrant_settings::presets::x_axis().friction;
     let curves = friction.sliding.map(|side| side.curve);
     let surface = SlidingTable::build(&curves, friction.gms.attraction_v_s, PERIOD_S);
     let model = gms::Gms::<f64, 10>::build(&friction.gms.elements);

@@ -2,14 +2,14 @@
 //!
 //! embedded-hal 1.0 has no encoder, no converter, no watchdog and no port that is read and written without waiting; these
 //! traits are ours, and this is their only place. They speak in raw words: what a word means is
-//! [`settings`](crate::settings). Flash for stored settings is an `embedded_storage::nor_flash::NorFlash` that knows the
+//! [`settings`](quadrant_settings). Flash for stored settings is an `embedded_storage::nor_flash::NorFlash` that knows the
 //! enable line ([`SettingsFlash`]).
 
 use embedded_storage::nor_flash::NorFlash;
 
-use crate::law::encoder::EncoderReading;
-use crate::law::safety;
-use crate::law::stage::Outputs;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety;
+use quadrant_law::stage::Outputs;
 
 /// The three axes' encoders.
 pub trait Encoders {

@@ -9,15 +9,13 @@
 //! In the recorded modes the inputs of all ticks lie in the memory beforehand and the outputs are collected there.
 //! All words are little-endian; offsets are bytes from the start of the memory.
 
-use serde::{Deserialize, Serialize};
 use strum::FromRepr;
 
-use crate::law::command::Command;
-use crate::law::encoder::EncoderReading;
-use crate::law::safety::Switches;
-use crate::law::stage::{Inputs, Outputs};
-use crate::law::units::DacCode;
-use crate::settings::{PlanSettings, StageSettings};
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety::Switches;
+use quadrant_law::stage::{Inputs, Outputs};
+use quadrant_law::units::DacCode;
 
 /// Address of the memory on the target: its PSRAM, which the host backs by a shared file.
 pub const BASE: usize = 0x2100_0000;
@@ -47,7 +45,7 @@ pub const INJECTED_FAULT_TICK: usize = 0x120;
 pub const HANGS_FROM: usize = 0x124;
 /// The clock the last time that a hanging firmware looked at it, a word.
 pub const HANGS_UNTIL: usize = 0x128;
-/// The job: a postcard-encoded [`Job`].
+/// The job: a postcard-encoded [`Job`](quadrant_settings::Job).
 pub const JOB: usize = 0x200;
 /// Largest encoded job.
 pub const JOB_BYTES: usize = 0x7E00;
@@ -187,15 +185,6 @@ pub enum InjectedFault {
     Hang = 6,
     /// Masks interrupts for a control period and a half, where a clock paces the run.
     LateTick = 7,
-}
-
-/// Settings and motions of a run.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Job {
-    /// The settings.
-    pub stage: StageSettings,
-    /// The plan's motions.
-    pub plan: PlanSettings,
 }
 
 /// The inputs of one tick, from the host.

@@ -5,20 +5,20 @@
 
 use core::sync::atomic::{AtomicU32, Ordering};
 
-use quadrant::app::friction_monitor::FrictionChange;
 use quadrant::app::glitch_monitor::GlitchEvent;
-use quadrant::app::oscillation_report::Oscillated;
 use quadrant::app::rate_limiter::RateLimiter;
-use quadrant::app::supervisor::Event;
 use quadrant::app::{ChangeDetector, Server, Snapshot, StateChange, TimingStatistics};
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
 use quadrant::hal::ResetCause;
-use quadrant::motion::MotionMode;
-use quadrant::safety::Fault;
-use quadrant::safety::oscillation::OscillationKind;
-use quadrant::scalar::{Quantity, Scalar};
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::safety::Fault;
+use quadrant_law::safety::oscillation::OscillationKind;
+use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_law::supervisor::Event;
+use quadrant_law::supervisor::FrictionChange;
+use quadrant_law::supervisor::Oscillated;
+use quadrant_settings::StageSettings;
 
 use crate::board::{self, SettingsFlash};
 

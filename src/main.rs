@@ -49,17 +49,18 @@ mod app {
     use core::sync::atomic::{AtomicU32, Ordering};
 
     use heapless::spsc::{Consumer, Producer, Queue};
+    use quadrant::app::Translated;
     use quadrant::app::glitch_monitor::GlitchReadings;
     use quadrant::app::start_record::LASTING_RUNS;
-    use quadrant::app::supervisor::Event;
     use quadrant::app::{
         Control, Inputs, Intake, Liveness, Poll, Server, Snapshot, Supervision, TimingStatistics,
     };
-    use quadrant::axes::AxisName;
-    use quadrant::command::Command;
     use quadrant::hal::{self, Amplifiers as _, Encoders as _, Switches as _, Watchdog as _};
     use quadrant::link::message::NumberType;
-    use quadrant::safety::AxisSwitches;
+    use quadrant_law::axes::AxisName;
+    use quadrant_law::command::Command;
+    use quadrant_law::safety::AxisSwitches;
+    use quadrant_law::supervisor::Event;
 
     use crate::board::{
         self, Amplifiers, Board, Encoders, Idle, Operator, Outcome, Serial, SettingsFlash,
@@ -73,7 +74,7 @@ mod app {
     type Number = f32;
     /// The number type of the control law.
     #[cfg(feature = "scalar-fixed")]
-    type Number = quadrant::scalar::Fixed;
+    type Number = quadrant_law::scalar::Fixed;
     /// The number type's name on the link.
     #[cfg(not(feature = "scalar-fixed"))]
     const NUMBER: NumberType = NumberType::F32;
@@ -349,7 +350,9 @@ mod app {
             Ordering::Relaxed,
         );
         while let Some((tick, event)) = cx.local.events_out.dequeue() {
-            cx.local.server.push_event(tick, event);
+            cx.local
+                .server
+                .push_event(tick, Translated::translated(event));
         }
         let seen = cx.shared.seen.lock(|seen| *seen);
         let timing = TimingStatistics {

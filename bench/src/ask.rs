@@ -3,8 +3,9 @@
 use quadrant::link::heapless::{String as Bounded, Vec as BoundedList};
 use quadrant::link::message::{
     AxisName, Body, Channel, MAX_CHANNELS, SERIAL_VALUES_PER_S, SettingsRequest, TelemetryRequest,
+    Value as LeafValue,
 };
-use quadrant::settings::tree::expand;
+use quadrant_settings::tree::expand;
 use quadrant_simulation::setting_value;
 use serde::Deserialize;
 use serde_json::Value;
@@ -140,11 +141,11 @@ impl Ask {
             Self::GetInForce { path: of } => settings(SettingsRequest::GetInForce(path(of)?)),
             Self::Set { path: of, value } => {
                 let json = value.to_string();
-                let value = setting_value::from_json(of, &json)
+                let (kind, bytes) = setting_value::from_json(of, &json)
                     .map_err(|error| format!("{of} = {json}: {error}"))?;
                 settings(SettingsRequest::Set {
                     path: path(of)?,
-                    value,
+                    value: LeafValue { kind, bytes },
                 })
             }
             Self::Apply => settings(SettingsRequest::Apply),

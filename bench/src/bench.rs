@@ -3,15 +3,15 @@
 use std::collections::BTreeSet;
 use std::path::Path;
 
-use quadrant::axes::AxisName;
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsParameters};
-use quadrant::friction::stribeck::StaticFriction;
-use quadrant::lockstep::Job;
-use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
-use quadrant::safety::SafetyState;
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::axes::AxisName;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsParameters};
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
+use quadrant_law::safety::SafetyState;
+use quadrant_law::stage::Outputs;
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_simulation::law_machine::{LawMachine, Operator};
 use quadrant_simulation::plant::{AxisParameters, SimulatedStage, virgin_curve_elements};
 use quadrant_simulation::settings_file::SettingsFile;

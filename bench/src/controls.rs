@@ -1,9 +1,9 @@
 //! The settings that the page offers to turn: of the law in force, of the feedforward, and of the friction that both were told.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{LeafInfo, Range, all};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::StageSettings;
+use quadrant_settings::leaves::{LeafInfo, Range, all};
 use serde::Serialize;
 use serde_json::Value;
 

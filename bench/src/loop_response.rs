@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::StageSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::StageSettings;
 use quadrant_simulation::loop_shape::{OpenLoop, SampledLoop};
 use quadrant_simulation::margins::margins;
 use quadrant_simulation::plant::StageParameters;

@@ -9,7 +9,7 @@ use quadrant::link::message::{
     Body, Channel, LinkError, Message, Notice, Reply, Request, SettingsRequest, TelemetryBlock,
     TelemetryRequest, Value as LeafValue,
 };
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_simulation::setting_value;
 use serde_json::{Value, json};
 
@@ -150,7 +150,8 @@ impl Session {
         else {
             return Err("the machine answered with a value that was not asked for".to_owned());
         };
-        let json = setting_value::to_json(path, value).map_err(|error| error.to_string())?;
+        let json = setting_value::to_json(path, value.kind, &value.bytes)
+            .map_err(|error| error.to_string())?;
         let json = serde_json::from_str(&json).unwrap_or(Value::String(json));
         if matches!(body, Body::Settings(SettingsRequest::Get(_))) {
             // It was taken by settings with every part; these may lack the part, which changes no bound.
@@ -292,11 +293,11 @@ mod tests {
     fn the_length_of_a_count_is_the_machine_s() {
         let mut session = Session::default();
         let path = "/axes/2/encoder/resolution_mm";
-        let value = setting_value::from_json(path, "0.002").unwrap();
+        let (kind, bytes) = setting_value::from_json(path, "0.002").unwrap();
         let told = exchange(
             &mut session,
             &json!({ "get": { "path": path } }).to_string(),
-            Ok(Reply::Value(value)),
+            Ok(Reply::Value(LeafValue { kind, bytes })),
         );
         assert_eq!(told["ok"]["value"], 0.002);
         assert_eq!(told["ok"]["unit"], "mm");

@@ -3,8 +3,8 @@
 use quadrant::link::message::{
     AxisName, AxisSet, AxisStatus, Event, FaultReport, INPUTS, Inputs, LimitedBy, Status,
 };
-use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{Range, find};
+use quadrant_settings::StageSettings;
+use quadrant_settings::leaves::{Range, find};
 use serde_json::{Value, json};
 
 /// A control tick as the time since the start, s.

@@ -1,7 +1,8 @@
 //! The names of the axes on a command line.
 
 use clap::ValueEnum;
-use quadrant::axes::AxisName;
+use quadrant::app::Translated;
+use quadrant_law::axes::AxisName;
 
 /// An axis of a stage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -34,6 +35,6 @@ impl From<Axis> for AxisName {
 
 impl From<Axis> for quadrant::link::message::AxisName {
     fn from(axis: Axis) -> Self {
-        AxisName::from(axis).into()
+        Translated::translated(AxisName::from(axis))
     }
 }

@@ -2,12 +2,12 @@
 
 use anyhow::{bail, ensure};
 use clap::Args;
-use quadrant::axes::AxisName;
-use quadrant::settings::StageSettings;
 use quadrant_cli::axis::Axis;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, share};
 use quadrant_cli::{say, terminal};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::client::plot;
 use quadrant_sim::compare::comparison::{Comparison, Request};

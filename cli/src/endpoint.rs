@@ -5,9 +5,9 @@ use std::str::FromStr;
 
 use anyhow::{Context, bail};
 use clap::ValueEnum;
-use quadrant::axes::AxisName;
-use quadrant::settings::StageSettings;
 use quadrant_cli::{terminal, warn};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
 use quadrant_sim::client::{Client, Interrupt};
 use quadrant_sim::machine::{
     LawStage, Machine, SerialTransport, Shared, SimulatedLink, StageSetup, TcpTransport, Transport,

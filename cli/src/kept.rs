@@ -3,8 +3,8 @@
 use std::path::Path;
 
 use anyhow::bail;
-use quadrant::axes::AxisName;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
 use quadrant_sim::report::whole;
 use quadrant_sim::setting_value::{Change, changes, lost};
 use quadrant_sim::settings_file::SettingsFile;

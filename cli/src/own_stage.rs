@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use quadrant::axes::AxisName;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::settings::StageSettings;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, command_line, share};
 use quadrant_cli::say;
+use quadrant_law::axes::AxisName;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_settings::StageSettings;
 use quadrant_sim::commission::commission_stage;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;

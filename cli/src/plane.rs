@@ -1,7 +1,7 @@
 //! The names of the planes on a command line.
 
 use clap::ValueEnum;
-use quadrant::reference::Plane;
+use quadrant_law::reference::Plane;
 
 /// A plane, as G17 to G19 select it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]

@@ -4,9 +4,9 @@ use std::path::PathBuf;
 
 use anyhow::{bail, ensure};
 use clap::Args;
-use quadrant::axes::AxisName;
 use quadrant_cli::law_settings::LawSettings;
 use quadrant_cli::output::{Output, progress};
+use quadrant_law::axes::AxisName;
 use quadrant_sim::experiment::run_configuration::{ModelKnowledge, RunConfiguration};
 use quadrant_sim::pages::provenance;
 use quadrant_sim::record::Record;

@@ -3,9 +3,9 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use quadrant::axes::AxisName;
 use quadrant_cli::output::{Output, command_line, progress};
 use quadrant_cli::{say, warn};
+use quadrant_law::axes::AxisName;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::gcode::{Limits, Program, Trajectory};
 use quadrant_sim::pages::provenance;

@@ -4,8 +4,8 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant::axes::AxisName;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::{Machine, MachineError, TestAxis, Travel};
 use quadrant_sim::settings_file::SettingsFile;
 

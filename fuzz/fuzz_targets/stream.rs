@@ -2,13 +2,13 @@
 #![no_main]
 
 #[allow(dead_code)]
-#[path = "../../tests/law/link_fuzz.rs"]
-mod link_fuzz;
+#[path = "../../crates/link/tests/suite/fuzz.rs"]
+mod fuzz;
 #[allow(dead_code)]
-#[path = "../../tests/law/link_model.rs"]
-mod link_model;
+#[path = "../../crates/link/tests/suite/model.rs"]
+mod model;
 
 libfuzzer_sys::fuzz_target!(|data: &[u8]| {
-    let mut model = link_model::Model::default();
-    link_fuzz::stream(data, |body| model.serve(body));
+    let mut served = model::Model::default();
+    fuzz::stream(data, |body| served.serve(body));
 });

@@ -5,12 +5,12 @@
 use std::hint::black_box;
 
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
-use quadrant::command::Command;
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, MAX_ELEMENTS};
-use quadrant::lockstep::InputRecord;
-use quadrant::safety::SafetyState;
-use quadrant::scalar::{Fixed, Scalar};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, MAX_ELEMENTS};
+use quadrant_law::safety::SafetyState;
+use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 
@@ -41,7 +41,7 @@ impl<S: Scalar> Rig<S> {
 
     fn step(&mut self) {
         let input =
-            InputRecord::of_counts(self.plant.read_counters(), self.operator.request(self.tick));
+            TickInput::of_counts(self.plant.read_counters(), self.operator.request(self.tick));
         let outputs = self.machine.tick(&input);
         self.plant.step(&outputs);
         self.tick += 1;
@@ -51,7 +51,7 @@ impl<S: Scalar> Rig<S> {
 fn law<S: Scalar>(criterion: &mut Criterion, name: &str) {
     let mut rig = Rig::<S>::moving();
     let counts = rig.plant.read_counters();
-    let still = InputRecord::of_counts(counts, None);
+    let still = TickInput::of_counts(counts, None);
     let mut group = criterion.benchmark_group("law");
     group.throughput(Throughput::Elements(100));
     // The counts stand while the reference moves on, so the error is large; no branch of the law is cheaper for it,
@@ -94,7 +94,7 @@ impl OneAxis {
     }
 
     fn step(&mut self, request: Option<Command>) {
-        let input = InputRecord::of_counts([self.plant.read_counter(), 0, 0], request);
+        let input = TickInput::of_counts([self.plant.read_counter(), 0, 0], request);
         let outputs = self.machine.tick(&input);
         self.plant.step(outputs.codes[0], outputs.enabled);
     }

@@ -3,9 +3,9 @@
 use std::collections::BTreeSet;
 use std::fmt::Write;
 
-use quadrant::settings::StageSettings;
-use quadrant::settings::leaves::{Bound, Exchange, LeafInfo, Range, UNSET, all};
-use quadrant::settings::tree::is_part;
+use quadrant_settings::StageSettings;
+use quadrant_settings::leaves::{Bound, Exchange, LeafInfo, Range, UNSET, all};
+use quadrant_settings::tree::is_part;
 use serde_json::Value;
 
 /// A row of the reference: a leaf, or a number of a list's points.
@@ -192,7 +192,7 @@ fn table(page: &mut String, heading: &str, rows: &[Row]) {
 const INTRODUCTION: &str = "\
 # Settings
 
-Made by `quadrant settings --markdown` from the table in `src/settings/leaves`; a test says when this page is stale.
+Made by `quadrant settings --markdown` from the table in `crates/settings/src/leaves`; a test says when this page is stale.
 
 Every setting has a path. `*` stands for the axis, `x`, `y` or `z` (or 0, 1, 2), and for a point of a list: a list is one
 value, and its points' numbers are below it here only to be explained. Values are JSON.

@@ -1,13 +1,13 @@
 //! The change detector: events of the slow half for the log, found by comparing the machine with its last state.
 //!
-//! Changes of the safety state, refusals and faults are found by the [`supervisor`](crate::app::supervisor).
+//! Changes of the safety state, refusals and faults are found by the [`supervisor`](quadrant_law::supervisor).
 
 use heapless::Vec;
 
 use super::{ServerStatistics, TimingStatistics};
-use crate::law::admission::StageView;
-use crate::law::axes::{AxisName, PerAxis};
-use crate::law::motion::MotionMode;
+use quadrant_law::admission::StageView;
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::motion::MotionMode;
 
 /// Ticks without a word from a host after which it counts as silent: 3 s at 10 kHz.
 const SILENT_TICKS: u32 = 30_000;

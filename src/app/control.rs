@@ -5,15 +5,15 @@ use super::host_need::HostNeed;
 use super::queues::{AxisSwap, CaptureCommand, ControlEnds, Order, StreamItem};
 use super::{Axis, Snapshot};
 use crate::app::capture::Capture;
-use crate::app::supervisor::PERIOD_TICKS;
 use crate::app::telemetry::{Observation, Sampler, SamplerState};
-use crate::law::axes::{AxisName, PerAxis};
-use crate::law::command::Command;
-use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::reference::Motion;
-use crate::law::safety::{FaultCode, Operation, Station, Switches};
-use crate::law::scalar::Scalar;
-use crate::law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::reference::Motion;
+use quadrant_law::safety::{FaultCode, Operation, Station, Switches};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Inputs, Outputs, Plan, StageRef, StageState};
+use quadrant_law::supervisor::PERIOD_TICKS;
 
 /// Everything that the control interrupt owns. What is small comes first.
 #[repr(C)]

@@ -6,9 +6,10 @@
 //! fills neither log nor link.
 
 use super::Snapshot;
-use crate::law::axes::AxisName;
-use crate::law::learning::{LearningReading, LearningStatus};
-use crate::law::scalar::Scalar;
+use quadrant_law::axes::AxisName;
+use quadrant_law::learning::{LearningReading, LearningStatus};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::supervisor::FrictionChange;
 
 /// Change of a scale that has settled.
 const STEADY: f32 = 0.03;
@@ -24,17 +25,6 @@ const MAINTENANCE: [f32; 2] = [0.67, 1.5];
 
 /// Least gate at which nothing vibrates.
 const QUIET: f32 = 0.9;
-
-/// A friction that has settled away from the last one reported.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct FrictionChange {
-    /// The axis.
-    pub axis: AxisName,
-    /// Its friction over what was commissioned, percent.
-    pub percent: u16,
-    /// True if the change asks for maintenance: beyond 67 to 150 %.
-    pub needs_maintenance: bool,
-}
 
 /// The monitor's memory.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

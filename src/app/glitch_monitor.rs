@@ -1,7 +1,7 @@
 //! The quadrant-glitch monitor: height of the error spike at each reversal, and the worst radial deviation of a circle.
 //!
 //! It runs in the supervising task on the snapshots, once every
-//! [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS), so the control interrupt pays for no more than the copy of three
+//! [`PERIOD_TICKS`](quadrant_law::supervisor::PERIOD_TICKS), so the control interrupt pays for no more than the copy of three
 //! reference positions in a snapshot. Its results are shown, in the log and as telemetry channels, and never fed back.
 //!
 //! - **Reversal**: the reference of an axis changes its direction, after a rest of 0.5 s at most. The *level* is the mean magnitude of the tracking error
@@ -13,14 +13,14 @@
 //!   one relative to the micrometres shown.
 //!
 //! Root and arctangent are `micromath`'s. One Newton step brings its root (6 %) to 0.2 %; its arctangent errs by 0.2
-//! degrees at most (`tests/law/glitch_monitor.rs` measures both).
+//! degrees at most (`tests/firmware/glitch_monitor.rs` measures both).
 
 use micromath::F32Ext;
 use quadrant_link::message::AxisName;
 
 use super::Snapshot;
-use crate::law::scalar::{Quantity, Scalar};
-use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
+use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// Longest window after a reversal, ticks: 0.5 s at 10 kHz.
 const MAX_WINDOW_TICKS: u32 = 5_000;

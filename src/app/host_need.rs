@@ -1,13 +1,13 @@
 //! The host that a motion needs: every one that it has started, or, if the settings say so, one that has no end of its own or
 //! that it feeds.
 
-use crate::law::axes::AxisName;
-use crate::law::command::Command;
-use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::motion::MotionMode;
-use crate::law::safety::HostNeeded;
-use crate::law::scalar::Scalar;
-use crate::law::stage::{Plan, StageState};
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::safety::HostNeeded;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Plan, StageState};
 
 /// Ticks without a valid request after which a host counts as lost: half a second.
 pub const fn link_timeout_ticks(rate_hz: u32) -> u32 {

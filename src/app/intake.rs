@@ -2,7 +2,7 @@
 
 use super::queues::IntakeEnds;
 use crate::hal::Serial;
-use crate::law::command::Command;
+use quadrant_law::command::Command;
 use quadrant_link::watch::{LinkWatch, Seen};
 
 /// Bytes that are taken from the port in a run at most: the line carries 92 in a millisecond.

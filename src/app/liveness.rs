@@ -1,6 +1,6 @@
 //! Liveness of control, supervision and server: the condition for feeding the watchdog.
 
-use super::supervisor::PERIOD_TICKS;
+use quadrant_law::supervisor::PERIOD_TICKS;
 
 /// Longest time without a poll of the server, s: it builds settings, and erases flash.
 const SERVER_TIMEOUT_S: u32 = 10;

@@ -14,7 +14,7 @@
 //! What passes from one half to the other is owned by one of them at a time, and goes through bounded queues ([`Queues`])
 //! that neither side waits for; beside them there are counters, each with one writer. **A decision is taken on the state of
 //! now, by the one who acts on it**: the control interrupt. The others judge an older state to tell a person early. Settings are built by the slow half into the one
-//! [`Axis`](crate::law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
+//! [`Axis`](quadrant_law::axis::Axis) that the law does not use, the back buffer, and swapped whole, by reference.
 //!
 //! The firmware puts each piece into an RTIC task; a host runs them one after the other in one thread
 //! (`quadrant_sim::machine`), in the order in which the target would.
@@ -35,23 +35,23 @@ mod server;
 mod snapshot;
 pub mod start_record;
 mod supervision;
-pub mod supervisor;
 pub mod telemetry;
 mod wire;
 
 pub use change_detector::{ChangeDetector, MAX_STATE_CHANGES, StateChange};
 pub use control::Control;
 
-pub use crate::law::stage::Inputs;
 pub use host_need::link_timeout_ticks;
 pub use intake::{Intake, Received};
 pub use liveness::Liveness;
+pub use quadrant_law::stage::Inputs;
 pub use queues::{ControlEnds, IntakeEnds, Queues, ServerEnds};
 pub use server::{Poll, Server, ServerParts, ServerStatistics};
 pub use snapshot::{AxisSnapshot, Snapshot, TimingStatistics};
 pub use supervision::{Supervised, Supervision};
+pub use wire::Translated;
 
-use crate::law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 
 /// An axis with the room that the firmware has.
-pub type Axis<S> = crate::law::axis::Axis<S, FIRMWARE_ELEMENTS>;
+pub type Axis<S> = quadrant_law::axis::Axis<S, FIRMWARE_ELEMENTS>;

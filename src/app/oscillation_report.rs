@@ -3,22 +3,10 @@
 //! It runs in the supervising task on the snapshots.
 
 use super::Snapshot;
-use crate::law::axes::AxisName;
-use crate::law::safety::oscillation::{OscillationKind, OscillationReading};
-use crate::law::scalar::Scalar;
-
-/// An oscillation of an axis.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Oscillated {
-    /// The axis.
-    pub axis: AxisName,
-    /// The finding, and the action taken.
-    pub kind: OscillationKind,
-    /// Frequency, 0.1 Hz.
-    pub decihertz: u16,
-    /// Amplitude, um.
-    pub micrometres: u16,
-}
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::oscillation::OscillationReading;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::supervisor::Oscillated;
 
 /// The memory of the report.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

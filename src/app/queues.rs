@@ -7,14 +7,14 @@ use heapless_queues::spsc::{Consumer, Producer, Queue};
 use super::Axis;
 use crate::app::capture::Capture;
 use crate::app::telemetry::{Sample, Sampler};
-use crate::law::axes::AxisName;
-use crate::law::cancelling::SpindleSpeed;
-use crate::law::command::Command;
-use crate::law::injection::{Injection, VoltageBlock};
-use crate::law::reference::Segment;
-use crate::law::safety::Operation;
-use crate::law::scalar::Scalar;
-use crate::law::stage::Plan;
+use quadrant_law::axes::AxisName;
+use quadrant_law::cancelling::SpindleSpeed;
+use quadrant_law::command::Command;
+use quadrant_law::injection::{Injection, VoltageBlock};
+use quadrant_law::reference::Segment;
+use quadrant_law::safety::Operation;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::Plan;
 
 /// An order of the server to the control law, which takes one a tick.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

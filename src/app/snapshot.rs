@@ -1,18 +1,18 @@
-//! The slow half's view of the fast one, taken once every [`PERIOD_TICKS`](crate::app::supervisor::PERIOD_TICKS).
+//! The slow half's view of the fast one, taken once every [`PERIOD_TICKS`](quadrant_law::supervisor::PERIOD_TICKS).
 
-use crate::law::admission::StageView;
-use crate::law::axes::PerAxis;
-use crate::law::axis::AxisState;
-use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::injection::InjectionProgress;
-use crate::law::learning::LearningReading;
-use crate::law::safety::Switches;
-use crate::law::safety::monitor::FollowingState;
-use crate::law::safety::oscillation::OscillationReading;
-use crate::law::scalar::Scalar;
-use crate::law::stage::{StageRef, StageState};
-use crate::law::telemetry::LimitedBy;
-use crate::law::units::{EncoderCount, Position};
+use quadrant_law::admission::StageView;
+use quadrant_law::axes::PerAxis;
+use quadrant_law::axis::AxisState;
+use quadrant_law::axis::telemetry::LimitedBy;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::injection::InjectionProgress;
+use quadrant_law::learning::LearningReading;
+use quadrant_law::safety::Switches;
+use quadrant_law::safety::monitor::FollowingState;
+use quadrant_law::safety::oscillation::OscillationReading;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{StageRef, StageState};
+use quadrant_law::units::{EncoderCount, Position};
 
 /// One axis in a [`Snapshot`].
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

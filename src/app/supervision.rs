@@ -4,9 +4,9 @@ use super::Snapshot;
 use super::friction_monitor::FrictionMonitor;
 use super::glitch_monitor::{GlitchEvent, GlitchMonitor, GlitchReadings, MAX_GLITCH_EVENTS};
 use super::oscillation_report::OscillationReport;
-use crate::app::supervisor::{Decision, Event, Supervisor};
-use crate::law::command::Command;
-use crate::law::scalar::Scalar;
+use quadrant_law::command::Command;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::supervisor::{Decision, Event, Supervisor};
 
 /// The result of one run of the supervising task.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -2,21 +2,28 @@
 
 use quadrant_link::message::{self as wire, text};
 
-use super::supervisor;
-use crate::law::axes::AxisName;
-use crate::law::learning::LearningStatus;
-use crate::law::motion::MotionMode;
-use crate::law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use crate::law::safety::SafetyState;
-use crate::law::safety::oscillation::OscillationKind;
-use crate::law::telemetry::LimitedBy;
-use crate::settings::{self, PlanSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::axis::telemetry::LimitedBy;
+use quadrant_law::learning::LearningStatus;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_law::safety::SafetyState;
+use quadrant_law::safety::oscillation::OscillationKind;
+use quadrant_law::supervisor;
+use quadrant_settings::{self as settings, PlanSettings};
+
+/// A type of the link made of the law's or of the settings', or the other way. All of them are other crates', so this cannot be
+/// `From`.
+pub trait Translated<T> {
+    /// The same in this type.
+    fn translated(value: T) -> Self;
+}
 
 // The link's bound holds every value of the settings.
 const _: () = assert!(settings::MAX_VALUE_BYTES == wire::MAX_VALUE_BYTES);
 
-impl From<AxisName> for wire::AxisName {
-    fn from(axis: AxisName) -> Self {
+impl Translated<AxisName> for wire::AxisName {
+    fn translated(axis: AxisName) -> Self {
         match axis {
             AxisName::X => Self::X,
             AxisName::Y => Self::Y,
@@ -25,8 +32,8 @@ impl From<AxisName> for wire::AxisName {
     }
 }
 
-impl From<wire::AxisName> for AxisName {
-    fn from(axis: wire::AxisName) -> Self {
+impl Translated<wire::AxisName> for AxisName {
+    fn translated(axis: wire::AxisName) -> Self {
         match axis {
             wire::AxisName::X => Self::X,
             wire::AxisName::Y => Self::Y,
@@ -35,8 +42,8 @@ impl From<wire::AxisName> for AxisName {
     }
 }
 
-impl From<LimitedBy> for wire::LimitedBy {
-    fn from(limit: LimitedBy) -> Self {
+impl Translated<LimitedBy> for wire::LimitedBy {
+    fn translated(limit: LimitedBy) -> Self {
         match limit {
             LimitedBy::Nothing => Self::Nothing,
             LimitedBy::OutputLimit => Self::OutputLimit,
@@ -44,24 +51,22 @@ impl From<LimitedBy> for wire::LimitedBy {
     }
 }
 
-impl LearningStatus {
-    /// The state of an axis that learns; none for one that does not.
-    pub(super) const fn on_the_link(self) -> Option<wire::LearningState> {
-        Some(match self {
-            Self::Off => return None,
-            Self::Learning => wire::LearningState::Learning,
-            Self::AtRest => wire::LearningState::AtRest,
-            Self::OtherMotion => wire::LearningState::OtherMotion,
-            Self::Saturated => wire::LearningState::Saturated,
-            Self::Settling => wire::LearningState::Settling,
-            Self::Fading => wire::LearningState::Fading,
-        })
-    }
+/// The state of an axis that learns; none for one that does not.
+pub(super) const fn learning_state(status: LearningStatus) -> Option<wire::LearningState> {
+    Some(match status {
+        LearningStatus::Off => return None,
+        LearningStatus::Learning => wire::LearningState::Learning,
+        LearningStatus::AtRest => wire::LearningState::AtRest,
+        LearningStatus::OtherMotion => wire::LearningState::OtherMotion,
+        LearningStatus::Saturated => wire::LearningState::Saturated,
+        LearningStatus::Settling => wire::LearningState::Settling,
+        LearningStatus::Fading => wire::LearningState::Fading,
+    })
 }
 
-impl From<SafetyState> for wire::MachineState {
+impl Translated<SafetyState> for wire::MachineState {
     #[inline(always)]
-    fn from(state: SafetyState) -> Self {
+    fn translated(state: SafetyState) -> Self {
         match state {
             SafetyState::Start => Self::Start,
             SafetyState::Disabled => Self::Disabled,
@@ -72,8 +77,8 @@ impl From<SafetyState> for wire::MachineState {
     }
 }
 
-impl From<OscillationKind> for wire::OscillationKind {
-    fn from(kind: OscillationKind) -> Self {
+impl Translated<OscillationKind> for wire::OscillationKind {
+    fn translated(kind: OscillationKind) -> Self {
         match kind {
             OscillationKind::Hum => Self::Hum,
             OscillationKind::Added => Self::Added,
@@ -82,8 +87,8 @@ impl From<OscillationKind> for wire::OscillationKind {
     }
 }
 
-impl From<MotionMode> for wire::AxisMode {
-    fn from(mode: MotionMode) -> Self {
+impl Translated<MotionMode> for wire::AxisMode {
+    fn translated(mode: MotionMode) -> Self {
         match mode {
             MotionMode::Hold => Self::Hold,
             MotionMode::Plan => Self::Plan,
@@ -96,35 +101,35 @@ impl From<MotionMode> for wire::AxisMode {
     }
 }
 
-impl From<supervisor::Event> for wire::Event {
-    fn from(event: supervisor::Event) -> Self {
+impl Translated<supervisor::Event> for wire::Event {
+    fn translated(event: supervisor::Event) -> Self {
         use supervisor::Event;
         match event {
             Event::Enabled => Self::Enabled,
             Event::Disabled => Self::Disabled,
             Event::Faulted(fault) => Self::Fault {
                 code: fault.code.number(),
-                axis: fault.axis.map(Into::into),
+                axis: fault.axis.map(Translated::translated),
             },
             Event::Stopping(fault) => Self::Stopping {
                 code: fault.code.number(),
-                axis: fault.axis.map(Into::into),
+                axis: fault.axis.map(Translated::translated),
             },
             Event::Held(fault) => Self::Held {
                 code: fault.code.number(),
-                axis: fault.axis.map(Into::into),
+                axis: fault.axis.map(Translated::translated),
             },
             Event::MotionStarted => Self::MotionStarted,
             Event::MotionFinished => Self::MotionFinished,
-            Event::MovedWhileOff(axis) => Self::MovedWhileOff(axis.into()),
+            Event::MovedWhileOff(axis) => Self::MovedWhileOff(Translated::translated(axis)),
             Event::FrictionChanged(change) => Self::FrictionChanged {
-                axis: change.axis.into(),
+                axis: Translated::translated(change.axis),
                 percent: change.percent,
                 needs_maintenance: change.needs_maintenance,
             },
             Event::Oscillated(found) => Self::Oscillated {
-                axis: found.axis.into(),
-                kind: found.kind.into(),
+                axis: Translated::translated(found.axis),
+                kind: Translated::translated(found.kind),
                 decihertz: found.decihertz,
                 micrometres: found.micrometres,
             },
@@ -133,24 +138,24 @@ impl From<supervisor::Event> for wire::Event {
     }
 }
 
-impl From<wire::Plan> for PlanSettings {
-    fn from(plan: wire::Plan) -> Self {
+impl Translated<wire::Plan> for PlanSettings {
+    fn translated(plan: wire::Plan) -> Self {
         Self {
-            motions: plan.motions.map(Into::into),
+            motions: plan.motions.map(Translated::translated),
         }
     }
 }
 
-impl From<PlanSettings> for wire::Plan {
-    fn from(plan: PlanSettings) -> Self {
+impl Translated<PlanSettings> for wire::Plan {
+    fn translated(plan: PlanSettings) -> Self {
         Self {
-            motions: plan.motions.map(Into::into),
+            motions: plan.motions.map(Translated::translated),
         }
     }
 }
 
-impl From<wire::Motion> for MotionSettings {
-    fn from(motion: wire::Motion) -> Self {
+impl Translated<wire::Motion> for MotionSettings {
+    fn translated(motion: wire::Motion) -> Self {
         match motion {
             wire::Motion::Hold => Self::Hold,
             wire::Motion::Harmonic(wire::Harmonic {
@@ -181,8 +186,8 @@ impl From<wire::Motion> for MotionSettings {
     }
 }
 
-impl From<MotionSettings> for wire::Motion {
-    fn from(motion: MotionSettings) -> Self {
+impl Translated<MotionSettings> for wire::Motion {
+    fn translated(motion: MotionSettings) -> Self {
         match motion {
             MotionSettings::Hold => Self::Hold,
             MotionSettings::Harmonic(HarmonicSettings {

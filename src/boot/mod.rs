@@ -7,13 +7,13 @@ use core::mem::MaybeUninit;
 
 use quadrant::app::crash_record::CrashCause;
 use quadrant::app::{Axis, Control, ControlEnds, Intake, Server, ServerParts};
-use quadrant::axes::AxisName;
 use quadrant::hal::ResetCause;
 use quadrant::link::message::NumberType;
-use quadrant::safety::{FaultCode, Operation};
-use quadrant::scalar::Scalar;
-use quadrant::settings::StageSettings;
-use quadrant::stage::Plan;
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::{FaultCode, Operation};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::Plan;
+use quadrant_settings::StageSettings;
 
 use self::settings::{Loaded, count_start, load};
 use crate::board::{self, SettingsFlash};

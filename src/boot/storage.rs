@@ -4,9 +4,9 @@ use core::mem::MaybeUninit;
 
 use quadrant::app::capture::CAPTURE_WORDS;
 use quadrant::app::{Axis, Control, Intake, Queues, Server};
-use quadrant::scalar::Scalar;
-use quadrant::settings::StageSettings;
 use quadrant::store::BUFFER_BYTES;
+use quadrant_law::scalar::Scalar;
+use quadrant_settings::StageSettings;
 
 use crate::board::SettingsFlash;
 

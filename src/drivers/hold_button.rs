@@ -1,6 +1,6 @@
 //! A button that is a dead man's switch.
 
-use crate::law::command::Command;
+use quadrant_law::command::Command;
 
 /// Ticks for which a button must read the same before it counts, 3.2 ms at 10 kHz: contacts bounce.
 pub const DEBOUNCE_TICKS: u32 = u32::BITS;

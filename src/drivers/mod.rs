@@ -6,5 +6,4 @@ pub mod counter;
 pub mod dma_ring;
 pub mod hold_button;
 pub mod input_filter;
-pub mod noise_shaper;
 pub mod tick_interval;

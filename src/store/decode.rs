@@ -7,11 +7,11 @@ use serde::Deserialize;
 
 use super::format::{FORMAT, Head, RecordHead};
 use super::provenance::Provenance;
-use crate::settings::parts::{PARTS, part_below_axis, part_of};
-use crate::settings::path::{ANY_AXIS, Path, below_axis, of_any_axis, of_axis};
-use crate::settings::tree::{TreeError, is_leaf, leaves};
-use crate::settings::value::{KIND_PART, take_bytes};
-use crate::settings::{SettingsError, StageSettings};
+use quadrant_settings::parts::{PARTS, part_below_axis, part_of};
+use quadrant_settings::path::{ANY_AXIS, Path, below_axis, of_any_axis, of_axis};
+use quadrant_settings::tree::{TreeError, is_leaf, leaves};
+use quadrant_settings::value::{KIND_PART, take_bytes};
+use quadrant_settings::{SettingsError, StageSettings};
 
 /// Reason why bytes are refused as settings.
 #[derive(Clone, Debug, PartialEq)]

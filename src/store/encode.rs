@@ -5,11 +5,11 @@ use core::any::Any;
 use serde::Serialize;
 
 use super::format::{FORMAT, Head, RecordHead};
-use crate::settings::StageSettings;
-use crate::settings::parts::PARTS;
-use crate::settings::path::{Path, below_axis, of_any_axis};
-use crate::settings::tree::{MAX_VALUE_BYTES, axis_leaf, leaves};
-use crate::settings::value::{KIND_PART, kind, to_bytes};
+use quadrant_settings::StageSettings;
+use quadrant_settings::parts::PARTS;
+use quadrant_settings::path::{Path, below_axis, of_any_axis};
+use quadrant_settings::tree::{MAX_VALUE_BYTES, axis_leaf, leaves};
+use quadrant_settings::value::{KIND_PART, kind, to_bytes};
 
 /// Settings are longer than their room.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -27,8 +27,8 @@ pub use provenance::{PROVENANCE_BYTES, Provenance};
 use core::fmt;
 
 use crate::hal::SettingsFlash;
-use crate::settings::{SettingsError, StageSettings};
 use log::{Log, Newest, SEQUENCE_BYTES};
+use quadrant_settings::{SettingsError, StageSettings};
 
 /// Room for one set while it is written or read; a test fills it with the longest.
 pub const BUFFER_BYTES: usize = 7 * 1024;

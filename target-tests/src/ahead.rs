@@ -6,7 +6,7 @@ use std::collections::VecDeque;
 
 use anyhow::{Result, ensure};
 use quadrant::lockstep::InputRecord;
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 
 use crate::reference_model::{ReferenceModel, Tally};
 
@@ -62,7 +62,7 @@ pub(crate) fn run<F: Firmware>(
 
 #[cfg(test)]
 mod tests {
-    use quadrant::units::DacCode;
+    use quadrant_law::units::DacCode;
     use xtask::image::Scalar;
 
     use super::*;

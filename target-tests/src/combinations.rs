@@ -2,12 +2,12 @@
 //! target, bit for bit, and what each law and each feedforward costs.
 
 use anyhow::{Result, ensure};
-use quadrant::cancelling::CancellingSettings;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::learning::LearningSettings;
-use quadrant::lockstep::Job;
-use quadrant::settings::AxisSettings;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
+use quadrant_settings::AxisSettings;
+use quadrant_settings::Job;
 
 use crate::reference_model::{self, ReferenceModel};
 use crate::{count, lockstep};

@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use anyhow::{Context, Result, ensure};
-use quadrant::axes::AxisName;
+use quadrant_law::axes::AxisName;
 use quadrant_sim::client::Client;
 use quadrant_sim::commission::{CommissionSettings, commission};
 use quadrant_sim::identify::static_friction::StaticFrictionSettings;

@@ -5,7 +5,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use anyhow::{Result, bail};
-use quadrant::lockstep::Job;
+use quadrant_settings::Job;
 use serde::{Deserialize, Serialize};
 
 use crate::kinds::{Kinds, USUAL, emulated, usual};

@@ -5,7 +5,7 @@ use std::collections::{BTreeMap, HashMap};
 use std::io::Read;
 
 use anyhow::Result;
-use quadrant::command::Command;
+use quadrant_law::command::Command;
 
 use crate::faults::approach::moving;
 use crate::faults::case::configuration;

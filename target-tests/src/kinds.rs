@@ -3,8 +3,9 @@
 use std::ops::Range;
 
 use anyhow::{Context, Result, ensure};
-use quadrant::lockstep::{BASE, InputRecord, Job, Mode, OutputRecord, RECORDED_OUTPUTS};
-use quadrant::safety::Switches;
+use quadrant::lockstep::{BASE, InputRecord, Mode, OutputRecord, RECORDED_OUTPUTS};
+use quadrant_law::safety::Switches;
+use quadrant_settings::Job;
 use quadrant_sim::machine::emulator::Memory;
 
 use crate::hosted;

@@ -5,9 +5,10 @@ use std::time::Instant;
 use anyhow::{Context, Result, bail, ensure};
 use indicatif::{ProgressBar, ProgressStyle};
 use quadrant::lockstep::{
-    InputRecord, Job, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
+    InputRecord, Mode, OutputRecord, RECORDED_INPUTS, RECORDED_OUTPUTS, RECORDED_TICKS,
 };
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
+use quadrant_settings::Job;
 use quadrant_sim::machine::emulator::{Clock, Emulator, Lockstep, Memory};
 
 use crate::ahead;

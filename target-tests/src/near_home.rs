@@ -1,6 +1,6 @@
 //! Axes that are homed within a few hundred ticks: they stand on their home switches.
 
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::plant::MarkParameters;
 
 /// Tick in which the outputs of a machine that homes and then runs its plan are asked for.

@@ -4,15 +4,17 @@ use std::marker::PhantomData;
 use std::path::Path;
 
 use anyhow::{Context, Result, ensure};
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::motion::MotionMode;
-use quadrant::scalar::{Fixed, Scalar};
-use quadrant::stage::Outputs;
+use quadrant::lockstep::InputRecord;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::scalar::{Fixed, Scalar};
+use quadrant_law::stage::Outputs;
+use quadrant_settings::Job;
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
 use quadrant_sim::machine::emulator::Program;
+use quadrant_sim::machine::emulator::{input_of, record_of};
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::settings_file::SettingsFile;
@@ -66,7 +68,7 @@ pub(crate) trait Law {
 
 impl<S: Scalar> Law for LawMachine<S, FIRMWARE_ELEMENTS> {
     fn tick(&mut self, input: &InputRecord) -> Outputs {
-        LawMachine::tick(self, input)
+        LawMachine::tick(self, &input_of(input))
     }
 
     fn runs_homed(&self) -> bool {
@@ -144,7 +146,7 @@ impl ReferenceModel {
 
     /// Returns the inputs of the next tick, for firmware and reference model.
     fn input(&mut self) -> InputRecord {
-        self.plant.read_inputs(self.operator.request(self.tick))
+        record_of(&self.plant.read_inputs(self.operator.request(self.tick)))
     }
 
     /// The reference model's own answer.

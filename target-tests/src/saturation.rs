@@ -2,7 +2,7 @@
 //! same motion in quiet.
 
 use anyhow::{Context, Result, ensure};
-use quadrant::command::Command;
+use quadrant_law::command::Command;
 
 use crate::faults::approach::moving;
 use crate::faults::case::configuration;

@@ -2,25 +2,24 @@
 
 /// The stages, each by the beginning of the path of its functions. Of an instruction's inlined frames, the outermost
 /// one found here decides: friction evaluated for the feedforward is feedforward.
-const STAGES: [(&str, &str); 12] = [
+const STAGES: [(&str, &str); 11] = [
     ("quadrant_firmware::board::", "inputs and outputs"),
-    ("quadrant::law::encoder::", "encoders"),
-    ("quadrant::law::reference::", "reference"),
-    ("quadrant::law::control::", "feedback"),
-    ("quadrant::law::feedforward::", "feedforward"),
-    ("quadrant::law::friction::", "friction"),
-    ("quadrant::law::safety::", "safety"),
-    ("quadrant::law::telemetry::", "telemetry"),
+    ("quadrant_law::encoder::", "encoders"),
+    ("quadrant_law::reference::", "reference"),
+    ("quadrant_law::control::", "feedback"),
+    ("quadrant_law::feedforward::", "feedforward"),
+    ("quadrant_law::friction::", "friction"),
+    ("quadrant_law::safety::", "safety"),
     ("quadrant::app::telemetry::", "telemetry"),
-    ("quadrant::law::units::", "units"),
+    ("quadrant_law::units::", "units"),
     ("heapless::", "queues"),
     ("quadrant_firmware::app::__rtic_internal_", "spawning"),
 ];
 
 /// Functions that hold the stages together, innermost first; they count only where no stage does.
 const FRAMES: [(&str, &str); 4] = [
-    ("quadrant::law::axis::", "axis"),
-    ("quadrant::law::stage::", "stage"),
+    ("quadrant_law::axis::", "axis"),
+    ("quadrant_law::stage::", "stage"),
     ("quadrant_firmware::", "interrupt"),
     ("rtic::", "interrupt"),
 ];
@@ -45,7 +44,7 @@ pub(crate) fn of<'a>(functions: impl Iterator<Item = &'a str> + Clone) -> Option
     stage.or_else(frame).map(|(_, name)| *name)
 }
 
-/// `<quadrant::law::axis::Axis<f32>>::tick` belongs to `quadrant::axis`; references to a type, too.
+/// `<quadrant_law::axis::Axis<f32>>::tick` belongs to `quadrant_law::axis`; references to a type, too.
 fn path(function: &str) -> &str {
     function.trim_start_matches(['<', '&', '[', '('])
 }
@@ -58,15 +57,15 @@ mod tests {
     fn the_outermost_stage_decides() {
         let frames = [
             "CONTROL_TICK",
-            "<quadrant::law::axis::Axis<f32>>::tick",
-            "quadrant::law::feedforward::f",
-            "quadrant::law::friction::g",
+            "<quadrant_law::axis::Axis<f32>>::tick",
+            "quadrant_law::feedforward::f",
+            "quadrant_law::friction::g",
         ];
         assert_eq!(of(frames.into_iter()), Some("feedforward"));
         assert_eq!(of(frames[..2].iter().copied()), Some("axis"));
         let frames = [
             "quadrant_firmware::app::control",
-            "quadrant::law::axis::Axis::drive",
+            "quadrant_law::axis::Axis::drive",
         ];
         assert_eq!(of(frames.into_iter()), Some("axis"));
         assert_eq!(of(["core::ptr::read"].into_iter()), None);

@@ -1,13 +1,9 @@
-//! The rules of the repository that its texts can be held to: layers, import circles, module style, doc comments, and that
-//! documentation names only what exists. Every check reads the sources as text, so it also sees code of other targets.
+//! The rules of the repository that its texts can be held to: doc comments, and that documentation names only what exists. Every check reads the sources as text, so it also sees code of other targets.
 //! `ARCHITECTURE.md` gives the reason of each rule.
 #![forbid(unsafe_code)]
 
-mod circles;
 mod commands;
 mod comments;
-mod crate_modules;
-mod layers;
 mod lexer;
 mod maps;
 mod markdown;

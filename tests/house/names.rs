@@ -247,12 +247,15 @@ fn names_of(name: &str) -> (Vec<String>, BTreeSet<String>) {
             .filter(|token| token.kind == Kind::Literal)
             .flat_map(|token| split(token.text));
         let mut variants = Vec::new();
+        // Within the parentheses of an attribute or of a variant there is none.
+        let mut depth = 0;
         for now in all[at + 2..].windows(2) {
+            depth += i32::from(now[0].is_sign("(")) - i32::from(now[0].is_sign(")"));
             if now[0].is_sign("}") || now[1].is_sign("}") {
                 break;
             }
             let starts = [",", "{", "]"].iter().any(|sign| now[0].is_sign(sign));
-            if starts && now[1].kind == Kind::Word {
+            if starts && depth == 0 && now[1].kind == Kind::Word {
                 variants.push(kebab_case(now[1].text));
             }
         }

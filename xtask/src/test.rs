@@ -256,6 +256,11 @@ pub(crate) fn firmware_only(toolchain: Toolchain) -> Result<bool> {
             check.args(["--package", "quadrant", "--lib", "--profile", "firmware"]);
             command::run(check.args(["--target", triple]))
         });
+        report.step(format!("the law alone for {triple}"), || {
+            let mut check = toolchain.cargo("check");
+            check.args(["--package", "quadrant-law", "--profile", "firmware"]);
+            command::run(check.args(["--target", triple]))
+        });
     }
     report.step("the page of the bench", || web::build(toolchain).map(drop));
     Ok(report.finish())

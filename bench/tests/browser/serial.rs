@@ -3,11 +3,11 @@
 
 use std::time::{Duration, Instant};
 
-use quadrant::axes::AxisName;
 use quadrant::link::watch::{LinkWatch, Seen};
-use quadrant::safety::{AxisSwitches, Switches};
-use quadrant::settings::StageSettings;
 use quadrant_chromium::Browser;
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::{AxisSwitches, Switches};
+use quadrant_settings::StageSettings;
 use quadrant_sim::machine::simulated::SimulatedMachine;
 use quadrant_sim::plant::StageParameters;
 use serde_json::{Value, json};

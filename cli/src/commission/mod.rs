@@ -9,8 +9,8 @@ use std::time::Duration;
 
 use anyhow::{Context, anyhow, bail};
 use clap::Args;
-use quadrant::axes::AxisName;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::page::{commission_page, gains_table, results_table};
 use quadrant_sim::commission::{
     CommissionError, CommissionSettings, Commissioned, CrossCheck, commission, plan, plan_table,
@@ -833,7 +833,10 @@ mod tests {
         let failure = done.failure.unwrap();
         assert!(failure.contains(&*kept.to_string_lossy()), "{failure}");
         let axis = &SettingsFile::read(&kept).unwrap().stage.axes[0];
-        assert_eq!(axis.feedback.law, quadrant::control::feedback::LawKind::Pid);
+        assert_eq!(
+            axis.feedback.law,
+            quadrant_law::control::feedback::LawKind::Pid
+        );
         assert!(!folder.path().join(SETTINGS).exists());
         assert_eq!(done.data["applied"], false);
         assert_eq!(machine.settings().unwrap(), before);

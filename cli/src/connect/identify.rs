@@ -1,9 +1,9 @@
 //! `identify`: measurements on the connected machine, by the code of `quadrant identify`.
 
 use anyhow::Context;
-use quadrant::axes::AxisName;
-use quadrant::settings::AxisSettings;
 use quadrant_cli::terminal;
+use quadrant_law::axes::AxisName;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::client::Client;
 use quadrant_sim::identify::frf::FrfSettings;
 use quadrant_sim::identify::motion::{MotionFitSettings, fit_motion, recommended};

@@ -3,7 +3,7 @@
 use std::time::Duration;
 
 use quadrant::link::message::{AxisName, Inputs};
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 use quadrant_sim::machine::simulated_io::INPUTS;
 use serde_json::{Value, json};
 

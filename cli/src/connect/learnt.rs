@@ -1,8 +1,8 @@
 //! The friction that the axes have learnt: how it is shown, and how it is kept.
 
-use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisLearning, Learning};
 use quadrant_cli::axis::Axis;
+use quadrant_law::axes::AxisName;
 use quadrant_sim::client::Client;
 use quadrant_sim::client::adopt;
 use serde_json::{Value, json};

@@ -1,11 +1,12 @@
 //! Identity and status of the machine, and orders to it.
 
+use quadrant::app::Translated;
 use std::fmt::Write as _;
 
 use anyhow::{Context, bail};
-use quadrant::axes::AxisName;
 use quadrant::link::message::{self, AxisSet, Body, Status};
-use quadrant::safety::FaultCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::FaultCode;
 use quadrant_sim::client::settings::{self, whole_path};
 use quadrant_sim::client::{Client, settle, with_reset};
 use quadrant_sim::machine::serial_ports;
@@ -96,7 +97,7 @@ pub(super) fn axis_lines(status: &Status) -> Vec<String> {
         lines.push(format!(
             "{axis:<4}  {homed:<5}  {mode:<8}  {position:>11}  {error:>9}  {output:>8}  {limit:<12}  {mark:>9.3}",
             axis = axis.as_str(),
-            homed = if status.homed.contains(axis.into()) {
+            homed = if status.homed.contains(Translated::translated(axis)) {
                 "yes"
             } else {
                 "no"
@@ -248,7 +249,7 @@ fn to_home(client: &mut Client, axes: &[Axis]) -> anyhow::Result<AxisSet> {
     // The machine says why none of them can.
     Ok(match ready.is_empty() {
         true => AxisSet::ALL,
-        false => ready.into_iter().map(Into::into).collect(),
+        false => ready.into_iter().map(Translated::translated).collect(),
     })
 }
 

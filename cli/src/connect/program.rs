@@ -1,5 +1,6 @@
 //! Plans and part programs.
 
+use quadrant::app::Translated;
 use std::f64::consts::TAU;
 use std::path::Path;
 use std::time::Duration;
@@ -7,8 +8,8 @@ use std::time::Duration;
 use anyhow::{Context, bail};
 use indicatif::ProgressBar;
 use quadrant::link::message::Body;
-use quadrant::reference::{Sense, circle};
-use quadrant::settings::PlanSettings;
+use quadrant_law::reference::{Sense, circle};
+use quadrant_settings::PlanSettings;
 use quadrant_sim::client::set_points::{references_mm, set_points, stream};
 use quadrant_sim::client::{Client, settings, settle};
 use quadrant_sim::gcode::{Limits, Program, Trajectory};
@@ -23,7 +24,7 @@ pub(super) fn plan(client: &mut Client, file: &Path) -> anyhow::Result<Answer> {
         std::fs::read_to_string(file).with_context(|| format!("cannot read {}", file.display()))?;
     let plan: PlanSettings =
         toml::from_str(&text).with_context(|| format!("{} is no plan", file.display()))?;
-    client.order(Body::SetPlan(plan.into()))?;
+    client.order(Body::SetPlan(Translated::translated(plan)))?;
     Ok(Answer::new("`run` starts it", json!(plan)))
 }
 
@@ -55,7 +56,9 @@ pub(super) fn circle_plan(client: &mut Client, options: &CircleOptions) -> anyho
         closed.turns,
         closed.lead_s,
     );
-    client.order(Body::SetPlan(PlanSettings { motions }.into()))?;
+    client.order(Body::SetPlan(Translated::translated(PlanSettings {
+        motions,
+    })))?;
     let duration_s = closed.duration_s;
     let text = format!(
         "a circle of {} mm in {} at {feed_mm_s:.3} mm/s: {duration_s:.3} s, {} from where the axes stand and back; `run` starts it",

@@ -1,6 +1,6 @@
 //! A session with a machine.
 
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 use quadrant_sim::client::Client;
 use quadrant_sim::client::settings::Before;
 

@@ -1,7 +1,7 @@
 //! Inputs, supply and log of a machine that is not real.
 
 use anyhow::{Context, bail};
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 use quadrant_sim::client::Client;
 use quadrant_sim::machine::simulated_io::{INPUTS, SimulatedIo, without};
 use serde_json::json;

@@ -2,8 +2,8 @@
 
 use anyhow::bail;
 use clap::Args;
-use quadrant::control::plant_model::PlantModel;
 use quadrant_cli::output::{Output, command_line, share};
+use quadrant_law::control::plant_model::PlantModel;
 use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear, filtered_proof};
 use quadrant_sim::design::pages::npid::NonlinearPage;
 use quadrant_sim::design::robustness::{Uncertainty, robustness};

@@ -4,10 +4,10 @@ use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::AxisSettings;
 use quadrant_cli::output::Output;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::design::Form;
 use quadrant_sim::settings_file::SettingsFile;
 

@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};
 use quadrant_sim::identify::frf::{

@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant::friction::FrictionSettings;
-use quadrant::settings::AxisSettings;
+use quadrant_law::friction::FrictionSettings;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::pages::friction::{friction_section, friction_table};
 use quadrant_sim::identify::single_state::with_all_models;

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail, ensure};
 use clap::Args;
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::identify::motion::{
     Candidate, CascadeLoop, MotionFitSettings, Signals, fit_motion, recommended, recommended_by,
     refined, replay_closed_loop, replay_open_loop, shuttle, validate,

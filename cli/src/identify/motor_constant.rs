@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
 use quadrant_sim::identify::motor_constant::{
     MotorConstant, MotorConstantSettings, evaluate, measure,

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use quadrant::control::nctf::NctfGains;
-use quadrant::control::surface::SurfaceGains;
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::nctf::NctfGains;
+use quadrant_law::control::surface::SurfaceGains;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::zero_gain_settings;
 use quadrant_sim::identify::characteristic::{
     Characteristic, CharacteristicSettings, evaluate, measure,

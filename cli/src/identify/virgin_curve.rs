@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use anyhow::Context;
 use clap::Args;
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::identify::pages::friction::{gms_table, presliding_section};
 use quadrant_sim::identify::single_state::with_all_models;

@@ -8,11 +8,11 @@ use std::path::PathBuf;
 
 use anyhow::{Context, bail};
 use clap::Args;
-use quadrant::axes::AxisName;
-use quadrant::settings::{AxisSettings, StageSettings};
 use quadrant_cli::axis::Axis;
 use quadrant_cli::output::command_line;
 use quadrant_cli::{say, warn};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::{Travel, enter_limits};
 use quadrant_sim::report::whole;
 use quadrant_sim::settings_file::{SettingsFile, defaults_at, without_law};

@@ -4,8 +4,8 @@ use std::fmt::Write as _;
 use std::path::Path;
 
 use crate::command::succeed;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::AxisSettings;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::settings_file::SettingsFile;
 
 /// A column of the verdict, law by law.

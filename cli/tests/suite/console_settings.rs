@@ -4,8 +4,8 @@ use crate::command;
 use std::path::Path;
 use std::process::Output;
 
-use quadrant::settings::StageSettings;
-use quadrant::settings::tree::is_part;
+use quadrant_settings::StageSettings;
+use quadrant_settings::tree::is_part;
 use serde_json::Value;
 
 /// Gives a script to a machine that has just been switched on.

@@ -1,12 +1,13 @@
 //! The commands `quadrant design pid` and `npid`, from end to end.
 
 use crate::command;
+use quadrant_settings::response::LinearResponse;
 use std::path::Path;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::popov::filtered_sector_bound;
-use quadrant::settings::StageSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_settings::StageSettings;
+use quadrant_settings::popov::filtered_sector_bound;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::identify::response::{FrequencyResponse, ResponsePoint};
 use quadrant_sim::report::whole;
@@ -82,7 +83,7 @@ fn one_design_builds_on_another_and_the_settings_tell_both() {
     let axes: Vec<&str> = file.provenance.iter().map(|p| p.axis.as_str()).collect();
     assert_eq!(axes, ["y", "y"]);
     assert_eq!(file.provenance[1].sets, ["feedback.nonlinear"]);
-    let default = quadrant::settings::presets::y_axis();
+    let default = quadrant_settings::presets::y_axis();
     assert!(file.stage.axes[1].feedback.pid.kp_v_per_mm > default.feedback.pid.kp_v_per_mm);
     assert!(at.join("npid/npid.html").exists());
 }

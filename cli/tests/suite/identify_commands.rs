@@ -4,7 +4,7 @@ use crate::command;
 use std::fs;
 use std::path::Path;
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::identify::response::FrequencyResponse;
 use quadrant_sim::machine::StageSetup;
 use quadrant_sim::report::whole;

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::command::{fail, succeed};
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::report::whole;
 use quadrant_sim::setting_value::changes;
 use quadrant_sim::settings_file::SettingsFile;

@@ -4,7 +4,7 @@ use crate::command;
 use std::fs;
 use std::path::Path;
 
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::settings_file::SettingsFile;
 
 /// Options that describe a machine whole.

@@ -1,13 +1,13 @@
 //! One axis of the law on a plant, behind an encoder that may die.
 
-use quadrant::axes::AxisName;
-use quadrant::axis::{Axis, AxisState};
-use quadrant::command::Command;
-use quadrant::encoder::EncoderReading;
-use quadrant::reference::{Motion, MotionSettings, Velocity};
-use quadrant::safety::FaultCode;
-use quadrant::scalar::Scalar;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::axis::{Axis, AxisState};
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::reference::{Motion, MotionSettings, Velocity};
+use quadrant_law::safety::FaultCode;
+use quadrant_law::scalar::Scalar;
+use quadrant_settings::StageSettings;
 
 use crate::plant::{Encoder, Plant};
 

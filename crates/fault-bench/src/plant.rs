@@ -2,7 +2,7 @@
 
 use std::collections::VecDeque;
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::noise::Noise;
 

@@ -13,18 +13,18 @@ use quadrant::app::{
     Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
     TimingStatistics,
 };
-use quadrant::command::Command;
-use quadrant::encoder::EncoderReading;
 use quadrant::hal::{Serial, SettingsFlash};
 use quadrant::link::frame::{self, FRAME_BYTES, Receiver};
 use quadrant::link::message::{
     Body, LinkError, Message, Notice, NumberType, Reply, Request, TelemetryBlock,
 };
-use quadrant::safety::FaultCode;
-use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::stage::{Outputs, StageState};
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
-use quadrant::units::POSITION_FRACTION_BITS;
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::stage::{Outputs, StageState};
+use quadrant_law::units::POSITION_FRACTION_BITS;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use crate::flash::{Flash, FlashError};
 use crate::noise::Noise;

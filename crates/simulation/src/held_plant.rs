@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 
 use nalgebra::{Matrix2, Matrix3, Vector2};
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
+use quadrant_law::control::plant_model::PlantModel;
 
 /// A linear axis behind a converter that holds each voltage for a period, with any delay, whole periods or not.
 #[derive(Clone, Copy, Debug, PartialEq)]

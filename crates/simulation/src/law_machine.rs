@@ -2,15 +2,51 @@
 
 use std::collections::VecDeque;
 
-use quadrant::app::supervisor::{Event, PERIOD_TICKS, Supervisor};
-use quadrant::axes::{AxisName, PerAxis};
-use quadrant::cancelling::SpindleSpeed;
-use quadrant::command::Command;
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{Motion, Segment};
-use quadrant::scalar::Scalar;
-use quadrant::settings::SettingsError;
-use quadrant::stage::{Inputs, Outputs, Plan, Stage, StageState};
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::cancelling::SpindleSpeed;
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::reference::{Motion, Segment};
+use quadrant_law::safety::Switches;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Inputs, Outputs, Plan, Stage, StageState};
+use quadrant_law::supervisor::{Event, PERIOD_TICKS, Supervisor};
+use quadrant_settings::Job;
+use quadrant_settings::SettingsError;
+
+/// What a machine reads in a tick: the law's inputs, and a person's request to the supervisor.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct TickInput {
+    /// The encoders' readings.
+    pub readings: [EncoderReading; 3],
+    /// The digital inputs.
+    pub switches: Switches,
+    /// True if the host that started the motion has fallen silent.
+    pub link_lost: bool,
+    /// The request.
+    pub request: Option<Command>,
+}
+
+impl TickInput {
+    /// Fresh and valid raw counts and a request: a stage without switches and index pulses.
+    pub fn of_counts(counts: [u32; 3], request: Option<Command>) -> Self {
+        Self {
+            readings: counts.map(EncoderReading::of),
+            request,
+            ..Self::default()
+        }
+    }
+
+    /// The law's inputs; the request goes to the supervisor.
+    pub fn inputs(&self) -> Inputs {
+        Inputs {
+            readings: self.readings.into(),
+            switches: self.switches,
+            link_lost: self.link_lost,
+            ..Inputs::default()
+        }
+    }
+}
 
 /// Control law, supervisor, and what passes between them.
 #[derive(Clone, Debug)]
@@ -117,7 +153,7 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
     }
 
     /// Runs one control period.
-    pub fn tick(&mut self, input: &InputRecord) -> Outputs {
+    pub fn tick(&mut self, input: &TickInput) -> Outputs {
         self.feed_stream();
         let inputs = Inputs {
             command: self.command.take(),

@@ -24,9 +24,9 @@ pub mod toml_file;
 
 #[cfg(test)]
 mod fixtures {
-    use quadrant::control::pid::PidGains;
-    use quadrant::settings::presets;
-    pub(crate) use quadrant::settings::presets::X_PLANT;
+    use quadrant_law::control::pid::PidGains;
+    use quadrant_settings::presets;
+    pub(crate) use quadrant_settings::presets::X_PLANT;
 
     /// The proportional and derivative gains of the x axis, chosen with its plant.
     pub(crate) const X_GAINS: PidGains = PidGains {

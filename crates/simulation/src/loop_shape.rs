@@ -1,9 +1,10 @@
 //! The open loop of an axis: plant times controller, seen by its frequency response.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
-use quadrant::control::{pid::PidGains, plant_model::PlantModel};
+use quadrant_law::control::{pid::PidGains, plant_model::PlantModel};
 
 use crate::held_plant::HeldPlant;
 

@@ -318,7 +318,7 @@ mod tests {
     use super::*;
     use crate::fixtures::{X_GAINS, X_PLANT};
     use crate::loop_shape::{ContinuousLoop, SampledLoop};
-    use quadrant::control::{pid::PidGains, plant_model::PlantModel};
+    use quadrant_law::control::{pid::PidGains, plant_model::PlantModel};
 
     const CONTINUOUS: ContinuousLoop = ContinuousLoop {
         plant: X_PLANT,

@@ -1,34 +1,36 @@
-//! A setting's value as it crosses the link, and as JSON; and what differs between settings.
+//! A setting's value in bytes, as it crosses the link, and as JSON; and what differs between settings.
 
-use quadrant::axes::AxisName;
-use quadrant::link::message::{MAX_VALUE_BYTES, Value};
-use quadrant::settings::StageSettings;
-use quadrant::settings::tree::{TreeError, is_part};
+use heapless::Vec as Bounded;
+use quadrant_law::axes::AxisName;
+use quadrant_settings::tree::{TreeError, is_part};
+use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 /// Room for every value as JSON.
 const JSON_BYTES: usize = 2048;
+
+/// A value: the number of its kind, and its bytes.
+pub type Encoded = (u8, Bounded<u8, MAX_VALUE_BYTES>);
 
 /// The value at a path of some settings, or whether a part that may be left out is there.
 ///
 /// # Errors
 /// A path that there is not, or one in a part that is left out.
-pub fn of(settings: &StageSettings, path: &str) -> Result<Value, TreeError> {
-    let mut value = Value::default();
+pub fn of(settings: &StageSettings, path: &str) -> Result<Encoded, TreeError> {
+    let mut bytes = Bounded::new();
     // Cannot fail: that is its capacity.
-    let _ = value.bytes.resize_default(MAX_VALUE_BYTES);
-    let (kind, length) = settings.get_bytes(path, &mut value.bytes)?;
-    value.kind = kind;
-    value.bytes.truncate(length);
-    Ok(value)
+    let _ = bytes.resize_default(MAX_VALUE_BYTES);
+    let (kind, length) = settings.get_bytes(path, &mut bytes)?;
+    bytes.truncate(length);
+    Ok((kind, bytes))
 }
 
 /// A value of this path as JSON.
 ///
 /// # Errors
 /// A path that there is not, or a value that is none of it.
-pub fn to_json(path: &str, value: &Value) -> Result<String, TreeError> {
+pub fn to_json(path: &str, kind: u8, bytes: &[u8]) -> Result<String, TreeError> {
     let mut own = with_parts_of(path)?;
-    own.set_bytes(path, value.kind, &value.bytes)?;
+    own.set_bytes(path, kind, bytes)?;
     let mut json = [0; JSON_BYTES];
     let length = own.get_json(path, &mut json)?;
     Ok(String::from_utf8_lossy(&json[..length]).into_owned())
@@ -38,7 +40,7 @@ pub fn to_json(path: &str, value: &Value) -> Result<String, TreeError> {
 ///
 /// # Errors
 /// A path that there is not, or a value that is none of it.
-pub fn from_json(path: &str, json: &str) -> Result<Value, TreeError> {
+pub fn from_json(path: &str, json: &str) -> Result<Encoded, TreeError> {
     let mut own = with_parts_of(path)?;
     own.set_json(path, json.as_bytes())?;
     of(&own, path)
@@ -209,7 +211,7 @@ mod tests {
             .unwrap();
         for path in paths {
             let value = of(&full, &path).unwrap();
-            let json = to_json(&path, &value).unwrap();
+            let json = to_json(&path, value.0, &value.1).unwrap();
             assert_eq!(from_json(&path, &json).unwrap(), value, "{path}");
         }
     }
@@ -278,8 +280,8 @@ mod tests {
             ("/axes/1/feedback/law", "\"n-pid\""),
             ("/axes/2/feedback/nonlinear", "null"),
         ] {
-            let value = from_json(path, json).unwrap();
-            assert_eq!(to_json(path, &value).unwrap(), json, "{path}");
+            let (kind, bytes) = from_json(path, json).unwrap();
+            assert_eq!(to_json(path, kind, &bytes).unwrap(), json, "{path}");
         }
         assert!(from_json("/axes/0/feedback/pid/kp_v_per_mm", "\"much\"").is_err());
         assert!(from_json("/axes/0/nothing", "1").is_err());

@@ -11,18 +11,18 @@ use std::time::Instant;
 use std::{array, fs, io};
 
 use parameters::{ELEMENTS, NODES, Parameters, node, surface_end};
-use quadrant::control::feedback::Feedback;
-use quadrant::control::terms::{FeedbackInput, FeedbackState};
-use quadrant::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
-use quadrant::friction::Direction;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::friction::stribeck::SlidingTable;
-use quadrant::lockstep::InputRecord;
-use quadrant::scalar::Scalar;
-use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
+use quadrant_law::control::feedback::Feedback;
+use quadrant_law::control::terms::{FeedbackInput, FeedbackState};
+use quadrant_law::feedforward::{Feedforward, FeedforwardKind, FeedforwardState, ReferenceStep};
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::friction::stribeck::SlidingTable;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::machine::benchmark_job::circle_and_sine;
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{
     AxisParameters, PLANT_ELEMENTS, SUBSTEPS, SimulatedStage, StageParameters,
@@ -117,7 +117,7 @@ fn whole_tick_ns() -> f64 {
     let mut operator = Operator::runs_the_plan();
     let start = Instant::now();
     for tick in 0..TICKS as u32 {
-        let inputs = InputRecord::of_counts(stage.read_counters(), operator.request(tick));
+        let inputs = TickInput::of_counts(stage.read_counters(), operator.request(tick));
         stage.step(&machine.tick(&inputs));
     }
     let taken = start.elapsed();

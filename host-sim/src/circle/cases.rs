@@ -1,6 +1,6 @@
 //! Circles of a test, grouped for its tables and figures.
 
-use quadrant::reference::{Plane, Sense};
+use quadrant_law::reference::{Plane, Sense};
 
 use crate::circle::request::{CircleCase, CircleResult, CircleTest};
 use crate::experiment::configuration::Configuration;

@@ -1,6 +1,6 @@
 //! The circle tests' figures: paths as a ball-bar draws them, and what grows with the feed.
 
-use quadrant::reference::Sense;
+use quadrant_law::reference::Sense;
 
 use crate::circle::cases::{
     Circle, axes_of, configurations, deviation_mm, plane_name, planes, sense_name,

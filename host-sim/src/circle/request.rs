@@ -1,6 +1,6 @@
 //! A whole circle test: every plane, radius, feed and configuration, both senses.
 
-use quadrant::reference::{Plane, Sense};
+use quadrant_law::reference::{Plane, Sense};
 use rayon::prelude::*;
 
 use crate::circle::roundness::{Both, both};

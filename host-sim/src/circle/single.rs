@@ -1,6 +1,6 @@
 //! The one circle of the comparison: XY, counter-clockwise, every configuration.
 
-use quadrant::reference::{Plane, Sense};
+use quadrant_law::reference::{Plane, Sense};
 use rayon::prelude::*;
 
 use crate::circle::turn::{CircleRefusal, NominalCircle, run_turn};

@@ -1,6 +1,6 @@
 //! The spikes at the four reversals of a turn.
 
-use quadrant::reference::Sense;
+use quadrant_law::reference::Sense;
 
 /// Angles at which an axis reverses, rad: on the plane's first axis, on its second, and opposite of each.
 pub const AT_RAD: [f64; 4] = [

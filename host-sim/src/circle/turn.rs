@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::lockstep::Job;
-use quadrant::reference::{Plane, Sense, circle};
-use quadrant::settings::PlanSettings;
+use quadrant_law::reference::{Plane, Sense, circle};
+use quadrant_settings::Job;
+use quadrant_settings::PlanSettings;
 
 use crate::circle::path::Point;
 use crate::circle::roundness::{LeastSquares, range};
@@ -52,7 +52,7 @@ pub enum CircleRefusal {
     },
     /// An axis' limits do not allow it.
     #[error("{0}; choose a lower feed or a larger radius")]
-    Limits(quadrant::settings::SettingsError),
+    Limits(quadrant_settings::SettingsError),
     /// The settings are refused, or the stage switched off.
     #[error(transparent)]
     Run(#[from] RunError),

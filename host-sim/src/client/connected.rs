@@ -1,10 +1,11 @@
 //! A connected machine as one that is measured.
 
+use quadrant::app::Translated;
 use std::error::Error;
 
-use quadrant::axes::AxisName;
 use quadrant::link::message::Body;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
 
 use super::session::Client;
 use super::settings;
@@ -41,7 +42,7 @@ impl Machine for Client {
         let limits = &stage.axes[axis as usize].limits;
         let travel = limits
             .travel_mm
-            .filter(|_| status.homed.contains(axis.into()));
+            .filter(|_| status.homed.contains(Translated::translated(axis)));
         let room = travel.map(|travel| Travel {
             negative_mm: here - travel.negative,
             positive_mm: travel.positive - here,

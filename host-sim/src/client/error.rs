@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use quadrant::link::PROTOCOL_VERSION;
 use quadrant::link::message::LinkError;
-use quadrant::settings::tree::TreeError;
+use quadrant_settings::tree::TreeError;
 
 /// Reason why a request was not carried out.
 #[derive(Debug, thiserror::Error)]
@@ -129,7 +129,7 @@ pub enum ClientError {
         /// Name of the fault code.
         name: String,
         /// Axis of the fault, if it has one.
-        axis: Option<quadrant::axes::AxisName>,
+        axis: Option<quadrant_law::axes::AxisName>,
         /// Control tick of the fault.
         tick: u32,
         /// Cause, as the machine words it.

@@ -1,5 +1,6 @@
 //! The client's end of the link: requests and their answers, and the notices between them.
 
+use quadrant::app::Translated;
 use std::collections::VecDeque;
 use std::io;
 use std::time::{Duration, Instant};
@@ -10,7 +11,7 @@ use quadrant::link::message::{
     Reply, Request, SettingsRequest, Status,
 };
 use quadrant::link::message::{MachineState, TelemetryBlock};
-use quadrant::safety::FaultCode;
+use quadrant_law::safety::FaultCode;
 
 use super::error::ClientError;
 use super::flat::{flatten_answer, flatten_notice};
@@ -389,7 +390,7 @@ impl Client {
                     what,
                     code: fault.code,
                     name: fault.name.as_str().to_owned(),
-                    axis: fault.axis.map(Into::into),
+                    axis: fault.axis.map(Translated::translated),
                     tick: fault.tick,
                     cause: fault.cause.as_str().to_owned(),
                     remedy: fault.remedy.as_str().to_owned(),
@@ -419,7 +420,7 @@ impl Client {
                     name: fault
                         .map_or("of a later release", FaultCode::name)
                         .to_owned(),
-                    axis: axis.map(Into::into),
+                    axis: axis.map(Translated::translated),
                     tick,
                     cause: fault
                         .map_or("unknown to this program", FaultCode::cause)

@@ -2,8 +2,8 @@
 
 use heapless::String as Bounded;
 use quadrant::link::message::{Applied, Body, Reply, SettingsRequest, Value as LeafValue};
-use quadrant::settings::StageSettings;
-use quadrant::settings::tree::{expand, is_part};
+use quadrant_settings::StageSettings;
+use quadrant_settings::tree::{expand, is_part};
 use quadrant_simulation::setting_value::{self, short};
 use serde::Serialize;
 use serde_json::Value;
@@ -28,9 +28,11 @@ pub fn get(client: &mut Client, path: &str) -> Result<Value, ClientError> {
 
 /// The bytes of a value as JSON.
 fn decode(path: &str, value: &LeafValue) -> Result<Value, ClientError> {
-    let json = setting_value::to_json(path, value).map_err(|source| ClientError::Setting {
-        path: short(path),
-        source,
+    let json = setting_value::to_json(path, value.kind, &value.bytes).map_err(|source| {
+        ClientError::Setting {
+            path: short(path),
+            source,
+        }
     })?;
     Ok(serde_json::from_str(&json).unwrap_or_else(|_| Value::from(json)))
 }
@@ -86,9 +88,10 @@ pub fn against(client: &mut Client, file: &StageSettings) -> Result<Vec<Differen
     let _ = file.list("", &mut |path| paths.push(path.to_owned()));
     let mut differences = Vec::new();
     for path in paths {
-        let Ok(wanted) = setting_value::of(file, &path) else {
+        let Ok((kind, bytes)) = setting_value::of(file, &path) else {
             continue;
         };
+        let wanted = LeafValue { kind, bytes };
         let acting = acting(client, &path)?;
         let other = decode(&path, &wanted)?;
         if acting.as_ref() != Some(&other) {
@@ -127,11 +130,12 @@ pub fn set(client: &mut Client, path: &str, value: &str) -> Result<(), ClientErr
         Ok(_) => value.to_owned(),
         Err(_) => Value::from(value).to_string(),
     };
-    let value = setting_value::from_json(path, &json).map_err(|source| ClientError::Setting {
-        path: format!("{} = {json}", short(path)),
-        source,
-    })?;
-    set_bytes(client, path, value)
+    let (kind, bytes) =
+        setting_value::from_json(path, &json).map_err(|source| ClientError::Setting {
+            path: format!("{} = {json}", short(path)),
+            source,
+        })?;
+    set_bytes(client, path, LeafValue { kind, bytes })
 }
 
 fn set_bytes(client: &mut Client, path: &str, value: LeafValue) -> Result<(), ClientError> {
@@ -485,9 +489,10 @@ fn change(
     wanted: &StageSettings,
     changed: &mut Vec<String>,
 ) -> Result<bool, ClientError> {
-    let Ok(value) = setting_value::of(wanted, path) else {
+    let Ok((kind, bytes)) = setting_value::of(wanted, path) else {
         return Ok(false);
     };
+    let value = LeafValue { kind, bytes };
     if get_bytes(client, path)? != value {
         set_bytes(client, path, value)?;
         changed.push(short(path));

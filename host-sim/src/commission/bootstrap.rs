@@ -2,14 +2,14 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::control::filter::{FilterList, FilterSettings};
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
-use quadrant::friction::PerDirection;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::filter::{FilterList, FilterSettings};
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_settings::AxisSettings;
 
 use crate::design::{Form, Process};
 
@@ -228,7 +228,7 @@ const QUIET_FILTER: f64 = 0.07;
 
 #[cfg(test)]
 mod tests {
-    use quadrant::settings::presets::{X_PLANT, x_axis, y_axis, z_axis};
+    use quadrant_settings::presets::{X_PLANT, x_axis, y_axis, z_axis};
 
     use super::*;
     use crate::design::{SampledLoop, margins};

@@ -1,6 +1,6 @@
 //! The chain: motor constant, response, plant, PID, friction, pre-sliding, revised model, N-PID, verdict.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use super::bootstrap::{low_bandwidth_settings_on, measuring_settings, zero_gain_settings};
 use super::commissioned::{CommissionSettings, Commissioned};

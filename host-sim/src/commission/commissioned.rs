@@ -1,6 +1,6 @@
 //! Request and result of a commissioning.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use super::guard::Run;
 use super::verify::Verification;

@@ -1,6 +1,6 @@
 //! Cross-checks of a finished commissioning: the response at rest, which friction bends, and an ordinary motion.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
 use super::error::CommissionError;

@@ -1,6 +1,6 @@
 //! Reasons why a commissioning ends early.
 
-use quadrant::settings::SettingsError;
+use quadrant_settings::SettingsError;
 
 use super::ringing::Ringing;
 use super::verify::VerifyError;

@@ -5,7 +5,7 @@
 //! one that strays from its plan, and its limit of the velocity one that is too fast to come to rest within the
 //! travel that is left. Both are set from the travel, for every experiment, and are not those that are handed over.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use super::ringing::{Ringing, ringing};
 use crate::machine::{
@@ -240,8 +240,8 @@ impl TestAxis for Guard<'_> {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::reference::{MotionSettings, PointToPointSettings};
-    use quadrant::settings::StageSettings;
+    use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+    use quadrant_settings::StageSettings;
 
     use super::*;
     use crate::machine::SimulatedTestAxis;

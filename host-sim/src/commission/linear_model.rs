@@ -1,8 +1,8 @@
 //! The linear model of an axis of which hardly more is known than what the open-loop test showed: its response under first controllers,
 //! until one of them holds it.
 
-use quadrant::safety::FaultCode;
-use quadrant::settings::AxisSettings;
+use quadrant_law::safety::FaultCode;
+use quadrant_settings::AxisSettings;
 
 use super::bootstrap::{
     BOOTSTRAP_SHARES, CROSSOVER_HZ, soft_bootstrap_settings, with_output_limit,

@@ -1,18 +1,18 @@
 //! From the measurements of a commissioning to its models and settings: without an axis.
 
 use heapless::Vec as ShortVec;
-use quadrant::axis::MAX_PREVIEW_TICKS;
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::filtered_sector_bound;
-use quadrant::feedforward::{FeedforwardGains, FeedforwardKind};
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
-use quadrant::friction::stribeck::StaticFriction;
-use quadrant::friction::{FrictionSettings, PerDirection};
-use quadrant::settings::leaves::LEAST_STIFFNESS_V_PER_MM;
-use quadrant::settings::{AxisSettings, FeedbackSettings};
+use quadrant_law::axis::MAX_PREVIEW_TICKS;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_law::friction::{FrictionSettings, PerDirection};
+use quadrant_settings::leaves::LEAST_STIFFNESS_V_PER_MM;
+use quadrant_settings::popov::filtered_sector_bound;
+use quadrant_settings::{AxisSettings, FeedbackSettings};
 
 use super::bootstrap::rough_sliding;
 use super::commissioned::{ASSUMED_RANGE_MM, CommissionSettings, Commissioned};
@@ -458,7 +458,7 @@ fn identify_elements(
 
 #[cfg(test)]
 mod tests {
-    use quadrant::settings::StageSettings;
+    use quadrant_settings::StageSettings;
 
     use super::*;
     use crate::identify::static_friction::FrictionRun;

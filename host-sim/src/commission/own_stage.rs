@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::sync::Mutex;
 
-use quadrant::axes::AxisName;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::{AxisSettings, StageSettings};
 use rayon::prelude::*;
 
 use super::chain::commission;

@@ -4,7 +4,7 @@
 //! table that stands still. A PID that oscillates there shakes the axis loose, and the friction that is measured or fed forward is not
 //! the one that acts.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
 use super::linear_model::HOME_MM;

@@ -3,9 +3,9 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::settings::AxisSettings;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_settings::AxisSettings;
 
 use super::bootstrap::measuring_settings;
 use super::drift::Drift;
@@ -836,7 +836,7 @@ pub fn run_sine(
 
 #[cfg(test)]
 mod tests {
-    use quadrant::settings::StageSettings;
+    use quadrant_settings::StageSettings;
 
     use super::*;
 

@@ -27,8 +27,8 @@ struct Headline {
 
 /// The headlines, in the order of the abstract.
 const HEADLINES: [Headline; 7] = {
-    use quadrant::control::feedback::LawKind::{self, NPid, Pid};
-    use quadrant::feedforward::FeedforwardKind as F;
+    use quadrant_law::control::feedback::LawKind::{self, NPid, Pid};
+    use quadrant_law::feedforward::FeedforwardKind as F;
     const fn c(controller: LawKind, feedforward: F) -> Configuration {
         Configuration {
             controller,

@@ -1,10 +1,10 @@
 //! One configuration on sines of up to three velocities: x on 30 mm at 5, 10 and 15 mm/s unless others are asked for.
 
-use quadrant::axes::AxisName;
-use quadrant::lockstep::Job;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::scalar::Scalar;
-use quadrant::settings::PlanSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::scalar::Scalar;
+use quadrant_settings::Job;
+use quadrant_settings::PlanSettings;
 
 use crate::experiment::configuration::{Configuration, ELEMENTS};
 use crate::experiment::metrics::{Score, score};

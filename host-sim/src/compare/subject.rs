@@ -1,7 +1,7 @@
 //! Subject of a comparison: the stage, its sines, and the laws that run on them.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 
 use crate::compare::sine::Sines;
 use crate::experiment::configuration::{Configuration, Gains};
@@ -111,7 +111,7 @@ impl Subject {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::axes::AxisName;
+    use quadrant_law::axes::AxisName;
 
     use super::*;
     use crate::compare::sine::VELOCITIES_MM_S;
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn a_commissioned_axis_is_compared_as_commissioning_left_it_or_fed_where_that_kept_the_pid() {
         let mut stage = identified_settings().unwrap().stage;
-        let subject = |stage: &quadrant::settings::StageSettings| {
+        let subject = |stage: &quadrant_settings::StageSettings| {
             let setup = RunConfiguration::commissioned(
                 stage.clone(),
                 StageParameters::real(),

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;

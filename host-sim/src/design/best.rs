@@ -3,9 +3,9 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::pid::PidGains;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::pid::PidGains;
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
@@ -104,7 +104,7 @@ pub fn load_step_error(process: &Process, gains: &PidGains, form: Form) -> f64 {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::control::plant_model::PlantModel;
+    use quadrant_law::control::plant_model::PlantModel;
 
     use super::*;
     use crate::design::fixtures::{FILTER_S, X_PLANT, Y_PLANT, Z_PLANT};

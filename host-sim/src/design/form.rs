@@ -1,7 +1,8 @@
 //! Continuous or sampled: the form in which a loop is closed.
 
 use num_complex::Complex64;
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
+use quadrant_settings::response::LinearResponse;
 
 use super::loop_shape::controller_response;
 

@@ -4,7 +4,7 @@
 //! largest Ki that a stated set of margins does not notice, rounded down to two significant digits, so that it can be
 //! written down and found again.
 
-use quadrant::control::{pid::PidGains, plant_model::PlantModel};
+use quadrant_law::control::{pid::PidGains, plant_model::PlantModel};
 
 use super::form::Form;
 use super::margins::Margins;
@@ -101,8 +101,8 @@ pub fn largest_integral_gain(
 /// Acceptable to 0.05 dB and 0.05 deg of the loop without integral action, for instance:
 ///
 /// ```
-/// # use quadrant::control::pid::PidGains;
-/// # use quadrant::settings::presets::{X_GAINS, X_PLANT};
+/// # use quadrant_law::control::pid::PidGains;
+/// # use quadrant_settings::presets::{X_GAINS, X_PLANT};
 /// # use quadrant_sim::design::{Form, Process, largest_integral_gain_where};
 /// # let gains = PidGains { ki_v_per_mm_s: 0.0, ..X_GAINS };
 /// let process = Process::Model(X_PLANT);

@@ -1,9 +1,10 @@
 //! A loop closed around a measured frequency response, without a model.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 
 use super::form::Form;
 use super::loop_shape::{OpenLoop, controller_response};

@@ -2,7 +2,7 @@
 //!
 //! Everything here works on [`OpenLoop`], a frequency response with a band: the continuous textbook form, the exact
 //! sampled form with the controller's own difference equations, or anything else that answers with a complex number.
-//! How much *nonlinear* gain a design then bears is [`quadrant::control::popov::sector_bound`]'s answer.
+//! How much *nonlinear* gain a design then bears is [`quadrant_settings::popov::sector_bound`]'s answer.
 
 mod bandwidth;
 pub mod best;
@@ -40,8 +40,8 @@ pub use shaping::{ShapingError, shape_to_crossover, shape_to_margins};
 
 #[cfg(test)]
 mod fixtures {
-    use quadrant::control::pid::PidGains;
-    pub(crate) use quadrant::settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
+    use quadrant_law::control::pid::PidGains;
+    pub(crate) use quadrant_settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 
     /// The derivative filter of all axes, s.
     pub(crate) const FILTER_S: f64 = 52e-6;

@@ -5,10 +5,10 @@
 //! of [`super::best_pid`], and within wider ones when every mode lies 5 % lower or higher. Some modes need no filter, since the
 //! loop is fast or slow enough to leave them alone or has a phase there that damps them; a filter must pay for itself.
 
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::filtered_sector_bound;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::popov::filtered_sector_bound;
 
 use super::form::Form;
 use super::margins::Margins;

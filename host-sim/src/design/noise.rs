@@ -3,7 +3,7 @@
 use std::f64::consts::PI;
 
 use num_complex::Complex64;
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;

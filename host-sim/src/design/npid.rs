@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::{SectorProof, filtered_sector_bound, sector_proof};
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::popov::{SectorProof, filtered_sector_bound, sector_proof};
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
@@ -134,7 +134,7 @@ pub fn choose_nonlinear(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use quadrant::settings::presets::{X_GAINS, X_PLANT};
+    use quadrant_settings::presets::{X_GAINS, X_PLANT};
 
     #[test]
     fn line_and_circle_are_those_of_the_proof_where_there_is_no_filter() {

@@ -1,6 +1,6 @@
 //! A PID to order: margins, crossover, or the stiffest loop under bounds on sensitivity.
 
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 
 use super::bandwidth::{NoLoop, PeakBounds, stiffest};
 use super::form::Form;

@@ -1,7 +1,8 @@
 //! Process that a controller is designed on: a model of the axis or its measured response, closed in continuous time or
 //! as it runs.
 
-use quadrant::control::{filter::FilterSettings, pid::PidGains, plant_model::PlantModel};
+use quadrant_law::control::{filter::FilterSettings, pid::PidGains, plant_model::PlantModel};
+use quadrant_settings::response::{LinearResponse, denominator, sampled_filter_response};
 
 use super::form::Form;
 use super::loop_shape::{ContinuousLoop, OpenLoop, SampledLoop};
@@ -54,7 +55,9 @@ pub struct ModalLoop<'a> {
 fn filters_at(filters: &[FilterSettings], form: Form, omega_rad_s: f64) -> Complex64 {
     let each = filters.iter().map(|filter| match form {
         Form::Continuous => filter.response(omega_rad_s),
-        Form::Sampled { sample_time_s, .. } => filter.sampled_response(omega_rad_s, sample_time_s),
+        Form::Sampled { sample_time_s, .. } => {
+            sampled_filter_response(filter, omega_rad_s, sample_time_s)
+        }
     });
     each.product()
 }
@@ -214,7 +217,7 @@ impl Process {
                 };
                 // Above the resonance, where delay and inertia turn on: from there the phase only falls.
                 let lag = |omega: f64| {
-                    (-damped.denominator(omega).arg()) - omega * plant.delay_s
+                    (-denominator(&damped, omega).arg()) - omega * plant.delay_s
                         > -std::f64::consts::PI
                 };
                 let lowest = plant.stiffness_per_s2.sqrt().max(1e-3);

@@ -1,10 +1,10 @@
 //! Popov bound of an axis that differs from its model.
 
 use nalgebra::{Matrix4, Vector4};
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::filtered_sector_bound;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::popov::filtered_sector_bound;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;

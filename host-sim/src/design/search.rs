@@ -10,7 +10,7 @@ use std::f64::consts::{PI, TAU};
 use argmin::core::{CostFunction, Executor};
 use argmin::solver::neldermead::NelderMead;
 use num_complex::Complex64;
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 use rayon::prelude::*;
 
 use super::form::Form;

@@ -4,7 +4,7 @@ use std::f64::consts::{PI, TAU};
 use std::fmt;
 
 use num_complex::Complex64;
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 
 use super::form::Form;
 use super::loop_shape::OpenLoop;
@@ -195,7 +195,7 @@ mod tests {
     use super::*;
     use crate::design::fixtures::{FILTER_S, X_GAINS, X_PLANT, Y_PLANT, Z_PLANT};
     use crate::design::{ContinuousLoop, margins};
-    use quadrant::control::plant_model::PlantModel;
+    use quadrant_law::control::plant_model::PlantModel;
 
     #[test]
     fn x_axis_gains_come_out_of_their_own_margins() {

@@ -1,11 +1,11 @@
 //! The step response of a linear axis under the firmware's own law, sample by sample.
 
-use quadrant::control::filter::{FilterSettings, Filters, FiltersState};
-use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
-use quadrant::control::pid::Pid;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::terms::FeedbackState;
+use quadrant_law::control::filter::{FilterSettings, Filters, FiltersState};
+use quadrant_law::control::npid::{NonlinearGain, NonlinearGainTable};
+use quadrant_law::control::pid::Pid;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::terms::FeedbackState;
 
 use super::held_plant::{HeldPlant, HeldPlantRun};
 

@@ -1,9 +1,9 @@
 //! Margins and the Popov bound, confirmed by running the loop: tests by a method that knows no frequency response.
 
 use proptest::prelude::*;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_bound;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::popov::sector_bound;
 use rand::{Rng, SeedableRng};
 use rand_xoshiro::Xoshiro256PlusPlus;
 

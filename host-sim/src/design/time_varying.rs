@@ -7,11 +7,11 @@
 
 use std::f64::consts::{PI, TAU};
 
-use quadrant::control::filter::{FilterSettings, Filters, FiltersState};
-use quadrant::control::pid::Pid;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::terms::FeedbackState;
+use quadrant_law::control::filter::{FilterSettings, Filters, FiltersState};
+use quadrant_law::control::pid::Pid;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::terms::FeedbackState;
 use rayon::prelude::*;
 
 use super::held_plant::{HeldPlant, HeldPlantRun};

@@ -1,8 +1,8 @@
 //! Feedback and feedforward laws in combination: the configurations that experiments compare.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::{AxisSettings, StageSettings};
 
 /// Room for GMS elements: the exact model has the plant's ten.
 pub const ELEMENTS: usize = 10;

@@ -1,9 +1,9 @@
 //! One run: a machine on a simulated stage, and the traces of its axes.
 
-use quadrant::lockstep::InputRecord;
-use quadrant::safety::SafetyState;
-use quadrant::scalar::Scalar;
-use quadrant::telemetry::AxisTelemetry;
+use quadrant_law::axis::telemetry::AxisTelemetry;
+use quadrant_law::safety::SafetyState;
+use quadrant_law::scalar::Scalar;
+use quadrant_simulation::law_machine::TickInput;
 
 use crate::machine::{LawMachine, Operator};
 use crate::plant::SimulatedStage;
@@ -44,12 +44,12 @@ impl AxisTrace {
 pub enum RunError {
     /// The settings are refused.
     #[error("settings refused: {0}")]
-    Settings(#[from] quadrant::settings::SettingsError),
+    Settings(#[from] quadrant_settings::SettingsError),
     /// The stage switched off.
     #[error("fault {number} on {axis} at tick {tick}: {cause}; {remedy}", number = .0.code.number(),
-        axis = .0.axis.map_or("the stage", quadrant::axes::AxisName::as_str), tick = .0.tick,
+        axis = .0.axis.map_or("the stage", quadrant_law::axes::AxisName::as_str), tick = .0.tick,
         cause = .0.code.cause(), remedy = .0.code.remedy())]
-    Fault(quadrant::safety::Fault),
+    Fault(quadrant_law::safety::Fault),
     /// The motion did not end.
     #[error("the motion has not ended after {0} ticks")]
     Endless(usize),
@@ -70,7 +70,7 @@ pub fn run<S: Scalar, const N: usize>(
     let mut traces: [AxisTrace; 3] = Default::default();
     let mut started = false;
     for tick in 0..most_ticks {
-        let outputs = machine.tick(&InputRecord::of_counts(
+        let outputs = machine.tick(&TickInput::of_counts(
             plant.read_counters(),
             operator.request(tick as u32),
         ));

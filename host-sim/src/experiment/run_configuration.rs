@@ -10,10 +10,10 @@
 
 use std::path::Path;
 
-use quadrant::axes::AxisName;
-use quadrant::control::feedback::LawKind;
-use quadrant::friction::stribeck::StaticFriction;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_settings::StageSettings;
 
 use crate::design::DesignError;
 use crate::design::best::{set_best_pid, with_best_pid};

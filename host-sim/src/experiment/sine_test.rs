@@ -1,8 +1,8 @@
 //! An axis on a sine, scored over its last whole cycles.
 
-use quadrant::lockstep::Job;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::settings::{
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_settings::Job;
+use quadrant_settings::{
     AxisSettings, BrakeSettings, OperationSettings, PlanSettings, StageSettings, StreamingSettings,
 };
 

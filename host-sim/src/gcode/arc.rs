@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::reference::{Plane, Sense};
+use quadrant_law::reference::{Plane, Sense};
 
 use crate::gcode::error::ProgramError;
 use crate::gcode::segment::{Segment, Vector};

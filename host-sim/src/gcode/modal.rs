@@ -1,6 +1,6 @@
 //! The state that codes leave behind for the lines that follow.
 
-use quadrant::reference::{Plane, Sense};
+use quadrant_law::reference::{Plane, Sense};
 
 use crate::gcode::error::ProgramError;
 use crate::gcode::lexer::Word;

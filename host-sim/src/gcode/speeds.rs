@@ -1,6 +1,6 @@
 //! Speed limits of a path: of each element, and of each joint between two elements.
 
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 
 use crate::gcode::error::ProgramError;
 use crate::gcode::interpret::Move;

@@ -1,6 +1,6 @@
 //! The speed along one segment: a jerk-limited rise to a peak, a stretch at it, and a jerk-limited fall.
 //!
-//! It is the S-curve of `quadrant::reference::PointToPoint`, which starts and ends at rest, between any two speeds: speed
+//! It is the S-curve of `quadrant_law::reference::PointToPoint`, which starts and ends at rest, between any two speeds: speed
 //! changes by a constant jerk up and a constant jerk down, with constant acceleration between them if its limit is reached.
 //! The acceleration is zero at both ends, so segments can follow one another without a jump of it. Source: Biagiotti and
 //! Melchiorri, *Trajectory Planning for Automatic Machines and Robots*, Springer 2008, section 3.4.

@@ -1,8 +1,8 @@
 //! The response of an axis at rest, where friction bends it: measured, and as a model with friction predicts it.
 
-use quadrant::control::plant_model::PlantModel;
-use quadrant::reference::MotionSettings;
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::reference::MotionSettings;
+use quadrant_settings::AxisSettings;
 
 use super::excitation::Excitation;
 use super::frf::{FrfSettings, SavedSettings, response_of, standstill};

@@ -6,7 +6,7 @@
 //! Source: Wahyudi, Sato and Shimokohbe, Precision Engineering 27 (2003).
 
 use heapless::Vec as Points;
-use quadrant::control::nctf::{CharacteristicPoint, MAX_POINTS};
+use quadrant_law::control::nctf::{CharacteristicPoint, MAX_POINTS};
 
 use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;

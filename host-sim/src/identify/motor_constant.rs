@@ -8,7 +8,7 @@
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
-use quadrant::safety::FaultCode;
+use quadrant_law::safety::FaultCode;
 
 use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;

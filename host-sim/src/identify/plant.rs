@@ -9,11 +9,12 @@
 //! handful of parameters would by chance ([`LEAST_DROP`]), and if its own parameters are determined; starts are tried over
 //! the band. Friction bends a response, too, but slowly over the frequency: no fit calls that a lightly damped mode.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
 use nalgebra::{DMatrix, DVector};
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
+use quadrant_law::control::plant_model::PlantModel;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
 use super::mode::{self, Mode, TRANSMITS};

@@ -8,12 +8,12 @@
 use std::fmt;
 
 use heapless::Vec as ShortVec;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::FrictionSettings;
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::{GmsElement, GmsParameters};
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::settings::{AxisSettings, SettingsError};
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_settings::{AxisSettings, SettingsError};
 use rayon::prelude::*;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit_with_step};

@@ -5,13 +5,13 @@
 //! both loops; the fit is the compromise. What a slow motion does not show is chosen: LuGre's sigma1 is the viscous
 //! friction, as much damping before sliding as in it.
 
-use quadrant::friction::FrictionSettings;
-use quadrant::friction::PerDirection;
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::gms::GmsParameters;
-use quadrant::friction::lugre::LugreParameters;
-use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
-use quadrant::friction::stribeck::StaticFriction;
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::gms::GmsParameters;
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
+use quadrant_law::friction::stribeck::StaticFriction;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit};
 
@@ -158,8 +158,8 @@ fn residuals(
 
 #[cfg(test)]
 mod tests {
-    use quadrant::friction::gms::{GmsElement, GmsParameters};
-    use quadrant::settings::StageSettings;
+    use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+    use quadrant_settings::StageSettings;
 
     use super::{fit_dahl, fit_lugre, with_all_models};
 

@@ -3,20 +3,21 @@
 
 use std::collections::VecDeque;
 
+use quadrant::app::Translated;
 use quadrant::app::{
     Axis, Control, Inputs, Intake, Poll, Queues, Server, ServerParts, Snapshot, Supervision,
     TimingStatistics,
 };
-use quadrant::command::Command;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
-use quadrant::lockstep::InputRecord;
-use quadrant::safety::FaultCode;
-use quadrant::scalar::Scalar;
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::{Outputs, StageState};
 use quadrant::store::{BUFFER_BYTES, LoadError, Loaded, Store};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::scalar::Scalar;
+use quadrant_law::stage::{Outputs, StageState};
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_simulation::law_machine::TickInput;
 
 use super::memory_flash::MemoryFlash;
 
@@ -143,7 +144,7 @@ impl<S: Scalar> Running<S> {
     }
 
     /// One control period, and what the slower tasks do before the next: the outputs, and what is to be done after it.
-    pub fn tick(&mut self, inputs: &InputRecord, serial: &mut impl Serial) -> (Outputs, Poll) {
+    pub fn tick(&mut self, inputs: &TickInput, serial: &mut impl Serial) -> (Outputs, Poll) {
         self.control.hear(self.intake.frames());
         let outputs = self.control.tick(&mut Inputs {
             command: self.commands.pop_front(),
@@ -171,7 +172,8 @@ impl<S: Scalar> Running<S> {
         self.control
             .show_glitches(self.supervision.glitch_readings());
         for event in supervised.events {
-            self.server.push_event(seen.tick, event);
+            self.server
+                .push_event(seen.tick, Translated::translated(event));
         }
         let after = self
             .server

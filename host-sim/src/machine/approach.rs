@@ -1,6 +1,6 @@
 //! Moving a test_axis's axis to a position between experiments.
 
-use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
 use super::test_axis::{AxisInfo, Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;

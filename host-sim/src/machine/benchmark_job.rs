@@ -1,8 +1,8 @@
 //! The motion that the firmware is emulated, counted and benchmarked with.
 
-use quadrant::lockstep::Job;
-use quadrant::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
-use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, Plane, Sense, circle};
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 /// A circle in XY and a sine in Z, without an end, on the simulated stage's settings: all axes move, and reverse, at different
 /// times. `lead_s` is the duration of the lead-in, s.

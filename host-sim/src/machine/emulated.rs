@@ -6,14 +6,16 @@
 
 use std::collections::VecDeque;
 
-use quadrant::app::supervisor::PERIOD_TICKS;
+use crate::machine::emulator::record_of;
 use quadrant::lockstep::{
-    FLASH, FLASH_BYTES, InputRecord, Job, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN,
-    LINK_OUT, LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
+    FLASH, FLASH_BYTES, InputRecord, LINK_BYTES, LINK_IN, LINK_IN_TAKEN, LINK_IN_WRITTEN, LINK_OUT,
+    LINK_OUT_SHOWN, LINK_OUT_TAKEN, Mode,
 };
-use quadrant::safety::Switches;
-use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::safety::Switches;
+use quadrant_law::stage::Outputs;
+use quadrant_law::supervisor::PERIOD_TICKS;
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, StageSettings};
 
 use super::emulator::{EmulatorError, Lockstep, Memory, Program};
 use super::stage_setup::StageSetup;
@@ -160,7 +162,7 @@ impl EmulatedMachine {
     }
 
     fn step(&mut self) -> Result<(), EmulatorError> {
-        let mut input = self.plant.read_inputs(None);
+        let mut input = record_of(&self.plant.read_inputs(None));
         input.switches = input.switches.with(self.pressed);
         self.outputs = match self.exchange(&input)? {
             Some(outputs) => outputs,

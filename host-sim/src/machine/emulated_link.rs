@@ -5,7 +5,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use quadrant::lockstep::FLASH_BYTES;
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 
 use super::emulated::EmulatedMachine;
 use super::emulator::Program;

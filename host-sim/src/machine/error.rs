@@ -2,7 +2,7 @@
 
 use std::error::Error;
 
-use quadrant::settings::SettingsError;
+use quadrant_settings::SettingsError;
 
 /// Reason why a machine cannot be measured.
 #[derive(Debug, thiserror::Error)]

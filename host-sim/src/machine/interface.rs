@@ -1,7 +1,7 @@
 //! A machine whose axes can be measured.
 
-use quadrant::axes::AxisName;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_settings::StageSettings;
 
 use super::error::MachineError;
 use super::test_axis::TestAxis;

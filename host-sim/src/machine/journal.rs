@@ -5,9 +5,9 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::io;
 use std::path::{Path, PathBuf};
 
-use quadrant::axes::AxisName;
-use quadrant::safety::{Fault, FaultCode};
-use quadrant::settings::AxisSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::safety::{Fault, FaultCode};
+use quadrant_settings::AxisSettings;
 use serde::{Deserialize, Serialize};
 
 use super::approach::approach;
@@ -562,7 +562,7 @@ mod tests {
         let mut journal = Journal::open(&mut again, folder.path(), true).unwrap();
         approach(&mut journal, 5.0).unwrap();
         let mut hold = hold(50);
-        hold.drive = Drive::ClosedLoop(quadrant::reference::MotionSettings::Hold);
+        hold.drive = Drive::ClosedLoop(quadrant_law::reference::MotionSettings::Hold);
         hold.injection_v = vec![0.0; 50];
         journal.perform(&hold, &mut |_| {}).unwrap();
         let difference_mm = (again.plant().position_mm() - left_mm).abs();

@@ -7,9 +7,9 @@ use std::collections::VecDeque;
 use quadrant::app::Poll;
 use quadrant::hal::Serial;
 use quadrant::link::message::NumberType;
-use quadrant::safety::Switches;
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::safety::Switches;
+use quadrant_law::stage::Outputs;
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 
 use super::application::{BoardIdentity, Running, Start};
 use super::memory_flash::MemoryFlash;

@@ -3,7 +3,7 @@
 use std::io;
 
 use quadrant::link::message;
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
 
 /// Inputs, supply and log of a machine that is not a real one.
 pub trait SimulatedIo {
@@ -48,8 +48,8 @@ pub const fn without(pressed: Switches, released: Switches) -> Switches {
 
 #[cfg(test)]
 mod tests {
-    use quadrant::axes::AxisName;
-    use quadrant::safety::AxisSwitches;
+    use quadrant_law::axes::AxisName;
+    use quadrant_law::safety::AxisSwitches;
 
     use super::*;
 

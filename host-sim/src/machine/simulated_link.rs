@@ -4,9 +4,9 @@ use std::io;
 use std::path::Path;
 use std::time::Duration;
 
-use quadrant::app::supervisor::PERIOD_TICKS;
 use quadrant::lockstep::FLASH_BYTES;
-use quadrant::safety::Switches;
+use quadrant_law::safety::Switches;
+use quadrant_law::supervisor::PERIOD_TICKS;
 
 use super::flash_file::FlashFile;
 use super::loopback::{Loopback, SimulatedPeer};

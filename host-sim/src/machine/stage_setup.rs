@@ -1,7 +1,7 @@
 //! Parts of a simulated machine that a person chooses: the stage that it drives, and its settings while nothing is stored.
 
-use quadrant::friction::Direction;
-use quadrant::settings::{
+use quadrant_law::friction::Direction;
+use quadrant_settings::{
     AxisSettings, HomeSwitch, HomingSettings, LimitSettings, StageSettings, TravelSettings,
 };
 
@@ -157,7 +157,7 @@ fn homing() -> HomingSettings {
 mod tests {
     use std::path::Path;
 
-    use quadrant::friction::gms::FIRMWARE_ELEMENTS;
+    use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
 
     use super::*;
 

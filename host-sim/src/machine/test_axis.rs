@@ -5,9 +5,9 @@
 
 use std::ops::Range;
 
-use quadrant::reference::MotionSettings;
-use quadrant::safety::{Fault, FaultCode};
-use quadrant::settings::{AxisSettings, SettingsError};
+use quadrant_law::reference::MotionSettings;
+use quadrant_law::safety::{Fault, FaultCode};
+use quadrant_settings::{AxisSettings, SettingsError};
 
 use super::error::MachineError;
 use crate::record::Recording;
@@ -286,7 +286,7 @@ impl ExperimentError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use quadrant::reference::{HarmonicSettings, PointToPointSettings};
+    use quadrant_law::reference::{HarmonicSettings, PointToPointSettings};
 
     #[test]
     fn a_motion_may_go_to_the_end_of_the_travel_that_it_goes_towards() {

@@ -2,8 +2,8 @@
 
 use std::time::Duration;
 
-use quadrant::app::supervisor::PERIOD_TICKS;
-use quadrant::settings::StageSettings;
+use quadrant_law::supervisor::PERIOD_TICKS;
+use quadrant_settings::StageSettings;
 
 /// Bytes that the port carries in a second: 921 600 baud.
 const PORT_BYTES_PER_S: f64 = 92_160.0;

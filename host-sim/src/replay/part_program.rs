@@ -1,9 +1,9 @@
 //! A part program on the simulated stage: the firmware's law follows it, and the true path is compared with the
 //! programmed one.
 
-use quadrant::reference::{Motion, RecordedTable};
-use quadrant::settings::StageSettings;
-use quadrant::units::Position;
+use quadrant_law::reference::{Motion, RecordedTable};
+use quadrant_law::units::Position;
+use quadrant_settings::StageSettings;
 use rayon::prelude::*;
 
 use crate::experiment::configuration::{Configuration, ELEMENTS};

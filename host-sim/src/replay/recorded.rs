@@ -3,16 +3,16 @@
 use std::fmt;
 
 use heapless::Vec as ShortVec;
-use quadrant::axes::AxisName;
-use quadrant::control::feedback::LawKind;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::{GmsElement, GmsParameters};
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::reference::{Motion, MotionScale, RecordedTable};
-use quadrant::settings::{AxisSettings, StageSettings};
-use quadrant::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::reference::{Motion, MotionScale, RecordedTable};
+use quadrant_law::units::Position;
+use quadrant_settings::{AxisSettings, StageSettings};
 use rayon::prelude::*;
 
 use crate::design::best::set_best_pid;
@@ -160,7 +160,7 @@ pub fn emps_axis() -> Result<Axis, ReplayError> {
         stiffness_per_s2: 0.0,
         delay_s: emps::DELAY_S,
     };
-    let mut settings = quadrant::settings::presets::x_axis();
+    let mut settings = quadrant_settings::presets::x_axis();
     let filter_s = settings.feedback.pid.derivative_filter_s;
     let mut pid = shape_to_margins(
         &Process::Model(plant),
@@ -255,8 +255,8 @@ pub enum ReplayError {
     SampleTime { sample_time_s: f64, period_s: f64 },
 }
 
-impl From<quadrant::settings::SettingsError> for ReplayError {
-    fn from(error: quadrant::settings::SettingsError) -> Self {
+impl From<quadrant_settings::SettingsError> for ReplayError {
+    fn from(error: quadrant_settings::SettingsError) -> Self {
         Self::Run(RunError::Settings(error))
     }
 }

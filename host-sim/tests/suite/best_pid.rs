@@ -1,8 +1,8 @@
 //! The best PID, compared with what an optimiser of another kind (CMA-ES) finds on plants that are drawn.
 
 use cmaes::{CMAESOptions, DVector};
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
 use quadrant_sim::design::best::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
 use quadrant_sim::design::{Form, Process, best_pid, load_step_error};
 use rand::{Rng, SeedableRng};

@@ -1,6 +1,6 @@
 //! The circle test on the simulated stage.
 
-use quadrant::reference::Plane;
+use quadrant_law::reference::Plane;
 use quadrant_sim::circle::page::circle_tables;
 use quadrant_sim::circle::{CircleRefusal, CircleRequest, CircleResult, run_circle_tests};
 use quadrant_sim::experiment::configuration::Configuration;

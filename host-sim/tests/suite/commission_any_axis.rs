@@ -1,8 +1,8 @@
 //! Commissioning of axes unlike the simulated stage's: what was refused once, or handed over worse than the PID.
 
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::lugre::LugreParameters;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionSettings, Commissioned, Planned, commission, plan};
 use quadrant_sim::machine::{
     AxisInfo, Experiment, ExperimentError, MachineError, SimulatedTestAxis, TestAxis, Travel,

@@ -1,15 +1,16 @@
 //! A voltage through the link, into an axis of the simulated machine, and back as a recording; and what becomes of a machine
 //! whose host falls silent.
 
+use quadrant::app::Translated;
 use std::time::Duration;
 
-use quadrant::axes::AxisName;
 use quadrant::link::message::MachineState;
 use quadrant::link::message::{
     AxisMode, Body, InjectRequest, InjectStatus, Reply, Status, Voltages,
 };
-use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::safety::FaultCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::safety::FaultCode;
 use quadrant_sim::client::test_axis::ConnectedAxis;
 use quadrant_sim::client::{Client, ClientError, settings};
 use quadrant_sim::commission::bootstrap::{measuring_settings, zero_gain_settings};
@@ -49,7 +50,7 @@ fn inject(client: &mut Client, request: InjectRequest) -> Result<InjectStatus, C
 
 fn open(open_loop: bool) -> InjectRequest {
     InjectRequest::Open {
-        axis: AxisName::X.into(),
+        axis: Translated::translated(AxisName::X),
         open_loop,
         with_plan: false,
         limit_v: 0.5,
@@ -79,7 +80,7 @@ fn fault(client: &mut Client) -> Option<FaultCode> {
 
 fn jog(velocity_mm_s: f64) -> Body {
     Body::Jog {
-        axis: AxisName::X.into(),
+        axis: Translated::translated(AxisName::X),
         velocity_mm_s,
     }
 }
@@ -113,8 +114,10 @@ fn left_alone(client: &mut Client) -> Status {
         max_jerk_mm_s3: 1e4,
     });
     let motions = [motion, MotionSettings::Hold, MotionSettings::Hold];
-    let plan = quadrant::settings::PlanSettings { motions };
-    client.order(Body::SetPlan(plan.into())).unwrap();
+    let plan = quadrant_settings::PlanSettings { motions };
+    client
+        .order(Body::SetPlan(Translated::translated(plan)))
+        .unwrap();
     client.order(Body::Run).unwrap();
     silence(client, Duration::from_secs(3));
     client.status().unwrap()
@@ -212,7 +215,7 @@ fn what_cannot_be_injected_is_refused_in_words() {
 
     let mut client = enabled();
     let both = InjectRequest::Open {
-        axis: AxisName::X.into(),
+        axis: Translated::translated(AxisName::X),
         open_loop: true,
         with_plan: true,
         limit_v: 1.0,
@@ -221,7 +224,7 @@ fn what_cannot_be_injected_is_refused_in_words() {
     };
     assert!(refused(&mut client, both).contains("with_plan"));
     let much = InjectRequest::Open {
-        axis: AxisName::X.into(),
+        axis: Translated::translated(AxisName::X),
         open_loop: true,
         with_plan: false,
         limit_v: 100.0,
@@ -237,7 +240,7 @@ fn what_cannot_be_injected_is_refused_in_words() {
     let said = refused(&mut client, values(0, &[1, 1700], false));
     assert!(said.contains("1700 is beyond 1638"), "{said}");
     let move_away = Body::Move {
-        axis: AxisName::Y.into(),
+        axis: Translated::translated(AxisName::Y),
         target_mm: 1.0,
         velocity_mm_s: 1.0,
     };

@@ -1,8 +1,8 @@
 //! The default settings' gains are what `docs/parameters.md` says they are.
 
-use quadrant::control::popov::sector_bound;
-use quadrant::settings::presets::{x_axis, y_axis, z_axis};
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::popov::sector_bound;
+use quadrant_settings::presets::{x_axis, y_axis, z_axis};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::design::{
     ContinuousLoop, Form, Margins, PrintedMargins, Process, largest_integral_gain,
     largest_integral_gain_where, margins, shape_to_margins,

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_proof;
-use quadrant::settings::presets::{X_GAINS, X_PLANT};
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::popov::sector_proof;
+use quadrant_settings::presets::{X_GAINS, X_PLANT};
 use quadrant_sim::design::npid::{NonlinearRule, Range, choose_nonlinear};
 use quadrant_sim::design::robustness::{Robustness, RobustnessError, Uncertainty, robustness};
 use quadrant_sim::design::time_varying::{Switching, VaryingLoop};

@@ -1,10 +1,11 @@
 //! PIDs designed on the x axis' model and on its response.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::presets::X_PLANT;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::presets::X_PLANT;
 use quadrant_sim::design::measured::{MeasuredError, MeasuredResponse};
 use quadrant_sim::design::step_response::{StepRequest, step_response};
 use quadrant_sim::design::{

@@ -1,15 +1,16 @@
 //! The experiments on the simulated stage: what they must show whatever the exact figures are.
 
-use quadrant::app::supervisor::Event;
-use quadrant::command::Command;
-use quadrant::lockstep::Job;
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{FaultCode, SafetyState};
-use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::command::Command;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_law::supervisor::Event;
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::circle::run_circles;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator, SimulatedTestAxis, TestAxis, approach};
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 use quadrant_sim::record::Record;
@@ -76,7 +77,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         // The encoder of x stands still, as if the axis were clamped.
         let mut counts = plant.read_counters();
         counts[0] = 0;
-        let input = quadrant::lockstep::InputRecord::of_counts(counts, operator.request(tick));
+        let input = TickInput::of_counts(counts, operator.request(tick));
         let outputs = machine.tick(&input);
         plant.step(&outputs);
         if let SafetyState::Faulted(fault) = machine.state().safety() {
@@ -87,10 +88,7 @@ fn a_blocked_axis_is_switched_off_and_the_log_says_why() {
         }
     }
     for _ in 0..20 {
-        machine.tick(&quadrant::lockstep::InputRecord::of_counts(
-            [0; 3],
-            Some(Command::Run),
-        ));
+        machine.tick(&TickInput::of_counts([0; 3], Some(Command::Run)));
     }
     let events: Vec<_> = machine.events().iter().map(|(_, event)| *event).collect();
     assert!(matches!(

@@ -1,15 +1,16 @@
 //! The reference under whatever a host asks for: in no tick does it go faster than the settings allow, in any order of
 //! streams, moves, plans, jogs and stops.
 
-use quadrant::axes::AxisName;
+use quadrant::app::Translated;
 use quadrant::link::message::{self, AxisPoint, AxisSet, Body, SetPoint, StreamRequest};
-use quadrant::motion::MotionMode;
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::settings::PlanSettings;
-use quadrant::units::{POSITION_FRACTION_BITS, Position};
+use quadrant_law::axes::AxisName;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_law::units::{POSITION_FRACTION_BITS, Position};
+use quadrant_settings::PlanSettings;
 
-use crate::common::Noise;
 use crate::hostile_link::{Bench, whole};
+use quadrant_test_support::Noise;
 
 /// Requests that are made.
 const REQUESTS: u32 = 20_000;
@@ -224,12 +225,9 @@ impl Host {
                     velocity_mm_s: self.velocity_mm_s(),
                 }
             }
-            18 => Body::SetPlan(
-                PlanSettings {
-                    motions: [(); 3].map(|()| self.motion()),
-                }
-                .into(),
-            ),
+            18 => Body::SetPlan(Translated::translated(PlanSettings {
+                motions: [(); 3].map(|()| self.motion()),
+            })),
             19 => Body::Run,
             20 => {
                 let sign = if self.noise.below(2) == 0 { -1.0 } else { 1.0 };

@@ -15,15 +15,15 @@ use quadrant::link::message::{
     AxisSet, Body, LinkError, NumberType, Reply, Request, SettingsRequest, StreamRequest, Value,
 };
 use quadrant::link::server::LinkServer;
-use quadrant::settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
+use quadrant_settings::{MAX_VALUE_BYTES, PlanSettings, StageSettings};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::application::{BoardIdentity, Running, Start};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::{SimulatedStage, StageParameters};
 
-use crate::common::Noise;
-use crate::link_traffic::{self, arrival, framed};
+use quadrant_test_support::Noise;
+use quadrant_test_support::traffic::{self, arrival, framed};
 
 /// Bytes that may wait before the machine runs on.
 const BACKLOG: usize = 1_000;
@@ -290,7 +290,7 @@ fn next(noise: &mut Noise, allowed: Allowed, paths: &[String]) -> Vec<u8> {
         0 => {
             let request = Request {
                 id: noise.bits() as u16,
-                body: link_traffic::body(noise),
+                body: traffic::body(noise),
             };
             let mut buffer = [0; PAYLOAD_BYTES];
             let posted = postcard::to_slice(&request, &mut buffer).expect("fits");
@@ -306,7 +306,7 @@ fn next(noise: &mut Noise, allowed: Allowed, paths: &[String]) -> Vec<u8> {
             }
         }
         1..=3 => {
-            let body = link_traffic::body(noise);
+            let body = traffic::body(noise);
             let body = plausible(body, noise, paths);
             if forbidden(&body) || is_restart(&body, noise) {
                 return Vec::new();

@@ -1,8 +1,8 @@
 //! The committed settings are what commissioning its axes gives, and as good as the truth.
 
-use quadrant::friction::gms::{GmsElement, GmsParameters};
-use quadrant::friction::stribeck::StaticFriction;
-use quadrant::settings::StageSettings;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, commission};
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;

@@ -1,9 +1,10 @@
 //! Frequency responses of the simulated stage, judged against its truth.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
-use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::commission::bootstrap::bootstrap_settings;
 use quadrant_sim::identify::excitation::Waveform;
 use quadrant_sim::identify::frf::{

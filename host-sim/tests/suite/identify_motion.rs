@@ -216,10 +216,10 @@ fn the_friction_of_a_record_makes_settings_that_the_firmware_takes() {
     let truth = &StageParameters::real().axes[0];
     let candidates = fitted(&simulated(0, truth), &MotionFitSettings::default());
     let model = &recommended(&candidates).unwrap().model;
-    let mut stage = quadrant::settings::StageSettings::simulated();
+    let mut stage = quadrant_settings::StageSettings::simulated();
     stage.axes[0].friction = model.friction_settings();
     stage
-        .validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)
+        .validate(quadrant_law::friction::gms::FIRMWARE_ELEMENTS)
         .unwrap();
 }
 
@@ -239,9 +239,9 @@ fn a_level_that_rises_with_the_speed_is_found_and_the_firmware_takes_it() {
     let curve = &model.friction.positive.curve;
     let rise = curve.breakaway_v / curve.coulomb_v;
     assert!((0.5..0.7).contains(&rise), "{curve:?}");
-    let mut stage = quadrant::settings::StageSettings::simulated();
+    let mut stage = quadrant_settings::StageSettings::simulated();
     stage.axes[0].friction = model.friction_settings();
-    let room = quadrant::friction::gms::FIRMWARE_ELEMENTS;
+    let room = quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
     stage.validate(room).unwrap();
 }
 

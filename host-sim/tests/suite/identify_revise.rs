@@ -1,6 +1,6 @@
 //! The linear model revised for explicit friction, on the simulated x axis at rest.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::identify::at_rest::AtRest;
 use quadrant_sim::identify::excitation::{Excitation, Waveform};

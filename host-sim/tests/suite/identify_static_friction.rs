@@ -1,6 +1,6 @@
 //! The friction-velocity map and its model, judged against the truth of the simulated stage.
 
-use quadrant::friction::PerDirection;
+use quadrant_law::friction::PerDirection;
 use quadrant_sim::commission::bootstrap::measuring_settings;
 use quadrant_sim::identify::static_friction::{
     Exponent, FrictionFitError, FrictionMap, FrictionRun, StaticFrictionError,

@@ -2,9 +2,9 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
-use quadrant::friction::stribeck::{SlidingTable, StaticFriction};
-use quadrant::friction::{Direction, PerDirection};
+use quadrant_law::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
+use quadrant_law::friction::stribeck::{SlidingTable, StaticFriction};
+use quadrant_law::friction::{Direction, PerDirection};
 use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::identify::virgin_curve::{
     Knots, VirginCurveError, VirginCurveSettings, identify, measure,

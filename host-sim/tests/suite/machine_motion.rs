@@ -2,18 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::admission::Refusal;
-use quadrant::app::supervisor::Event;
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::lockstep::Job;
-use quadrant::motion::MotionMode;
-use quadrant::reference::{
-    AxisPoint, Motion, MotionSettings, ReferenceSample, SetPoint, StreamPlanner, Velocity,
-};
-use quadrant::safety::{FaultCode, SafetyState};
-use quadrant::settings::{PlanSettings, StageSettings};
-use quadrant::units::Position;
+use quadrant_law::admission::Refusal;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::reference::{Motion, MotionSettings, ReferenceSample, Velocity};
+use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_law::supervisor::Event;
+use quadrant_law::units::Position;
+use quadrant_settings::Job;
+use quadrant_settings::stream_planner::{AxisPoint, SetPoint, StreamPlanner};
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::machine::LawMachine;
 use quadrant_sim::plant::{MarkParameters, SimulatedStage, StageParameters};
 

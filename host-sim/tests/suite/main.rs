@@ -35,10 +35,3 @@ mod record_refusals;
 mod record_trace;
 mod simulated_machine;
 mod test_axis;
-
-#[allow(dead_code, reason = "the law's tests use the rest")]
-#[path = "../../../tests/law/common.rs"]
-mod common;
-#[allow(dead_code, reason = "the law's tests use the rest")]
-#[path = "../../../tests/law/link_traffic.rs"]
-mod link_traffic;

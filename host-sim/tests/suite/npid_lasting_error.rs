@@ -1,13 +1,13 @@
 //! N-PID under a load that leaves a lasting error: Popov's criterion speaks of the origin, and about another point the loop
 //! has the slope of k(e) e for a gain.
 
-use quadrant::control::npid::{NonlinearGain, NonlinearGainTable};
-use quadrant::control::pid::Pid;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_bound;
-use quadrant::control::terms::FeedbackState;
-use quadrant::settings::presets::{X_GAINS, X_PLANT};
+use quadrant_law::control::npid::{NonlinearGain, NonlinearGainTable};
+use quadrant_law::control::pid::Pid;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::terms::FeedbackState;
+use quadrant_settings::popov::sector_bound;
+use quadrant_settings::presets::{X_GAINS, X_PLANT};
 use quadrant_sim::design::held_plant::{HeldPlant, HeldPlantRun};
 use quadrant_sim::design::{Form, Process};
 

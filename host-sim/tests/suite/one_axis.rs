@@ -1,11 +1,12 @@
 //! x alone, without y and z: the same as with them, to the bit.
 
-use quadrant::command::Command;
-use quadrant::friction::gms::MAX_ELEMENTS;
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{FaultCode, SafetyState};
-use quadrant::settings::{PlanSettings, StageSettings};
+use quadrant_law::command::Command;
+use quadrant_law::friction::gms::MAX_ELEMENTS;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::{FaultCode, SafetyState};
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, StageSettings};
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::{SimulatedAxis, StageParameters};
 
@@ -20,7 +21,7 @@ fn plan_then(rest: &[(u32, Command)]) -> Operator {
 fn compared(
     motion: MotionSettings,
     mut operator: Operator,
-    disturb: impl Fn(u32, &mut InputRecord, &mut SimulatedAxis),
+    disturb: impl Fn(u32, &mut TickInput, &mut SimulatedAxis),
 ) -> SafetyState {
     let job = Job {
         stage: StageSettings::simulated(),
@@ -34,7 +35,7 @@ fn compared(
     let mut plant = SimulatedAxis::new(truth, job.stage.rate_hz, 7);
     for tick in 0..40_000 {
         let counts = [plant.read_counter(), 0, 0];
-        let mut input = InputRecord::of_counts(counts, operator.request(tick));
+        let mut input = TickInput::of_counts(counts, operator.request(tick));
         disturb(tick, &mut input, &mut plant);
         let (of_whole, of_alone) = (whole.tick(&input), alone.tick(&input));
         assert_eq!(of_whole.codes[0], of_alone.codes[0], "tick {tick}");

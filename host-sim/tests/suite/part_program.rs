@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use proptest::prelude::*;
 use proptest::test_runner::{RngSeed, TestCaseError};
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::gcode::{Limits, Program, ProgramError, Trajectory, Vector};
 
 fn limits() -> Limits {

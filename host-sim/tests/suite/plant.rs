@@ -1,6 +1,6 @@
 //! The simulated axis behaves as the equations it is made from.
 
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 use quadrant_sim::plant::{SimulatedAxis, SimulatedStage, StageParameters};
 
 const RATE_HZ: f64 = 10e3;

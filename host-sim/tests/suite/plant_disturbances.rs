@@ -1,6 +1,6 @@
 //! Loads and changed axes do what their equations say.
 
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{ENTRY_S, Force, Load};
 use quadrant_sim::plant::{AxisParameters, SimulatedAxis, StageParameters};

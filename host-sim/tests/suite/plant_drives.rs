@@ -1,6 +1,6 @@
 //! The drives do what their equations say.
 
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Body, Drive, EncoderSide, Forcing, SimulatedAxis, StageParameters,
 };

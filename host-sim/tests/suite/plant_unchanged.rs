@@ -1,10 +1,10 @@
 //! A plain axis moves as it did before loads, changes and other drives came in, bit for bit.
 
-use quadrant::friction::Direction;
-use quadrant::friction::gms::{Gms, GmsState};
-use quadrant::friction::stribeck::SlidingTable;
-use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::gms::{Gms, GmsState};
+use quadrant_law::friction::stribeck::SlidingTable;
+use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
 use quadrant_sim::plant::{PLANT_ELEMENTS, SimulatedAxis, SimulatedStage, StageParameters};
 use std::collections::VecDeque;
 use std::f64::consts::TAU;

@@ -7,8 +7,8 @@ use quadrant::link::message::{
     SettingsRequest, Status, StreamRequest, TelemetryRequest, Value,
 };
 
-use quadrant::safety::Switches;
-use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
+use quadrant_law::safety::Switches;
+use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::machine::simulated::SimulatedMachine;
 use quadrant_sim::plant::StageParameters;

@@ -1,7 +1,7 @@
 //! Experiments on the simulated stage's axes.
 
-use quadrant::reference::{MotionSettings, PointToPointSettings};
-use quadrant::settings::presets::x_axis;
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+use quadrant_settings::presets::x_axis;
 use quadrant_sim::machine::{Drive, Experiment, ExperimentError, SimulatedTestAxis, TestAxis};
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::record::Recording;

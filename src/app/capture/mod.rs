@@ -11,7 +11,7 @@ use core::fmt;
 use quadrant_link::message::{CaptureCause, CapturePhase, CaptureRecord, Trigger};
 
 use crate::app::telemetry::{Observation, Selection, SelectionError, shown};
-use crate::law::scalar::Scalar;
+use quadrant_law::scalar::Scalar;
 use trigger::Watch;
 
 /// Words of the ring: 8 KiB; 1024 samples of two channels are 0.1 s at 10 kHz.

@@ -3,8 +3,8 @@
 use quadrant_link::message::{CaptureCause, Edge, Level, Trigger, WordKind};
 
 use crate::app::telemetry::{Observation, read};
-use crate::law::rounding;
-use crate::law::scalar::Scalar;
+use quadrant_law::rounding;
+use quadrant_law::scalar::Scalar;
 
 /// A level as its channel's words have it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,6 +1,6 @@
 //! Requests that wait for control.
 
-use crate::law::axes::PerAxis;
+use quadrant_law::axes::PerAxis;
 use quadrant_link::message::Provenance;
 
 /// The work of a request that waits for control.

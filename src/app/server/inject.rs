@@ -3,13 +3,14 @@
 use super::opened::OpenInjection;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
-use crate::app::supervisor::PERIOD_TICKS;
+use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
-use crate::law::command::Command;
-use crate::law::injection::{BLOCK_VALUES, VoltageBlock};
-use crate::law::scalar::Scalar;
-use crate::settings::InjectionSettings;
+use quadrant_law::command::Command;
+use quadrant_law::injection::{BLOCK_VALUES, VoltageBlock};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::supervisor::PERIOD_TICKS;
 use quadrant_link::message::{InjectRequest, InjectStatus, LinkError, Reply, Voltages};
+use quadrant_settings::InjectionSettings;
 
 /// Blocks that must wait before the injection begins: the host is that far ahead.
 const START_BLOCKS: usize = STREAM_ITEM_ROOM / 2;
@@ -27,7 +28,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 travel_mm,
                 max_velocity_mm_s,
             } => self.open_injection(&InjectionSettings {
-                axis: axis.into(),
+                axis: Translated::translated(axis),
                 open_loop,
                 with_plan,
                 limit_v,

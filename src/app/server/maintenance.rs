@@ -4,7 +4,7 @@ use super::deferred::{Deferred, Work};
 use super::{Server, refused};
 use crate::app::queues::Order;
 use crate::hal::SettingsFlash;
-use crate::law::scalar::Scalar;
+use quadrant_law::scalar::Scalar;
 use quadrant_link::message::{LinkError, Message, Reply, Response};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {

@@ -22,6 +22,7 @@ mod status;
 mod stream;
 mod transmit_buffer;
 
+use crate::app::wire::Translated;
 use heapless::String;
 
 use self::deferred::{Deferred, Work};
@@ -32,18 +33,18 @@ use super::queues::ServerEnds;
 use super::{Axis, Snapshot, TimingStatistics};
 use crate::app::telemetry::Packer;
 use crate::hal::{Serial, SettingsFlash};
-use crate::law::admission::Refusal;
-use crate::law::axes::{AxisName, PerAxis};
-use crate::law::scalar::Scalar;
-use crate::settings::StageSettings;
-use crate::settings::draft::Draft;
 use crate::store::{BUFFER_BYTES, Store};
+use quadrant_law::admission::Refusal;
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::scalar::Scalar;
 use quadrant_link::frame::FrameCounters;
 use quadrant_link::message::{
     AxisSet, Body, Event, LinkError, Message, Notice, NumberType, Provenance, Reply,
     SettingsRequest, text,
 };
 use quadrant_link::server::LinkServer;
+use quadrant_settings::StageSettings;
+use quadrant_settings::draft::Draft;
 
 pub use self::statistics::ServerStatistics;
 
@@ -201,8 +202,8 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
     }
 
     /// Queues an event of a tick for the host; counts it as dropped if the queue is full.
-    pub fn push_event(&mut self, tick: u32, event: impl Into<Event>) {
-        if self.events.push_back((tick, event.into())).is_err() {
+    pub fn push_event(&mut self, tick: u32, event: Event) {
+        if self.events.push_back((tick, event)).is_err() {
             self.dropped_events = self.dropped_events.wrapping_add(1);
         }
     }
@@ -247,7 +248,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
     fn report_homed(&mut self, seen: &Snapshot<S>) {
         for axis in AxisName::ALL {
             if seen.view.homed[index(axis)] && !self.seen.view.homed[index(axis)] {
-                self.push_event(seen.tick, Event::Homed(axis.into()));
+                self.push_event(seen.tick, Event::Homed(Translated::translated(axis)));
             }
         }
     }
@@ -349,7 +350,7 @@ impl<'q, 'a, S: Scalar, F: SettingsFlash> Server<'q, 'a, S, F> {
                 axis,
                 target_mm,
                 velocity_mm_s,
-            } => self.start_move(axis.into(), target_mm, velocity_mm_s),
+            } => self.start_move(Translated::translated(axis), target_mm, velocity_mm_s),
             Body::Spindle { rpm } => self.set_spindle(rpm),
             other => self.serve_command(other),
         }

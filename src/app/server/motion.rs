@@ -3,17 +3,18 @@
 use super::deferred::Work;
 use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::Order;
-use crate::app::supervisor;
+use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
-use crate::law::axes::{AxisName, PerAxis};
-use crate::law::cancelling::{MOST_RPM, SpindleSpeed};
-use crate::law::command::Command;
-use crate::law::decimal::Decimal;
-use crate::law::reference::{Motion, MotionSettings};
-use crate::law::safety::Station;
-use crate::law::scalar::Scalar;
-use crate::settings::{PlanSettings, StageSettings, reach_mm};
+use quadrant_law::admission;
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::cancelling::{MOST_RPM, SpindleSpeed};
+use quadrant_law::command::Command;
+use quadrant_law::decimal::Decimal;
+use quadrant_law::reference::{Motion, MotionSettings};
+use quadrant_law::safety::Station;
+use quadrant_law::scalar::Scalar;
 use quadrant_link::message::{Body, LinkError, Plan, Reply, text};
+use quadrant_settings::{PlanSettings, StageSettings, reach_mm};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// Requests that are commands of the control law.
@@ -37,12 +38,12 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 self.order(Order::Command(Command::Run))?;
             }
             Body::Home(axes) => {
-                for axis in axes.iter().map(AxisName::from) {
+                for axis in axes.iter().map(AxisName::translated) {
                     self.check(Command::Home(axis))?;
                     let known = self.in_force()?.can_home(axis);
                     known.map_err(|error| refused(format_args!("{error}")))?;
                 }
-                for axis in axes.iter().map(AxisName::from) {
+                for axis in axes.iter().map(AxisName::translated) {
                     self.command(Command::Home(axis))?;
                 }
             }
@@ -50,7 +51,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 axis,
                 velocity_mm_s,
             } => {
-                let axis = axis.into();
+                let axis = Translated::translated(axis);
                 let velocity = self
                     .draft
                     .in_force()
@@ -99,7 +100,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 
     /// Checks that the control law would take a command, as far as the last snapshot tells.
     pub(super) fn check(&self, command: Command) -> Result<(), LinkError> {
-        match supervisor::refusal_from(Station::Host, self.seen.view, command) {
+        match admission::refusal_from(Station::Host, self.seen.view, command) {
             Some(reason) => Err(refused(format_args!("{reason}"))),
             None => Ok(()),
         }
@@ -168,7 +169,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
                 "a motion is under way; stop it before the plan is exchanged"
             )));
         }
-        let plan = PlanSettings::from(plan);
+        let plan = PlanSettings::translated(plan);
         self.hand_over(&plan)?;
         let reach_mm = PerAxis::from_fn(|axis| reach_mm(&plan.motions[index(axis)]));
         self.defer(Work::Plan(reach_mm))

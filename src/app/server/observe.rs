@@ -5,8 +5,8 @@ use crate::app::capture::Capture;
 use crate::app::queues::CaptureCommand;
 use crate::app::telemetry::{Packer, Sampler, Selection};
 use crate::hal::SettingsFlash;
-use crate::law::safety::SafetyState;
-use crate::law::scalar::Scalar;
+use quadrant_law::safety::SafetyState;
+use quadrant_law::scalar::Scalar;
 use quadrant_link::message::{
     AxisName, AxisSignal, BLOCK_WORDS, CapturePhase, CaptureRequest, CaptureStatus, Channel, Event,
     LinkError, Reply, StageSignal, TelemetryBlock, TelemetryRequest, Trigger, WordPage,

@@ -1,7 +1,7 @@
 //! Streams and injections that a host has opened.
 
-use crate::law::injection::InjectionProgress;
-use crate::law::reference::StreamPlanner;
+use quadrant_law::injection::InjectionProgress;
+use quadrant_settings::stream_planner::StreamPlanner;
 
 /// A stream that a host has opened.
 #[derive(Debug)]

@@ -3,17 +3,18 @@
 use super::deferred::Work;
 use super::{Server, busy, index, invalid, refused};
 use crate::app::queues::AxisSwap;
+use crate::app::wire::Translated;
 use crate::hal::SettingsFlash;
-use crate::law::axes::AxisName;
-use crate::law::decimal::Decimal;
-use crate::law::friction::gms::FIRMWARE_ELEMENTS;
-use crate::law::scalar::Scalar;
-use crate::settings::draft::ApplyError;
-use crate::settings::{MAX_VALUE_BYTES, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::decimal::Decimal;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_law::scalar::Scalar;
 use quadrant_link::message::{
     Applied, AxisSet, Event, LinkError, PAGE_PATHS, PathPage, Provenance, Reply, SettingsRequest,
     Value, text,
 };
+use quadrant_settings::draft::ApplyError;
+use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     /// The memory for settings.
@@ -116,7 +117,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         let changed = AxisName::ALL
             .into_iter()
             .filter(|&axis| changed[index(axis)])
-            .map(Into::into)
+            .map(Translated::translated)
             .collect();
         self.pending = changed;
         self.changed = changed;
@@ -154,7 +155,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         let Some(axis) = self.back_buffer.take() else {
             return;
         };
-        let name = pending.into();
+        let name = Translated::translated(pending);
         let settings = self.draft.in_force();
         settings.build_axis_into(name, axis);
         let swap = AxisSwap {

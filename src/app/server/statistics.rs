@@ -2,7 +2,7 @@
 
 use super::Server;
 use crate::hal::SettingsFlash;
-use crate::law::scalar::Scalar;
+use quadrant_law::scalar::Scalar;
 
 /// Statistics of a server: counts that only grow, and wrap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -1,14 +1,15 @@
 //! Identity and status of the machine.
 
 use super::Server;
+use crate::app::wire::{Translated, learning_state};
 use crate::hal::SettingsFlash;
-use crate::law::admission;
-use crate::law::axes::{AxisName, PerAxis};
-use crate::law::command::Command;
-use crate::law::motion::MotionMode;
-use crate::law::safety::{SafetyState, Station};
-use crate::law::scalar::{Quantity, Scalar};
-use crate::law::units::{POSITION_FRACTION_BITS, Position};
+use quadrant_law::admission;
+use quadrant_law::axes::{AxisName, PerAxis};
+use quadrant_law::command::Command;
+use quadrant_law::motion::MotionMode;
+use quadrant_law::safety::{SafetyState, Station};
+use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_law::units::{POSITION_FRACTION_BITS, Position};
 use quadrant_link::PROTOCOL_VERSION;
 use quadrant_link::message::{
     AxisLearning, AxisSet, AxisStatus, FaultReport, Identity, Inputs, Learning, MachineState,
@@ -35,11 +36,11 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             let (axis, settings) = (&self.seen.axes[index], &settings.axes[index]);
             let measured = Position(axis.measured.0 << POSITION_FRACTION_BITS);
             AxisStatus {
-                mode: view.modes[index].into(),
+                mode: Translated::translated(view.modes[index]),
                 position_mm: measured.to_mm(settings.encoder.resolution_mm),
                 error_mm: axis.error.to_f32(Quantity::Length),
                 output_v: axis.output.to_f32(Quantity::Voltage),
-                limited_by: axis.limited_by.into(),
+                limited_by: Translated::translated(axis.limited_by),
                 high_mark: axis.following.high_mark(),
             }
         });
@@ -79,7 +80,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
             axes: self.seen.axes.map(|axis| {
                 let seen = axis.learning;
                 Some(AxisLearning {
-                    state: seen.status.on_the_link()?,
+                    state: learning_state(seen.status)?,
                     scale: seen.scale(),
                     gate: seen.gate(),
                     error_share: seen.error_share(),
@@ -92,7 +93,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
     fn state(&self) -> MachineState {
         let view = &self.seen.view;
         let homing = view.modes.into_iter().any(|mode| mode == MotionMode::Home);
-        match MachineState::from(view.safety) {
+        match MachineState::translated(view.safety) {
             MachineState::Enabled if homing => MachineState::Homing,
             state => state,
         }
@@ -106,7 +107,7 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
         };
         Some(FaultReport {
             code: fault.code.number(),
-            axis: fault.axis.map(Into::into),
+            axis: fault.axis.map(Translated::translated),
             tick: fault.tick,
             name: text(format_args!("{}", fault.code.name())),
             cause: text(format_args!("{}", fault.code.cause())),
@@ -120,6 +121,6 @@ impl<S: Scalar, F: SettingsFlash> Server<'_, '_, S, F> {
 fn set_of(axes: PerAxis<bool>) -> AxisSet {
     let named = AxisName::ALL.into_iter().zip(axes);
     named
-        .filter_map(|(axis, is_true)| is_true.then_some(axis.into()))
+        .filter_map(|(axis, is_true)| is_true.then_some(Translated::translated(axis)))
         .collect()
 }

@@ -4,15 +4,15 @@ use super::opened::OpenStream;
 use super::{Server, invalid, refused};
 use crate::app::queues::{STREAM_ITEM_ROOM, StreamItem};
 use crate::hal::SettingsFlash;
-use crate::law::axes::AxisName;
-use crate::law::command::Command;
-use crate::law::reference::{
-    AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, MotionScale, ReferenceSample, SetPoint,
-    StreamPlanner,
-};
-use crate::law::scalar::Scalar;
-use crate::law::units::Position;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::reference::{MotionScale, ReferenceSample};
+use quadrant_law::scalar::Scalar;
+use quadrant_law::units::Position;
 use quadrant_link::message::{self, LinkError, Reply, StreamRequest, StreamStatus};
+use quadrant_settings::stream_planner::{
+    AxisPoint, LEAST_PERIOD_TICKS, MOST_SEGMENT_TICKS, SetPoint, StreamPlanner,
+};
 
 /// Segments that must wait before the axes start: the host is that far ahead.
 const START_SEGMENTS: usize = STREAM_ITEM_ROOM / 2;

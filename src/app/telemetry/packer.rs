@@ -6,7 +6,7 @@ use quadrant_link::message::{Channel, MAX_CHANNELS, TelemetryBlock, Words};
 use super::read::shown;
 use super::sampler::Sample;
 use super::selection::Selection;
-use crate::law::scalar::Scalar;
+use quadrant_law::scalar::Scalar;
 
 /// Makes blocks of samples.
 #[derive(Clone, Debug, Default)]

@@ -1,10 +1,11 @@
 //! Reading a channel's word after a tick.
 
+use crate::app::wire::Translated;
 use quadrant_link::message::{AxisName, AxisSignal, Channel, MachineState, StageSignal};
 
 use crate::app::glitch_monitor::GlitchReadings;
-use crate::law::scalar::{Quantity, Scalar};
-use crate::law::stage::StageState;
+use quadrant_law::scalar::{Quantity, Scalar};
+use quadrant_law::stage::StageState;
 
 /// The readable state after a tick.
 #[derive(Clone, Copy, Debug)]
@@ -140,7 +141,7 @@ fn read_axis<S: Scalar, const N: usize>(
 #[inline(always)]
 fn read_stage<S: Scalar, const N: usize>(signal: StageSignal, seen: &Observation<'_, S, N>) -> u32 {
     match signal {
-        StageSignal::State => MachineState::from(seen.stage.safety()) as u32,
+        StageSignal::State => MachineState::translated(seen.stage.safety()) as u32,
         StageSignal::Fault => match seen.stage.safety().fault() {
             Some(fault) => u32::from(fault.code.number()),
             None => 0,

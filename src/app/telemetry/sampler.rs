@@ -3,7 +3,7 @@
 use quadrant_link::message::MAX_CHANNELS;
 
 use super::{Observation, Selection};
-use crate::law::scalar::Scalar;
+use quadrant_law::scalar::Scalar;
 
 /// The selection to sample. The slow half makes it and hands it over whole.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]

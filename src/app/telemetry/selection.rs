@@ -7,7 +7,7 @@ use quadrant_link::message::{Channel, MAX_CHANNELS};
 
 use super::Observation;
 use super::read::read_raw;
-use crate::law::scalar::Scalar;
+use quadrant_law::scalar::Scalar;
 
 /// Channels to sample together, checked.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -19,13 +19,13 @@ use cortex_m::peripheral::NVIC;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
 
-use quadrant::app::supervisor::PERIOD_TICKS;
-use quadrant::command::Command;
 use quadrant::drivers::tick_interval::TickInterval;
-use quadrant::encoder::EncoderReading;
 use quadrant::hal::{self, ResetCause};
-use quadrant::safety;
-use quadrant::stage::Outputs;
+use quadrant_law::command::Command;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety;
+use quadrant_law::stage::Outputs;
+use quadrant_law::supervisor::PERIOD_TICKS;
 
 pub(crate) use self::flash::SettingsFlash;
 use self::nap::Nap;

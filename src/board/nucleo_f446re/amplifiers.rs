@@ -4,7 +4,7 @@ use embedded_hal::delay::DelayNs;
 use quadrant::drivers::ad5754r::steps::FRAME_STEPS;
 use quadrant::drivers::ad5754r::{ALL_ZERO, Ad5754r, Error, Item};
 use quadrant::hal;
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 use stm32f4xx_hal::gpio::{Output, PB2, PB5, PC9};
 use stm32f4xx_hal::pac::{self, DMA2, SPI2, TIM1};
 use stm32f4xx_hal::rcc::Rcc;

@@ -11,8 +11,8 @@
 use core::sync::atomic::{AtomicU32, Ordering};
 
 use quadrant::drivers::counter::ExtendedCounter;
-use quadrant::encoder::EncoderReading;
 use quadrant::hal;
+use quadrant_law::encoder::EncoderReading;
 use stm32f4xx_hal::gpio::{PA6, PA7, PB0, PB8, PB9, PB10, PC6, PC7, PC8, Pull};
 use stm32f4xx_hal::pac::{TIM2, TIM3, TIM8};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};

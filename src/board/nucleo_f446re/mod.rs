@@ -56,9 +56,9 @@ pub(crate) use self::switches::Switches;
 pub(crate) use self::tick::Tick;
 use self::watchdog::Supply;
 pub(crate) use self::watchdog::Watchdog;
-use quadrant::command::Command;
 use quadrant::drivers::hold_button::HoldButton;
 use quadrant::hal::ResetCause;
+use quadrant_law::command::Command;
 
 use super::{Finished, Outcome};
 

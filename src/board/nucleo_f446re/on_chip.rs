@@ -3,9 +3,9 @@
 //!
 //! `docs/outputs.md` says what this costs in tracking error, and the circuit that makes ±10 V of 0 to 3.3 V.
 
-use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
 use quadrant::hal;
-use quadrant::stage::Outputs;
+use quadrant_law::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant_law::stage::Outputs;
 use stm32f4xx_hal::gpio::{Output, PA4, PA5, PB5, PC9};
 use stm32f4xx_hal::pac::{self, DAC};
 use stm32f4xx_hal::rcc::{Enable, Rcc, Reset};

@@ -1,6 +1,7 @@
 //! Switches, amplifier faults and the emergency stop: fourteen pins, two reads of a port. And the supply.
 
-use quadrant::{hal, safety};
+use quadrant::hal;
+use quadrant_law::safety;
 use stm32f4xx_hal::pac::{GPIOA, GPIOC};
 
 use super::watchdog::Supply;

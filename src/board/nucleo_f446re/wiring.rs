@@ -2,7 +2,7 @@
 
 use quadrant::drivers::input_filter::{InputFilter, shortest_level_ns};
 use quadrant::hal::ResetCause;
-use quadrant::safety::{AxisSwitches, Switches};
+use quadrant_law::safety::{AxisSwitches, Switches};
 
 /// The fastest an encoder may count, per second: an axis at 250 mm/s with 0.5 um per count, and twice that, as the
 /// control law believes an encoder up to twice the axis' largest velocity.

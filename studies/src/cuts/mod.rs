@@ -10,17 +10,18 @@ pub mod command;
 
 use std::path::Path;
 
-use quadrant::cancelling::CancellingSettings;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::learning::LearningSettings;
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::SafetyState;
-use quadrant::settings::{PlanSettings, StageSettings};
 use quadrant_cli::warn;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::SafetyState;
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, StageSettings};
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::run_configuration::identified_settings;
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
@@ -268,7 +269,7 @@ impl Case {
                 plant.change(with_friction(time_s));
             }
             let counts = [plant.read_counter(), 0, 0];
-            let outputs = machine.tick(&InputRecord::of_counts(counts, operator.request(tick)));
+            let outputs = machine.tick(&TickInput::of_counts(counts, operator.request(tick)));
             let state = machine.state();
             if matches!(state.safety(), SafetyState::Faulted(_)) {
                 return None;

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
 
 use crate::friction_models::Parameters;

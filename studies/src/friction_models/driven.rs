@@ -1,7 +1,7 @@
 //! A friction model that is moved.
 
-use quadrant::friction::Direction;
-use quadrant::friction::stribeck::SlidingTable;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::stribeck::SlidingTable;
 use quadrant_sim::plant::{AxisParameters, Presliding};
 
 use crate::friction_models::Parameters;

@@ -1,6 +1,6 @@
 //! The friction models side by side: table and page.
 
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::pages::{UM_PER_MM, columns, lines, series};
 use quadrant_sim::report::{
     Block, Cell, Column, Figure, Page, Provenance, Section, Series, Style, Table,

@@ -1,9 +1,9 @@
 //! The models that are compared, and the parameters of all of them on one axis.
 
-use quadrant::friction::FrictionSettings;
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::lugre::LugreParameters;
-use quadrant::settings::AxisSettings;
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::identify::single_state::{presliding_range_mm, with_all_models};
 use quadrant_sim::plant::{AxisParameters, Drive, FrictionParameters, Imperfections};
 

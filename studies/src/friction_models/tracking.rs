@@ -2,9 +2,9 @@
 //! follows one model or another.
 
 use indicatif::ProgressBar;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;

@@ -7,7 +7,7 @@ pub mod command;
 pub mod page;
 
 use indicatif::ProgressBar;
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::commission::{CommissionError, CommissionSettings, Commissioned, commission};
 use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, StageParameters};

@@ -1,8 +1,8 @@
 //! The tuned laws on the axis itself, each without and with feedforward.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
 use quadrant_sim::experiment::statistic::Statistic;

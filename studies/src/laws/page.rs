@@ -1,7 +1,7 @@
 //! The feedback laws side by side: how they were tuned, and what they did.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::experiment::sine_test::SineTestOutcome;
 use quadrant_sim::pages::{UM_PER_MM, columns, dot, lines, series, statistic_cells};
 use quadrant_sim::report;
@@ -21,7 +21,7 @@ pub fn tuning_table(laws: &[TunedLaw]) -> Table {
             .map(|(_, cost)| *cost)
             .fold(f64::INFINITY, f64::min);
         let gains = tuned.feedback.linear_gains();
-        let gain = |read: fn(&quadrant::control::pid::PidGains) -> f64, decimals| {
+        let gain = |read: fn(&quadrant_law::control::pid::PidGains) -> f64, decimals| {
             gains
                 .first()
                 .map_or(Cell::Missing, |gains| Cell::number(read(gains), decimals))

@@ -1,7 +1,7 @@
 //! The whole study of the laws on one axis: trajectory, tuning, comparison, wrong models.
 
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::StageSettings;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::StageSettings;
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::identify::characteristic::{
     CharacteristicError, CharacteristicSettings, measure,

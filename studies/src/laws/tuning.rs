@@ -1,15 +1,15 @@
 //! Tuning: what is free in each law within the bounds on robustness.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::control::nctf::NctfGains;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::sector_bound;
-use quadrant::control::schedule::SchedulePoint;
-use quadrant::control::sliding_mode::SlidingModeGains;
-use quadrant::control::surface::SurfaceGains;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::{AxisSettings, FeedbackSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::nctf::NctfGains;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::control::schedule::SchedulePoint;
+use quadrant_law::control::sliding_mode::SlidingModeGains;
+use quadrant_law::control::surface::SurfaceGains;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::popov::sector_bound;
+use quadrant_settings::{AxisSettings, FeedbackSettings};
 use quadrant_sim::design::{
     DesignError, Form, Margins, PidDesign, PidRequest, Process, Target, design_pid,
 };

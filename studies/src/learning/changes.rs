@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::AxisParameters;
 use quadrant_sim::plant::load::{Force, Load};
 use quadrant_sim::report::{Cell, Column, Table};

@@ -1,8 +1,8 @@
 //! The cut, with what else may be done about it.
 
-use quadrant::cancelling::CancellingSettings;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT};

@@ -1,6 +1,6 @@
 //! The study's figures: the scale settling after a step of friction, and a slot with and without.
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::NEWTONS_PER_VOLT;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::Load;

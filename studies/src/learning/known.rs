@@ -1,6 +1,6 @@
 //! The error that is left where the feedforward knows the friction: as identified and scaled by hand, and the simulated axis' own.
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;
 

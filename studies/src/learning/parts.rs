@@ -2,8 +2,8 @@
 
 use std::fmt::Write as _;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::settings::StageSettings;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_settings::StageSettings;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::{largest, rms};
 use quadrant_sim::experiment::run_configuration::RunConfiguration;

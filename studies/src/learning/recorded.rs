@@ -8,8 +8,8 @@ use std::path::Path;
 use std::sync::Arc;
 
 use anyhow::Context;
-use quadrant::reference::{MotionScale, RecordedTable};
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::reference::{MotionScale, RecordedTable};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::identify::motion::{
     MotionFitSettings, MotionModel, Signals, fit_motion, recommended,
 };

@@ -1,15 +1,16 @@
 //! Remedies against a cut, tried beside the law: a disturbance observer, and a friction model fed with the measured
 //! vibration. Each adds a voltage to the law's output.
 
+use quadrant_settings::response::LinearResponse;
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::Direction;
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, Gms, GmsState};
-use quadrant::friction::stribeck::SlidingTable;
-use quadrant::settings::AxisSettings;
-use quadrant::telemetry::AxisTelemetry;
+use quadrant_law::axis::telemetry::AxisTelemetry;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, Gms, GmsState};
+use quadrant_law::friction::stribeck::SlidingTable;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::design::{OpenLoop, SampledLoop};
 
 use super::run::Addition;

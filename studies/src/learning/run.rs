@@ -1,19 +1,20 @@
 //! A run of one axis: motions one after the other, on an axis that changes between them, while a tool may cut.
 
-use quadrant::axes::AxisName;
-use quadrant::cancelling::SpindleSpeed;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::learning::LearningSettings;
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
-use quadrant::safety::SafetyState;
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant::telemetry::AxisTelemetry;
-use quadrant::units::DacCode;
+use quadrant_law::axes::AxisName;
+use quadrant_law::axis::telemetry::AxisTelemetry;
+use quadrant_law::cancelling::SpindleSpeed;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
+use quadrant_law::reference::{HarmonicSettings, Motion, MotionSettings, RecordedTable};
+use quadrant_law::safety::SafetyState;
+use quadrant_law::units::DacCode;
+use quadrant_settings::Job;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::machine::LawMachine;
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
 
@@ -216,7 +217,7 @@ pub(super) fn run(
                 requests.push(Command::StartMove(AxisName::X));
             }
             let counts = [plant.read_counter(), 0, 0];
-            let outputs = machine.tick(&InputRecord::of_counts(counts, requests.pop()));
+            let outputs = machine.tick(&TickInput::of_counts(counts, requests.pop()));
             let state = machine.state();
             if let SafetyState::Faulted(fault) = state.safety() {
                 anyhow::bail!("fault {} in tick {}", fault.code.number(), fault.tick);

@@ -1,7 +1,7 @@
 //! Learning that begins with the wrong friction: gains of the settings, a history, and values of a catalogue.
 
-use quadrant::friction::gms::{GmsElement, GmsElements, GmsParameters};
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::friction::gms::{GmsElement, GmsElements, GmsParameters};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::report::{Cell, Column, Table};
 use rayon::prelude::*;

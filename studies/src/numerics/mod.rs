@@ -8,13 +8,13 @@ pub mod command;
 pub mod page;
 
 use indicatif::ProgressBar;
-use quadrant::lockstep::InputRecord;
-use quadrant::scalar::{Fixed, Scalar};
+use quadrant_law::scalar::{Fixed, Scalar};
 use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_configuration};
 use quadrant_sim::experiment::configuration::{Configuration, ELEMENTS};
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::run_configuration::RunConfiguration;
 use quadrant_sim::machine::LawMachine;
+use quadrant_sim::machine::law::TickInput;
 use rayon::prelude::*;
 
 /// Deviation of a number type from `f64`: the worst over all velocities and both kinds of model knowledge.
@@ -99,7 +99,7 @@ fn shadow(numerics: &mut Numerics, setup: &RunConfiguration, seed: u64) -> Resul
     let mut single = LawMachine::<f32, ELEMENTS>::new(&job)?;
     let mut fixed = LawMachine::<Fixed, ELEMENTS>::new(&job)?;
     for tick in 0..most_ticks {
-        let input = InputRecord::of_counts(plant.read_counters(), operator.request(tick as u32));
+        let input = TickInput::of_counts(plant.read_counters(), operator.request(tick as u32));
         let outputs = exact.tick(&input);
         single.tick(&input);
         fixed.tick(&input);
@@ -118,7 +118,7 @@ fn differ<S: Scalar>(
     let axes = exact.state().axes().iter().zip(other.state().axes());
     for (exact, other) in axes {
         let (exact, other) = (exact.telemetry(), other.telemetry());
-        let output_v = other.output.to_f64(quadrant::scalar::Quantity::Voltage);
+        let output_v = other.output.to_f64(quadrant_law::scalar::Quantity::Voltage);
         deviation.output_v = deviation.output_v.max((output_v - exact.output).abs());
         deviation.words.0 += u64::from(exact.code != other.code);
         deviation.words.1 += 1;

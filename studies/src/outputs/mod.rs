@@ -4,7 +4,7 @@
 pub mod command;
 pub mod page;
 
-use quadrant::drivers::noise_shaper::NoiseShaper;
+use quadrant_law::noise_shaper::NoiseShaper;
 use quadrant_sim::compare::sine::{Bench, Outcome, Sines, run_bench};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run::RunError;

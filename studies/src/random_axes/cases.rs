@@ -1,8 +1,8 @@
 //! Named axes unlike the simulated stage's: each with one thing that a commissioning may stumble over.
 
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::lugre::LugreParameters;
 use quadrant_cli::say;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::lugre::LugreParameters;
 use quadrant_sim::machine::Travel;
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Drive, EncoderSide, FrictionParameters, StageParameters,

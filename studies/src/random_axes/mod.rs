@@ -11,9 +11,9 @@ mod subject;
 
 use std::time::Instant;
 
-use quadrant::axes::AxisName;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::client::{Client, ClientError};
 use quadrant_sim::commission::bootstrap::{self, measuring_settings};
 use quadrant_sim::commission::verify::run_sine;

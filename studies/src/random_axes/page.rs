@@ -1,7 +1,7 @@
 //! The page of one axis: what was found beside what is true, everything that was tried, and the commissioning's own page.
 
-use quadrant::friction::stribeck::StaticFriction;
 use quadrant_cli::output::command_line;
+use quadrant_law::friction::stribeck::StaticFriction;
 use quadrant_sim::commission::page::commission_page;
 use quadrant_sim::commission::verify::{LawResult, Verification};
 use quadrant_sim::experiment::sine_test::SineTest;
@@ -124,8 +124,9 @@ fn parameters(subject: &Subject, judged: &Judged) -> Table {
             number(found, decimals),
         ]
     };
-    let rigid =
-        |value: fn(&quadrant::control::plant_model::PlantModel) -> f64| plant.as_ref().map(value);
+    let rigid = |value: fn(&quadrant_law::control::plant_model::PlantModel) -> f64| {
+        plant.as_ref().map(value)
+    };
     let mut rows = vec![
         row(
             "A",

@@ -2,11 +2,11 @@
 
 use std::fmt;
 
-use quadrant::friction::PerDirection;
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::lugre::LugreParameters;
-use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use quadrant_sim::machine::Travel;
 use quadrant_sim::plant::{
     AxisParameters, Backlash, Cogging, Drive, EncoderSide, FrictionParameters, PLANT_ELEMENTS,

@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use anyhow::bail;
 use clap::Args;
-use quadrant::safety::FaultCode;
 use quadrant_cli::say;
+use quadrant_law::safety::FaultCode;
 
 use super::{Line, judge};
 use crate::campaign::{Campaign, Seeded};

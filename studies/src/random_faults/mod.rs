@@ -6,13 +6,13 @@
 pub mod command;
 mod restart;
 
-use quadrant::command::Command;
 use quadrant::link::message::{
     AxisName, AxisSet, Body, Harmonic, InjectRequest, Motion, Plan, PointToPoint, Reply,
     SettingsRequest, Voltages,
 };
-use quadrant::safety::{SafetyState, Switches};
-use quadrant::settings::StageSettings;
+use quadrant_law::command::Command;
+use quadrant_law::safety::{SafetyState, Switches};
+use quadrant_settings::StageSettings;
 
 use quadrant_fault_bench::flash::{Damage, SECTOR};
 use quadrant_fault_bench::noise::Noise;
@@ -283,7 +283,7 @@ impl Watch {
         let x = upper.x.as_ref().expect("given");
         let reference = state.axes()[0].reference().to_mm(5e-4);
         if outputs.enabled {
-            let open = state.axes()[0].mode() == quadrant::motion::MotionMode::OpenLoop;
+            let open = state.axes()[0].mode() == quadrant_law::motion::MotionMode::OpenLoop;
             let planned = if open { x.plant.position_mm } else { reference };
             self.unplanned_mm = self.unplanned_mm.max((x.plant.position_mm - planned).abs());
             (self.coasts_at, self.off_at) = (x.plant.velocity_mm_s, Some(x.plant.position_mm));

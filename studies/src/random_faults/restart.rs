@@ -1,10 +1,10 @@
 //! The start after the supply has failed: which settings are in force, and that nothing moves.
 
 use quadrant::link::message::{Body, Provenance, SettingsRequest};
-use quadrant::settings::StageSettings;
 use quadrant::store::{BUFFER_BYTES, Loaded, Store};
 use quadrant_fault_bench::flash::Flash;
 use quadrant_fault_bench::tasks::Tasks;
+use quadrant_settings::StageSettings;
 
 /// Room for GMS elements.
 const ELEMENTS: usize = 8;

@@ -1,8 +1,8 @@
 //! Chapter 3, what a commissioning of the x axis finds; and chapter 4, the controllers of the settings.
 
 use anyhow::Context as _;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::settings::StageSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::StageSettings;
 use quadrant_sim::commission::{CommissionSettings, CrossCheck, commission};
 use quadrant_sim::design::npid::filtered_proof;
 use quadrant_sim::design::pages::npid::NonlinearPage;

@@ -1,6 +1,6 @@
 //! The axis on other drives, each with a controller that was designed for it in the same way: by commissioning it.
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::{CommissionError, CommissionSettings, commission};
 use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, EncoderSide, StageParameters};

@@ -1,6 +1,6 @@
 //! The errors of the study.
 
-use quadrant::settings::SettingsError;
+use quadrant_settings::SettingsError;
 
 /// Reasons for which a competitor cannot run.
 #[derive(Clone, Debug, thiserror::Error)]

@@ -15,11 +15,11 @@ pub mod scenario;
 pub mod study;
 mod trial;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::learning::LearningSettings;
-use quadrant::safety::Fault;
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::learning::LearningSettings;
+use quadrant_law::safety::Fault;
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::metrics::Score;
 use quadrant_sim::experiment::run::AxisTrace;

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 use quadrant_sim::plant::cutting::{Component, Milling};
 use quadrant_sim::plant::load::{Force, Load};
 use quadrant_sim::plant::{AxisParameters, NEWTONS_PER_VOLT, StageParameters};

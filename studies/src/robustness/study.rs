@@ -1,6 +1,6 @@
 //! The whole study: the scenarios on the axis, the other drives, and the compliances.
 
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 use quadrant_sim::plant::StageParameters;
 use quadrant_sim::plant::load::Force;
 

@@ -2,14 +2,15 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::safety::{Fault, SafetyState};
-use quadrant::settings::{PlanSettings, SettingsError, StageSettings};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_law::safety::{Fault, SafetyState};
+use quadrant_settings::Job;
+use quadrant_settings::{PlanSettings, SettingsError, StageSettings};
 use quadrant_sim::compare::sine::AMPLITUDE_MM;
 use quadrant_sim::experiment::configuration::ELEMENTS;
 use quadrant_sim::experiment::metrics::{Score, largest, rms, score};
 use quadrant_sim::experiment::run::AxisTrace;
+use quadrant_sim::machine::law::TickInput;
 use quadrant_sim::machine::{LawMachine, Operator};
 use quadrant_sim::plant::load::Load;
 use quadrant_sim::plant::{AxisParameters, SimulatedAxis};
@@ -186,7 +187,7 @@ impl Trial<'_> {
         let mut trace = AxisTrace::default();
         let mut enabled_ticks = 0.0;
         for tick in 0..most_ticks {
-            let outputs = machine.tick(&InputRecord::of_counts(
+            let outputs = machine.tick(&TickInput::of_counts(
                 [plant.read_counter(), 0, 0],
                 operator.request(tick as u32),
             ));

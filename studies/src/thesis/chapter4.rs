@@ -1,6 +1,6 @@
 //! Chapter 4 of the thesis on our stage: the controllers, and what the runs of chapter 5 are made of.
 
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::compare::comparison::AMPLITUDES_MM;
 use quadrant_sim::compare::sine::{CYCLES, SCORED_CYCLES, VELOCITIES_MM_S, cycle_s};
 use quadrant_sim::design::pages::npid::NonlinearPage;
@@ -96,7 +96,7 @@ fn data_rows(rate_hz: f64, x: &AxisSettings, truth: &AxisParameters, seeds: u64)
         same(
             "converter step",
             "mV",
-            1e3 * truth.full_scale_v / quadrant::units::DacCode::FULL_SCALE,
+            1e3 * truth.full_scale_v / quadrant_law::units::DacCode::FULL_SCALE,
             3,
         ),
         imperfect(

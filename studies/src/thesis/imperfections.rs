@@ -1,8 +1,8 @@
 //! The cost of each imperfection: each is switched off by itself, and the comparison of the
 //! PID with N-PID and combined feedforward is run again. The plant is not tuned; only what is asked about is changed.
 
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::settings::SettingsError;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_settings::SettingsError;
 use quadrant_sim::commission::bootstrap::low_bandwidth_settings;
 use quadrant_sim::compare::comparison::{Comparison, Request};
 use quadrant_sim::compare::sine::Sines;

@@ -7,11 +7,11 @@
 
 pub mod page;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::friction::stribeck::StaticFriction;
-use quadrant::settings::{AxisSettings, FeedbackSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::friction::stribeck::StaticFriction;
+use quadrant_settings::{AxisSettings, FeedbackSettings};
 use quadrant_sim::experiment::run::RunError;
 use quadrant_sim::experiment::sine_test::{SineTest, SineTestOutcome, run_sine_tests};
 use quadrant_sim::plant::AxisParameters;

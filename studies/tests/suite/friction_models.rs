@@ -2,8 +2,8 @@
 
 use crate::command::{fail, succeed};
 use indicatif::ProgressBar;
-use quadrant::settings::presets::x_axis;
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
+use quadrant_settings::presets::x_axis;
 use quadrant_sim::plant::{AxisParameters, FrictionParameters, SimulatedAxis, StageParameters};
 use quadrant_studies::friction_models::{Behaviour, Model, Parameters, compare};
 

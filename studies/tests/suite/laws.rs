@@ -1,7 +1,7 @@
 //! The laws' comparison: equal robustness, knobs that were really tried, and the same again.
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::design::{Form, Process};
 use quadrant_sim::experiment::run_configuration::identified_settings;
 use quadrant_sim::identify::characteristic::{CharacteristicSettings, measure};
@@ -11,7 +11,7 @@ use quadrant_studies::laws::comparison::compare_laws;
 use quadrant_studies::laws::tuning::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK, TunedLaw, tune_all};
 use quadrant_studies::wrong_model::{Competitor, Wrong, feedback, with_wrong_model};
 
-fn tuned() -> (quadrant::settings::AxisSettings, Vec<TunedLaw>) {
+fn tuned() -> (quadrant_settings::AxisSettings, Vec<TunedLaw>) {
     let settings = identified_settings().unwrap().stage.axes[0].clone();
     let mut rig = SimulatedTestAxis::new(0, StageParameters::real().axes[0].clone(), 1);
     let characteristic =

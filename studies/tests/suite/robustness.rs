@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use quadrant::safety::FaultCode;
-use quadrant::settings::StageSettings;
+use quadrant_law::safety::FaultCode;
+use quadrant_settings::StageSettings;
 use quadrant_sim::compare::sine::run_configuration;
 use quadrant_sim::experiment::configuration::Configuration;
 use quadrant_sim::experiment::run_configuration::{RunConfiguration, identified_settings};

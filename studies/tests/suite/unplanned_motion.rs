@@ -1,8 +1,8 @@
 //! Experiments of a commissioning stay in the travel but for a fiftieth of it, whatever the axis, the stroke and the place where it stands, and however
 //! wrong the first controller is.
 
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_settings::{AxisSettings, StageSettings};
 use quadrant_sim::commission::Guard;
 use quadrant_sim::commission::bootstrap::{bootstrap_settings, zero_gain_settings};
 use quadrant_sim::identify::motor_constant::{self, MotorConstant, MotorConstantSettings};

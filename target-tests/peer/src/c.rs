@@ -1,6 +1,6 @@
 //! The law in C, `law.c`: its types and its functions.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use crate::parameters::{ELEMENTS, Parameters};
 

@@ -8,9 +8,9 @@ use core::panic::PanicInfo;
 use cortex_m as _;
 use cortex_m_semihosting::debug;
 use defmt_semihosting as _;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::{Feedforward, FeedforwardKind};
-use quadrant::settings::{AxisSettings, StageSettings};
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::{Feedforward, FeedforwardKind};
+use quadrant_settings::{AxisSettings, StageSettings};
 
 use crate::c::{BarePid, Input, State, c_law, c_pid};
 use crate::parameters::Parameters;

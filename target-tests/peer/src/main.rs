@@ -3,6 +3,7 @@
 #![cfg_attr(target_os = "none", no_std, no_main)]
 
 #[cfg(target_os = "none")]
+#[allow(unsafe_code)]
 mod c;
 #[cfg(target_os = "none")]
 mod compare;

@@ -1,9 +1,9 @@
 //! Parameters of the law in C, `law.c`, made from the settings.
 
-use quadrant::control::npid::NonlinearGain;
-use quadrant::friction::PerDirection;
-use quadrant::friction::stribeck::StribeckCurve;
-use quadrant::settings::AxisSettings;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::stribeck::StribeckCurve;
+use quadrant_settings::AxisSettings;
 
 /// Elements of the GMS model.
 pub(crate) const ELEMENTS: usize = 4;

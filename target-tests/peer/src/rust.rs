@@ -1,9 +1,9 @@
 //! The law of three axes as the firmware has it, without what the firmware does around it.
 
-use quadrant::control::feedback::Feedback;
-use quadrant::control::terms::{FeedbackInput, FeedbackState};
-use quadrant::feedforward::{Feedforward, FeedforwardState, ReferenceStep};
-use quadrant::scalar::Scalar;
+use quadrant_law::control::feedback::Feedback;
+use quadrant_law::control::terms::{FeedbackInput, FeedbackState};
+use quadrant_law::feedforward::{Feedforward, FeedforwardState, ReferenceStep};
+use quadrant_law::scalar::Scalar;
 
 use crate::c::Input;
 use crate::parameters::ELEMENTS;

@@ -1,8 +1,9 @@
 //! The states of the machine in which faults are brought about: enabled, moving, homed.
 
 use anyhow::{Result, bail, ensure};
-use quadrant::axes::AxisName;
+use quadrant::app::Translated;
 use quadrant::link::message::{AxisSet, Body};
+use quadrant_law::axes::AxisName;
 
 use super::fixture::{A_WHILE, Fixture};
 
@@ -50,6 +51,8 @@ pub(super) fn homing(fixture: &mut Fixture) -> Result<u32> {
 /// Lets x home; gives the tick before.
 pub(super) fn start_homing(fixture: &mut Fixture) -> Result<u32> {
     let from = fixture.tick();
-    fixture.done(Body::Home(AxisSet::NONE.with(AxisName::X.into())))?;
+    fixture.done(Body::Home(
+        AxisSet::NONE.with(Translated::translated(AxisName::X)),
+    ))?;
     Ok(from)
 }

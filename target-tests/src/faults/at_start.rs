@@ -1,12 +1,12 @@
 //! Faults that a firmware finds when it starts: what ended the one before it, and stored settings that it refuses.
 
 use anyhow::{Result, anyhow, ensure};
-use quadrant::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
 use quadrant::lockstep::{InjectedFault, Mode, OUTPUT, OutputRecord};
-use quadrant::safety::FaultCode;
-use quadrant::settings::StageSettings;
-use quadrant::stage::Outputs;
 use quadrant::store::{BUFFER_BYTES, Provenance, Store};
+use quadrant_law::friction::gms::{FIRMWARE_ELEMENTS, GmsElement};
+use quadrant_law::safety::FaultCode;
+use quadrant_law::stage::Outputs;
+use quadrant_settings::StageSettings;
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 
 use super::approach::moving;

@@ -1,13 +1,15 @@
 //! Cases: the cause of each fault that is found while the machine runs.
 
 use anyhow::Result;
-use quadrant::axes::AxisName;
-use quadrant::encoder::EncoderReading;
+use quadrant::app::Translated;
 use quadrant::link::message::Body;
-use quadrant::lockstep::{InputRecord, Job};
-use quadrant::reference::{HarmonicSettings, MotionSettings};
-use quadrant::safety::{AxisSwitches, FaultCode, Switches};
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant::lockstep::InputRecord;
+use quadrant_law::axes::AxisName;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::safety::{AxisSwitches, FaultCode, Switches};
+use quadrant_settings::Job;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 use quadrant_sim::machine::memory_flash::MemoryFlash;
 use quadrant_sim::plant::MarkParameters;
 
@@ -142,7 +144,7 @@ pub(crate) fn of(code: FaultCode) -> Option<Case> {
             bring: |fixture| {
                 enabled(fixture)?;
                 fixture.done(Body::Jog {
-                    axis: AxisName::X.into(),
+                    axis: Translated::translated(AxisName::X),
                     velocity_mm_s: 10.0,
                 })?;
                 for _ in 0..10 {

@@ -2,8 +2,8 @@
 
 use anyhow::{Context, Result, bail, ensure};
 use quadrant::link::message::{Body, FaultReport};
-use quadrant::safety::{FaultCode, Reaction};
-use quadrant::stage::Outputs;
+use quadrant_law::safety::{FaultCode, Reaction};
+use quadrant_law::stage::Outputs;
 use serde::{Deserialize, Serialize};
 
 use super::case::Case;

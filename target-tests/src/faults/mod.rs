@@ -11,7 +11,7 @@ mod serial_ring;
 mod streams;
 
 use anyhow::{Context, Result, bail, ensure};
-use quadrant::safety::FaultCode;
+use quadrant_law::safety::FaultCode;
 use serde::{Deserialize, Serialize};
 
 use self::finding::Finding;

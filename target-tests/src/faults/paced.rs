@@ -5,8 +5,8 @@ use quadrant::lockstep::{
     HANGS_FROM, HANGS_UNTIL, INJECTED_FAULT, INJECTED_FAULT_TICK, InjectedFault, InputRecord, Mode,
     OutputRecord, RECORDED_OUTPUTS,
 };
-use quadrant::safety::FaultCode;
-use quadrant::stage::Outputs;
+use quadrant_law::safety::FaultCode;
+use quadrant_law::stage::Outputs;
 
 use super::finding::{Finding, are_off, log_contains};
 use crate::lockstep;

@@ -5,7 +5,7 @@ use quadrant::link::message::AxisName;
 use quadrant::link::message::{
     Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, SetPoint, StreamRequest, Voltages,
 };
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
 
 use super::approach::{LONGEST, enabled};
 use super::fixture::Fixture;

@@ -85,9 +85,10 @@ fn waits_for_event(time: Duration) -> anyhow::Result<bool> {
 #[cfg(test)]
 mod tests {
     use clap::Parser;
+    use quadrant::app::Translated;
     use quadrant::link::message::{Body, MachineState};
-    use quadrant::reference::{MotionSettings, PointToPointSettings};
-    use quadrant::settings::PlanSettings;
+    use quadrant_law::reference::{MotionSettings, PointToPointSettings};
+    use quadrant_settings::PlanSettings;
     use quadrant_sim::machine::{SimulatedLink, StageSetup};
     use ratatui::Terminal;
     use ratatui::backend::TestBackend;
@@ -247,7 +248,9 @@ mod tests {
             max_acceleration_mm_s2: 1e3,
             max_jerk_mm_s3: 1e5,
         });
-        client.order(Body::SetPlan(plan.into())).unwrap();
+        client
+            .order(Body::SetPlan(Translated::translated(plan)))
+            .unwrap();
         twice(&mut client, &mut watch, 'g');
         for _ in 0..200 {
             watch.look(&mut client, PICTURE).unwrap();

@@ -3,8 +3,8 @@
 use std::f64::consts::TAU;
 use std::hint::cold_path;
 
-use quadrant::friction::{Direction, PerDirection};
-use quadrant::units::DacCode;
+use quadrant_law::friction::{Direction, PerDirection};
+use quadrant_law::units::DacCode;
 use rand::SeedableRng;
 use rand_distr::{Distribution, StandardNormal};
 use rand_xoshiro::Xoshiro256PlusPlus;

@@ -1,12 +1,12 @@
 //! The simulated axes' pre-sliding friction: any of the library's models, in `f64`.
 
-use quadrant::friction::Direction;
-use quadrant::friction::bristle::Bristle;
-use quadrant::friction::dahl::Dahl;
-use quadrant::friction::gms::{Gms, GmsState};
-use quadrant::friction::lugre::Lugre;
-use quadrant::friction::smoothed_gms::SmoothedGms;
-use quadrant::friction::stribeck::SlidingTable;
+use quadrant_law::friction::Direction;
+use quadrant_law::friction::bristle::Bristle;
+use quadrant_law::friction::dahl::Dahl;
+use quadrant_law::friction::gms::{Gms, GmsState};
+use quadrant_law::friction::lugre::Lugre;
+use quadrant_law::friction::smoothed_gms::SmoothedGms;
+use quadrant_law::friction::stribeck::SlidingTable;
 
 use super::{AxisParameters, FrictionParameters, PLANT_ELEMENTS};
 

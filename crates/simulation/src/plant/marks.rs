@@ -1,7 +1,7 @@
 //! Limit switches, home switch and index pulses of a simulated axis.
 
-use quadrant::encoder::EncoderReading;
-use quadrant::safety::AxisSwitches;
+use quadrant_law::encoder::EncoderReading;
+use quadrant_law::safety::AxisSwitches;
 
 /// True positions of an axis' switches and index pulses. Every number is chosen, none measured.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -3,14 +3,14 @@
 use std::f64::consts::TAU;
 
 use heapless::Vec;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::PerDirection;
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
-use quadrant::friction::lugre::LugreParameters;
-use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
-use quadrant::settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_settings::presets::{X_PLANT, Y_PLANT, Z_PLANT};
 
 use super::Drive;
 

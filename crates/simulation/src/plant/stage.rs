@@ -1,12 +1,12 @@
 //! The simulated stage: three axes that share nothing but the clock.
 
-use quadrant::axes::AxisName;
-use quadrant::command::Command;
-use quadrant::drivers::noise_shaper::{NoiseShaper, NoiseShaperState};
-use quadrant::lockstep::InputRecord;
-use quadrant::safety::Switches;
-use quadrant::stage::Outputs;
-use quadrant::units::DacCode;
+use crate::law_machine::TickInput;
+use quadrant_law::axes::AxisName;
+use quadrant_law::command::Command;
+use quadrant_law::noise_shaper::{NoiseShaper, NoiseShaperState};
+use quadrant_law::safety::Switches;
+use quadrant_law::stage::Outputs;
+use quadrant_law::units::DacCode;
 
 use super::{MarkParameters, Marks, SUBSTEPS, SimulatedAxis, StageParameters};
 
@@ -64,8 +64,8 @@ impl SimulatedStage {
 
     /// Returns the board's inputs: counters with their index pulses, and switches; with a request that comes at the
     /// same time.
-    pub fn read_inputs(&mut self, request: Option<Command>) -> InputRecord {
-        let mut inputs = InputRecord::of_counts(self.read_counters(), request);
+    pub fn read_inputs(&mut self, request: Option<Command>) -> TickInput {
+        let mut inputs = TickInput::of_counts(self.read_counters(), request);
         let mut switches = Switches::NONE;
         for (index, axis) in self.axes.iter().enumerate() {
             let counter = inputs.readings[index].count;

@@ -1,6 +1,6 @@
 //! The same axis after something about it has changed, and the same axis on other drives. Every number is chosen.
 
-use quadrant::friction::stribeck::StaticFriction;
+use quadrant_law::friction::stribeck::StaticFriction;
 
 use super::{
     AxisParameters, Backlash, Cogging, Drive, EncoderSide, Imperfections, virgin_curve_elements,
@@ -25,7 +25,7 @@ impl AxisParameters {
     #[must_use]
     pub fn with_friction(mut self, factor: f64) -> Self {
         self.friction = self.friction.map(|model| StaticFriction {
-            curve: quadrant::friction::stribeck::StribeckCurve {
+            curve: quadrant_law::friction::stribeck::StribeckCurve {
                 coulomb_v: factor * model.curve.coulomb_v,
                 breakaway_v: factor * model.curve.breakaway_v,
                 ..model.curve

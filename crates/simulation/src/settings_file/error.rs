@@ -2,7 +2,7 @@
 
 use std::path::PathBuf;
 
-use quadrant::settings::SettingsError;
+use quadrant_settings::SettingsError;
 
 use crate::toml_file::TomlFileError;
 

@@ -10,9 +10,9 @@ mod uncommissioned;
 use std::io;
 use std::path::Path;
 
-use quadrant::axes::AxisName;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_settings::StageSettings;
 use serde::{Deserialize, Serialize};
 
 use self::error::FORM;
@@ -199,7 +199,7 @@ impl SettingsFile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use quadrant::control::feedback::LawKind;
+    use quadrant_law::control::feedback::LawKind;
 
     fn file() -> SettingsFile {
         SettingsFile {

@@ -5,9 +5,9 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use quadrant::axes::AxisName;
-use quadrant::settings::tree::is_part;
-use quadrant::settings::{StageSettings, leaves};
+use quadrant_law::axes::AxisName;
+use quadrant_settings::tree::is_part;
+use quadrant_settings::{StageSettings, leaves};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use toml::de::{DeTable, DeValue};

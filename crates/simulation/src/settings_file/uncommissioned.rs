@@ -1,6 +1,6 @@
 //! An axis before it is commissioned.
 
-use quadrant::settings::AxisSettings;
+use quadrant_settings::AxisSettings;
 
 use super::sparse::defaults_at;
 

@@ -9,13 +9,13 @@ mod fields;
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
-use quadrant::axes::AxisName;
-use quadrant::friction::PerDirection;
-use quadrant::friction::dahl::DahlParameters;
-use quadrant::friction::gms::GmsElement;
-use quadrant::friction::lugre::LugreParameters;
-use quadrant::friction::smoothed_gms::SmoothedGmsParameters;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::axes::AxisName;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::dahl::DahlParameters;
+use quadrant_law::friction::gms::GmsElement;
+use quadrant_law::friction::lugre::LugreParameters;
+use quadrant_law::friction::smoothed_gms::SmoothedGmsParameters;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 use serde::Deserialize;
 
 use self::choices::{EncoderPlace, Friction};

@@ -1,12 +1,13 @@
 //! An axis of a connected machine, under experiments.
 
+use quadrant::app::Translated;
 use std::time::Duration;
 
-use quadrant::axes::AxisName;
 use quadrant::link::message::{AxisSignal, Body, Channel, MachineState};
-use quadrant::reference::MotionSettings;
-use quadrant::safety::FaultCode;
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant_law::axes::AxisName;
+use quadrant_law::reference::MotionSettings;
+use quadrant_law::safety::FaultCode;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
 
 use super::injection::Injection;
 use super::recording::Shape;
@@ -97,13 +98,15 @@ impl<'a> ConnectedAxis<'a> {
         let mut motions = [MotionSettings::Hold; 3];
         motions[self.axis as usize] = motion.unwrap_or(MotionSettings::Hold);
         self.client
-            .order(Body::SetPlan(PlanSettings { motions }.into()))?;
+            .order(Body::SetPlan(Translated::translated(PlanSettings {
+                motions,
+            })))?;
         let channels = [
             AxisSignal::Reference,
             AxisSignal::Position,
             AxisSignal::CodeSum,
         ]
-        .map(|signal| Channel::Axis(self.axis.into(), signal));
+        .map(|signal| Channel::Axis(Translated::translated(self.axis), signal));
         let rate_hz = self.client.identity().rate_hz;
         let wanted = u16::try_from(experiment.decimation).unwrap_or(u16::MAX);
         let least = wanted.max(least_decimation(channels.len(), rate_hz));
@@ -170,7 +173,7 @@ impl<'a> ConnectedAxis<'a> {
             let mut plan = Injection::new(
                 experiment,
                 self.settings(),
-                self.axis.into(),
+                Translated::translated(self.axis),
                 room_mm,
                 moves,
             );
@@ -267,7 +270,7 @@ impl TestAxis for ConnectedAxis<'_> {
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError> {
         let mut stage = self.stage.clone();
         stage.axes[self.axis as usize] = settings.clone();
-        stage.validate(quadrant::friction::gms::FIRMWARE_ELEMENTS)?;
+        stage.validate(quadrant_law::friction::gms::FIRMWARE_ELEMENTS)?;
         self.disabled_for(&stage)
             .and_then(|()| settings::load(self.client, &stage))
             .map_err(|error| MachineError::Connection(Box::new(error)))?;

@@ -5,8 +5,8 @@ use std::time::Duration;
 use quadrant::link::message::AxisName;
 use quadrant::link::message::MachineState;
 use quadrant::link::message::{Body, INJECT_VALUES, InjectRequest, InjectStatus, Reply, Voltages};
-use quadrant::settings::AxisSettings;
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
+use quadrant_settings::AxisSettings;
 
 use super::stop::{Injected, Stop};
 use crate::client::error::ClientError;

@@ -1,7 +1,7 @@
 //! From the channels of a connected axis to the recording of an experiment.
 
-use quadrant::settings::AxisSettings;
-use quadrant::units::DacCode;
+use quadrant_law::units::DacCode;
+use quadrant_settings::AxisSettings;
 
 use super::stop::Injected;
 use crate::client::samples::Samples;
@@ -94,7 +94,7 @@ impl Shape<'_> {
 #[cfg(test)]
 mod tests {
     use quadrant::link::message::{AxisName, AxisSignal, Channel};
-    use quadrant::settings::presets::x_axis;
+    use quadrant_settings::presets::x_axis;
 
     use super::*;
 

@@ -1,7 +1,7 @@
 //! End of an experiment on a connected axis: put out in full, or stopped.
 
 use quadrant::link::message::InjectStatus;
-use quadrant::safety::{Fault, FaultCode};
+use quadrant_law::safety::{Fault, FaultCode};
 
 use crate::client::error::ClientError;
 use crate::machine::{Experiment, ExperimentError};

@@ -1,9 +1,9 @@
 //! Settings to and from the machine.
 
-use quadrant::axes::AxisName;
-use quadrant::control::feedback::LawKind;
 use quadrant::link::message::{self, AxisSet};
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_settings::StageSettings;
 
 use super::connected;
 use crate::client::settings::{self, ExchangeError, whole_path};

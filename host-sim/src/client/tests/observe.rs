@@ -6,7 +6,7 @@ use quadrant::link::message::AxisName;
 use quadrant::link::message::Trigger;
 use quadrant::link::message::{AxisSignal, Channel, StageSignal};
 use quadrant::link::message::{Body, SetPoint};
-use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
 use super::connected;
 use crate::client::samples::{Samples, TelemetryRecorder, arm, least_decimation, read_capture};
@@ -177,7 +177,7 @@ fn a_program_arrives_whole_in_order_and_ends_at_rest() {
     let (mut client, bench) = connected();
     client.order(Body::Enable).unwrap();
     let program = Program::parse("G21 G90 G17\nF600\nG1 X5\nG3 X5 Y4 J2\nG1 X0\nM2").unwrap();
-    let limits = Limits::of(&quadrant::settings::StageSettings::simulated());
+    let limits = Limits::of(&quadrant_settings::StageSettings::simulated());
     let trajectory = Trajectory::plan(&program, &limits).unwrap();
     let points = set_points(&trajectory, 1e4, 20, [10.0, 0.0, -1.0]);
     bench.borrow_mut().noise = vec![0, 3, 0];
@@ -230,7 +230,7 @@ fn a_stream_that_fails_is_closed_and_one_that_did_not_begin_is_not() {
 #[test]
 fn a_set_points_velocity_and_acceleration_are_those_of_its_position() {
     let program = Program::parse("G21 G90 G17\nF600\nG3 X10 Y0 I5\nM2").unwrap();
-    let limits = Limits::of(&quadrant::settings::StageSettings::simulated());
+    let limits = Limits::of(&quadrant_settings::StageSettings::simulated());
     let trajectory = Trajectory::plan(&program, &limits).unwrap();
     let (rate, period) = (1e4, 10);
     let step = f64::from(period) / rate;
@@ -258,7 +258,7 @@ fn a_connected_axis_runs_experiments_in_closed_loop() {
     let (mut client, bench) = connected();
     let mut test_axis = ConnectedAxis::new(
         &mut client,
-        quadrant::axes::AxisName::X,
+        quadrant_law::axes::AxisName::X,
         crate::machine::Travel::either_way(200.0),
     )
     .unwrap();

@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
-use quadrant::control::filter::FilterSettings;
-use quadrant::control::npid::NonlinearGain;
-use quadrant::control::pid::PidGains;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::control::popov::SectorProof;
+use quadrant_law::control::filter::FilterSettings;
+use quadrant_law::control::npid::NonlinearGain;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_settings::popov::SectorProof;
 
 use crate::design::pages::loop_figures::step_blocks;
 use crate::design::pages::pid::{step_name, step_table};

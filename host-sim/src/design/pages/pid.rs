@@ -1,6 +1,6 @@
 //! Page of a PID's design.
 
-use quadrant::control::pid::PidGains;
+use quadrant_law::control::pid::PidGains;
 
 use crate::design::pages::loop_figures::{
     DrawnLoop, bode_blocks, nyquist_block, sensitivity_blocks, step_blocks,

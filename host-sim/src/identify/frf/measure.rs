@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
 use super::estimate::{Estimate, Estimator, estimates};
 use crate::identify::excitation::{Excitation, NoLine, Waveform};

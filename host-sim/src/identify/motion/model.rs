@@ -1,11 +1,11 @@
 //! Models identified from a motion record.
 
 use heapless::Vec as ShortVec;
-use quadrant::control::plant_model::PlantModel;
-use quadrant::friction::FrictionSettings;
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::{GmsElement, GmsParameters};
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{GmsElement, GmsParameters};
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use crate::identify::single_state::with_all_models;
 

@@ -1,6 +1,6 @@
 //! An ordinary motion: moves to and fro at several velocities, and a brisk sine.
 
-use quadrant::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings, PointToPointSettings};
 
 use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;

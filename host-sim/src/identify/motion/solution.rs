@@ -1,7 +1,7 @@
 //! One fit: the parameters that are not linear are searched for, the others follow.
 
 use nalgebra::DVector;
-use quadrant::friction::PerDirection;
+use quadrant_law::friction::PerDirection;
 
 use super::error::MotionFitError;
 use super::model::{Change, Estimate, MotionModel, Structure, sliding};

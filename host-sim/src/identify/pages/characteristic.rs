@@ -1,6 +1,6 @@
 //! The nominal characteristic trajectory: what was measured, and what control follows of it.
 
-use quadrant::control::nctf::CharacteristicPoint;
+use quadrant_law::control::nctf::CharacteristicPoint;
 
 use crate::identify::characteristic::Characteristic;
 use crate::pages::{columns, lines, series};

@@ -1,6 +1,6 @@
 //! Tables and figures of an identified friction: friction-velocity map, virgin curve, hysteresis.
 
-use quadrant::friction::stribeck::StaticFriction;
+use quadrant_law::friction::stribeck::StaticFriction;
 
 use crate::identify::static_friction::{DirectionFit, FrictionFit, FrictionMap};
 use crate::identify::virgin_curve::GmsFit;

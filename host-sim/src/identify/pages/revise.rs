@@ -1,6 +1,6 @@
 //! The table and page of the revised linear model (thesis, Table 3.4, Figs 3.16-3.21).
 
-use quadrant::control::plant_model::PlantModel;
+use quadrant_law::control::plant_model::PlantModel;
 
 use crate::identify::fit::Fit;
 use crate::identify::pages::bode::{Curve, bode_figures};

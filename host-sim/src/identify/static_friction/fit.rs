@@ -1,7 +1,7 @@
 //! The model fitted to the map.
 
-use quadrant::friction::PerDirection;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use super::map::{FrictionMap, FrictionRun, LEAST_RUNS};
 use crate::identify::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};

@@ -1,6 +1,6 @@
 //! The experiment: moves at constant velocity over the same stretch, both ways.
 
-use quadrant::reference::{MotionSettings, PointToPointSettings};
+use quadrant_law::reference::{MotionSettings, PointToPointSettings};
 
 use super::map::{FrictionMap, FrictionRun};
 use crate::identify::setting::SettingError;

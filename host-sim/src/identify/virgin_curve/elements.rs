@@ -1,8 +1,8 @@
 //! Elements from the virgin curve, and their refinement on the whole hysteresis.
 
-use quadrant::friction::PerDirection;
-use quadrant::friction::gms::{GmsParameters, MAX_ELEMENTS};
-use quadrant::friction::stribeck::StaticFriction;
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::gms::{GmsParameters, MAX_ELEMENTS};
+use quadrant_law::friction::stribeck::StaticFriction;
 
 use super::branches::{Smooth, VirginCurve, range};
 use super::error::VirginCurveError;

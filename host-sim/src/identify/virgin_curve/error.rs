@@ -1,6 +1,6 @@
 //! Errors of the identification of pre-sliding friction.
 
-use quadrant::friction::gms::MAX_ELEMENTS;
+use quadrant_law::friction::gms::MAX_ELEMENTS;
 
 use crate::identify::fit::FitError;
 

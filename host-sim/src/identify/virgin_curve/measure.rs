@@ -1,6 +1,6 @@
 //! The experiment: a slow sine of small amplitude.
 
-use quadrant::reference::{HarmonicSettings, MotionSettings};
+use quadrant_law::reference::{HarmonicSettings, MotionSettings};
 
 use crate::machine::{Drive, Experiment, ExperimentError, TestAxis};
 use crate::record::Recording;

@@ -1,7 +1,7 @@
 //! The plateau of the virgin curve: whether the record reaches it, and what friction it shows.
 
-use quadrant::friction::PerDirection;
-use quadrant::friction::stribeck::{StaticFriction, StribeckCurve};
+use quadrant_law::friction::PerDirection;
+use quadrant_law::friction::stribeck::{StaticFriction, StribeckCurve};
 
 use super::branches::{Smooth, VirginCurve, VirginPoint, range};
 use super::error::VirginCurveError;

@@ -2,9 +2,9 @@
 
 use std::sync::Arc;
 
-use quadrant::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
-use quadrant::friction::stribeck::{Sliding, SlidingTable, StaticFriction, StribeckCurve};
-use quadrant::friction::{Direction, PerDirection};
+use quadrant_law::friction::gms::{Gms, GmsParameters, GmsState, MAX_ELEMENTS};
+use quadrant_law::friction::stribeck::{Sliding, SlidingTable, StaticFriction, StribeckCurve};
+use quadrant_law::friction::{Direction, PerDirection};
 
 use super::branches::Smooth;
 use crate::identify::latest::Latest;

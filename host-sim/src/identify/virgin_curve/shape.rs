@@ -1,7 +1,7 @@
 //! The shape of a virgin curve over its plateau: knots and shares of the elements.
 
 use heapless::Vec as ShortVec;
-use quadrant::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
+use quadrant_law::friction::gms::{GmsElement, GmsParameters, MAX_ELEMENTS};
 
 use crate::identify::fit::Parameter;
 

@@ -6,7 +6,7 @@ use quadrant::lockstep::{
     END_OF_RUN, INPUT_SEQUENCE, InputRecord, LOCKSTEP_TICKS, Mode, OUTPUT_SEQUENCE, OutputRecord,
     input_offset, output_offset,
 };
-use quadrant::stage::Outputs;
+use quadrant_law::stage::Outputs;
 
 use super::backoff::Backoff;
 use super::error::EmulatorError;

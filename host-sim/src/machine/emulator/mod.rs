@@ -8,6 +8,7 @@ mod log;
 mod memory;
 mod process;
 mod program;
+mod record;
 
 pub use self::backoff::Backoff;
 pub use self::error::EmulatorError;
@@ -15,3 +16,4 @@ pub use self::lockstep::Lockstep;
 pub use self::memory::Memory;
 pub use self::process::{Clock, Emulator, Listener, command_line};
 pub use self::program::Program;
+pub use self::record::{input_of, record_of};

@@ -1,14 +1,14 @@
 //! One axis of the simulated stage as a test_axis: its truth is on the other side of encoder and converter.
 
-use quadrant::app::supervisor::Event;
-use quadrant::command::Command;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
-use quadrant::lockstep::InputRecord;
-use quadrant::reference::MotionSettings;
-use quadrant::safety::SafetyState;
-use quadrant::settings::{AxisSettings, PlanSettings, StageSettings};
-use quadrant::units::DacCode;
+use quadrant_law::command::Command;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
+use quadrant_law::reference::MotionSettings;
+use quadrant_law::safety::SafetyState;
+use quadrant_law::supervisor::Event;
+use quadrant_law::units::DacCode;
+use quadrant_settings::{AxisSettings, PlanSettings, StageSettings};
+use quadrant_simulation::law_machine::TickInput;
 use quadrant_simulation::law_machine::{LawMachine, Operator};
 
 use super::recorder::{Period, Recorder};
@@ -20,7 +20,7 @@ use crate::plant::{AxisParameters, SimulatedAxis};
 use crate::record::Recording;
 
 /// Room for GMS elements in the law.
-const ELEMENTS: usize = quadrant::friction::gms::MAX_ELEMENTS;
+const ELEMENTS: usize = quadrant_law::friction::gms::MAX_ELEMENTS;
 /// Travel either way, mm.
 pub(super) const TRAVEL_MM: f64 = 200.0;
 /// Control periods within which the law has enabled the outputs, or does not.
@@ -299,10 +299,7 @@ impl Law {
                 motion_ended: true,
             }));
         };
-        let outputs = machine.tick(&InputRecord::of_counts(
-            [raw, 0, 0],
-            operator.request(*tick),
-        ));
+        let outputs = machine.tick(&TickInput::of_counts([raw, 0, 0], operator.request(*tick)));
         *tick += 1;
         let state = machine.state();
         if let SafetyState::Faulted(fault) = state.safety() {

@@ -10,5 +10,5 @@ mod stage;
 mod watch;
 
 pub use axis::SimulatedTestAxis;
-pub use quadrant_simulation::law_machine::{LawMachine, Operator};
+pub use quadrant_simulation::law_machine::{LawMachine, Operator, TickInput};
 pub use stage::LawStage;

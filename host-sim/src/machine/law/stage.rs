@@ -1,8 +1,8 @@
 //! The simulated stage under the control law alone, as a machine.
 
-use quadrant::axes::AxisName;
-use quadrant::friction::gms::FIRMWARE_ELEMENTS;
-use quadrant::settings::StageSettings;
+use quadrant_law::axes::AxisName;
+use quadrant_law::friction::gms::FIRMWARE_ELEMENTS;
+use quadrant_settings::StageSettings;
 
 use super::axis::{SimulatedTestAxis, TRAVEL_MM};
 use crate::machine::error::MachineError;

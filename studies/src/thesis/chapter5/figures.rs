@@ -4,8 +4,8 @@ use std::f64::consts::TAU;
 
 use FeedforwardKind::{Combined, None as Without};
 use ModelKnowledge::Identified;
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
 use quadrant_sim::compare::sine::{VELOCITIES_MM_S, cycle_s};
 use quadrant_sim::experiment::metrics::GLITCH_WINDOW;

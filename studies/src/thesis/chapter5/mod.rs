@@ -4,8 +4,8 @@
 mod figures;
 mod tables;
 
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Comparison, Entry};
 use quadrant_sim::compare::sine::VELOCITIES_MM_S;
 use quadrant_sim::experiment::configuration::Configuration;

@@ -2,8 +2,8 @@
 
 use FeedforwardKind::{Combined, None as Without};
 use ModelKnowledge::{Exact, Identified};
-use quadrant::control::feedback::LawKind;
-use quadrant::feedforward::FeedforwardKind;
+use quadrant_law::control::feedback::LawKind;
+use quadrant_law::feedforward::FeedforwardKind;
 use quadrant_sim::compare::comparison::{AMPLITUDES_MM, Entry};
 use quadrant_sim::compare::sine::VELOCITIES_MM_S;
 use quadrant_sim::experiment::configuration::Configuration;

@@ -12,7 +12,7 @@ use quadrant::link::frame::{self, FRAME_BYTES};
 use quadrant::link::message::*;
 use quadrant::link::message::{AxisSignal, Channel, StageSignal};
 use quadrant::link::server::LinkServer;
-use quadrant::settings::StageSettings;
+use quadrant_settings::StageSettings;
 
 use crate::machine::SimulatedPeer;
 
@@ -44,7 +44,7 @@ pub(super) struct Bench {
     /// The settings in force.
     pub(super) in_force: StageSettings,
     /// The plan, once one was sent.
-    pub(super) plan: Option<quadrant::settings::PlanSettings>,
+    pub(super) plan: Option<quadrant_settings::PlanSettings>,
 }
 
 pub(super) struct Model {

@@ -1,11 +1,12 @@
 //! Answers of the model to each request.
 
 use heapless::String as Bounded;
+use quadrant::app::Translated;
 use quadrant::app::telemetry::{Packer, Selection};
 use quadrant::link::message::*;
 use quadrant::link::message::{CaptureCause, CapturePhase, CaptureRecord};
 use quadrant::link::message::{LimitedBy, MachineState, Words};
-use quadrant::settings::{MAX_VALUE_BYTES, StageSettings};
+use quadrant_settings::{MAX_VALUE_BYTES, StageSettings};
 
 use super::{Model, ROOM, read};
 
@@ -88,7 +89,9 @@ impl Model {
             }
             Body::Run if self.running() => return Err(refused("a motion is under way")),
             Body::Run => self.plan_left = 5000,
-            Body::SetPlan(plan) => self.bench.borrow_mut().plan = Some(plan.into()),
+            Body::SetPlan(plan) => {
+                self.bench.borrow_mut().plan = Some(Translated::translated(plan))
+            }
             Body::Stream(request) => return self.stream(request),
             Body::Settings(request) => return self.settings(request),
             Body::Telemetry(TelemetryRequest::Select {

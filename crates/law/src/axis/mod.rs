@@ -1,0 +1,1418 @@
+//! One axis, one tick: counts in, a converter's word out.
+//!
+//! An [`Axis`] is what the tick reads, made by an [`AxisBuilder`]; an [`AxisState`] is what it remembers. The stage
+//! ticks three of them together; [`Axis::tick`] ticks one alone.
+//!
+//! ```
+//! use quadrant_law::axis::{Axis, AxisBuilder, AxisState};
+//! use quadrant_law::control::feedback::Feedback;
+//! use quadrant_law::control::pid::{Pid, PidGains};
+//! use quadrant_law::encoder::EncoderReading;
+//! use quadrant_law::reference::Motion;
+//!
+//! let gains = PidGains { kp_v_per_mm: 1.0, ki_v_per_mm_s: 0.5, kd_v_s_per_mm: 5e-3, derivative_filter_s: 50e-6 };
+//! let mut axis = Axis::<f32, 8>::blank();
+//! AxisBuilder::new(&mut axis, 0.5e-3, 1e-4)
+//!     .amplifier(10.0, 10.0, 0.0, false)
+//!     .feedback(Feedback::Pid(Pid::build(&gains, 2.0, 1e-4)))
+//!     .try_build()?;
+//! let mut state = AxisState::default();
+//! axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(0), 0).unwrap();
+//! // Pushed one count (0.5 um) away, the axis pushes back.
+//! let code = axis.tick(&mut state, &Motion::Hold, &EncoderReading::of(1), 1).unwrap();
+//! assert!(code.0 < 0);
+//! # Ok::<(), quadrant_law::axis::AxisError>(())
+//! ```
+
+mod rest;
+pub mod telemetry;
+
+use core::fmt;
+use core::hint::cold_path;
+
+use self::rest::RestState;
+use self::telemetry::{AxisTelemetry, LimitedBy};
+use crate::cancelling::{
+    Cancelling, CancellingLoop, CancellingSettings, CancellingState, Cut, SpindleSpeed,
+};
+use crate::command::Command;
+use crate::control::feedback::Feedback;
+use crate::control::filter::{Filters, FiltersState};
+use crate::control::pid::Pid;
+use crate::control::terms::{FeedbackInput, FeedbackState, FeedbackTerms};
+use crate::decimal::Decimal;
+use crate::encoder::{Encoder, EncoderReading, EncoderState};
+use crate::feedforward::{
+    Feedforward, FeedforwardGains, FeedforwardKind, FeedforwardState, FeedforwardTerms,
+    ReferenceStep,
+};
+use crate::friction::FrictionSettings;
+use crate::homing::HomingInput;
+use crate::learning::{Learning, LearningInput, LearningState, LearningStatus};
+use crate::motion::{
+    GeneratorEvent, GeneratorState, MotionMode, ReferenceGenerator, ReferenceState,
+};
+use crate::reference::{Motion, ReferenceSample, Segment};
+use crate::rounding;
+use crate::safety::monitor::{
+    Following, FollowingState, IndexSpacing, IndexState, Overspeed, OverspeedState, SignalLoss,
+    SignalLossState, speed_limit,
+};
+use crate::safety::oscillation::{
+    Oscillation, OscillationInput, OscillationReading, OscillationState,
+};
+use crate::safety::overload::{Overload, OverloadState};
+use crate::safety::plausibility::{Plausibility, PlausibilityState, Shown, is_due};
+use crate::safety::standstill::{Standstill, StandstillState};
+use crate::safety::travel::{Travel, TravelState};
+use crate::safety::{AxisSwitches, FaultCode};
+use crate::scalar::{Quantity, Scalar};
+use crate::units::{DacCode, POSITION_FRACTION_BITS, POSITION_UNITS_PER_COUNT, Position};
+
+/// Ticks that the feedforward can look ahead at most: 3 ms at 10 kHz.
+pub const MAX_PREVIEW_TICKS: usize = 30;
+
+/// Room for the reference positions from the feedforward's tick back to the one before the feedback's; a power of two.
+const PREVIEW_ROOM: usize = MAX_PREVIEW_TICKS + 2;
+
+/// A speed in 2^-8 counts as a displacement.
+const SPEED_SHIFT: u32 = POSITION_FRACTION_BITS - 8;
+
+/// The output stage of an axis.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Amplifier<S: Scalar> {
+    limit: S,
+    codes_per_volt: S::Gain,
+    offset_code: i32,
+}
+
+impl<S: Scalar> Amplifier<S> {
+    #[inline(always)]
+    fn code(&self, output: S) -> DacCode {
+        DacCode::saturating(
+            output
+                .round_scaled(self.codes_per_volt)
+                .saturating_add(self.offset_code),
+        )
+    }
+}
+
+/// An axis ready for the tick; `N` is the room for GMS elements. Made by an [`AxisBuilder`].
+///
+/// Fields that every tick reads come first, and tables last: floating-point loads reach 1020 bytes from an address.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
+pub struct Axis<S: Scalar, const N: usize> {
+    encoder: Encoder,
+    overspeed: Overspeed,
+    /// Limit of the measured speed until the axis is homed, 2^-8 counts per tick; the largest number for none.
+    reduced_speed: u32,
+    signal_loss: SignalLoss<S>,
+    preview_ticks: usize,
+    unit_mm: S::Gain,
+    following: Following<S>,
+    amplifier: Amplifier<S>,
+    bumpless_decay: S,
+    travel: Travel,
+    /// It learns or cancels.
+    adapts: bool,
+    learns: bool,
+    cancels: bool,
+    feedback: Feedback<S>,
+    filters: Filters<S>,
+    feedforward: Feedforward<S, N>,
+    /// A displacement in a tick as a velocity.
+    unit_mm_s: S::Gain,
+    plausibility: Plausibility,
+    overload: Overload,
+    oscillation: Oscillation<S>,
+    index_spacing: IndexSpacing,
+    standstill: Standstill,
+    generator: ReferenceGenerator<S>,
+    commissioning: Commissioning,
+    learning: Learning<S>,
+    cancelling: Cancelling<S>,
+}
+
+/// The standing of an axis' settings: the outputs are enabled only if no axis is [`Missing`](Self::Missing) and one is
+/// [`Done`](Self::Done).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Commissioning {
+    /// Nobody has commissioned the axis, and its law puts out nothing, whatever is measured.
+    #[default]
+    Inert,
+    /// Nobody has commissioned the axis, but its law would drive it.
+    Missing,
+    /// The axis was commissioned.
+    Done,
+}
+
+/// Puts the parts of an axis together, in place: no temporary is as large as an axis. Settings time only.
+///
+/// Parts that are not given are absent: no feedforward, no homing, no limits but the amplifier's, and a 32-bit encoder.
+#[derive(Debug)]
+pub struct AxisBuilder<'a, S: Scalar, const N: usize> {
+    axis: &'a mut Axis<S, N>,
+    period_s: f64,
+    error: Option<AxisError>,
+}
+
+/// A part that an axis cannot be made with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum AxisError {
+    /// The length of an encoder count, mm: not above zero.
+    Resolution(f64),
+    /// The control period, s: not above zero.
+    Period(f64),
+    /// The output limit, V: not above zero, beyond the amplifier's full scale, or not given.
+    OutputLimit(f64),
+    /// The preview in ticks: more than [`MAX_PREVIEW_TICKS`].
+    Preview(usize),
+    /// The time constant of a bumpless offset, s: not above zero.
+    Bumpless(f64),
+}
+
+impl fmt::Display for AxisError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Resolution(mm) => write!(f, "a count of {} mm is not above zero", Decimal(*mm)),
+            Self::Period(s) => write!(f, "a control period of {} s is not above zero", Decimal(*s)),
+            Self::OutputLimit(v) => write!(
+                f,
+                "an output limit of {} V is not above zero and within the amplifier's full scale",
+                Decimal(*v)
+            ),
+            Self::Preview(ticks) => write!(
+                f,
+                "a preview of {ticks} ticks is longer than {MAX_PREVIEW_TICKS}"
+            ),
+            Self::Bumpless(s) => {
+                write!(f, "a bumpless time of {} s is not above zero", Decimal(*s))
+            }
+        }
+    }
+}
+
+impl core::error::Error for AxisError {}
+
+/// True for a number above zero that is finite.
+fn is_positive(value: f64) -> bool {
+    value > 0.0 && value < f64::INFINITY
+}
+
+impl<'a, S: Scalar, const N: usize> AxisBuilder<'a, S, N> {
+    /// Begins an axis in the place of one that is no longer used. An encoder count is `resolution_mm` long, a tick
+    /// takes `period_s`.
+    pub fn new(axis: &'a mut Axis<S, N>, resolution_mm: f64, period_s: f64) -> Self {
+        let unit_mm = resolution_mm / POSITION_UNITS_PER_COUNT;
+        axis.encoder = Encoder::new(32, false, i32::MAX);
+        axis.unit_mm = S::gain(unit_mm, Quantity::Integer, Quantity::Length);
+        axis.unit_mm_s = S::gain(unit_mm / period_s, Quantity::Integer, Quantity::Velocity);
+        axis.feedback = Feedback::Pid(Pid::default());
+        axis.filters = Filters::NONE;
+        axis.feedforward.switch_off();
+        axis.preview_ticks = 0;
+        axis.amplifier = Amplifier::default();
+        axis.bumpless_decay = S::ZERO;
+        axis.overspeed = Overspeed::UNLIMITED;
+        axis.signal_loss = SignalLoss::off();
+        axis.plausibility = Plausibility::default();
+        axis.overload = Overload::UNLIMITED;
+        axis.oscillation = Oscillation::off();
+        axis.index_spacing = IndexSpacing::default();
+        axis.following = Following::unlimited();
+        axis.travel = Travel::UNLIMITED;
+        axis.standstill = Standstill::ALWAYS;
+        axis.reduced_speed = u32::MAX;
+        axis.generator = ReferenceGenerator::default();
+        axis.commissioning = Commissioning::Done;
+        axis.adapts = false;
+        axis.learns = false;
+        axis.learning = Learning::off();
+        axis.cancels = false;
+        axis.cancelling.switch_off();
+        let builder = Self {
+            axis,
+            period_s,
+            error: None,
+        };
+        builder
+            .require(
+                is_positive(resolution_mm),
+                AxisError::Resolution(resolution_mm),
+            )
+            .require(is_positive(period_s), AxisError::Period(period_s))
+    }
+
+    /// Keeps the first error.
+    fn require(mut self, holds: bool, error: AxisError) -> Self {
+        if !holds && self.error.is_none() {
+            self.error = Some(error);
+        }
+        self
+    }
+
+    /// The encoder's counter; 32 bits unless given.
+    #[must_use]
+    pub fn encoder(self, encoder: Encoder) -> Self {
+        self.axis.encoder = encoder;
+        self
+    }
+
+    /// The output stage: outputs within +-`limit_v` on a converter of +-`full_scale_v`, whose zero lies at `offset_v`;
+    /// reversed, a positive output turns the motor the other way.
+    #[must_use]
+    pub fn amplifier(self, limit_v: f64, full_scale_v: f64, offset_v: f64, reversed: bool) -> Self {
+        let sign = if reversed { -1.0 } else { 1.0 };
+        let codes_per_volt = DacCode::FULL_SCALE / full_scale_v;
+        self.axis.amplifier = Amplifier {
+            limit: S::quantise(limit_v, Quantity::Voltage),
+            codes_per_volt: S::gain(sign * codes_per_volt, Quantity::Voltage, Quantity::Integer),
+            offset_code: rounding::round(offset_v * codes_per_volt) as i32,
+        };
+        self.require(
+            is_positive(limit_v) && limit_v <= full_scale_v,
+            AxisError::OutputLimit(limit_v),
+        )
+    }
+
+    /// The feedback law, built for the same control period.
+    #[must_use]
+    pub fn feedback(self, feedback: Feedback<S>) -> Self {
+        self.axis.feedback = feedback;
+        self
+    }
+
+    /// The filters behind the feedback law, built for the same control period.
+    #[must_use]
+    pub fn filters(self, filters: Filters<S>) -> Self {
+        self.axis.filters = filters;
+        self
+    }
+
+    /// The feedforward, which looks `preview_ticks` ahead: the dead time of the plant.
+    #[must_use]
+    pub fn feedforward(
+        self,
+        kind: FeedforwardKind,
+        gains: &FeedforwardGains,
+        friction: &FrictionSettings,
+        preview_ticks: usize,
+    ) -> Self {
+        self.axis
+            .feedforward
+            .build_over(kind, gains, friction, self.period_s);
+        self.axis.preview_ticks = preview_ticks;
+        self.require(
+            preview_ticks <= MAX_PREVIEW_TICKS,
+            AxisError::Preview(preview_ticks),
+        )
+    }
+
+    /// The time constant with which the offset fades that makes a change of settings bumpless, s.
+    #[must_use]
+    pub fn bumpless(self, time_s: f64) -> Self {
+        self.axis.bumpless_decay =
+            S::quantise(libm::exp(-self.period_s / time_s), Quantity::Fraction);
+        self.require(is_positive(time_s), AxisError::Bumpless(time_s))
+    }
+
+    /// The limit of the measured speed.
+    #[must_use]
+    pub fn overspeed(self, overspeed: Overspeed) -> Self {
+        self.axis.overspeed = overspeed;
+        self
+    }
+
+    /// The monitor of the encoder's signal.
+    #[must_use]
+    pub fn signal_loss(self, signal_loss: SignalLoss<S>) -> Self {
+        self.axis.signal_loss = signal_loss;
+        self
+    }
+
+    /// The comparison of the encoder with the plant.
+    #[must_use]
+    pub fn plausibility(self, plausibility: Plausibility) -> Self {
+        self.axis.plausibility = plausibility;
+        self
+    }
+
+    /// The load that the motor bears.
+    #[must_use]
+    pub fn overload(self, overload: Overload) -> Self {
+        self.axis.overload = overload;
+        self
+    }
+
+    /// The monitor for oscillation.
+    #[must_use]
+    pub fn oscillation(self, oscillation: Oscillation<S>) -> Self {
+        self.axis.oscillation = oscillation;
+        self
+    }
+
+    /// Learning of the friction feedforward's scale.
+    #[must_use]
+    pub fn learning(self, learning: Learning<S>) -> Self {
+        self.axis.learns = learning.is_on();
+        self.axis.learning = learning;
+        self.axis.adapts = self.axis.learns | self.axis.cancels;
+        self
+    }
+
+    /// Cancelling of a cut's vibration.
+    #[must_use]
+    pub fn cancelling(self, parts: Option<(&CancellingSettings, &impl CancellingLoop)>) -> Self {
+        if let Some((settings, of)) = parts {
+            self.axis.cancelling.build_over(settings, of, self.period_s);
+        }
+        self.axis.cancels = self.axis.cancelling.is_on();
+        self.axis.adapts = self.axis.learns | self.axis.cancels;
+        self
+    }
+
+    /// The distance of the encoder's index pulses.
+    #[must_use]
+    pub fn index_spacing(self, index_spacing: IndexSpacing) -> Self {
+        self.axis.index_spacing = index_spacing;
+        self
+    }
+
+    /// The limit of the tracking error.
+    #[must_use]
+    pub fn following(self, following: Following<S>) -> Self {
+        self.axis.following = following;
+        self
+    }
+
+    /// The soft limits, in force once the axis is homed.
+    #[must_use]
+    pub fn travel(self, travel: Travel) -> Self {
+        self.axis.travel = travel;
+        self
+    }
+
+    /// The measured speed below which the axis stands, counts per tick; half a count is added for the quantisation.
+    #[must_use]
+    pub fn standstill(self, counts_per_tick: f64) -> Self {
+        self.axis.standstill = Standstill::new(counts_per_tick);
+        self
+    }
+
+    /// The limit of the measured speed until the axis is homed, counts per tick; half a count is added for the
+    /// quantisation. With it, the axis starts no motion but jogs and homing until then.
+    #[must_use]
+    pub fn reduced_speed(self, counts_per_tick: Option<f64>) -> Self {
+        self.axis.reduced_speed = counts_per_tick.map_or(u32::MAX, speed_limit);
+        self
+    }
+
+    /// The reference generator, for motions beside the plan's.
+    #[must_use]
+    pub fn generator(self, generator: ReferenceGenerator<S>) -> Self {
+        self.axis.generator = generator;
+        self
+    }
+
+    /// The standing of the settings; [`Commissioning::Done`] unless given.
+    #[must_use]
+    pub fn commissioning(self, commissioning: Commissioning) -> Self {
+        self.axis.commissioning = commissioning;
+        self
+    }
+
+    /// Ends the axis. A refused one puts out nothing.
+    ///
+    /// # Errors
+    /// The first part that was refused.
+    pub fn try_build(self) -> Result<(), AxisError> {
+        let driven = self.axis.amplifier.limit > S::ZERO;
+        let built = self.require(driven, AxisError::OutputLimit(0.0));
+        match built.error {
+            None => Ok(()),
+            Some(error) => {
+                built.axis.amplifier = Amplifier::default();
+                Err(error)
+            }
+        }
+    }
+}
+
+/// The memory of an axis. What every tick reads and writes comes first.
+#[derive(Clone, Debug, PartialEq)]
+#[repr(C)]
+pub struct AxisState<S: Scalar, const N: usize> {
+    encoder: EncoderState,
+    overspeed: OverspeedState,
+    signal_loss: SignalLossState,
+    /// The travel is in force.
+    homed: bool,
+    travel: TravelState,
+    telemetry: AxisTelemetry<S>,
+    /// The displacement of the reference at the feedforward's tick, and in the tick before.
+    displacement: Position,
+    displacement_before: Position,
+    /// The reference at the feedforward's tick, ahead of the feedback's.
+    look_ahead: Position,
+    following: FollowingState<S>,
+    /// The acceleration of the reference at the feedforward's tick, mm/s^2.
+    acceleration: S,
+    /// The velocity of the feedback's reference, mm/s, for a law that needs it.
+    reference_velocity: S,
+    /// Voltage that a host adds to the output in this tick, V.
+    injected: S,
+    feedback: FeedbackState<S>,
+    rest: RestState<S>,
+    filters: FiltersState<S>,
+    friction: FeedforwardState<S, N>,
+    generator: GeneratorState<S>,
+    plausibility: PlausibilityState,
+    overload: OverloadState,
+    oscillation: OscillationState,
+    preview: [Position; PREVIEW_ROOM],
+    /// Position of the axis at the last index pulse, until homing takes it.
+    pulse: Option<Position>,
+    index: IndexState,
+    learning: LearningState<S>,
+    cancelling: CancellingState<S>,
+}
+
+impl<S: Scalar, const N: usize> Default for AxisState<S, N> {
+    fn default() -> Self {
+        Self {
+            encoder: EncoderState::default(),
+            generator: GeneratorState::default(),
+            pulse: None,
+            homed: false,
+            overspeed: OverspeedState::default(),
+            signal_loss: SignalLossState::default(),
+            plausibility: PlausibilityState::default(),
+            overload: OverloadState::default(),
+            oscillation: OscillationState::default(),
+            index: IndexState::default(),
+            following: FollowingState::default(),
+            travel: TravelState::default(),
+            displacement: Position::ZERO,
+            displacement_before: Position::ZERO,
+            acceleration: S::ZERO,
+            look_ahead: Position::ZERO,
+            preview: [Position::ZERO; PREVIEW_ROOM],
+            reference_velocity: S::ZERO,
+            feedback: FeedbackState::default(),
+            rest: RestState::default(),
+            filters: FiltersState::default(),
+            friction: FeedforwardState::default(),
+            injected: S::ZERO,
+            telemetry: AxisTelemetry::default(),
+            learning: LearningState::default(),
+            cancelling: CancellingState::default(),
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> AxisState<S, N> {
+    /// Every term of the law at the last tick.
+    pub fn telemetry(&self) -> &AxisTelemetry<S> {
+        &self.telemetry
+    }
+
+    /// The memory of learning: the friction's scale.
+    pub fn learning(&self) -> &LearningState<S> {
+        &self.learning
+    }
+
+    /// The memory of cancelling: the voltage that it adds.
+    pub fn cancelling(&self) -> &CancellingState<S> {
+        &self.cancelling
+    }
+
+    /// The oscillation that was found last.
+    pub fn oscillation(&self) -> OscillationReading {
+        self.oscillation.reading()
+    }
+
+    /// Takes the speed of the spindle over.
+    pub(crate) fn tell_spindle(&mut self, speed: SpindleSpeed) {
+        self.cancelling.tell(speed);
+    }
+
+    /// True while a motion is under way.
+    pub fn is_running(&self) -> bool {
+        self.mode() != MotionMode::Hold
+    }
+
+    /// The present motion mode.
+    pub fn mode(&self) -> MotionMode {
+        self.generator.mode()
+    }
+
+    /// Voltage that a host adds to the output, V.
+    #[inline(always)]
+    pub fn injected(&self) -> S {
+        self.injected
+    }
+
+    /// Measured position, 2^-16 counts.
+    #[inline(always)]
+    pub(crate) fn measured(&self) -> Position {
+        self.encoder.position()
+    }
+
+    /// Measured and filtered speed, 2^-8 counts per tick.
+    #[inline(always)]
+    pub(crate) fn speed(&self) -> i32 {
+        self.overspeed.speed()
+    }
+
+    /// The axis' motion and output as it shows them.
+    #[inline(always)]
+    fn shown(&self) -> Shown {
+        Shown {
+            count: self.encoder.count().0 as i32,
+            speed: self.speed(),
+            words: self.telemetry.code_sum,
+            reference: Shown::reference(self.telemetry.reference),
+            open: self.mode() == MotionMode::OpenLoop,
+        }
+    }
+
+    /// Sets what is added to the output from this tick on, V.
+    pub(crate) fn inject(&mut self, voltage: S) {
+        self.injected = voltage;
+    }
+
+    /// Position of the look-ahead reference: that of the feedback follows by the preview.
+    pub fn reference(&self) -> Position {
+        self.look_ahead
+    }
+
+    /// True if there is room for a segment of a stream.
+    #[inline(always)]
+    pub fn wants_segment(&self) -> bool {
+        self.generator.stream.wants_segment()
+    }
+
+    /// Gives the axis the next segment of a stream; call it when [`AxisState::wants_segment`]. What is left of a stream
+    /// that was broken off is dropped.
+    #[inline(always)]
+    pub(crate) fn offer_segment(&mut self, segment: &Segment) {
+        self.generator.stream.offer(segment);
+    }
+
+    /// True if a stream can start: its first segment is there, and starts where the axis rests.
+    pub(crate) fn is_stream_ready(&self) -> bool {
+        self.mode() == MotionMode::Hold && self.generator.stream.is_ready(self.look_ahead)
+    }
+
+    /// True if the axis' position is that of the machine, so that its travel is in force.
+    pub fn is_homed(&self) -> bool {
+        self.homed
+    }
+
+    /// True if the encoder has shown an index pulse since the axis was homed last, or since the start.
+    pub fn is_indexed(&self) -> bool {
+        self.index.is_seen()
+    }
+
+    /// Takes the next sample of the look-ahead reference.
+    #[inline(always)]
+    fn move_reference(&mut self, ahead: &ReferenceSample<S>) {
+        self.displacement_before = self.displacement;
+        self.displacement = ahead.position - self.look_ahead;
+        self.look_ahead = ahead.position;
+        self.telemetry.velocity = ahead.velocity;
+        self.acceleration = ahead.acceleration;
+    }
+
+    #[inline(always)]
+    fn reference_state(&self) -> ReferenceState {
+        ReferenceState {
+            position: self.look_ahead,
+            displacement: self.displacement,
+            before: self.displacement_before,
+        }
+    }
+
+    /// The largest tracking error since enabling, against its limit.
+    #[inline(always)]
+    pub fn following(&self) -> FollowingState<S> {
+        self.following
+    }
+
+    /// The largest tracking error since enabling as a share of its limit at the time: above 1 after a following error.
+    /// It stays until the next enabling. For telemetry; it divides.
+    pub fn following_high_mark(&self) -> f32 {
+        self.following.high_mark()
+    }
+
+    /// Declares the present count that of the machine, or not: homing does, and a board whose encoders are absolute.
+    pub(crate) fn set_homed(&mut self, homed: bool) {
+        if self.homed != homed {
+            self.homed = homed;
+            self.travel = TravelState::default();
+        }
+    }
+}
+
+impl<S: Scalar, const N: usize> Axis<S, N> {
+    /// An axis that puts out nothing: room for one that an [`AxisBuilder`] makes in its place.
+    #[inline(never)]
+    pub fn blank() -> Self {
+        Self {
+            encoder: Encoder::default(),
+            unit_mm: S::Gain::default(),
+            unit_mm_s: S::Gain::default(),
+            feedback: Feedback::Pid(Pid::default()),
+            filters: Filters::NONE,
+            feedforward: Feedforward::blank(),
+            preview_ticks: 0,
+            amplifier: Amplifier::default(),
+            bumpless_decay: S::ZERO,
+            overspeed: Overspeed::default(),
+            signal_loss: SignalLoss::default(),
+            plausibility: Plausibility::default(),
+            overload: Overload::UNLIMITED,
+            oscillation: Oscillation::off(),
+            index_spacing: IndexSpacing::default(),
+            following: Following::default(),
+            travel: Travel::UNLIMITED,
+            standstill: Standstill::ALWAYS,
+            reduced_speed: u32::MAX,
+            generator: ReferenceGenerator::default(),
+            commissioning: Commissioning::Inert,
+            adapts: false,
+            learns: false,
+            learning: Learning::off(),
+            cancels: false,
+            cancelling: Cancelling::off(),
+        }
+    }
+
+    /// The standing of the axis' settings.
+    pub const fn commissioning(&self) -> Commissioning {
+        self.commissioning
+    }
+
+    /// One control period of an axis that is driven by itself, without a stage: reads the encoder, advances the
+    /// reference, computes the output. `tick` numbers the ticks.
+    ///
+    /// # Errors
+    /// The fault that was found, if any. It is the caller who switches the amplifier off.
+    pub fn tick(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        reading: &EncoderReading,
+        tick: u32,
+    ) -> Result<DacCode, FaultCode> {
+        self.read_encoder(state, reading, is_due(tick, 0))?;
+        self.update_reference(state, motion, AxisSwitches::default(), tick)?;
+        Ok(self.drive(state, false))
+    }
+
+    /// Takes the encoder's reading and checks it. `due`: it is compared with the plant in this tick.
+    #[inline(always)]
+    pub(crate) fn read_encoder(
+        &self,
+        state: &mut AxisState<S, N>,
+        reading: &EncoderReading,
+        due: bool,
+    ) -> Result<(), FaultCode> {
+        let counts = self.encoder.accumulate(&mut state.encoder, reading.count);
+        state.telemetry.measured = state.encoder.count();
+        state.overspeed.filter(counts);
+        let alive = self
+            .signal_loss
+            .step(&mut state.signal_loss, counts, state.telemetry.output);
+        let watched = if due { self.compare(state) } else { Ok(()) };
+        let usual = alive
+            && watched.is_ok()
+            && self.encoder.is_plausible(counts)
+            && self.is_slow(state)
+            && reading.is_plain();
+        if !usual {
+            return self.examine(state, reading, counts, alive, watched);
+        }
+        Ok(())
+    }
+
+    /// True if the measured speed is within its limits.
+    #[inline(always)]
+    fn is_slow(&self, state: &AxisState<S, N>) -> bool {
+        if !self.overspeed.allows(&state.overspeed) {
+            return false;
+        }
+        if state.homed {
+            return true;
+        }
+        cold_path();
+        state.speed().unsigned_abs() <= self.reduced_speed
+    }
+
+    /// Examines a reading that has an index pulse, or that a monitor takes for a fault.
+    #[cold]
+    #[inline(never)]
+    fn examine(
+        &self,
+        state: &mut AxisState<S, N>,
+        reading: &EncoderReading,
+        counts: i32,
+        alive: bool,
+        watched: Result<(), FaultCode>,
+    ) -> Result<(), FaultCode> {
+        let possible = self.encoder.is_plausible(counts);
+        let slow = self.is_slow(state);
+        let indexed = match reading.index {
+            Some(raw) => self.take_pulse(state, raw),
+            None => true,
+        };
+        // An index pulse, and nothing wrong.
+        if indexed && possible && slow && alive && watched.is_ok() && reading.is_good() {
+            return Ok(());
+        }
+        cold_path();
+        let agrees = watched != Err(FaultCode::EncoderImplausible);
+        // Where counts may be lost, so is the origin.
+        if [reading.valid, possible, indexed, agrees].contains(&false) {
+            state.homed = false;
+        }
+        // The first that explains the others.
+        Err(if !reading.fresh {
+            FaultCode::StaleSample
+        } else if !reading.valid {
+            FaultCode::EncoderInvalid
+        } else if !possible {
+            FaultCode::EncoderJump
+        } else if !indexed {
+            FaultCode::IndexMismatch
+        } else if !slow {
+            FaultCode::Overspeed
+        } else if !agrees {
+            FaultCode::EncoderImplausible
+        } else if !alive {
+            FaultCode::EncoderSignalLoss
+        } else {
+            return watched;
+        })
+    }
+
+    /// Compares the encoder with the plant, and watches the load.
+    #[inline(never)]
+    fn compare(&self, state: &mut AxisState<S, N>) -> Result<(), FaultCode> {
+        if self.adapts {
+            if self.learns {
+                self.learn(state);
+            }
+            if self.cancels {
+                self.cancel(state);
+            }
+        }
+        let shown = state.shown();
+        let bears = self
+            .overload
+            .step(&mut state.overload, state.telemetry.code.0);
+        let stable = self.watch_oscillation(state);
+        if !self.plausibility.step(&mut state.plausibility, shown) {
+            Err(FaultCode::EncoderImplausible)
+        } else if !bears {
+            Err(FaultCode::Overload)
+        } else if !stable {
+            Err(FaultCode::Oscillation)
+        } else {
+            Ok(())
+        }
+    }
+
+    /// Watches the error of the last tick for oscillation; returns false if the axis is not stable.
+    #[inline(always)]
+    fn watch_oscillation(&self, state: &mut AxisState<S, N>) -> bool {
+        let seen = &state.telemetry;
+        let reference = seen.reference.0 >> POSITION_FRACTION_BITS;
+        let input = OscillationInput {
+            error: reference.wrapping_sub(seen.measured.0),
+            reference,
+            sense: i8::from(seen.velocity > S::ZERO) - i8::from(seen.velocity < S::ZERO),
+            excited: (state.injected != S::ZERO) | (state.mode() == MotionMode::OpenLoop),
+        };
+        self.oscillation.step(&mut state.oscillation, input)
+    }
+
+    /// Learns from what the last tick left.
+    #[inline(never)]
+    fn learn(&self, state: &mut AxisState<S, N>) {
+        let seen = &state.telemetry;
+        if !self.learning.look(&mut state.learning, seen.error) {
+            return;
+        }
+        let status = if !matches!(
+            state.mode(),
+            MotionMode::Plan | MotionMode::Stream | MotionMode::Hold
+        ) || state.injected != S::ZERO
+        {
+            LearningStatus::OtherMotion
+        } else if seen.velocity == S::ZERO {
+            LearningStatus::AtRest
+        } else {
+            LearningStatus::Learning
+        };
+        let input = LearningInput {
+            error: seen.error,
+            status,
+        };
+        if state.oscillation.is_reduced() {
+            self.learning.unsettle(&mut state.learning);
+        }
+        let gained = self
+            .learning
+            .step(&mut state.learning, input, |error| match &self.feedback {
+                Feedback::NPid(law) => Some(law.gain.at(error)),
+                _ => None,
+            });
+        state.feedback.unload(gained);
+        state.rest.unload(gained);
+    }
+
+    /// Takes a step of cancelling, on what the last tick left.
+    #[inline(never)]
+    fn cancel(&self, state: &mut AxisState<S, N>) {
+        let mode = state.mode();
+        if mode != MotionMode::OpenLoop {
+            let words = self.cancelling.mean(&state.cancelling);
+            let words = words.round_scaled(self.amplifier.codes_per_volt);
+            state.plausibility.leave_out(words);
+        }
+        let works = matches!(
+            mode,
+            MotionMode::Plan | MotionMode::Stream | MotionMode::Hold
+        );
+        let seen = &state.telemetry;
+        let fed = works & (state.injected == S::ZERO) & (seen.velocity != S::ZERO);
+        let cut = if fed { Cut::Fed } else { Cut::Idle };
+        self.cancelling.step(&mut state.cancelling, seen.error, cut);
+    }
+
+    /// Takes the count that was latched at an index pulse; returns true if it fits the last one.
+    #[inline(always)]
+    fn take_pulse(&self, state: &mut AxisState<S, N>, raw: u32) -> bool {
+        let at = self.encoder.count_at(&state.encoder, raw);
+        state.pulse = Some(at.position());
+        self.index_spacing.step(&mut state.index, at.0 as u32)
+    }
+
+    /// True if the axis has to be homed before it may start more than jogs and homing.
+    #[inline(always)]
+    pub(crate) fn awaits_homing(&self, state: &AxisState<S, N>) -> bool {
+        (self.reduced_speed != u32::MAX) & !state.homed
+    }
+
+    /// True if the measured speed is that of an axis that stands. `begins` where `standstill` was not asked in the tick before.
+    #[inline(always)]
+    pub(crate) fn stands(
+        &self,
+        state: &AxisState<S, N>,
+        standstill: &mut StandstillState,
+        begins: bool,
+    ) -> bool {
+        self.standstill.step(standstill, state.speed(), begins)
+    }
+
+    /// Prepares to hold the measured position.
+    pub fn enable(&self, state: &mut AxisState<S, N>) {
+        let here = state.encoder.position();
+        let shown = Shown {
+            speed: 0,
+            reference: Shown::reference(here),
+            ..state.shown()
+        };
+        // Field by field: a whole state, made apart and copied, takes half a tick longer.
+        let AxisState {
+            encoder: _,
+            homed: _,
+            overload: _,
+            index: _,
+            overspeed,
+            signal_loss,
+            travel,
+            telemetry,
+            displacement,
+            displacement_before,
+            look_ahead,
+            following,
+            acceleration,
+            reference_velocity,
+            injected,
+            feedback,
+            rest,
+            filters,
+            friction,
+            generator,
+            plausibility,
+            oscillation,
+            preview,
+            pulse,
+            learning,
+            cancelling,
+        } = state;
+        *overspeed = OverspeedState::default();
+        *signal_loss = SignalLossState::default();
+        *travel = TravelState::default();
+        telemetry.bumpless_offset = S::ZERO;
+        telemetry.output = S::ZERO;
+        *displacement = Position::ZERO;
+        *displacement_before = Position::ZERO;
+        *look_ahead = here;
+        *following = self.following.start();
+        *acceleration = S::ZERO;
+        *reference_velocity = S::ZERO;
+        *injected = S::ZERO;
+        *feedback = FeedbackState::default();
+        *rest = RestState::default();
+        *filters = FiltersState::default();
+        *friction = self.feedforward.start();
+        generator.reset();
+        *plausibility = self.plausibility.start(shown);
+        oscillation.forget();
+        *preview = [here; PREVIEW_ROOM];
+        *pulse = None;
+        self.learning.resume(learning);
+        if self.cancels {
+            self.cancelling.start(cancelling);
+        }
+    }
+
+    /// Starts or ends a motion, from where the reference stands. Only what
+    /// [`admission`](crate::admission::refusal) lets through may come here.
+    pub fn handle_command(&self, state: &mut AxisState<S, N>, command: Command) {
+        let (generator, here) = (&mut state.generator, state.look_ahead);
+        match command {
+            Command::Run | Command::StartMove(_) => self.generator.start_plan(generator, here),
+            Command::Jog(_, velocity) => {
+                self.generator
+                    .start_jog(generator, here, velocity, state.homed);
+            }
+            Command::StartStream => self.generator.start_stream(generator),
+            Command::Stop => self.stop(state),
+            Command::Home(_) => {
+                if self.generator.start_homing(generator, here) {
+                    state.homed = false;
+                    state.pulse = None;
+                }
+            }
+            // The stage's own.
+            Command::StartInjection | Command::Enable | Command::Disable | Command::ResetFault => {}
+        }
+    }
+
+    /// Begins a controlled stop, unless one is under way.
+    pub(crate) fn stop(&self, state: &mut AxisState<S, N>) {
+        let from = state.reference_state();
+        self.generator.stop(&mut state.generator, from);
+    }
+
+    /// Shifts every position of the axis: nothing moves by it.
+    #[cold]
+    #[inline(never)]
+    fn shift(state: &mut AxisState<S, N>, offset: Position) {
+        state.encoder.shift(offset);
+        state.telemetry.measured = state.encoder.count();
+        state.plausibility.recount(state.encoder.count().0 as i32);
+        state.look_ahead = state.look_ahead + offset;
+        for position in &mut state.preview {
+            *position = *position + offset;
+        }
+        // Distances to pulses before the shift would be off by it.
+        IndexSpacing::forget(&mut state.index);
+        state.travel = TravelState::default();
+        state.homed = true;
+    }
+
+    /// Checks the reference against limit switches and soft limits.
+    #[inline(always)]
+    fn check_limits(
+        &self,
+        state: &mut AxisState<S, N>,
+        switches: AxisSwitches,
+    ) -> Result<(), FaultCode> {
+        if switches.at_limit() {
+            // Away from a pressed switch the axis may go.
+            let forward = state.displacement > Position::ZERO;
+            let backward = state.displacement < Position::ZERO;
+            if forward && switches.has(AxisSwitches::POSITIVE_LIMIT) {
+                return Err(FaultCode::PositiveLimitSwitch);
+            }
+            if backward && switches.has(AxisSwitches::NEGATIVE_LIMIT) {
+                return Err(FaultCode::NegativeLimitSwitch);
+            }
+        }
+        if !state.homed {
+            return Ok(());
+        }
+        if self
+            .travel
+            .is_clear(state.look_ahead, state.encoder.position())
+        {
+            state.travel.enter();
+            return Ok(());
+        }
+        self.check_travel(state)
+    }
+
+    /// Checks an axis near an end of its travel or beyond.
+    #[inline(never)]
+    fn check_travel(&self, state: &mut AxisState<S, N>) -> Result<(), FaultCode> {
+        self.travel.step(
+            &mut state.travel,
+            self.generator.stop_ramp(),
+            state.look_ahead,
+            state.displacement,
+            state.encoder.position(),
+        )
+    }
+
+    /// Advances the reference, forms the error, and checks both. `tick` numbers the ticks.
+    #[inline(never)]
+    pub(crate) fn update_reference(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        switches: AxisSwitches,
+        tick: u32,
+    ) -> Result<(), FaultCode> {
+        let here = state.look_ahead;
+        let planned = self
+            .generator
+            .advance_plan(&mut state.generator, motion, here);
+        let Some(ahead) = planned else {
+            return self.update_other_reference(state, motion, switches, tick);
+        };
+        state.move_reference(&ahead);
+        let found = self.check_limits(state, switches);
+        self.form_error(state, tick)?;
+        found
+    }
+
+    /// The same in every mode but the plan's and standstill.
+    #[inline(never)]
+    fn update_other_reference(
+        &self,
+        state: &mut AxisState<S, N>,
+        motion: &Motion<S>,
+        switches: AxisSwitches,
+        tick: u32,
+    ) -> Result<(), FaultCode> {
+        let input = HomingInput {
+            switches,
+            index: state.pulse.take(),
+            measured: state.encoder.position(),
+        };
+        let from = state.reference_state();
+        let (ahead, event) =
+            self.generator
+                .advance(&mut state.generator, motion, from, state.homed, input);
+        if event == GeneratorEvent::Open {
+            return self.update_open_reference(state, switches, tick);
+        }
+        if let GeneratorEvent::Origin(offset) = event {
+            Self::shift(state, offset);
+        }
+        state.move_reference(&ahead);
+        let switches = switches.without(self.generator.expected(&state.generator));
+        let mut found = if state.mode() == MotionMode::Stopping {
+            Ok(())
+        } else {
+            self.check_limits(state, switches)
+        };
+        if let GeneratorEvent::Fault(code) = event {
+            found = Err(code);
+        }
+        self.form_error(state, tick)?;
+        found
+    }
+
+    /// Forms the error, and checks it.
+    #[inline(always)]
+    fn form_error(&self, state: &mut AxisState<S, N>, tick: u32) -> Result<(), FaultCode> {
+        // The feedback's reference is what the feedforward's was `preview_ticks` ago.
+        let slot = tick as usize % PREVIEW_ROOM;
+        state.preview[slot] = state.look_ahead;
+        let delayed = (tick as usize).wrapping_sub(self.preview_ticks) % PREVIEW_ROOM;
+        let reference = state.preview[delayed];
+        if self.feedback.needs_velocity() {
+            let before = state.preview[delayed.wrapping_sub(1) % PREVIEW_ROOM];
+            let displacement = (reference - before).clipped();
+            state.reference_velocity = S::scale_integer(displacement, self.unit_mm_s);
+        }
+
+        let measured = state.encoder.position();
+        let error = S::scale_wide((reference - measured).0, self.unit_mm);
+        state.telemetry.reference = reference;
+        state.telemetry.error = error;
+        let speed = state.telemetry.velocity.magnitude();
+        let follows = self.following.step(&mut state.following, error, speed);
+        // An axis that does not follow cannot be stopped under control, so this goes before what could.
+        if follows {
+            Ok(())
+        } else {
+            Err(FaultCode::FollowingError)
+        }
+    }
+
+    /// Lets the reference go along with the axis, so that the loop can be closed at any tick, and checks it.
+    #[cold]
+    #[inline(never)]
+    fn update_open_reference(
+        &self,
+        state: &mut AxisState<S, N>,
+        switches: AxisSwitches,
+        tick: u32,
+    ) -> Result<(), FaultCode> {
+        let here = state.encoder.position();
+        let speed = i64::from(state.speed()) << SPEED_SHIFT;
+        let ahead_by = |ticks: i64| here + Position(ticks * speed);
+        let preview = self.preview_ticks as i64;
+        for age in 0..PREVIEW_ROOM {
+            let slot = (tick as usize).wrapping_sub(age) % PREVIEW_ROOM;
+            state.preview[slot] = ahead_by(preview - age as i64);
+        }
+        state.look_ahead = ahead_by(preview);
+        state.displacement = Position(speed);
+        state.displacement_before = state.displacement;
+        let velocity = S::scale_integer(state.displacement.clipped(), self.unit_mm_s);
+        state.reference_velocity = velocity;
+        state.telemetry.error = S::ZERO;
+        state.telemetry.velocity = velocity;
+        state.telemetry.reference = here;
+        self.check_limits(state, switches)
+    }
+
+    /// Computes the output. `changed` says that the settings are new in this tick: the output then starts from where
+    /// it was, and the difference fades.
+    #[inline(never)]
+    pub(crate) fn drive(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
+        if state.mode() == MotionMode::OpenLoop {
+            return self.drive_open(state, changed);
+        }
+        let moves = state.telemetry.velocity != S::ZERO;
+        if state.rest.changes(moves) {
+            self.set_off_or_stop(state, moves);
+        }
+        let seen = &mut state.telemetry;
+        let step = ReferenceStep {
+            displacement: S::scale_integer(state.displacement.clipped(), self.unit_mm),
+            velocity: seen.velocity,
+            acceleration: state.acceleration,
+        };
+        if changed {
+            self.feedforward.go_on(&mut state.friction, step.velocity);
+            state.oscillation.forget();
+        }
+        seen.feedforward = self.feedforward.step(&mut state.friction, step);
+        let mut total = seen.feedforward.total();
+        let error = seen.error;
+        if self.adapts {
+            if self.learns {
+                total = self.scale_friction(state, changed);
+            }
+            if self.cancels {
+                total = total + self.add_cancelling(state, changed);
+            }
+        }
+        if state.oscillation.is_reduced() {
+            total = self.take_away(state, total);
+        }
+        let input = FeedbackInput {
+            error,
+            velocity: state.reference_velocity,
+        };
+        if changed {
+            self.make_bumpless(state, input, total + state.injected);
+        }
+        let base = total + state.telemetry.bumpless_offset + state.injected;
+        let mut feedback = self.feed_back(&mut state.feedback, input, base);
+        feedback.output = self.filters.step(&mut state.filters, feedback.output);
+        let mut output = feedback.output + base;
+        if !output.is_within(self.amplifier.limit) {
+            cold_path();
+            output = output.within(self.amplifier.limit);
+            // The law keeps to the limit; filters behind it may not.
+            feedback.saturated = true;
+        }
+        let seen = &mut state.telemetry;
+        seen.feedback = feedback;
+        seen.bumpless_offset = seen
+            .bumpless_offset
+            .times(self.bumpless_decay, Quantity::Fraction);
+        self.put_out(state, output)
+    }
+
+    /// Takes note of a stop; lets the friction model take over at the next start what the integral has moved by.
+    #[cold]
+    #[inline(never)]
+    fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {
+        let integral = state.feedback.integral();
+        if !moves {
+            return state.rest.stop(integral);
+        }
+        let Some(mut taken) = state.rest.set_off(integral) else {
+            return;
+        };
+        if self.learns {
+            taken = self.learning.unscaled(&state.learning, taken);
+        }
+        taken = self.feedforward.take_over(&mut state.friction, taken);
+        if self.learns {
+            taken = self.learning.take_over(&mut state.learning, taken);
+        }
+        state.feedback.unload(taken);
+        self.filters.shift(&mut state.filters, -taken);
+    }
+
+    /// Scales the friction's feedforward as was learnt; returns the whole feedforward, V.
+    #[inline(never)]
+    fn scale_friction(&self, state: &mut AxisState<S, N>, changed: bool) -> S {
+        if changed {
+            state.learning = self.learning.start();
+        }
+        let terms = &mut state.telemetry.feedforward;
+        self.learning.apply(&mut state.learning, terms);
+        terms.total()
+    }
+
+    /// The voltage that cancels; after a change of settings it begins at none.
+    #[inline(always)]
+    fn add_cancelling(&self, state: &mut AxisState<S, N>, changed: bool) -> S {
+        if changed {
+            self.cancelling.start(&mut state.cancelling);
+        }
+        self.cancelling.advance(&mut state.cancelling)
+    }
+
+    /// Leaves of the friction fed forward the share that the monitor for oscillation allows; returns the whole feedforward, V.
+    ///
+    /// Cancelling is left alone: it has a guard of its own, and would learn nothing right of a part of itself.
+    #[cold]
+    #[inline(never)]
+    fn take_away(&self, state: &mut AxisState<S, N>, total: S) -> S {
+        let share = self.oscillation.share(&state.oscillation);
+        let terms = &mut state.telemetry.feedforward;
+        let cancelled = total - terms.total();
+        terms.scale_friction(share);
+        terms.total() + cancelled
+    }
+
+    /// Puts the injected voltage out.
+    #[cold]
+    #[inline(never)]
+    fn drive_open(&self, state: &mut AxisState<S, N>, changed: bool) -> DacCode {
+        if changed {
+            self.forget_learnt(state);
+        }
+        let output = state.injected.within(self.amplifier.limit);
+        state.telemetry.feedback = FeedbackTerms {
+            saturated: output != state.injected,
+            ..FeedbackTerms::default()
+        };
+        state.telemetry.feedforward = FeedforwardTerms::default();
+        self.put_out(state, output)
+    }
+
+    /// Makes a converter's word of the output, and leaves everything to be seen.
+    #[inline(always)]
+    fn put_out(&self, state: &mut AxisState<S, N>, output: S) -> DacCode {
+        let code = self.amplifier.code(output);
+        let telemetry = &mut state.telemetry;
+        telemetry.output = output;
+        telemetry.code = code;
+        telemetry.code_sum = telemetry.code_sum.wrapping_add(code.0.into());
+        telemetry.limited_by = if telemetry.feedback.saturated {
+            cold_path();
+            state.learning.saturate();
+            state.cancelling.saturate();
+            LimitedBy::OutputLimit
+        } else {
+            LimitedBy::Nothing
+        };
+        code
+    }
+
+    /// The law, within what the output limit leaves beside `base`.
+    #[inline(always)]
+    fn feed_back(
+        &self,
+        state: &mut FeedbackState<S>,
+        input: FeedbackInput<S>,
+        base: S,
+    ) -> FeedbackTerms<S> {
+        self.feedback.step(state, input, base, self.amplifier.limit)
+    }
+
+    /// Makes a change of settings bumpless: the output starts from where it was.
+    #[cold]
+    #[inline(never)]
+    fn make_bumpless(&self, state: &mut AxisState<S, N>, input: FeedbackInput<S>, base: S) {
+        self.feedback.take_over(&mut state.feedback, input.error);
+        state.rest.forget();
+        if !self.learns {
+            state.learning = LearningState::default();
+        }
+        if !self.cancels {
+            self.cancelling.start(&mut state.cancelling);
+        }
+        // The output under the new settings, computed on a copy, decides the offset.
+        let mut trial = state.feedback.clone();
+        let terms = self.feed_back(&mut trial, input, base);
+        self.filters.settle(&mut state.filters, terms.output);
+        state.telemetry.bumpless_offset = state.telemetry.output - (terms.output + base);
+    }
+
+    /// Opens the loop of an axis at rest.
+    pub(crate) fn open_loop(&self, state: &mut AxisState<S, N>) {
+        state.plausibility.forget_standstill();
+        self.generator.open_loop(&mut state.generator);
+    }
+
+    /// Takes the injected voltage away. A loop that was open is closed: it stops from the motion that the axis has.
+    pub(crate) fn end_injection(&self, state: &mut AxisState<S, N>) {
+        state.injected = S::ZERO;
+        if state.mode() == MotionMode::OpenLoop {
+            // As after enabling: the law's memory is of before, and its error is zero now.
+            state.feedback = FeedbackState::default();
+            state.rest.forget();
+            state.filters = FiltersState::default();
+            state.friction = self.feedforward.start();
+            self.learning.resume(&mut state.learning);
+            self.cancelling.start(&mut state.cancelling);
+            state.telemetry.bumpless_offset = S::ZERO;
+            self.stop(state);
+        }
+    }
+
+    /// Forgets what was learnt and cancelled under other settings.
+    #[cold]
+    #[inline(never)]
+    fn forget_learnt(&self, state: &mut AxisState<S, N>) {
+        state.learning = LearningState::default();
+        self.cancelling.start(&mut state.cancelling);
+        state.oscillation.forget();
+    }
+
+    /// Shows an axis whose outputs are off. `changed` says that the settings are new in this tick.
+    #[inline(always)]
+    pub(crate) fn output_zero(&self, state: &mut AxisState<S, N>, changed: bool) {
+        if changed {
+            self.forget_learnt(state);
+        }
+        let measured = state.encoder.count();
+        state.generator.hold();
+        state.injected = S::ZERO;
+        state.oscillation.forget();
+        state.plausibility = self.plausibility.start(state.shown());
+        state.telemetry = AxisTelemetry {
+            reference: state.encoder.position(),
+            measured,
+            code_sum: state.telemetry.code_sum,
+            ..AxisTelemetry::default()
+        };
+    }
+}

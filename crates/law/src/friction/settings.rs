@@ -1,0 +1,40 @@
+//! The friction of an axis, as a person writes it.
+
+use super::dahl::DahlParameters;
+use super::direction::PerDirection;
+use super::gms::GmsParameters;
+use super::lugre::LugreParameters;
+use super::smoothed_gms::SmoothedGmsParameters;
+use super::stribeck::StaticFriction;
+
+/// The friction of an axis, as identified.
+#[derive(Clone, Debug, PartialEq)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(deny_unknown_fields)
+)]
+#[cfg_attr(feature = "settings", derive(miniconf::TreeSchema, miniconf::TreeAny))]
+pub struct FrictionSettings {
+    /// The static model, for each sense of motion.
+    pub sliding: PerDirection<StaticFriction>,
+    /// The elements of the GMS model.
+    pub gms: GmsParameters,
+    /// Parameters of the smoothed GMS beyond those of the GMS.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub smoothed_gms: SmoothedGmsParameters,
+    /// Dahl's model; needed by its kind of feedforward alone.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub dahl: Option<DahlParameters>,
+    /// The LuGre model; needed by its kind of feedforward alone.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub lugre: Option<LugreParameters>,
+}
+
+impl FrictionSettings {
+    /// The mean of both directions' breakaway levels, V.
+    pub fn mean_breakaway_v(&self) -> f64 {
+        let PerDirection { positive, negative } = &self.sliding;
+        0.5 * (positive.curve.breakaway_v + negative.curve.breakaway_v)
+    }
+}

@@ -1,0 +1,108 @@
+//! The settings of one axis. Ranges, defaults and meanings stand in [the table](super::leaves).
+
+use miniconf::{TreeAny, TreeSchema};
+use serde::{Deserialize, Serialize};
+
+use super::feedback::FeedbackSettings;
+use super::homing::HomingSettings;
+use super::limits::LimitSettings;
+use quadrant_law::cancelling::CancellingSettings;
+use quadrant_law::control::plant_model::PlantModel;
+use quadrant_law::feedforward::{FeedforwardGains, FeedforwardKind};
+use quadrant_law::friction::FrictionSettings;
+use quadrant_law::learning::LearningSettings;
+
+/// Everything one axis' control law is made from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct AxisSettings {
+    /// Encoder.
+    pub encoder: EncoderSettings,
+    /// Amplifier, and the converter that drives it.
+    pub amplifier: AmplifierSettings,
+    /// Feedback law and its parameters.
+    pub feedback: FeedbackSettings,
+    /// Friction models that the feedforward uses.
+    pub friction: FrictionSettings,
+    /// Friction and inertia feedforward.
+    pub feedforward: FeedforwardSettings,
+    /// Limits of motion, tracking error and encoder signal.
+    pub limits: LimitSettings,
+    /// Homing; none: the axis cannot be homed.
+    #[serde(default)]
+    pub homing: Option<HomingSettings>,
+    /// The linear model of the axis, if known: with it, the nonlinear gain is held to the Popov bound.
+    pub plant: Option<PlantModel>,
+    /// True if the axis was commissioned: by the tool, or by the person who entered its settings.
+    #[serde(default)]
+    pub commissioned: bool,
+}
+
+/// An incremental encoder and its hardware counter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct EncoderSettings {
+    /// Length of one count, mm.
+    pub resolution_mm: f64,
+    /// Width of the hardware counter, bits.
+    pub counter_bits: u8,
+    /// True if the counter runs backwards when the axis moves to larger positions.
+    pub reversed: bool,
+    /// Counts between neighbouring index pulses; none: the encoder has no index, or its spacing is not known.
+    #[serde(default)]
+    pub counts_per_index: Option<u32>,
+    /// Distance, either way, by which an index pulse may miss its place, counts.
+    #[serde(default = "index_tolerance_counts")]
+    pub index_tolerance_counts: u32,
+}
+
+fn index_tolerance_counts() -> u32 {
+    EncoderSettings::default().index_tolerance_counts
+}
+
+/// An amplifier input driven by a 16-bit converter.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct AmplifierSettings {
+    /// Voltage of the converter's largest code, V.
+    pub full_scale_v: f64,
+    /// Output limit, V.
+    pub output_limit_v: f64,
+    /// Voltage at which the motor gives no force, V; it is added to every output.
+    pub offset_v: f64,
+    /// True if a positive voltage moves the axis to smaller positions.
+    pub reversed: bool,
+    /// Output that the motor bears for ever, V; from the output limit on, the load is not watched.
+    #[serde(default = "continuous_v")]
+    pub continuous_v: f64,
+    /// Time for which the motor bears the output limit, s.
+    #[serde(default = "overload_s")]
+    pub overload_s: f64,
+}
+
+fn continuous_v() -> f64 {
+    AmplifierSettings::default().continuous_v
+}
+
+fn overload_s() -> f64 {
+    AmplifierSettings::default().overload_s
+}
+
+/// The feedforward.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, TreeSchema, TreeAny)]
+#[serde(deny_unknown_fields)]
+pub struct FeedforwardSettings {
+    /// Friction models that act.
+    #[tree(with = miniconf::leaf)]
+    pub kind: FeedforwardKind,
+    /// Shares of the models, and the inertia gain.
+    pub gains: FeedforwardGains,
+    /// Look-ahead of the feedforward over the feedback's reference, s: the plant's delay.
+    pub preview_s: f64,
+    /// Learning of the friction's scale while the axis works; none: the scale stays 1.
+    #[serde(default)]
+    pub learning: Option<LearningSettings>,
+    /// Cancelling of a cut's vibration at multiples of the spindle's frequency; none: nothing is cancelled.
+    #[serde(default)]
+    pub cancelling: Option<CancellingSettings>,
+}

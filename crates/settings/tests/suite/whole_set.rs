@@ -1,0 +1,172 @@
+//! Every number out of its range is refused by name, with the value and what is allowed.
+
+use quadrant_law::axes::AxisName;
+use quadrant_law::control::pid::PidGains;
+use quadrant_law::decimal::Decimal;
+use quadrant_settings::{FeedbackSettings, PlanSettings, Reason, SettingsError, StageSettings};
+
+use crate::fields::{FIELDS, Field};
+use crate::law_fields::LAW_FIELDS;
+use crate::leaves::law_of;
+use quadrant_test_support::with_x;
+
+pub(crate) const ROOM: usize = 4;
+
+fn fields() -> impl Iterator<Item = &'static (&'static str, Field, f64, f64)> {
+    FIELDS.iter().chain(LAW_FIELDS)
+}
+
+pub(crate) fn refusal(settings: &StageSettings) -> SettingsError {
+    settings.validate(ROOM).expect_err("refused")
+}
+
+/// Checks that the message names everything a person needs.
+pub(crate) fn check_message(error: &SettingsError, axis: AxisName, field: &str) {
+    assert_eq!((error.axis, error.field), (Some(axis), field));
+    let text = error.to_string();
+    assert!(
+        text.starts_with(&format!(
+            "{axis}/{} = {}",
+            field.replace('.', "/"),
+            Decimal(error.value)
+        )),
+        "{text}"
+    );
+    if let Reason::OutOfRange { least, most } = error.reason {
+        let (least, most) = (Decimal(least), Decimal(most));
+        assert!(
+            text.ends_with(&format!("is outside {least} to {most}")),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn every_number_out_of_its_range_is_refused_by_name_on_every_axis() {
+    for (index, name) in AxisName::ALL.into_iter().enumerate() {
+        for &(field, place, below, above) in fields() {
+            for value in [below, above] {
+                let mut settings = StageSettings::simulated();
+                // Below breakaway is above x's coulomb level; other axes have other levels.
+                settings.axes[index] = quadrant_settings::presets::x_axis();
+                // An end that another setting decides is that of the law in force.
+                if let Some(law) = law_of(field) {
+                    settings.axes[index].feedback.law = law;
+                }
+                *place(&mut settings.axes[index]) = value;
+                let error = refusal(&settings);
+                check_message(&error, name, field);
+                assert_eq!(error.value, value, "{field}");
+                let outside = matches!(error.reason, Reason::OutOfRange { least, most }
+                    if value < least || value > most);
+                assert!(outside, "{field}: {error}");
+            }
+        }
+    }
+}
+
+#[test]
+fn every_number_that_is_not_finite_is_refused_by_name() {
+    for &(field, place, ..) in fields() {
+        for value in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            let settings = with_x(|axis| *place(axis) = value);
+            let error = refusal(&settings);
+            check_message(&error, AxisName::X, field);
+            assert_eq!(error.reason, Reason::NotFinite, "{field}");
+        }
+    }
+}
+
+#[test]
+fn the_list_of_fields_is_complete() {
+    fn numbers(value: &serde_json::Value) -> usize {
+        match value {
+            serde_json::Value::Number(_) => 1,
+            serde_json::Value::Array(items) => items.iter().map(numbers).sum(),
+            serde_json::Value::Object(fields) => fields.values().map(numbers).sum(),
+            _ => 0,
+        }
+    }
+    let axis = quadrant_settings::presets::x_axis();
+    let elements = axis.friction.gms.elements.len();
+    let stored = numbers(&serde_json::to_value(&axis).expect("plain data"));
+    let points = axis.feedback.schedule.expect("by default").len();
+    // One element and one point stand for all; the encoder has three whole numbers.
+    assert_eq!(
+        stored,
+        fields().count() + 2 * (elements - 1) + 4 * (points - 1) + 3
+    );
+}
+
+#[test]
+fn the_control_rate_the_brake_and_the_counter_width_have_ranges() {
+    for rate_hz in [999.0, 1.01e5, f64::NAN] {
+        let settings = StageSettings {
+            rate_hz,
+            ..StageSettings::simulated()
+        };
+        let error = refusal(&settings);
+        assert_eq!((error.axis, error.field), (None, "rate_hz"));
+        assert!(error.to_string().starts_with("rate_hz = "), "{error}");
+    }
+    for (release_s, apply_s, field) in [
+        (-1e-3, 0.0, "brake.release_s"),
+        (2.01, 0.0, "brake.release_s"),
+        (0.0, -1e-3, "brake.apply_s"),
+        (0.0, 2.01, "brake.apply_s"),
+    ] {
+        let mut settings = StageSettings::simulated();
+        (settings.brake.release_s, settings.brake.apply_s) = (release_s, apply_s);
+        let error = refusal(&settings);
+        assert_eq!((error.axis, error.field), (None, field));
+    }
+    for bits in [0, 7, 33, 255] {
+        let error = refusal(&with_x(|axis| axis.encoder.counter_bits = bits));
+        check_message(&error, AxisName::X, "encoder.counter_bits");
+    }
+}
+
+#[test]
+fn the_spacing_of_the_index_and_its_tolerance_have_ranges() {
+    for counts in [0, 15, 1_000_000_001] {
+        let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = Some(counts)));
+        check_message(&error, AxisName::X, "encoder.counts_per_index");
+    }
+    let error = refusal(&with_x(|axis| axis.encoder.index_tolerance_counts = 5001));
+    check_message(&error, AxisName::X, "encoder.index_tolerance_counts");
+    let without = with_x(|axis| {
+        axis.encoder.counts_per_index = None;
+        axis.encoder.index_tolerance_counts = 5001;
+        axis.homing.as_mut().expect("by default").index = false;
+    });
+    assert_eq!(without.validate(ROOM), Ok(()));
+    let error = refusal(&with_x(|axis| axis.encoder.counts_per_index = None));
+    check_message(&error, AxisName::X, "homing.index");
+    assert!(error.to_string().contains("encoder/counts_per_index"));
+}
+
+#[test]
+fn defaults_are_valid_at_every_rate_they_claim_and_with_room() {
+    assert_eq!(StageSettings::simulated().validate(4), Ok(()));
+    assert_eq!(StageSettings::simulated().validate(10), Ok(()));
+    assert_eq!(
+        PlanSettings::default().validate(&StageSettings::simulated()),
+        Ok(())
+    );
+}
+
+#[test]
+fn all_laws_of_a_pid_are_within_the_ranges_of_their_parameters_however_soft_it_is() {
+    for step in 0..2000 {
+        let soft = 1.01_f64.powi(-step);
+        let pid = PidGains {
+            kp_v_per_mm: 5.0 * soft,
+            ki_v_per_mm_s: 20.0 * soft,
+            kd_v_s_per_mm: 0.02 * soft,
+            derivative_filter_s: 1e-4,
+        };
+        let sliding_mode = FeedbackSettings::all_laws(pid, None, 250.0).sliding_mode;
+        let widest = sliding_mode.map(|gains| gains.boundary_mm_s);
+        assert!(widest.is_none_or(|mm_s| mm_s <= 1e3), "{soft}: {widest:?}");
+    }
+}
