@@ -198,6 +198,15 @@ pub fn progress(runs: u64, what: &'static str) -> ProgressBar {
     ProgressBar::new(runs).with_style(style).with_message(what)
 }
 
+/// A word of a command as a shell takes it.
+pub fn quoted(word: &str) -> String {
+    let plain = |sign: char| sign.is_alphanumeric() || "_./:=,+-@%".contains(sign);
+    match !word.is_empty() && word.chars().all(plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', "'\\''")),
+    }
+}
+
 /// The command line as it was given, but for the folder and the formats of the results: what a reader repeats.
 pub fn command_line() -> String {
     const LEFT_OUT: [&str; 2] = ["--out", "--format"];
@@ -208,10 +217,25 @@ pub fn command_line() -> String {
     while let Some(word) = given.next() {
         let name = word.split('=').next().unwrap_or_default();
         if !LEFT_OUT.contains(&name) {
-            words.push(word);
+            words.push(quoted(&word));
         } else if word == name {
             given.next();
         }
     }
     words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::quoted;
+
+    #[test]
+    fn a_word_that_a_shell_would_take_apart_is_quoted() {
+        for plain in ["--travel", "-3..20", "a/b_1.toml", "x=1:um,y=2", "ü.toml"] {
+            assert_eq!(quoted(plain), plain);
+        }
+        assert_eq!(quoted("my stage.toml"), "'my stage.toml'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted(""), "''");
+    }
 }

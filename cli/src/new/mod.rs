@@ -3,13 +3,12 @@
 mod ask;
 mod presets;
 
-use std::fmt::Display;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context, bail};
 use clap::Args;
 use quadrant_cli::axis::Axis;
-use quadrant_cli::output::command_line;
+use quadrant_cli::output::{command_line, quoted};
 use quadrant_cli::{say, warn};
 use quadrant_law::axes::AxisName;
 use quadrant_settings::{AxisSettings, StageSettings};
@@ -272,12 +271,14 @@ pub(super) fn run(arguments: &Arguments) -> anyhow::Result<()> {
     if let Some(taken) = questions.taken() {
         warn!("not given, so the defaults: {taken}");
     }
-    say!("{}", next(&machine, &axes, path.display()));
+    say!("{}", next(&machine, &axes, path));
     Ok(())
 }
 
 /// The next commands, with the file.
-fn next(machine: &Machine, axes: &[AxisName], file: impl Display) -> String {
+fn next(machine: &Machine, axes: &[AxisName], path: &Path) -> String {
+    let shown = path.display();
+    let file = quoted(&shown.to_string());
     let names: Vec<&str> = axes.iter().map(|axis| axis.as_str()).collect();
     let axis = names.first().copied().unwrap_or("x");
     let Travel {
@@ -294,7 +295,7 @@ fn next(machine: &Machine, axes: &[AxisName], file: impl Display) -> String {
             .encoder
             .count_mm(machine.lead_mm.unwrap_or_default());
     format!(
-        "{file}: the settings of {}, {} um a count, {} Hz; not commissioned\n\
+        "{shown}: the settings of {}, {} um a count, {} Hz; not commissioned\n\
          \n\
          Next, on the simulated stage:\n\
          \x20   quadrant commission --axis {axis} --settings {file} --machine simulated --travel {travel}\n\

@@ -115,7 +115,10 @@ fn names(drawn: &[String], runs: &[Run]) -> anyhow::Result<Vec<String>> {
         !names.is_empty(),
         "no column is in all of the files: {}",
         runs.iter()
-            .map(|run| format!("{} has {}", run.path.display(), run.names().join(", ")))
+            .map(|run| match run.names().join(", ") {
+                none if none.is_empty() => format!("{} has none of numbers", run.path.display()),
+                names => format!("{} has {names}", run.path.display()),
+            })
             .collect::<Vec<_>>()
             .join("; ")
     );

@@ -72,7 +72,14 @@ fn put(path: &Path, content: impl FnOnce(&mut dyn Write) -> io::Result<()>) -> i
         // Less the user's mask, as of any new file.
         builder.permissions(fs::Permissions::from_mode(0o666));
     }
-    let unfinished = builder.tempfile_in(&folder)?;
+    // The error would name the file that is not there yet, and its folder is what is wrong.
+    let unfinished = (builder.tempfile_in(&folder)).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => io::Error::new(
+            io::ErrorKind::NotFound,
+            format!("there is no folder {}", folder.display()),
+        ),
+        kind => io::Error::new(kind, format!("{}: {kind}", folder.display())),
+    })?;
     let file = fill(unfinished.as_file(), content)?;
     if let Some(before) = &before {
         keep_permissions(file, before)?;

@@ -51,7 +51,9 @@ impl fmt::Display for MoveError {
             MoveFlaw::NotHomed => {
                 f.write_str("the axis does not know where it is; home it first, or jog")
             }
-            MoveFlaw::NoHoming => f.write_str("the axis has no homing; set its homing"),
+            MoveFlaw::NoHoming => f.write_str(
+                "the axis has no homing; set its part `homing`: switch, senses and velocities",
+            ),
             MoveFlaw::BeyondTravel {
                 target_mm,
                 travel_mm: (negative, positive),
