@@ -27,7 +27,7 @@ pub struct CommissionSettings {
 }
 
 impl Default for CommissionSettings {
-    /// The best PID, and three quarters of the Popov bound.
+    /// The best PID, and 75 % of the Popov bound.
     fn default() -> Self {
         Self {
             target: None,

@@ -26,15 +26,17 @@ pub struct CrossCheck {
 }
 
 /// RMS of the excitation at rest over the friction at breakaway: enough to slide most of the time.
-const EXCITATION: f64 = 2.6;
-/// Band, Hz, and period, s, of the excitation, and its periods.
+const EXCITATION_RATIO: f64 = 2.6;
+/// Band of the excitation, Hz.
 const BAND_HZ: (f64, f64) = (4.0, 400.0);
+/// Period of the excitation, s.
 const PERIOD_S: f64 = 0.5;
+/// Periods of the excitation.
 const PERIODS: usize = 12;
 
 impl CrossCheck {
-    /// Excites the axis at rest and moves it to and fro, under the feedback of finished settings; `progress` is told step
-    /// and share.
+    /// Excites the axis at rest and moves it to and fro, under the feedback of finished settings; `progress` receives the step
+    /// and the share.
     ///
     /// # Errors
     /// A run that is stopped, or data that yield no model.
@@ -50,7 +52,7 @@ impl CrossCheck {
             0.5 * (sliding.positive.curve.breakaway_v + sliding.negative.curve.breakaway_v);
         let excitation = Excitation {
             waveform: Waveform::Multisine,
-            rms_v: EXCITATION * breakaway_v,
+            rms_v: EXCITATION_RATIO * breakaway_v,
             band_hz: BAND_HZ,
             rise_hz: 0.0,
             period_s: PERIOD_S,
