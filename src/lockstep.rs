@@ -183,7 +183,7 @@ pub enum InjectedFault {
     StackOverflow = 4,
     /// Requests an interrupt without a handler.
     StrayInterrupt = 5,
-    /// Loops for ever with interrupts masked.
+    /// Loops indefinitely with interrupts masked.
     Hang = 6,
     /// Masks interrupts for a control period and a half, where a clock paces the run.
     LateTick = 7,

@@ -117,7 +117,7 @@ impl ChangeDetector {
             dropped_events,
             ..
         } = self.server;
-        // A count that is smaller began anew, with another selection of telemetry.
+        // A count that is smaller began again, with another selection of telemetry.
         if server.bad_frames > bad_frames {
             report(StateChange::BadFrames(server.bad_frames - bad_frames));
         }

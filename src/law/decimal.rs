@@ -12,7 +12,7 @@ use crate::law::rounding;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Decimal(pub f64);
 
-/// Significant digits: enough to tell a count of 2^32 from the next.
+/// Significant digits: enough to distinguish a count of 2^32 from the next.
 const DIGITS: i32 = 12;
 /// The first digit's place from which on numbers are written with an exponent; with all digits, 10^18 is the unit then.
 const SMALL: i32 = -7;

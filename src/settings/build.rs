@@ -35,7 +35,7 @@ const HELD_ERROR: f64 = 2.0;
 /// Breakaway over that of the settings that need not show as motion in open loop, and below which silence is none.
 const FRICTION_ERROR: f64 = 1.5;
 const SILENT_FRICTIONS: f64 = 2.0;
-/// What it takes up over breakaway at least, however stiff the settings say it is.
+/// What it takes up over breakaway at least, even if the settings call it stiffer.
 const HELD_FRICTIONS: f64 = 0.65;
 /// What friction takes up, over breakaway: of an axis that stands after it slid; that slides; that is turned around, twice 1.4 of
 /// it and some more.
@@ -337,7 +337,7 @@ impl AxisSettings {
         }
     }
 
-    /// Cancelling, if it is wanted, and the loop that it is in.
+    /// Cancelling, if the settings have it, and the loop that it is in.
     fn cancelling<'a>(
         &'a self,
         gains: Option<&'a PidGains>,

@@ -256,7 +256,7 @@ const LEAST_FRICTION: f64 = 0.457;
 const MOST_FRICTION: f64 = 0.857;
 /// Divisor of the level of a direction in which the axis went too far.
 const LEVEL_REDUCTION: f64 = 1.2;
-/// Largest level that is tried after the axis went too far in shorter tests, over that level.
+/// Largest level that is tried in shorter tests after the axis went too far, over the level at which it did.
 const MAX_RETRY_RATIO: f64 = 1.7;
 /// Least ratio of a level that goes too far to one that friction holds for which a level between them is tried.
 const MIN_LEVEL_RATIO: f64 = 1.06;

@@ -141,7 +141,7 @@ pub struct Server<'q, 'a, S: Scalar, F> {
     deferred: Option<Deferred>,
     /// Control keeps the outputs off for this server.
     locked: bool,
-    /// Valid settings were stored, which control has not been told yet.
+    /// Valid settings were stored, which control does not know yet.
     accepted: bool,
 }
 

@@ -46,7 +46,7 @@ const ERASE_LOOKS: u32 = 9_000_000;
 /// The same for a word: at least 1 ms, and the processor waits by itself, as it fetches from the same flash.
 const PROGRAM_LOOKS: u32 = 20_000;
 
-/// The flash did not do what it was told.
+/// The flash did not carry out its command.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum FlashError {
     /// Outside of the two sectors.
@@ -141,7 +141,7 @@ impl SettingsFlash {
         }
     }
 
-    /// Waits until the controller is idle, but not for ever.
+    /// Waits until the controller is idle, with a limit.
     fn wait(&self) {
         for _ in 0..PROGRAM_LOOKS {
             if self.flash.sr().read().bits() & BUSY == 0 {

@@ -75,7 +75,7 @@ impl Serial {
         let data_register = usart.dr().as_ptr() as u32;
 
         let receiver = dma.st(RECEIVER);
-        // SAFETY: the addresses are those of the data register and of memory that lives for ever.
+        // SAFETY: the addresses are those of the data register and of static memory.
         unsafe {
             receiver.par().write(|w| w.pa().bits(data_register));
             receiver.m0ar().write(|w| w.m0a().bits(RECEIVED.address()));
@@ -109,7 +109,7 @@ impl hal::Serial for Serial {
         // What the counter says was written is read after the counter.
         fence(Ordering::Acquire);
         let byte = |index| {
-            // SAFETY: the index is one of the ring, which lives for ever; the stream writes it, hence volatile.
+            // SAFETY: the index is one of the ring, which is static; the stream writes it, hence volatile.
             unsafe { RECEIVED.byte(index).read_volatile() }
         };
         self.ring.read(remaining.into(), byte, into)

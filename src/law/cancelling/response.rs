@@ -20,21 +20,24 @@ pub const LEAST_MARGIN_DEG: f64 = 30.0;
 /// larger.
 const MOST_GAIN: f64 = 0.1;
 
-/// Errors of the plant that the margin is for: mass, and dead time.
+/// Errors of the plant's mass that the margin is for, as factors.
 const MASSES: [f64; 2] = [0.75, 1.33];
+/// Errors of the plant's dead time that the margin is for, as factors.
 const DEAD_TIMES: [f64; 2] = [0.9, 1.1];
 
-/// Amplitudes of a vibration before sliding, mm; the response there counts where it is this share of the one while sliding, and
-/// turns the phase by so much at most.
+/// Amplitudes of a vibration before sliding, mm.
 const AMPLITUDES_MM: [f64; 4] = [2e-3, 5e-3, 10e-3, 20e-3];
+/// Least response before sliding that counts, over the response while sliding.
 const LEAST_SHARE: f64 = 0.3;
+/// Largest lead of the response before sliding that counts, rad.
 const MOST_LEAD: f64 = 45.0 * PI / 180.0;
 
-/// Places at which the virgin curve is integrated.
-const PLACES: u32 = 16;
+/// Number of positions at which the virgin curve is integrated.
+const INTEGRATION_POINTS: u32 = 16;
 
-/// The table's first octave begins at 2^FIRST units, 2^-9 turns in a step: 4.9 Hz at 10 kHz. There are eight, of four intervals.
-const FIRST: u32 = 23;
+/// The table's first octave begins at 2^FIRST_OCTAVE units, 2^-9 turns in a step: 4.9 Hz at 10 kHz. There are eight octaves.
+const FIRST_OCTAVE: u32 = 23;
+/// Intervals in an octave, as a power of two.
 const INTERVAL_BITS: u32 = 2;
 
 /// Nodes of the table: the last one, at 7/16 of a turn in a step, is 1094 Hz at 10 kHz.
@@ -44,7 +47,7 @@ pub(super) const NODES: usize = 8 << INTERVAL_BITS;
 pub(super) fn node_turns(index: usize) -> f64 {
     let intervals = 1usize << INTERVAL_BITS;
     let place = (index % intervals) as f64 / intervals as f64;
-    let octave = (index / intervals) as i32 + FIRST as i32 - 32;
+    let octave = (index / intervals) as i32 + FIRST_OCTAVE as i32 - 32;
     libm::scalbn(1.0 + place, octave)
 }
 
@@ -53,7 +56,7 @@ pub(super) fn node_turns(index: usize) -> f64 {
 #[inline(always)]
 pub(super) fn interval(turns: u32) -> Option<(usize, i32)> {
     let leading = turns.leading_zeros();
-    let octave = (31 - FIRST).checked_sub(leading)?;
+    let octave = (31 - FIRST_OCTAVE).checked_sub(leading)?;
     let normal = turns << (leading & 31);
     let within = (normal << 1) >> (32 - INTERVAL_BITS);
     let place = ((normal << (1 + INTERVAL_BITS)) >> 2) as i32;
@@ -139,10 +142,10 @@ impl CancellingLoop<'_> {
     fn held(&self, amplitude_mm: f64) -> Complex64 {
         let force = |x| self.friction.virgin_curve_v(x, self.breakaway_v);
         let mut area = 0.0;
-        for place in 0..PLACES {
-            area += force((f64::from(place) + 0.5) / f64::from(PLACES) * amplitude_mm);
+        for place in 0..INTEGRATION_POINTS {
+            area += force((f64::from(place) + 0.5) / f64::from(INTEGRATION_POINTS) * amplitude_mm);
         }
-        let area = area * amplitude_mm / f64::from(PLACES);
+        let area = area * amplitude_mm / f64::from(INTEGRATION_POINTS);
         let level = force(amplitude_mm);
         let lost = 8.0 * area - 4.0 * level * amplitude_mm;
         Complex64::new(

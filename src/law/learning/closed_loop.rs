@@ -104,7 +104,7 @@ impl<S: Scalar> ClosedLoop<S> {
         S::total(state.integral)
     }
 
-    /// Lets the integral hold against `voltage` more from now on, V: the position does not change by it.
+    /// Adds `voltage` to what the integral holds, V: the position does not change by it.
     #[inline(always)]
     pub(super) fn hold_against(state: &mut ClosedLoopState<S>, voltage: S) {
         state.integral = (S::total(state.integral) + voltage).into_sum();

@@ -22,7 +22,7 @@ pub struct Segment {
     pub(super) start: Position,
     /// The forward differences of the position at the start, first to fifth.
     pub(super) differences: [i128; 5],
-    /// Ticks left of it; at least one when it is handed over.
+    /// Ticks left of it; at least one when the axis receives it.
     pub(super) ticks: u32,
     /// It begins a stream.
     pub(super) first: bool,
