@@ -1,4 +1,4 @@
-//! The open loop of an axis over frequency: with the plant that the law was told of, and with the stage's own.
+//! The open loop of an axis over frequency: with the plant of the settings, and with the stage's own.
 
 use std::f64::consts::TAU;
 
@@ -111,17 +111,17 @@ mod tests {
     fn the_preset_s_loop_has_its_margins_and_no_jump_of_phase() {
         let settings = StageSettings::simulated();
         let found = LoopResponse::of(&settings, &StageParameters::real(), 0);
-        let told = found.told.unwrap();
+        let of_settings = found.told.unwrap();
         assert!(
-            told.margins.starts_with("gain margin 9."),
+            of_settings.margins.starts_with("gain margin 9."),
             "{}",
-            told.margins
+            of_settings.margins
         );
-        assert!((told.crossover_hz.unwrap() - 65.0).abs() < 1.0);
-        for pair in told.phase_deg.windows(2) {
+        assert!((of_settings.crossover_hz.unwrap() - 65.0).abs() < 1.0);
+        for pair in of_settings.phase_deg.windows(2) {
             assert!((pair[1] - pair[0]).abs() < 60.0, "{pair:?}");
         }
-        assert_eq!(found.frequency_hz.len(), told.gain_db.len());
+        assert_eq!(found.frequency_hz.len(), of_settings.gain_db.len());
         assert!(found.true_stage.is_some());
     }
 }

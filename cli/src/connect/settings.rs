@@ -167,7 +167,7 @@ pub(super) fn load(session: &mut Session, file: &Path) -> anyhow::Result<Answer>
     Ok(Answer::new(text, data))
 }
 
-/// Says where a file's settings come from: its name, and the last command that had a hand in them.
+/// Says where a file's settings come from: its name, and the last command that changed them.
 fn origin_of(file: &Path, read: &SettingsFile) -> String {
     let name = file.file_name().unwrap_or(file.as_os_str()).display();
     match read.provenance.last() {

@@ -81,9 +81,9 @@ impl<S: Scalar, const N: usize> LawMachine<S, N> {
         self.plan[axis as usize] = motion;
     }
 
-    /// Tells the speed of the spindle.
-    pub fn tell_spindle(&mut self, speed: SpindleSpeed) {
-        self.state.tell_spindle(speed);
+    /// Sets the speed of the spindle.
+    pub fn set_spindle_speed(&mut self, speed: SpindleSpeed) {
+        self.state.set_spindle_speed(speed);
     }
 
     /// Takes other settings between two ticks, as the firmware does: the outputs go over without a jump.

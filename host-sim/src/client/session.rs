@@ -63,7 +63,7 @@ pub struct Client {
     interrupt: Interrupt,
     /// State of the axes since an interruption: nothing starts until [`Client::resume`].
     interrupted: Option<&'static str>,
-    /// The interruption is being heeded.
+    /// The interruption is being acted on.
     stopping: bool,
     /// The last fault that the machine has reported, and how many there were.
     reported: (Option<ReportedFault>, u32),
@@ -95,7 +95,7 @@ impl Client {
             notices: VecDeque::new(),
             dropped_notices: 0,
         };
-        // Ends whatever the other end takes for a frame's beginning.
+        // Ends what the other end takes for a frame's beginning.
         client.send(&[DELIMITER])?;
         client.greet()?;
         if client.transport.is_shared() {
@@ -134,7 +134,7 @@ impl Client {
         self.interrupt.clone()
     }
 
-    /// True if an interruption was heeded since the last [`resume`](Self::resume).
+    /// True if an interruption was acted on since the last [`resume`](Self::resume).
     pub const fn is_interrupted(&self) -> bool {
         self.interrupted.is_some()
     }
@@ -300,13 +300,13 @@ impl Client {
     }
 
     /// Lets the machine know that its host is there, if a motion was started and nothing was asked for a while: it stops what
-    /// its host has started when that falls silent. Asks for everything that others see, if they may look. Whoever lets time
+    /// its host has started when that falls silent. Asks for everything that others see, if they may look. A caller that lets time
     /// pass without [`wait`](Self::wait) calls this a few times a second.
     ///
     /// # Errors
     /// As [`request`](Self::request).
     pub fn keep_alive(&mut self) -> Result<(), ClientError> {
-        self.heed_interrupt()?;
+        self.act_on_interrupt()?;
         let silent = self.now().saturating_sub(self.asked);
         let status = if self.transport.is_shared() {
             let (looked, at) = self.looked;
@@ -341,7 +341,7 @@ impl Client {
 
     /// Stops the axes if somebody asked for it: once, and the outputs go off when it was asked for again before they are at
     /// rest.
-    fn heed_interrupt(&mut self) -> Result<(), ClientError> {
+    fn act_on_interrupt(&mut self) -> Result<(), ClientError> {
         if self.stopping {
             return Ok(());
         }
@@ -549,7 +549,7 @@ impl Client {
         }
     }
 
-    /// Lets the other end hear that this one is there; nobody waits for what it answers to this.
+    /// Reports to the other end that this one is there; nobody waits for what it answers to this.
     fn show_alive(&mut self) -> Result<(), ClientError> {
         self.asked = self.now();
         let request = Request {
@@ -577,7 +577,7 @@ impl Client {
         id: u16,
         due: Duration,
     ) -> Result<Option<Result<Reply, LinkError>>, ClientError> {
-        self.heed_interrupt()?;
+        self.act_on_interrupt()?;
         let mut buffer = [0; FRAME_BYTES];
         let timeout = due.saturating_sub(self.now()).min(ANSWER);
         let count = self

@@ -34,7 +34,7 @@ pub(super) enum Idempotency {
     Query,
     /// The same as of one: it says what should be, or has a number.
     Idempotent,
-    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and whatever
+    /// Something else: a second reset would clear another fault unseen, a second arming lose what was captured, and a request that
     /// enables the outputs or starts a motion is asked for by a person, each time: somebody at the machine may have switched
     /// off in between.
     NotIdempotent,

@@ -1,4 +1,4 @@
-//! Moving a test_axis's axis to a position between experiments.
+//! Moving an axis under test to a position between experiments.
 
 use quadrant::reference::{MotionSettings, PointToPointSettings};
 

@@ -44,7 +44,7 @@ impl StageSetup {
         Self::fresh(StageParameters::real(), [MarkParameters::default(); 3])
     }
 
-    /// A stage of one's own under a firmware that nobody has commissioned, and that a person has told what data sheets say: limits,
+    /// A stage of one's own under a firmware that nobody has commissioned, and whose settings have what data sheets say: limits,
     /// travel, and where the home switch is.
     pub fn of(file: &StageFile) -> Self {
         let mut setup = Self::fresh(file.truth.clone(), file.marks);

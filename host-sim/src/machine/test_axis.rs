@@ -78,11 +78,11 @@ pub trait TestAxis {
     /// Settings that are refused, here or by the machine, or a connection that is broken; the old ones stay in force.
     fn apply(&mut self, settings: &AxisSettings) -> Result<(), MachineError>;
 
-    /// Runs an experiment from where the axis stands, and records it. `progress` is told the share that is done,
+    /// Runs an experiment from where the axis stands, and records it. `progress` receives the share that is done,
     /// 0 to 1, a few times a second.
     ///
     /// # Errors
-    /// Whatever stopped the experiment; the outputs are off then.
+    /// The error that stopped the experiment; the outputs are off then.
     fn perform(
         &mut self,
         experiment: &Experiment,
@@ -154,7 +154,7 @@ pub fn span_mm(motion: &MotionSettings) -> Option<Range<f64>> {
     match motion {
         MotionSettings::Hold => Some(0.0..0.0),
         MotionSettings::PointToPoint(to) => Some(to.distance_mm.min(0.0)..to.distance_mm.max(0.0)),
-        // Whatever its phase.
+        // With any phase.
         MotionSettings::Harmonic(sine) if sine.phase_rad == 0.0 => {
             Some(-sine.amplitude_mm..sine.amplitude_mm)
         }

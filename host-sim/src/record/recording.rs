@@ -48,7 +48,7 @@ pub struct MotionOptions {
     pub resample: bool,
 }
 
-/// The units that columns are in, as far as their ranges tell.
+/// The units that columns are in, as far as their ranges show.
 #[derive(Clone, Copy)]
 struct Believed {
     /// Positions are lengths.
@@ -179,7 +179,7 @@ impl Recording {
         Self::read_csv_with(path, &mut |_| {})
     }
 
-    /// As [`read_csv`](Self::read_csv), for long files: `progress` is told the share that is read, 0 to 1.
+    /// As [`read_csv`](Self::read_csv), for long files: `progress` receives the share that is read, 0 to 1.
     ///
     /// # Errors
     /// As [`read_csv`](Self::read_csv).
@@ -333,7 +333,7 @@ fn resample_by(grid: &Grid, columns: &mut Columns) {
     }
 }
 
-/// Refuses a position that no axis reaches, whatever the reference says.
+/// Refuses a position that no axis reaches, with any reference.
 fn check_travel(path: &Path, column: &'static str, travel_mm: f64) -> Result<(), RecordError> {
     if travel_mm <= MOST_TRAVEL_MM {
         return Ok(());

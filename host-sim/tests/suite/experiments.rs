@@ -1,4 +1,4 @@
-//! The experiments on the simulated stage: what they must show whatever the exact figures are.
+//! The experiments on the simulated stage: what they must show with any exact figures.
 
 use quadrant::app::supervisor::Event;
 use quadrant::command::Command;

@@ -96,7 +96,7 @@ fn the_record_of_emps_repeats_itself_and_is_not_judged_by_its_repetitions() {
     let Some((_, candidates)) = emps_models() else {
         return;
     };
-    // The same trajectory four times: whoever withholds one of them judges what was fitted.
+    // The same trajectory four times: a fit without one of them is judged by its own data.
     for candidate in candidates {
         let ratio = validation(candidate) / candidate.model.relative_error;
         assert!((1.04..1.3).contains(&ratio), "{ratio}");
@@ -191,7 +191,7 @@ fn with_the_dead_time_known_the_simulated_axes_are_found() {
 }
 
 #[test]
-fn without_it_inertia_and_dead_time_are_hardly_told_apart_but_their_sum_is() {
+fn without_it_inertia_and_dead_time_are_hardly_separated_but_their_sum_is_known() {
     let truth = &StageParameters::real().axes[0];
     let candidates = fitted(&simulated(0, truth), &MotionFitSettings::default());
     let model = &recommended(&candidates).unwrap().model;
@@ -317,7 +317,7 @@ const NEARLY: f64 = 1.02;
 const NEARLY_OF_VOLTAGE: f64 = 0.0015;
 
 #[test]
-fn records_that_tell_too_little_are_refused_with_what_they_lack() {
+fn records_that_determine_too_little_are_refused_with_what_they_lack() {
     let truth = &StageParameters::real().axes[0];
     let whole = simulated(0, truth);
     let settings = MotionFitSettings::default();
@@ -377,8 +377,8 @@ fn simulated_record(coulomb_v: f64, mut step_s: impl FnMut(usize) -> f64) -> Vec
     while time < 8.0 {
         let measured = (position * 1e3_f64).round() / 1e3;
         let ahead = (reference(time + 1e-4) - reference(time - 1e-4)) / 2e-4;
-        let wanted = 2.0 * (reference(time) - measured) + 0.012 * (ahead - velocity);
-        let voltage = (wanted + 2e-3 * ahead).clamp(-10.0, 10.0);
+        let commanded = 2.0 * (reference(time) - measured) + 0.012 * (ahead - velocity);
+        let voltage = (commanded + 2e-3 * ahead).clamp(-10.0, 10.0);
         rows.push([time, measured, voltage]);
         let step = step_s(rows.len());
         for _ in 0..40 {

@@ -214,7 +214,7 @@ impl Channel {
         }
     }
 
-    /// The unit in which people read it, and how many of them its physical unit is: errors are told in um.
+    /// The unit in which people read it, and how many of them its physical unit is: errors are shown in um.
     pub const fn shown_unit(self) -> (&'static str, f64) {
         match self {
             Self::Axis(_, AxisSignal::Error) => ("um", 1e3),

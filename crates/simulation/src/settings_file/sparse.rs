@@ -1,4 +1,4 @@
-//! Settings that a file leaves out: they are the defaults. Reading lays the file over the defaults; writing drops what equals them.
+//! Settings that a file leaves out: they are the defaults. Reading replaces defaults by the file's values; writing drops what equals them.
 //!
 //! A part that a stage has by default only if it is named (`nonlinear`, `homing`, `plant`) begins at its own defaults where a file names it.
 

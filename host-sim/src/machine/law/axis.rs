@@ -174,7 +174,7 @@ impl SimulatedTestAxis {
             let position_mm = moved_mm + self.travel.start_mm();
             let Some(step) = law.step(raw, experiment)? else {
                 if waited == ENABLE_TICKS && !rested {
-                    // As a person would, who is told that the axis still moves.
+                    // As a person would, who sees that the axis still moves.
                     rested = true;
                     waited = 0;
                     self.coast();
