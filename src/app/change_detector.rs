@@ -91,7 +91,7 @@ impl ChangeDetector {
         }
         self.modes = view.modes;
 
-        let silent = server.greeted && tick.wrapping_sub(server.heard_tick) > SILENT_TICKS;
+        let silent = server.greeted && tick.wrapping_sub(server.request_tick) > SILENT_TICKS;
         if server.greeted && !self.server.greeted {
             report(StateChange::Greeted);
         } else if silent != self.is_silent {

@@ -241,7 +241,7 @@ impl Log {
         })
     }
 
-    /// Takes what is there, as a probe does.
+    /// Takes the bytes that have come, as a probe does.
     fn read(&mut self, debugger: &mut Debugger) -> Result<()> {
         let buffer = debugger.word(self.channel + 4)?;
         let size = debugger.word(self.channel + 8)?;
@@ -273,7 +273,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loads_are_told_from_other_instructions() {
+    fn loads_are_distinguished_from_other_instructions() {
         // ldr r2, [r1, #4]; ldr.w r12, [r3, #64]; ldr.w r0, [r4, #-8]; movs r0, #1; str r0, [r1].
         assert_eq!(decode_load(0x684A, 0), Some((2, 1, 4)));
         assert_eq!(decode_load(0xF8D3, 0xC040), Some((12, 3, 64)));

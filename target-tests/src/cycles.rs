@@ -37,7 +37,7 @@ const NO_CACHE_TOLERANCE_PERCENT: f64 = 20.0;
 /// File of the expected bounds.
 const GOLDEN: Golden = Golden {
     path: golden::CYCLES,
-    head: "Written by `cargo xtask cycles --overwrite-expected`; `cargo xtask cycles` holds its figures against these.",
+    head: "Written by `cargo xtask cycles --overwrite-expected`; `cargo xtask cycles` compares its figures with these.",
 };
 
 /// Bounds of any tick, in cycles.
@@ -49,7 +49,7 @@ struct Bounds {
     no_cache: f64,
 }
 
-/// Prints cycles by kind of tick and their bounds, and holds these against the committed ones.
+/// Prints cycles by kind of tick and their bounds, and compares these with the committed ones.
 pub(crate) fn run(toolchain: Toolchain, scalar: Scalar, ticks: u32, overwrite: bool) -> Result<()> {
     let image = emulated(toolchain, scalar)?;
     let code = Code::of(&image, scalar)?;
@@ -148,12 +148,12 @@ fn compare(key: &str, bounds: Bounds, compiler: &str) -> Result<()> {
     println!(
         "  {key}: {grown:+.1} % against the committed bound, {no_cache_grown:+.1} % without a cache"
     );
-    let bears =
+    let allowed =
         grown.abs() <= TOLERANCE_PERCENT && no_cache_grown.abs() <= NO_CACHE_TOLERANCE_PERCENT;
-    difference.ensure(bears, || {
+    difference.ensure(allowed, || {
         format!(
             "{key}: the bound has changed by {grown:+.1} %, without a cache by {no_cache_grown:+.1} %, more than {TOLERANCE_PERCENT} or \
-             {NO_CACHE_TOLERANCE_PERCENT} %; if that is wanted, `cargo xtask cycles --overwrite-expected` accepts it"
+             {NO_CACHE_TOLERANCE_PERCENT} %; if that is intended, `cargo xtask cycles --overwrite-expected` accepts it"
         )
     })
 }

@@ -27,7 +27,7 @@ const SET_POINTS: u32 = 15;
 const STREAM_MM: f64 = 0.25;
 /// Ticks of the stream that are traced.
 const STREAMED: u32 = 250;
-/// Ticks from the end of a segment on that are of the change: the next one is taken over, and then the one after it from the queue.
+/// Ticks from the end of a segment on that are of the change: the next one is adopted, and then the one after it from the queue.
 const CHANGE_TICKS: u32 = 2;
 
 /// Velocity at whose crossing a capture triggers, mm/s.

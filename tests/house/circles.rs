@@ -27,10 +27,10 @@ fn circles(imports: &[Import]) -> Vec<String> {
             (from, seen)
         })
         .collect();
-    let mut told = BTreeSet::new();
+    let mut reported = BTreeSet::new();
     let mut found = Vec::new();
     for (&file, beyond) in &reach {
-        if !beyond.contains(file) || told.contains(file) {
+        if !beyond.contains(file) || reported.contains(file) {
             continue;
         }
         let group: BTreeSet<&str> = beyond
@@ -46,7 +46,7 @@ fn circles(imports: &[Import]) -> Vec<String> {
                 }
             }
         }
-        told.extend(group);
+        reported.extend(group);
         found.push(text);
     }
     found

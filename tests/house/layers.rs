@@ -46,7 +46,7 @@ fn manifest(path: &str) -> String {
     fs::read_to_string(root().join(path)).expect("a manifest")
 }
 
-/// The dependencies that a manifest names, in whatever table: each with its table's heading and its line.
+/// The dependencies that a manifest names, in any table: each with its table's heading and its line.
 fn dependencies(manifest: &str) -> Vec<(String, String, String)> {
     let mut table = String::new();
     let mut found = Vec::new();

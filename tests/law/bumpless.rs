@@ -25,7 +25,7 @@ fn plan() -> PlanSettings {
     plan
 }
 
-/// Runs x along its sine while the machine lags by a growing distance, whatever the output: every law sees the same
+/// Runs x along its sine while the machine lags by a growing distance, for any output: every law sees the same
 /// counts. Returns the volts of every tick and the transfer offset.
 fn volts<S: Scalar>(first: &StageSettings, second: Option<&StageSettings>) -> Vec<(f64, f64)> {
     let mut rig = Rig::<S>::new(first, &plan());

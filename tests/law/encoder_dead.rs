@@ -342,7 +342,7 @@ fn is_unseen(activity: Activity, death: Death) -> bool {
     match (death, activity) {
         // What a load does to an axis that stands is seen by the encoder alone.
         (_, Activity::RestUnderLoad) => death != Death::Reversed,
-        // It is slower than its gaps; the index pulses tell.
+        // It is slower than its gaps; the index pulses show it.
         (Death::Intermittent, Activity::Jog(speed) | Activity::JogFromRest(speed)) => speed <= 10.0,
         // A cut is a load that comes and goes in the gaps.
         (Death::Intermittent, Activity::CutSine(..)) => true,
@@ -520,7 +520,7 @@ fn a_healthy_axis_is_left_alone() {
     println!("{runs} runs of 1.2 s");
 }
 
-/// Vibration or noise that shakes an axis loose while it is measured hides friction at rest, not while sliding.
+/// Vibration or noise that makes an axis break away while it is measured hides friction at rest, not while sliding.
 #[test]
 fn friction_at_rest_that_was_taken_for_less_than_while_sliding_is_no_fault_of_the_encoder() {
     let mut settings = StageSettings::simulated();

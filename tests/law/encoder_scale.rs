@@ -127,7 +127,7 @@ fn fit(mut axis: Lone<f32>) -> Result<Fit, FaultCode> {
 }
 
 #[test]
-fn seconds_of_motion_tell_a_scale_only_as_another_mass() {
+fn seconds_of_motion_show_a_scale_only_as_another_mass() {
     let truth = |gain: f64, damping: f64, friction: f64| Truth {
         gain,
         damping,

@@ -82,9 +82,9 @@ impl Machine {
     fn tick(&mut self, command: Option<Command>) {
         let telemetry = *self.rig.state.axes()[0].telemetry();
         let drives = self.rig.state.safety().drives();
-        let wanted = telemetry.reference.0 >> 16;
+        let reference = telemetry.reference.0 >> 16;
         let step = if drives {
-            wanted - telemetry.measured.0
+            reference - telemetry.measured.0
         } else {
             0
         };

@@ -161,7 +161,7 @@ fn homing_goes_on_alone_if_the_settings_say_so() {
 }
 
 #[test]
-fn a_host_is_lost_half_a_second_after_the_tick_that_heard_it_last() {
+fn a_host_is_lost_half_a_second_after_the_tick_of_its_last_request() {
     let mut tasks = tasks(|_| {});
     tasks.ask(Body::Enable).expect("enables");
     tasks.run(40);
@@ -171,13 +171,13 @@ fn a_host_is_lost_half_a_second_after_the_tick_that_heard_it_last() {
     };
     tasks.ask(jog).expect("jogs");
     tasks.run(10);
-    // Received by the run of the supervising task in tick `heard` - 1, and counted by the next.
-    let heard = tasks.tick() + 10;
+    // Received by the run of the supervising task in tick `received` - 1, and counted by the next.
+    let received = tasks.tick() + 10;
     tasks.send(&[Body::Status]);
     tasks.run(2 * LINK_TIMEOUT_TICKS);
     let fault = safety(&tasks).fault().expect("latched");
     assert_eq!(fault.code, FaultCode::LinkLost);
-    assert_eq!(fault.tick - heard, LINK_TIMEOUT_TICKS + 1);
+    assert_eq!(fault.tick - received, LINK_TIMEOUT_TICKS + 1);
 }
 
 /// An injection of a few values with the plan, and then nobody asks anything.
@@ -281,14 +281,14 @@ fn what_switches_off_still_does_while_an_emergency_stop_brakes() {
         rig.inputs.switches = fault;
         follow(&mut rig);
         assert_eq!(rig.tick(), Outputs::default());
-        // What began it is what a person is told.
+        // What began it is what a person sees.
         let first = rig.state.safety().fault().expect("latched").code;
         assert_eq!(first, FaultCode::EmergencyStop);
     }
 }
 
 #[test]
-fn an_axis_that_is_pushed_while_the_outputs_are_off_is_told_once_a_push() {
+fn an_axis_that_is_pushed_while_the_outputs_are_off_is_reported_once_a_push() {
     let standing = StageView {
         safety: SafetyState::Disabled,
         commissioned: true,
@@ -303,21 +303,21 @@ fn an_axis_that_is_pushed_while_the_outputs_are_off_is_told_once_a_push() {
         ..standing
     };
     let mut supervisor = Supervisor::default();
-    let mut told = |view, runs| {
+    let mut reported = |view, runs| {
         (0..runs)
             .flat_map(|_| supervisor.step(view, None).events)
             .flatten()
             .filter(|event| matches!(event, Event::MovedWhileOff(AxisName::Y)))
             .count()
     };
-    assert_eq!(told(standing, 200), 0);
-    assert_eq!(told(pushed, 50), 1);
-    assert_eq!(told(standing, 200), 0);
-    assert_eq!(told(pushed, 1), 1);
+    assert_eq!(reported(standing, 200), 0);
+    assert_eq!(reported(pushed, 50), 1);
+    assert_eq!(reported(standing, 200), 0);
+    assert_eq!(reported(pushed, 1), 1);
     // What coasts after it was switched off was not pushed.
-    assert_eq!(told(enabled, 200), 0);
-    assert_eq!(told(standing, 1), 0);
-    assert_eq!(told(pushed, 50), 0);
+    assert_eq!(reported(enabled, 200), 0);
+    assert_eq!(reported(standing, 1), 0);
+    assert_eq!(reported(pushed, 50), 0);
 }
 
 #[test]
@@ -361,13 +361,13 @@ fn a_host_counts_as_lost_after_half_a_second_at_every_control_rate() {
                 velocity_mm_s: 2.0,
             })
             .expect("jogs");
-        let heard = tasks.tick();
+        let received = tasks.tick();
         while safety(&tasks).is_enabled() {
             tasks.run(1);
         }
         let fault = safety(&tasks).fault().expect("latched");
         assert_eq!(fault.code, FaultCode::LinkLost);
-        let silent_s = f64::from(fault.tick - heard) / rate_hz;
+        let silent_s = f64::from(fault.tick - received) / rate_hz;
         assert!(
             (silent_s - 0.5).abs() < 0.02,
             "{silent_s} s at {rate_hz} Hz"

@@ -104,7 +104,7 @@ fn truth(hz: f64, side: EncoderSide) -> AxisParameters {
     truth
 }
 
-/// The x axis with a feedforward and gains that bear a spring between motor and table.
+/// The x axis with a feedforward and gains that suit a spring between motor and table.
 fn soft(kind: FeedforwardKind) -> StageSettings {
     x_alone(|x| {
         x.feedback.law = LawKind::Pid;
@@ -269,13 +269,13 @@ fn what_is_found_becomes_an_event_once() {
     let mut snapshot = Snapshot::<f32>::default();
     snapshot.axes[0].oscillation = bench.found();
     let mut supervision = Supervision::new([5e-4; 3]);
-    let mut told = || {
+    let mut reported = || {
         let events = supervision.run(&snapshot, None).events;
-        let told = events.into_iter().filter_map(|event| match event {
+        let reported = events.into_iter().filter_map(|event| match event {
             Event::Oscillated(found) => Some(found),
             _ => None,
         });
-        told.collect::<Vec<_>>()
+        reported.collect::<Vec<_>>()
     };
     let found = Oscillated {
         axis: AxisName::X,
@@ -283,8 +283,8 @@ fn what_is_found_becomes_an_event_once() {
         decihertz: 2589,
         micrometres: 7,
     };
-    assert_eq!(told(), [found]);
-    assert_eq!(told(), []);
+    assert_eq!(reported(), [found]);
+    assert_eq!(reported(), []);
 }
 
 #[test]

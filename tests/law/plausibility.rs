@@ -424,9 +424,9 @@ fn a_loop_that_is_opened_begins_its_standstill_anew() {
         }
         (0..1000).find(|_| !step(&mut state)).expect("found")
     };
-    let anew = found_after(30, true);
-    assert_eq!(found_after(100, true), anew);
-    assert!(found_after(30, false) < anew);
+    let restarted = found_after(30, true);
+    assert_eq!(found_after(100, true), restarted);
+    assert!(found_after(30, false) < restarted);
     assert!(found_after(100, false) < found_after(30, false));
 }
 

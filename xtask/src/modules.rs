@@ -7,9 +7,9 @@ use object::{Object, ObjectSymbol, SymbolKind};
 
 use xtask::image::Image;
 
-/// Crates whose modules are told apart.
+/// Crates whose modules are distinguished.
 const OURS: [&str; 2] = ["quadrant", "quadrant_firmware"];
-/// Modules that are told apart in turn.
+/// Modules that are distinguished in turn.
 const LARGE: [&str; 3] = ["settings", "law", "app"];
 /// Smaller ones go together.
 const LEAST_BYTES: u64 = 1024;
@@ -60,7 +60,7 @@ pub(crate) fn print(image: &Image) -> Result<()> {
     Ok(())
 }
 
-/// The module of a function or constant: its path without its own name, cut to what is worth telling apart.
+/// The module of a function or constant: its path without its own name, cut to what is worth distinguishing.
 fn module(name: &str) -> String {
     if name.contains("miniconf::tree::TreeAny") {
         return "leaves of the settings by path (miniconf)".into();

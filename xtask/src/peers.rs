@@ -21,7 +21,7 @@ const PERIOD_NS: f64 = 100_000.0;
 /// Largest difference of a position from ours, mm.
 const BOUND_MM: f64 = 1e-9;
 
-/// Names of the programs that are told apart.
+/// Names of the programs that are distinguished.
 const OURS: &str = "Quadrant";
 const WHOLE: &str = "Quadrant, the whole tick";
 const CPP: &str = "C++ (g++ -O3)";

@@ -89,7 +89,7 @@ pub(super) fn diff(client: &mut Client, file: Option<&Path>) -> anyhow::Result<A
     let mut lines: Vec<String> = differences.iter().map(difference_line).collect();
     if lines.is_empty() {
         lines.push(match file {
-            Some(file) => format!("what acts is what {} says", file.display()),
+            Some(file) => format!("the settings in force are those of {}", file.display()),
             None => "nothing is edited that does not act".to_owned(),
         });
     }

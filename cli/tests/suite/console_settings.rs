@@ -199,7 +199,7 @@ fn what_was_applied_is_undone_step_by_step() {
     assert_eq!(
         read[13]["result"],
         serde_json::json!([]),
-        "the draft is what acts"
+        "the draft equals the settings in force"
     );
     assert_eq!(
         read[14]["result"],

@@ -41,7 +41,7 @@ impl LowPass {
     }
 }
 
-/// Disturbance observer of the nominal plant that is told of the friction feedforward, so that it takes away only what that
+/// Disturbance observer of the nominal plant that receives the friction feedforward, so that it takes away only what that
 /// leaves.
 pub(super) struct Observer {
     plant: PlantModel,

@@ -64,7 +64,7 @@ pub(super) struct Phase {
     /// The axis as it then is, and what pushes it, from the beginning of the phase on.
     pub(super) truth: AxisParameters,
     pub(super) load: Load,
-    /// Speed of the spindle that the law is told at its beginning, rpm.
+    /// Speed of the spindle that is set at its beginning, rpm.
     pub(super) spindle_rpm: Option<f64>,
 }
 
@@ -210,7 +210,7 @@ pub(super) fn run(
             if tick == starting
                 && let Some(rpm) = phase.spindle_rpm
             {
-                machine.tell_spindle(SpindleSpeed::from_rpm(rpm, 1.0 / rate_hz));
+                machine.set_spindle_speed(SpindleSpeed::from_rpm(rpm, 1.0 / rate_hz));
             }
             if tick == starting && moves {
                 requests.push(Command::StartMove(AxisName::X));

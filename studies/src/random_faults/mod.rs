@@ -186,7 +186,7 @@ impl Campaign {
         self.events.iter().any(is_load)
     }
 
-    /// True if nothing that the law sees tells that an encoder died at this speed: `docs/safety.md`, "Not found".
+    /// True if nothing that the law sees shows that an encoder died at this speed: `docs/safety.md`, "Not found".
     fn is_unseen(&self, death: Death, speed_mm_s: f64) -> bool {
         let stops = |(_, event): &(u32, Event)| *event == Event::Stop;
         let goes_on = matches!(self.activity, Activity::Jog(_) | Activity::Home)
@@ -431,7 +431,7 @@ fn run(campaign: &Campaign) -> Result<End, String> {
 struct End {
     /// Largest way that was not planned, mm.
     unplanned_mm: f64,
-    /// Nothing that the law sees tells that the encoder died.
+    /// Nothing that the law sees shows that the encoder died.
     unseen: bool,
     /// The first fault's number.
     fault: Option<u8>,
@@ -447,7 +447,7 @@ pub struct Line {
     pub broken: String,
     /// Largest way that the reference did not ask for until the outputs were off, mm.
     pub unplanned_mm: Option<f64>,
-    /// Nothing that the law sees tells that the encoder died.
+    /// Nothing that the law sees shows that the encoder died.
     pub unseen: Option<bool>,
     /// Number of the first fault.
     pub fault: Option<u8>,

@@ -44,7 +44,7 @@ pub(super) struct Before {
     pub(super) has_stored: bool,
     /// Some of its words no longer change.
     pub(super) is_worn: bool,
-    /// A host was told that its settings are kept.
+    /// A host has the reply that its settings are kept.
     pub(super) acknowledged: bool,
 }
 
@@ -99,7 +99,7 @@ pub(super) fn check(flash: Flash, before: &Before, seed: u64) -> Result<(), Stri
     }
 }
 
-/// Starts on damaged settings: nothing enables, whoever asks.
+/// Starts on damaged settings: nothing enables, for any station.
 fn stays_off(flash: Flash) -> Result<(), String> {
     let default = StageSettings::default();
     let mut tasks = Tasks::with_flash(&default, 1, flash, Some(&default));
