@@ -1,5 +1,5 @@
 //! The fallback without an external converter: x and y on the chip's own two 12-bit converters, made better by shaping
-//! their error. **There is no third converter: z is not driven**, and nothing moves it, with any codes.
+//! their error. **There is no third converter: z is not driven**, and its codes move nothing.
 //!
 //! `docs/outputs.md` says what this costs in tracking error, and the circuit that makes ±10 V of 0 to 3.3 V.
 
