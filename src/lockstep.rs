@@ -224,12 +224,17 @@ impl InputRecord {
     /// The word of the flags; its low half are the switches.
     pub const FLAGS_WORD: usize = 4;
 
-    /// Bits of the flags' word above the switches': the lowest of three, x first.
+    /// First of three bits, x first, of index pulses in the flags' word.
     const INDEX_SEEN: u32 = 16;
+    /// First of three bits of stale samples.
     const STALE: u32 = 19;
+    /// First of three bits of invalid encoder readings.
     const INVALID: u32 = 22;
+    /// Bit of a lost link.
     const LINK_LOST: u32 = 25;
+    /// First of three bits of stuck converters.
     const STUCK: u32 = 26;
+    /// Bit of slow flash.
     const SLOW: u32 = 29;
     /// The flags beside the switches, one of which is seldom set.
     pub const SELDOM: u32 = !0 << Self::INDEX_SEEN;

@@ -34,7 +34,7 @@ pub struct LoopResponse {
     /// Frequencies, Hz.
     pub frequency_hz: Vec<f64>,
     /// With the plant of the settings; none if they have none.
-    pub told: Option<Curve>,
+    pub settings_plant: Option<Curve>,
     /// With the stage's own.
     pub true_stage: Option<Curve>,
 }
@@ -62,7 +62,7 @@ impl LoopResponse {
             Some(Curve::of(&open_loop, &frequency_hz))
         };
         Self {
-            told: settings.axes[axis].plant.as_ref().and_then(curve),
+            settings_plant: settings.axes[axis].plant.as_ref().and_then(curve),
             true_stage: curve(&own),
             frequency_hz,
         }
@@ -111,7 +111,7 @@ mod tests {
     fn the_preset_s_loop_has_its_margins_and_no_jump_of_phase() {
         let settings = StageSettings::simulated();
         let found = LoopResponse::of(&settings, &StageParameters::real(), 0);
-        let of_settings = found.told.unwrap();
+        let of_settings = found.settings_plant.unwrap();
         assert!(
             of_settings.margins.starts_with("gain margin 9."),
             "{}",

@@ -185,7 +185,7 @@ impl LinkEndpoint {
             Self::Look(address, token) => {
                 let socket = TcpTransport::look(address, token.as_deref()).with_context(|| {
                     format!(
-                        "nobody shares a machine at {address}; whoever holds it gives `quadrant connect --share {address}`"
+                        "nobody shares a machine at {address}; its holder starts `quadrant connect --share {address}`"
                     )
                 })?;
                 session(socket, share)

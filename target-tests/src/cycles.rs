@@ -18,12 +18,15 @@ use xtask::image::{Image, Scalar};
 use xtask::listing::{Instruction, Listing};
 use xtask::toolchain::Toolchain;
 
-/// Clock of the reference board's processor, and the wait states of its flash at that clock (RM0390, table 5).
+/// Clock of the reference board's processor, Hz.
 const CORE_HZ: f64 = 180e6;
+/// Wait states of its flash at that clock (RM0390, table 5).
 const WAIT_STATES: u32 = 5;
-/// Bytes that the flash gives at once, and the lines that the accelerator before it keeps, of code and of literals (RM0390, 3.4.2).
+/// Bytes that the flash returns at a time (RM0390, 3.4.2).
 const LINE_BYTES: u32 = 16;
+/// Lines of code that the accelerator keeps.
 const CODE_LINES: usize = 64;
+/// Lines of literals that it keeps.
 const LITERAL_LINES: usize = 8;
 
 /// Control rate for which the share of the processor is printed, Hz.

@@ -15,8 +15,9 @@ use crate::preemption;
 use crate::stops::follow;
 use quadrant_fault_bench::tasks::Tasks;
 
-/// Ticks that the brake of these tests takes.
+/// Ticks in which the brake of these tests releases.
 const RELEASE: u32 = 300;
+/// Ticks in which it applies.
 const APPLY: u32 = 200;
 
 fn settings() -> StageSettings {

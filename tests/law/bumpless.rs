@@ -12,6 +12,7 @@ use crate::common::{Rig, x_alone};
 const RESOLUTION_MM: f64 = 5e-4;
 /// Ticks before the change: into the motion, out of the lead-in.
 const BEFORE: usize = 2000;
+/// Ticks after the change.
 const AFTER: usize = 4000;
 /// Lag of the machine when the change comes.
 const LAG_MM: f64 = 0.05;

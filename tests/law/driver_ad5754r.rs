@@ -278,8 +278,9 @@ struct Bench {
     clear: Pin,
 }
 
-/// A control period at 10 kHz, and the share of it between the beginning of a tick and its write, in cycles.
+/// Control period at 10 kHz, in cycles.
 const PERIOD: u64 = 18_000;
+/// Cycles between the beginning of a tick and its write.
 const COMPUTING: u64 = 5_000;
 
 type Outcome = Result<(), Error<Stuck>>;

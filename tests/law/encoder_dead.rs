@@ -329,8 +329,9 @@ fn run_until_off(settings: &StageSettings, truth: &Truth, activity: Activity, de
 
 /// The stated bounds: outputs off before so much unplanned motion.
 const MOST_MM: f64 = 2.0;
-/// The same in a jog at 1 mm/s; by speed: `encoder_dead_by_speed`.
+/// Largest motion in a jog at 1 mm/s; by speed: `encoder_dead_by_speed`.
 const SLOW_MM: f64 = 3.0;
+/// Longest time of that motion, ms.
 const MOST_MS: f64 = 50.0;
 /// The same of an encoder that shows some of the motion.
 const GAPS_MS: f64 = 65.0;

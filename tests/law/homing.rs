@@ -12,8 +12,9 @@ use quadrant::units::Position;
 
 use crate::common::{Noise, Rig, repeatable, with_x};
 
-/// Counts between index pulses, and where one of them is.
+/// Counts between index pulses.
 const REVOLUTION: i64 = 20_000;
+/// Count of one of them.
 const PULSE: i64 = 8_000;
 
 /// The machine around the x axis, in its own counts, of which the encoder knows nothing.

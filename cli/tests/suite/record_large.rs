@@ -17,6 +17,7 @@ use quadrant_sim::record::Recording;
 const ROWS: usize = 10_000_000;
 /// Rows of a stretch that repeats in the file.
 const STRETCH: usize = 1_000_000;
+/// Sampling rate of the file, Hz.
 const RATE_HZ: f64 = 1e4;
 
 /// An axis shaken in open loop.

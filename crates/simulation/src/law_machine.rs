@@ -162,8 +162,9 @@ pub struct Operator {
     script: VecDeque<(u32, Command)>,
 }
 
-/// Tick at which [`Operator::runs_the_plan`] enables, and at which it starts the plan.
+/// Tick at which [`Operator::runs_the_plan`] enables.
 const ENABLE_TICK: u32 = 100;
+/// Tick at which it starts the plan.
 const RUN_TICK: u32 = 200;
 
 impl Operator {

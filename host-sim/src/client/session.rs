@@ -24,16 +24,19 @@ const MOST_NOTICES: usize = 1 << 14;
 /// Longest silence of a host that has started a motion: less than half of the machine's time-out.
 const ALIVE: Duration = Duration::from_millis(200);
 
-/// Longest silence of one that looks at a machine which another program holds, and time for what has come.
+/// Longest silence of a viewer of a machine that another program holds.
 const VIEWING: Duration = Duration::from_secs(1);
+/// Time in which notices that have come are read.
 const TAKING: Duration = Duration::from_millis(1);
 
-/// Time in which the axes come to rest after an interruption, before the outputs are disabled, and time between two looks.
+/// Time in which the axes come to rest after an interruption, before the outputs are disabled.
 const STOPPING: Duration = Duration::from_secs(10);
+/// Time between two looks at them.
 const STOPPING_LOOK: Duration = Duration::from_millis(20);
 
-/// Time for a restart, and pause before the machine is asked again.
+/// Time for a restart.
 const RESTART: Duration = Duration::from_secs(10);
+/// Pause before the machine is asked again.
 const RESTART_PAUSE: Duration = Duration::from_millis(50);
 
 /// Times that a request which may be repeated is made before the machine counts as silent.

@@ -23,8 +23,9 @@ const BUILT: Duration = Duration::from_secs(2);
 /// 500 million. Flash is slower than one a cycle, and filters add to a bound.
 const CHECKED: Duration = Duration::from_secs(10);
 
-/// Time for which, and pause after which, a request is repeated that the machine is too busy for.
+/// Time for which a request is repeated while the machine is busy.
 pub(super) const BUSY: Duration = Duration::from_secs(2);
+/// Pause between two of these requests.
 pub(super) const BUSY_PAUSE: Duration = Duration::from_millis(5);
 
 /// Effect of a request that is made twice.

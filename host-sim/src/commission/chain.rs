@@ -29,7 +29,7 @@ const STEPS: [(&str, f64); 6] = [
 ];
 
 /// Commissions an axis, unattended. Of `base` encoder, amplifier, limits and derivative filter count, not the gains and the
-/// friction. `progress` is told the step and the share of the whole.
+/// friction. `progress` receives the step and the share of the whole.
 ///
 /// # Errors
 /// The first step that fails, with the reason and a remedy; the axis is left at rest, its outputs off.

@@ -31,8 +31,9 @@ pub struct Limits {
     pub rate_hz: f64,
 }
 
-/// Shares of an axis' acceleration.
+/// Share of an axis' acceleration for curves and changes of speed.
 const CURVE_SHARE: f64 = 0.88;
+/// Share of it for the corner at a joint.
 const JOINT_SHARE: f64 = 0.1;
 /// Of an arc's part, the share for changes of speed; what is left for the curve makes a right angle with it.
 const ARC_TANGENTIAL_SHARE: f64 = 0.5;

@@ -34,8 +34,9 @@ pub const MOST_VIEWERS: usize = 16;
 const FRESH: Duration = Duration::from_secs(1);
 /// Time within which the machine answers what a viewer asked of it, or the viewer learns that it did not.
 pub const PASSED_ON: Duration = Duration::from_millis(600);
-/// Time in which a new connection says its token and hello, and silence of a viewer after which its connection is closed.
+/// Time in which a new connection sends its token and hello.
 const GREETING: Duration = Duration::from_secs(2);
+/// Silence of a viewer after which its connection is closed.
 const SILENCE: Duration = Duration::from_secs(10);
 /// Notices that wait for a viewer; one that is slower misses the newest.
 const WAITING: usize = 1000;
@@ -45,8 +46,9 @@ const LOOK: Duration = Duration::from_millis(20);
 const TAKING: Duration = Duration::from_secs(2);
 /// Pause after a connection that could not be taken: without it, a system that has no more descriptors is asked in a circle.
 const REFUSED_PAUSE: Duration = Duration::from_millis(200);
-/// Random bytes of a token, and the longest that is read.
+/// Random bytes of a token.
 const TOKEN_BYTES: usize = 16;
+/// Longest token that is read, characters.
 const TOKEN_CHARS: usize = 2 * TOKEN_BYTES;
 
 /// A transport whose other end others may look at.

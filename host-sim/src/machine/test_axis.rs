@@ -96,14 +96,17 @@ pub trait TestAxis {
     }
 }
 
-/// Share of the travel that motions use: on a short one the tracking error takes a larger part.
+/// Share of the travel that motions use.
 const USED: f64 = 0.9;
+/// The same on a short travel, where the tracking error takes a larger part.
 const USED_OF_SHORT: f64 = 0.7;
+/// Travel either way below which it is short, mm.
 const SHORT_MM: f64 = 200.0;
 /// Share of the room in a direction after which an axis in open loop is stopped: it coasts on by as much again, and more.
 const OPEN_LOOP: f64 = 0.4;
-/// The same towards an end that is nearer than this share of the travel: what it coasts does not shrink with the room.
+/// The same towards an end that is nearer than [`NEAR_END`]: what it coasts does not shrink with the room.
 const OPEN_LOOP_NEAR: f64 = 0.2;
+/// Distance of this end over the travel.
 const NEAR_END: f64 = 0.52;
 
 /// Returns the travel that planned motions use of a travel either way, mm.

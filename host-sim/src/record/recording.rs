@@ -17,8 +17,9 @@ const MOST_VOLTS: f64 = 20.0;
 const LEAST_VOLTS: f64 = 0.01;
 /// Longest travel of a machine's axis, mm.
 const MOST_TRAVEL_MM: f64 = 1e4;
-/// The usual limit of an amplifier's input, V, and the share of rows that may lie there.
+/// Usual limit of an amplifier's input, V.
 const LIMIT_V: f64 = 10.0;
+/// Largest share of rows that may lie there.
 const MOST_SATURATED: f64 = 0.01;
 
 /// The signals of one experiment on one axis, sampled evenly. All columns have one length.

@@ -13,8 +13,9 @@ use quadrant_sim::machine::SimulatedTestAxis;
 use quadrant_sim::plant::{AxisParameters, StageParameters};
 use quadrant_sim::record::{MotionOptions, Recording};
 
-/// Of the EMPS drive (see the record's own description).
+/// Force constant of the EMPS drive, N/V (see the record's own description).
 const FORCE_N_PER_V: f64 = 35.150_651_882_485_47;
+/// Control loop of the EMPS drive.
 const EMPS_LOOP: CascadeLoop = CascadeLoop {
     position_gain_per_s: 160.18,
     velocity_gain_v_s_per_mm: 0.243_45,
@@ -293,7 +294,7 @@ fn the_record_that_judges_and_not_that_of_the_fit_decides_which_model_is_recomme
     };
     let (_, best, of_own) = by(&fit);
     assert!(
-        best <= NEARLY * of_own + NEARLY_OF_VOLTAGE,
+        best <= EQUAL_ERROR_RATIO * of_own + EQUAL_ERROR_SHARE,
         "{best} {of_own}"
     );
     let mut smooth = truth.clone();
@@ -307,14 +308,15 @@ fn the_record_that_judges_and_not_that_of_the_fit_decides_which_model_is_recomme
     let (_, best, of_own) = by(&other);
     println!("error on the other record: {best:.4}, of the fit's own choice {of_own:.4}");
     assert!(
-        best <= NEARLY * of_own + NEARLY_OF_VOLTAGE,
+        best <= EQUAL_ERROR_RATIO * of_own + EQUAL_ERROR_SHARE,
         "{best} {of_own}"
     );
 }
 
-/// Errors over the smallest up to which a simpler model is recommended, and shares of the voltage.
-const NEARLY: f64 = 1.02;
-const NEARLY_OF_VOLTAGE: f64 = 0.0015;
+/// Largest error over the smallest up to which a simpler model is recommended.
+const EQUAL_ERROR_RATIO: f64 = 1.02;
+/// The same as a share of the voltage.
+const EQUAL_ERROR_SHARE: f64 = 0.0015;
 
 #[test]
 fn records_that_determine_too_little_are_refused_with_what_they_lack() {

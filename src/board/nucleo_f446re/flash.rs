@@ -20,9 +20,11 @@ use super::watchdog::KEY_RELOAD;
 
 /// Address of the two sectors; the linker's map leaves them out.
 const START: u32 = 0x0800_4000;
-/// Bytes of a sector, and the number of the first.
+/// Bytes of a sector.
 const SECTOR: u32 = 16 * 1024;
+/// Number of the first sector of the settings.
 const FIRST_SECTOR: u32 = 1;
+/// Number of these sectors.
 const SECTORS: u32 = 2;
 
 /// FLASH_KEYR (RM0390, 3.8.3).

@@ -22,6 +22,7 @@ const SENDING: usize = 512;
 /// Streams of DMA 1 (RM0390, table 28): USART2_RX is stream 5, USART2_TX is stream 6, both on channel 4.
 const RECEIVER: usize = 5;
 const SENDER: usize = 6;
+/// Channel of both streams.
 const CHANNEL: u8 = 4;
 /// USART_SR: all bits that a zero clears, but for that of a finished transmission.
 const CLEAR_SENT: u16 = !(1 << 6);

@@ -54,6 +54,7 @@ const POWER_UP: u16 = 0b1_1111;
 /// The bits of the power register that mean something: over-current of D to A (10..7), over-temperature (5), powered
 /// parts (4..0).
 const POWER_BITS: u16 = 0b111_1011_1111;
+/// The bits of a code's register: all.
 const ALL_BITS: u16 = u16::MAX;
 
 /// From power-up until outputs may be written: at least 10 us.

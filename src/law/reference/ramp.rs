@@ -14,11 +14,12 @@ use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// Fraction bits of a [`Velocity`].
 const FRACTION_BITS: u32 = 32;
-/// Fraction bits that remain when a velocity and an acceleration become numbers.
+/// Fraction bits that remain when a velocity becomes a number.
 const VELOCITY_BITS: u32 = 8;
+/// Fraction bits that remain when an acceleration becomes a number.
 const ACCELERATION_BITS: u32 = 16;
-/// No velocity is larger: then no difference of two, and no sum with what braking needs, overflows.
-const LARGEST: i64 = 1 << 61;
+/// Largest velocity: no difference of two, and no sum with what braking needs, overflows.
+const MAX_VELOCITY: i64 = 1 << 61;
 
 /// A displacement per tick in 2^-32 of a [`Position`] unit, so that no velocity that a machine can distinguish is rounded
 /// away; at most +-2^29 units (8192 counts) in a tick.
@@ -59,10 +60,10 @@ impl Velocity {
 
     #[inline(always)]
     const fn clamped(value: i64) -> Self {
-        if value > LARGEST {
-            Self(LARGEST)
-        } else if value < -LARGEST {
-            Self(-LARGEST)
+        if value > MAX_VELOCITY {
+            Self(MAX_VELOCITY)
+        } else if value < -MAX_VELOCITY {
+            Self(-MAX_VELOCITY)
         } else {
             Self(value)
         }
@@ -164,10 +165,10 @@ impl<S: Scalar> Ramp<S> {
         let rate = scale.rate_hz;
         let acceleration = acceleration_mm_s2 * steps_per_mm(scale) / (rate * rate);
         let jerk = jerk_mm_s3 * steps_per_mm(scale) / (rate * rate * rate);
-        let jerk = rounding::clamp(jerk.min(acceleration), 1.0, LARGEST as f64);
+        let jerk = rounding::clamp(jerk.min(acceleration), 1.0, MAX_VELOCITY as f64);
         let jerk = rounding::floor(jerk);
         // T(levels) stays below the largest velocity.
-        let most = libm::sqrt(LARGEST as f64 / jerk).min(f64::from(i32::MAX));
+        let most = libm::sqrt(MAX_VELOCITY as f64 / jerk).min(f64::from(i32::MAX));
         let levels = rounding::clamp(rounding::floor(acceleration / jerk), 1.0, most.max(1.0));
         let unit_mm = scale.resolution_mm / POSITION_UNITS_PER_COUNT;
         let one = libm::scalbn(1.0, FRACTION_BITS as i32);

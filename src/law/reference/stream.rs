@@ -11,8 +11,9 @@ use crate::law::units::{POSITION_UNITS_PER_COUNT, Position};
 
 /// Fraction bits of the differences beyond those of a [`Position`].
 pub(super) const FRACTION_BITS: u32 = 64;
-/// Bits dropped from the differences before they become a velocity and an acceleration.
+/// Bits dropped from a difference before it becomes a velocity.
 const VELOCITY_SHIFT: u32 = 56;
+/// Bits dropped from a difference before it becomes an acceleration.
 const ACCELERATION_SHIFT: u32 = 48;
 
 /// The way of one axis from one set point to the next.

@@ -34,6 +34,7 @@ use crate::law::units::{POSITION_FRACTION_BITS, Position};
 
 /// Ticks from one comparison of an axis to the next, as a power of two.
 const INTERVAL_BITS: u32 = 2;
+/// The same as a number of ticks.
 const INTERVAL_TICKS: f64 = (1u32 << INTERVAL_BITS) as f64;
 
 /// Share of the output that is added to the largest load, for the error of the model's A: a quarter and a sixteenth.
@@ -43,8 +44,8 @@ const GAIN_ERROR_SHIFTS: (u32, u32) = (2, 4);
 /// is left over does not add up for hours.
 const FORGET_S: f64 = 0.3;
 
-/// Largest speed, and gain of speed from one comparison to the next, that there is room for.
-const ROOM: f64 = (1u32 << 28) as f64;
+/// Largest speed, and largest gain of speed from one comparison to the next.
+const MAX_SPEED: f64 = (1u32 << 28) as f64;
 
 /// Counts within which an encoder with one dead line dithers.
 const DITHER_COUNTS: u32 = 2;
@@ -52,7 +53,7 @@ const DITHER_COUNTS: u32 = 2;
 /// Comparisons over which the heading takes the mean of the motion, as a power of two.
 const MEAN_BITS: u32 = 4;
 
-/// Largest way that there is room for, counts.
+/// Largest way, counts.
 const LARGEST_WAY: f64 = (1u32 << 15) as f64;
 
 /// Fraction bits of the force of a speed.
@@ -264,7 +265,7 @@ impl Plausibility {
         let largest = (model.largest_mm_s.max(model.velocity_mm_s) * filtered)
             .max(push * model.limit_v)
             .max(1.0);
-        let shift = whole_log2(ROOM / largest);
+        let shift = whole_log2(MAX_SPEED / largest);
         let unit = f64::from(1u32 << shift);
         let force = |volts: f64| rounding::round(push * volts * unit) as i32;
         let filter_s = period_s * (f64::from(1u32 << SPEED_FILTER_BITS) + 0.5 * INTERVAL_TICKS);

@@ -19,12 +19,14 @@ const PASSING_HZ: [f64; 9] = [20.0, 35.0, 50.0, 70.0, 100.0, 200.0, 300.0, 500.0
 /// Cycles of the sine, the last of which is scored.
 const CYCLES: f64 = 3.25;
 
-/// Sinusoidal loads at rest: frequency, Hz, and amplitude, V, those of the compliance.
+/// Frequencies of the sinusoidal loads at rest, Hz: those of the compliance.
 const LOADS_HZ: [f64; 2] = [5.0, 10.0];
+/// Amplitude of these loads, V.
 const LOAD_V: f64 = 0.3;
 
-/// Time of a load at rest, s, and its last part, which is scored.
+/// Time of a load at rest, s.
 const LOADED_S: f64 = 6.0;
+/// Last part of it, which is scored, s.
 const SCORED_S: f64 = 2.0;
 
 /// Speed of the spindle where nothing is cut, Hz: that of the slot.
@@ -118,8 +120,9 @@ fn cases() -> Vec<Case> {
 /// Errors of the speed setting, %.
 const SPEED_ERRORS: [f64; 7] = [0.0, 0.03, 0.1, 0.3, 1.0, 3.0, -1.0];
 
-/// Rates of a ramp through the spindle's speed, rpm/s, and its ends, Hz of the teeth.
+/// Rates of a ramp through the spindle's speed, rpm/s.
 const RAMPS_RPM_S: [f64; 3] = [100.0, 1000.0, 10_000.0];
+/// Ends of this ramp, Hz of the teeth.
 const RAMP_HZ: (f64, f64) = (20.0, 200.0);
 
 /// The slot with a spindle whose speed differs from the setting; nothing for an axis without a plant.

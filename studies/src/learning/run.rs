@@ -68,8 +68,9 @@ pub(super) struct Phase {
     pub(super) spindle_rpm: Option<f64>,
 }
 
-/// Amplitude and velocity of the usual sine, mm and mm/s, and its lead-in, s: those of the comparison.
+/// Amplitude and velocity of the usual sine, mm and mm/s: those of the comparison.
 pub(super) const SINE: (f64, f64) = (30.0, 10.0);
+/// Its lead-in, s.
 const LEAD_S: f64 = 0.5;
 /// Time for a motion to begin, s.
 const START_S: f64 = 0.1;

@@ -8,8 +8,9 @@ use quadrant_fault_bench::tasks::Tasks;
 
 /// Room for GMS elements.
 const ELEMENTS: usize = 8;
-/// Origins of the set that a campaign may begin with, and of those that it stores.
+/// Origin of the set that a campaign may begin with.
 const BEFORE: &str = "before";
+/// Origin of the sets that a campaign stores.
 const DURING: &str = "during";
 /// Ticks after the start for which nothing may be enabled.
 const QUIET_TICKS: u32 = 500;

@@ -11,6 +11,7 @@ use quadrant_studies::report::{Context, Part, Progress, Request, compute};
 thread_local! {
     /// Parts computed in this test.
     static COMPUTED: Cell<u32> = const { Cell::new(0) };
+    /// True while the second part ends with an error.
     static INTERRUPTED: Cell<bool> = const { Cell::new(false) };
 }
 

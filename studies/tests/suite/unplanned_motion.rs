@@ -14,8 +14,9 @@ use rayon::prelude::*;
 
 /// Axes that are tried.
 const AXES: u64 = 60;
-/// First controllers that are tried on each, and motions under each.
+/// First controllers that are tried on each axis.
 const CONTROLLERS: usize = 3;
+/// Motions under each controller.
 const MOTIONS: usize = 3;
 /// Factor by which the gain that a controller is made for may be wrong: the commissioning's own is within two.
 const WRONG: f64 = 2.5;

@@ -23,8 +23,9 @@ const MOST_SAMPLES: f64 = 4000.0;
 const NUDGE: f64 = 1.05;
 /// Samples that the cursor goes at a time, as a share of the window: slowly, and fast.
 const STEPS: (f64, f64) = (0.005, 0.1);
-/// Bounds of the time across a chart, s, and the factor by which it is changed.
+/// Least and largest time across a chart, s.
 const WINDOW_S: (f64, f64) = (0.1, 60.0);
+/// Factor by which this time changes.
 const ZOOM: f64 = 2.0;
 /// Share of a capture before its trigger, %.
 const BEFORE_TRIGGER: u8 = 30;

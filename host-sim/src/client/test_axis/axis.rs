@@ -24,8 +24,9 @@ use crate::record::Recording;
 
 /// Time from one look at the telemetry to the next.
 const LOOK: Duration = Duration::from_millis(50);
-/// Time recorded after the motion, so that the last block has come: a block takes time to fill, and the server runs every so many ticks.
+/// Least time recorded after the motion, so that the last block has come.
 const TAIL: Duration = Duration::from_millis(30);
+/// The same in control ticks: a block takes time to fill, and the server runs every few ticks.
 const TAIL_TICKS: f64 = 300.0;
 /// Time for a moving axis to come to rest before an experiment.
 const BEFORE: Duration = Duration::from_secs(60);

@@ -7,8 +7,9 @@ use super::regressors::{Regression, Term, Way};
 use super::signals::MotionFitSettings;
 use super::solution::Solution;
 
-/// Names of what is not linear.
+/// Name of the dead time.
 const DEAD_TIME: &str = "Td";
+/// Name of the Stribeck velocity.
 const STRIBECK_VELOCITY: &str = "Vs";
 /// Number of blocks from which standard errors are computed.
 const BLOCKS: usize = 40;
