@@ -234,7 +234,7 @@ impl InputRecord {
     const LINK_LOST: u32 = 25;
     /// First of three bits of stuck converters.
     const STUCK: u32 = 26;
-    /// Bit of slow flash.
+    /// Bit of a slow reading of the encoders.
     const SLOW: u32 = 29;
     /// The flags beside the switches, one of which is seldom set.
     pub const SELDOM: u32 = !0 << Self::INDEX_SEEN;

@@ -82,7 +82,7 @@ impl<S: Scalar> ReferenceGenerator<S> {
     }
 
     /// Delays the start of plans and streams by this many ticks, so that the feedback's reference of every axis starts
-    /// in the same tick, with any previews.
+    /// in the same tick, independent of their previews.
     #[must_use]
     pub fn with_wait(mut self, ticks: u32) -> Self {
         self.wait_ticks = ticks;

@@ -277,7 +277,7 @@ fn every_parameter_of_a_law_acts_where_the_law_does() {
         for axis in 0..3 {
             let own = format!("/axes/{axis}/feedback/{field}/");
             let idle = inert(&settings, |path| path.starts_with(&own));
-            // The first point of a schedule is at rest, with every other value.
+            // The first point of a schedule is at rest, in every variant.
             assert!(idle.is_empty(), "{idle:?}");
         }
     }

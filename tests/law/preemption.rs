@@ -586,7 +586,7 @@ fn invalid_settings_outlast_a_reset_until_others_are_stored() {
         tasks.ask(Body::ResetFault),
         Err(LinkError::Refused(_))
     ));
-    // The law decides, for any station.
+    // The law decides, for every station.
     tasks.upper.borrow_mut().inputs.command = Some(Command::ResetFault);
     tasks.run(20);
     tasks.upper.borrow_mut().inputs.command = None;

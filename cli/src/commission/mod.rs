@@ -296,7 +296,7 @@ fn resumed(experiments: &Path, words: &str) -> anyhow::Result<String> {
 
 impl Job<'_> {
     /// Commissions the axis, and writes everything that was found. The machine has its old settings afterwards unless the
-    /// new ones are to act, with any outcome.
+    /// new ones are to act, also after an error.
     pub(super) fn run(self, machine: &mut dyn Machine) -> anyhow::Result<Done> {
         let Self { axis, output, .. } = self;
         output.ready()?;

@@ -99,7 +99,7 @@ fn larger([one, two]: [f64; 2], [other, another]: [f64; 2]) -> [f64; 2] {
     [one.max(other), two.max(another)]
 }
 
-/// Checks what is true of a story with any numbers.
+/// Checks what must hold in every run of the script, apart from its numbers.
 fn check(played: &Played) {
     let lines: Vec<&str> = played.transcript.lines().collect();
     // The change is in what was captured.

@@ -255,7 +255,7 @@ pub fn dump(client: &mut Client) -> Result<StageSettings, ClientError> {
     Ok(settings)
 }
 
-/// Reads all settings that act, with any draft.
+/// Reads all settings in force; the draft does not matter.
 ///
 /// # Errors
 /// As [`dump`].

@@ -158,7 +158,7 @@ type Friction = (
     Result<FrictionFit, CommissionError>,
 );
 
-/// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest, or breaks away by a vibration; and
+/// Friction at constant velocities, at faster ones as long as the axis sticks and slips at the slowest, or breaks away under vibration; and
 /// its model.
 fn friction(
     test_axis: &mut dyn TestAxis,
@@ -184,7 +184,7 @@ fn friction(
     }
 }
 
-/// The hysteresis before sliding, and the elements from it. On an axis that breaks away by noise or a vibration, a slow motion meets
+/// The hysteresis before sliding, and the elements from it. On an axis that breaks away under noise or vibration, a slow motion meets
 /// less friction than it will in use: quicker sines are tried until one meets what sliding did, and the one that meets most counts.
 /// The sines run under `quiet`, from the middle of the travel, to which the axis goes under `moving`; from where it stands without.
 fn presliding(
@@ -247,7 +247,7 @@ fn presliding(
     Ok(best)
 }
 
-/// Least friction that a slow sine meets over the least level of sliding: with less, the axis breaks away by a vibration.
+/// Least friction that a slow sine meets over the least level of sliding: with less, the axis breaks away under vibration.
 const MIN_MET_SHARE: f64 = 0.8;
 /// Error of the elements' prediction from which on the fit is poor.
 const POOR_FIT: f64 = 0.2;

@@ -125,7 +125,7 @@ impl Commissioned {
         let uneven = runs.iter().filter(|run| run.stick_slip).count();
         if 2 * uneven > runs.len() {
             notes.push(format!(
-                "The axis stuck and slipped, or broke away by a vibration, in {uneven} of {} runs at constant velocity.",
+                "The axis stuck and slipped, or broke away under vibration, in {uneven} of {} runs at constant velocity.",
                 runs.len()
             ));
         }

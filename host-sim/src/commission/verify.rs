@@ -77,7 +77,7 @@ const EQUAL_ERROR_RATIO: f64 = 1.1;
 const JUMP_RATIO: f64 = 3.0;
 /// Errors over the PID's up to which a law counts as no worse: a repeated run scatters by as much.
 const MAX_SCATTER_RATIO: f64 = 1.01;
-/// Largest mean error over the PID's, and largest error on a withheld sine over the PID's, of a law that is selected: with less gain,
+/// Largest mean error over the PID's, and largest error on a withheld sine over the PID's, of a law that is selected: with a smaller improvement
 /// it is not worth its risk on motions that are not tried.
 const MAX_ERROR_RATIO: f64 = 0.95;
 /// Largest RMS error on a withheld sine over the PID's of a law whose largest error is no larger than the PID's: what is left then

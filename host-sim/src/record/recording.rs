@@ -334,7 +334,7 @@ fn resample_by(grid: &Grid, columns: &mut Columns) {
     }
 }
 
-/// Refuses a position that no axis reaches, with any reference.
+/// Refuses a position that no axis reaches, even if the reference has it.
 fn check_travel(path: &Path, column: &'static str, travel_mm: f64) -> Result<(), RecordError> {
     if travel_mm <= MOST_TRAVEL_MM {
         return Ok(());

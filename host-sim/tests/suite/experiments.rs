@@ -1,4 +1,4 @@
-//! The experiments on the simulated stage: what they must show with any exact figures.
+//! The experiments on the simulated stage: what they must show, apart from exact figures.
 
 use quadrant::app::supervisor::Event;
 use quadrant::command::Command;

@@ -11,8 +11,8 @@
 //! sends them ([`steps`]). [`Ad5754r::begin`], at the beginning of the next tick, checks that all of it left.
 //!
 //! # Read-back
-//! A frame with bit 23 set asks for a register; the chip shifts it out through SDO in the frame that follows, with any
-//! content of that frame. SDO is valid up to 40 ns after the clock's rising edge and is sampled at the falling one, so that
+//! A frame with bit 23 set asks for a register; the chip shifts it out through SDO in the frame that follows, independent
+//! of that frame's content. SDO is valid up to 40 ns after the clock's rising edge and is sampled at the falling one, so that
 //! frame needs a clock below about 10 MHz. The fourth frame of a write asks, and the chip answers in a slow one that
 //! [`Ad5754r::begin`] starts: the codes of A, B and C and the power register in turn. A wrong code, a chip that lost its
 //! supply, an overloaded or overheated output and a broken SDO are found within four ticks.

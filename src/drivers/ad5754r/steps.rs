@@ -62,7 +62,7 @@ pub struct Hardware {
 
 /// Count of the timer at which the pins change in a step. Not zero, where it rests.
 pub const PINS_AT: u32 = 2;
-/// Count of the timer at which the byte is written: after the pins, with any delay of theirs, as one DMA controller makes both writes
+/// Count of the timer at which the byte is written: after the pins, even if they are late, as one DMA controller makes both writes
 /// one after the other.
 pub const BYTE_AT: u32 = 6;
 

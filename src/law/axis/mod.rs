@@ -138,7 +138,7 @@ pub struct Axis<S: Scalar, const N: usize> {
 /// [`Done`](Self::Done).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Commissioning {
-    /// Nobody has commissioned the axis, and its law puts out nothing, with any measurement.
+    /// Nobody has commissioned the axis, and its law puts out nothing.
     #[default]
     Inert,
     /// Nobody has commissioned the axis, but its law would drive it.
@@ -1246,7 +1246,7 @@ impl<S: Scalar, const N: usize> Axis<S, N> {
         self.put_out(state, output)
     }
 
-    /// Takes note of a stop; at the next start the friction model adopts the integral's change since.
+    /// Takes note of a stop; at the next start the friction model adopts the integral's change since then.
     #[cold]
     #[inline(never)]
     fn set_off_or_stop(&self, state: &mut AxisState<S, N>, moves: bool) {

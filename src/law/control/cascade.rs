@@ -8,7 +8,7 @@
 //! v is the measured velocity, `v_ref - de/dt` with a filtered rate. With full velocity feedforward (g = 1) and within
 //! the limit, w is `Kv e + de/dt` and the cascade is a PID with real zeros; with less, the axis lags by
 //! `(1 - g) v_ref / Kv`, or until the integral has taken it up. What is its own is the limit on the velocity it asks for:
-//! a large error is driven back at that speed, with any gains.
+//! a large error is driven back at that speed, independent of the gains.
 //! Source: Gross, Hamann and Wiegärtner, *Electrical Feed Drives in Automation*, Publicis, 2001.
 
 use miniconf::{TreeAny, TreeSchema};

@@ -100,7 +100,7 @@ pub(super) fn check(flash: Flash, before: &Before, seed: u64) -> Result<(), Stri
     }
 }
 
-/// Starts on damaged settings: nothing enables, for any station.
+/// Starts on damaged settings: no station can enable.
 fn stays_off(flash: Flash) -> Result<(), String> {
     let default = StageSettings::default();
     let mut tasks = Tasks::with_flash(&default, 1, flash, Some(&default));

@@ -33,7 +33,7 @@ const TRAVEL_MM: [f64; 2] = [-200.0, 200.0];
 pub const LIMIT_BEYOND_MM: f64 = 5.0;
 /// Share of the way to the negative end at which the home switch is.
 const HOME_SHARE: f64 = 0.2;
-/// Distance of an index pulse from the end of travel, over the screw's lead.
+/// Distance of an index pulse from the home switch, over the screw's lead.
 const INDEX_SHARE: f64 = 0.4;
 /// Largest such distance over the travel.
 const INDEX_TRAVEL_SHARE: f64 = 0.1;

@@ -231,7 +231,7 @@ fn excited_lines(
 ) -> Vec<usize> {
     let transform = Transform::new(length);
     let mut power = vec![0.0; length / 2];
-    // A few at a time, as an hour's recording has thousands of blocks; summed up in their order, with any number of threads.
+    // A few at a time, as an hour's recording has thousands of blocks; summed up in their order, so that the number of threads does not matter.
     for some in blocks.chunks(BLOCKS_AT_A_TIME) {
         let powers: Vec<Vec<f64>> = some
             .par_iter()

@@ -412,7 +412,7 @@ fn withheld(
         slides[row] = true;
     }
     let mut solutions = Vec::new();
-    // Summed up in their order, with any number of threads.
+    // Summed up in their order, so that the number of threads does not matter.
     let found: Vec<(Vec<usize>, Result<Solution, MotionFitError>)> = (0..PARTS)
         .into_par_iter()
         .map(|part| {

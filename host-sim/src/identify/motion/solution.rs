@@ -56,7 +56,7 @@ impl Solution {
             let dead_time_s = match known_s {
                 Some(known_s) => known_s,
                 None if structure.dead_time => values[0],
-                // A held voltage is late by half its hold, with any axis.
+                // A held voltage is late by half its hold, on every axis.
                 None if structure.sliding => regression.hold_s(),
                 None => 0.0,
             };

@@ -13,7 +13,7 @@ pub struct FrictionRun {
     pub voltage_v: f64,
     /// Standard deviation of that mean, from the scatter within the run, V.
     pub deviation_v: f64,
-    /// The axis stuck and slipped instead of moving evenly, or broke away by a vibration: the mean is no friction at this velocity.
+    /// The axis stuck and slipped instead of moving evenly, or broke away under vibration: the mean is no friction at this velocity.
     pub stick_slip: bool,
 }
 
@@ -24,7 +24,7 @@ pub struct FrictionMap {
     pub runs: Vec<FrictionRun>,
 }
 
-/// Least exponent of the fall of friction with speed, from one run to the next slower one, of an axis that vibration makes break away.
+/// Least exponent of the fall of friction with speed, from one run to the next slower one, of an axis that breaks away under vibration.
 const MIN_BREAKAWAY_EXPONENT: f64 = 0.5;
 /// Runs below this share of the first speed without such a fall are marked.
 const MARKED_SPEED_SHARE: f64 = 0.95;
