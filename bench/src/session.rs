@@ -331,7 +331,12 @@ mod tests {
         // The payload 09 00, with a right CRC.
         let foreign = [0x02, 0x09, 0x05, 0xB6, 0xA9, 0x1B, 0x90, 0x00];
         let messages = session.take(&foreign, &mut Vec::new());
-        assert!(messages[0]["foreign"].as_str().unwrap().contains("version 9"));
+        assert!(
+            messages[0]["foreign"]
+                .as_str()
+                .unwrap()
+                .contains("version 9")
+        );
     }
 
     #[test]

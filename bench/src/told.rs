@@ -142,7 +142,10 @@ mod tests {
         let settings = StageSettings::simulated();
         let reported = setting("/axes/1/feedback/integral_limit_v", json!(2.0), &settings);
         assert_eq!(reported["unit"], "V");
-        assert_eq!(reported["range"][1], settings.axes[1].amplifier.output_limit_v);
+        assert_eq!(
+            reported["range"][1],
+            settings.axes[1].amplifier.output_limit_v
+        );
         assert!(
             reported["meaning"]
                 .as_str()

@@ -344,7 +344,10 @@ impl Bench {
 
     /// Ends it: nothing was rejected, and /CLR took all its levels.
     fn done(mut self) {
-        assert_eq!(self.chip(|chip| chip.rejected.clone()), Vec::<String>::new());
+        assert_eq!(
+            self.chip(|chip| chip.rejected.clone()),
+            Vec::<String>::new()
+        );
         self.clear.done();
     }
 }

@@ -887,7 +887,8 @@ mod tests {
     }
 
     #[test]
-    fn results_are_written_and_errors_reported_though_the_machine_does_not_take_its_settings_back() {
+    fn results_are_written_and_errors_reported_though_the_machine_does_not_take_its_settings_back()
+    {
         for dead in [false, true] {
             let folder = tempfile::tempdir().unwrap();
             let mut machine = Spoilt {

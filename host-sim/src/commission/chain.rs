@@ -136,7 +136,7 @@ fn guarded(
     let mut softenings = 0;
     let verification = loop {
         match verify(test_axis, &found.settings, &mut |share| report(step, share)) {
-            Err(error) if error.asks_for_softer() && softenings < models::SOFTENINGS => {
+            Err(error) if error.asks_for_softer() && softenings < models::MAX_SOFTENINGS => {
                 softenings += 1;
                 found.soften(&error, rate_hz);
             }

@@ -239,7 +239,11 @@ fn trimmed(test_axis: &Guard<'_>, error: &CommissionError, rings: Option<Ringing
     }
     let (first, last) = (stopped.reference_mm.first()?, stopped.reference_mm.last()?);
     let behind_mm = (last - stopped.position_mm.last()?) * (last - first).signum();
-    Some(if behind_mm > 0.0 { FRICTION_RAISE } else { FRICTION_REDUCTION })
+    Some(if behind_mm > 0.0 {
+        FRICTION_RAISE
+    } else {
+        FRICTION_REDUCTION
+    })
 }
 
 /// Share of the usual crossover that is tried after one that failed; none if there is none left. `is_short`: the travel is below
@@ -260,8 +264,9 @@ fn next_share(
         return Some(CROSSOVER_RAISE * share).filter(|share| *share <= MAX_CROSSOVER_SHARE);
     }
     // A mode is left alone by a loop that is slow enough.
-    let keeps_away =
-        |share: f64| rings.is_none_or(|seen| share * CROSSOVER_HZ * MIN_OSCILLATION_RATIO <= seen.frequency_hz);
+    let keeps_away = |share: f64| {
+        rings.is_none_or(|seen| share * CROSSOVER_HZ * MIN_OSCILLATION_RATIO <= seen.frequency_hz)
+    };
     let softer: Vec<f64> = BOOTSTRAP_SHARES
         .into_iter()
         .filter(|next| *next < share.min(1.0))

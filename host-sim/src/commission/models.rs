@@ -279,7 +279,9 @@ fn resolved(
         .map(|model| model.curve.coulomb_v.min(model.curve.breakaway_v))
         .into_iter()
         .fold(f64::INFINITY, f64::min);
-    gms.attraction_v_s = gms.attraction_v_s.min(RESOLUTION_SHARE * lowest_v * rate_hz);
+    gms.attraction_v_s = gms
+        .attraction_v_s
+        .min(RESOLUTION_SHARE * lowest_v * rate_hz);
     gms
 }
 

@@ -186,18 +186,24 @@ impl LawResult {
         let seen_mm = RESOLVED_COUNTS * self.settings.encoder.resolution_mm;
         let own = self.scores.iter().zip(&self.at_s);
         let pairs = own.zip(pid.scores.iter().zip(&pid.at_s));
-        pairs.skip(CHOICE_SINES).all(|((own, own_s), (pid, pid_s))| {
-            let changed = drift.between(*pid_s, *own_s);
-            let pid_mm = changed * pid.largest_mm;
-            let mostly_clear = own.rms_mm <= MAX_RMS_RATIO * changed * pid.rms_mm;
-            own.largest_mm <= seen_mm.max(MAX_ERROR_RATIO * pid_mm)
-                || mostly_clear && own.largest_mm <= pid_mm
-        })
+        pairs
+            .skip(CHOICE_SINES)
+            .all(|((own, own_s), (pid, pid_s))| {
+                let changed = drift.between(*pid_s, *own_s);
+                let pid_mm = changed * pid.largest_mm;
+                let mostly_clear = own.rms_mm <= MAX_RMS_RATIO * changed * pid.rms_mm;
+                own.largest_mm <= seen_mm.max(MAX_ERROR_RATIO * pid_mm)
+                    || mostly_clear && own.largest_mm <= pid_mm
+            })
     }
 
     /// Errors over the PID's up to which it counts as no worse: more of the same is known to be, and that is no scatter.
     fn most_worse(&self) -> f64 {
-        if self.is_share { 1.0 } else { MAX_SCATTER_RATIO }
+        if self.is_share {
+            1.0
+        } else {
+            MAX_SCATTER_RATIO
+        }
     }
 
     /// Its errors over those that the PID would have made at the same time: the largest of all ratios, and their geometric mean,
@@ -373,7 +379,9 @@ pub fn verify(
         .map(|(_, law)| law.against(&pid_alone, &drift).1);
     let means: Vec<f64> = means.collect();
     let smallest = means.iter().copied().fold(f64::INFINITY, f64::min);
-    let best = means.iter().position(|mean| *mean <= EQUAL_ERROR_RATIO * smallest);
+    let best = means
+        .iter()
+        .position(|mean| *mean <= EQUAL_ERROR_RATIO * smallest);
     if let Some(index) = best {
         let (kind, compared) = kinds.remove(index);
         let mut whole = bench.stretched(&compared, &pid_alone, &drift);
@@ -398,7 +406,8 @@ pub fn verify(
         });
         for _ in 0..OTHER_KINDS.min(kinds.len()) {
             let (worst_so_far, mean_so_far) = kinds[0].1.against(&pid_alone, &drift);
-            if worst <= MAX_SCATTER_RATIO || worst_so_far > MAX_SCATTER_RATIO || mean_so_far >= 1.0 {
+            if worst <= MAX_SCATTER_RATIO || worst_so_far > MAX_SCATTER_RATIO || mean_so_far >= 1.0
+            {
                 break;
             }
             let (_, mut other) = kinds.remove(0);
@@ -524,7 +533,11 @@ pub(super) fn lasts_s(sines: &[SineTest]) -> f64 {
         if index >= CHOICE_SINES {
             return 2;
         }
-        let compared = if index < COMPARISON_SINES { KINDS.len() } else { 1 };
+        let compared = if index < COMPARISON_SINES {
+            KINDS.len()
+        } else {
+            1
+        };
         // The PID and the N-PID alone, the best law once more, and the PID again three times.
         3 + compared + 3 * usize::from(index == 0)
     };
@@ -571,7 +584,9 @@ impl Bench<'_> {
                 let name = format!("{} over {factor:.2} x the range", law.law);
                 let settings = over_range(&law.settings, factor);
                 match self.try_law(&name, &settings, COMPARISON_SINES) {
-                    Ok((found, _)) if error(&found) < MAX_STRETCH_ERROR_RATIO * error(&best) => best = found,
+                    Ok((found, _)) if error(&found) < MAX_STRETCH_ERROR_RATIO * error(&best) => {
+                        best = found
+                    }
                     // A spring that is refused ends it as well.
                     _ => break,
                 }
@@ -755,7 +770,9 @@ impl Bench<'_> {
                     if self.detects_ringing {
                         let resolution_mm = result.settings.encoder.resolution_mm;
                         let found = lasting(&recording, resolution_mm);
-                        let is_all = |found: &Ringing| found.amplitude_mm > MIN_DOMINANT_RATIO * score.rms_mm;
+                        let is_all = |found: &Ringing| {
+                            found.amplitude_mm > MIN_DOMINANT_RATIO * score.rms_mm
+                        };
                         result.rings.extend(found.filter(is_all));
                     }
                     if index == 0 {

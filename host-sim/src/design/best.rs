@@ -11,8 +11,8 @@ use super::form::Form;
 use super::loop_shape::OpenLoop;
 use super::pid::{DesignError, PidDesign, PidRequest, Target, design_pid};
 use super::process::Process;
+use super::search::{BOUND_RESERVES, Search};
 pub use super::search::{COMPLEMENTARY_PEAK, SENSITIVITY_PEAK};
-use super::search::{Search, BOUND_RESERVES};
 
 /// Band over which a disturbance counts, Hz.
 const BAND_HZ: (f64, f64) = (0.1, 2000.0);

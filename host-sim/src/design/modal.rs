@@ -14,7 +14,7 @@ use super::form::Form;
 use super::margins::Margins;
 use super::pid::{DesignError, PidDesign};
 use super::process::Process;
-use super::search::{Search, BOUND_RESERVES};
+use super::search::{BOUND_RESERVES, Search};
 use crate::identify::mode::Mode;
 
 /// A PID, its filters, and what they achieve.
@@ -92,7 +92,10 @@ pub fn modal_pid(
             margins,
         })
     };
-    BOUND_RESERVES.into_iter().find_map(kept).ok_or_else(refused)
+    BOUND_RESERVES
+        .into_iter()
+        .find_map(kept)
+        .ok_or_else(refused)
 }
 
 impl Form {
@@ -156,7 +159,11 @@ fn search(
             modes,
             filters: filters.to_vec(),
         };
-        let wider = if shift == 1.0 { 1.0 } else { SHIFTED_PEAK_RATIO };
+        let wider = if shift == 1.0 {
+            1.0
+        } else {
+            SHIFTED_PEAK_RATIO
+        };
         (process, wider * (1.0 - tighter), about)
     });
     Search::new(&processes, form, filter_s).with_integral_within(MOST_INTEGRAL)

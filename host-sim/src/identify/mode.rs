@@ -38,7 +38,8 @@ impl Mode {
 
     /// True if the encoder is on the motor's side of the spring.
     pub fn is_at_motor(&self) -> bool {
-        self.anti.is_some_and(|(_, damping)| damping < MIN_TRANSMITTING_DAMPING)
+        self.anti
+            .is_some_and(|(_, damping)| damping < MIN_TRANSMITTING_DAMPING)
     }
 
     /// The mode at other frequencies by a factor, as when a mass on the axis has changed.

@@ -16,7 +16,7 @@ use num_complex::Complex64;
 use quadrant::control::plant_model::PlantModel;
 
 use super::fit::{Fit, FitError, Loss, Parameter, fit, fit_nearest};
-use super::mode::{self, Mode, MIN_TRANSMITTING_DAMPING};
+use super::mode::{self, MIN_TRANSMITTING_DAMPING, Mode};
 use super::response::{FrequencyResponse, ResponsePoint};
 
 /// Spring to ground in the model.

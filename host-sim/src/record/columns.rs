@@ -450,12 +450,22 @@ mod tests {
             (small(header, &["\n"], good), 10),
             (small("t_s,reference_mm,note\r\n", &["\r\n"], good), 10),
             (small("\u{feff}t_s,reference_mm,note\n", &["\n"], good), 10),
-            (small("\"t_s\",\"reference_mm\",\"note\"\n", &["\n"], good), 10),
+            (
+                small("\"t_s\",\"reference_mm\",\"note\"\n", &["\n"], good),
+                10,
+            ),
             (small(header, &["\n\n", "\r\n\r\n"], good), 18),
             (small(header, &["\n"], good).trim_ascii_end().to_vec(), 10),
             (small(header, &["\n"], "  7e-4 ,\t21.25,n"), 10),
             (small(header, &["\n"], "7e-4,\"21.25\",n"), 10),
-            (small(header, &["\n"], "7e-4,21.25,\"a, \"\"note\"\"\nof two lines\""), 11),
+            (
+                small(
+                    header,
+                    &["\n"],
+                    "7e-4,21.25,\"a, \"\"note\"\"\nof two lines\"",
+                ),
+                11,
+            ),
         ] {
             let shown = String::from_utf8_lossy(&text);
             let columns = read_bytes(&text, MOST_ROWS).unwrap();

@@ -83,7 +83,10 @@ fn a_law_is_not_refused_because_the_axis_warmed_before_it_was_tried() {
     let (worst, mean) = verification.against_pid(npid);
     let without_drift = npid.scores[0].rms_mm / verification.laws[0].scores[0].rms_mm;
     println!("drift {drift:.2}, N-PID {worst:.3} {mean:.3}, without drift {without_drift:.3}");
-    assert!(without_drift > 1.01 && worst <= 1.01, "{without_drift} {worst}");
+    assert!(
+        without_drift > 1.01 && worst <= 1.01,
+        "{without_drift} {worst}"
+    );
     assert!(verification.is_better_than_pid());
 }
 

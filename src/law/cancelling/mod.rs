@@ -322,7 +322,11 @@ impl<S: Scalar> Cancelling<S> {
             floor: number(floor * floor),
             unlearn: fraction(libm::exp(-step_s / UNLEARN_S)),
             quadrature_ratio: S::gain(QUADRATURE_RATIO, Quantity::Multiplier, Quantity::Multiplier),
-            quadrature_cotangent: S::gain(QUADRATURE_COTANGENT, Quantity::Multiplier, Quantity::Multiplier),
+            quadrature_cotangent: S::gain(
+                QUADRATURE_COTANGENT,
+                Quantity::Multiplier,
+                Quantity::Multiplier,
+            ),
             // `as` saturates.
             quadrature_steps: rounding::round(2.0 * QUADRATURE_S / step_s) as u16,
         };
@@ -331,7 +335,11 @@ impl<S: Scalar> Cancelling<S> {
         // Growth times response, which it is multiplied by, is 2 rate Ts.
         let turns = SLIP_SHARE * look_s * LEAST_ROTATION / (2.0 * UNITS_PER_MM * TAU);
         self.follower = Follower {
-            grown: S::gain(GROWTH_SCALE * per_volt, Quantity::Voltage, Quantity::Multiplier),
+            grown: S::gain(
+                GROWTH_SCALE * per_volt,
+                Quantity::Voltage,
+                Quantity::Multiplier,
+            ),
             per_volt: S::gain(per_volt, Quantity::Voltage, Quantity::Multiplier),
             share: fraction(-libm::expm1(-look_s / ROTATION_S)),
             least: S::quantise(LEAST_V * LEAST_V * per_volt, Quantity::Voltage),
@@ -466,7 +474,10 @@ impl<S: Scalar> Cancelling<S> {
             & (quadrature > state.size.scale(guard.quadrature_ratio))
             & (quadrature.scale(guard.quadrature_cotangent) + state.harm > S::ZERO);
         state.quadrature_steps = if responds_in_quadrature {
-            state.quadrature_steps.saturating_add(1).min(guard.quadrature_steps)
+            state
+                .quadrature_steps
+                .saturating_add(1)
+                .min(guard.quadrature_steps)
         } else {
             state.quadrature_steps.saturating_sub(IN_PHASE_STEPS)
         };

@@ -252,7 +252,11 @@ impl<S: Scalar> Ramp<S> {
             (before - 1, true)
         };
         // What remains at level zero is less than one multiple.
-        let landing = if may_land && level == 0 { needed_units } else { 0 };
+        let landing = if may_land && level == 0 {
+            needed_units
+        } else {
+            0
+        };
         let change = i64::from(level) * self.jerk + landing;
         let change = if backward { -change } else { change };
         state.level = if backward { -level } else { level };

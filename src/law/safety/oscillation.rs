@@ -314,7 +314,10 @@ impl<S: Scalar> Oscillation<S> {
                 }
             }
             Phase::Reducing => {
-                state.reduced = state.reduced.saturating_add(self.steps_per_look).min(REDUCTION_STEPS);
+                state.reduced = state
+                    .reduced
+                    .saturating_add(self.steps_per_look)
+                    .min(REDUCTION_STEPS);
                 if state.reduced == REDUCTION_STEPS {
                     state.enter(Phase::Trial);
                 }

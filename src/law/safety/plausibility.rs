@@ -423,7 +423,10 @@ impl Plausibility {
         } else {
             moved << 1
         };
-        lag.behind = lag.behind.saturating_add(step.requested).saturating_sub(kept);
+        lag.behind = lag
+            .behind
+            .saturating_add(step.requested)
+            .saturating_sub(kept);
         let alive = lag.way.saturating_sub(lag.pushed) > self.alive;
         if (lag.behind <= 0) | alive {
             let slides = step.heading > 0;

@@ -64,7 +64,11 @@ impl Standstill {
         state.change = change;
         let filtered = state.filtered >> FILTER_BITS;
         state.filtered += speed - filtered;
-        let judged = if state.noise > MIN_NOISE { filtered } else { speed };
+        let judged = if state.noise > MIN_NOISE {
+            filtered
+        } else {
+            speed
+        };
         judged.unsigned_abs() <= self.limit
     }
 }

@@ -100,12 +100,16 @@ pub fn run_study(
         seeds: request.seeds,
     };
     let references = ["nominal", "hold", "slow feed"];
-    runs.scenarios
-        .retain(|scenario| is_requested(&scenario.name) || references.contains(&scenario.name.as_str()));
+    runs.scenarios.retain(|scenario| {
+        is_requested(&scenario.name) || references.contains(&scenario.name.as_str())
+    });
     runs.scenarios.extend(drives);
     if let Some(only) = &request.only
         && refused.is_empty()
-        && !runs.scenarios.iter().any(|scenario| is_requested(&scenario.name))
+        && !runs
+            .scenarios
+            .iter()
+            .any(|scenario| is_requested(&scenario.name))
     {
         return Err(StudyError::NoScenario(only.clone()));
     }

@@ -93,7 +93,8 @@ impl FrictionMap {
                 let [slow, fast] = [pair[0], pair[1]];
                 let volts = fast.voltage_v / slow.voltage_v;
                 slow.voltage_v <= 0.0
-                    || volts.ln() > MIN_BREAKAWAY_EXPONENT * (fast.velocity_mm_s / slow.velocity_mm_s).ln()
+                    || volts.ln()
+                        > MIN_BREAKAWAY_EXPONENT * (fast.velocity_mm_s / slow.velocity_mm_s).ln()
             };
             let count = runs.windows(2).take_while(falls).count();
             if runs.len() < count + LEAST_RUNS {
@@ -153,7 +154,7 @@ mod tests {
 
     #[test]
     fn the_slowest_runs_are_marked_in_which_friction_falls_with_speed_as_where_a_vibration_breaks_it_away()
-    {
+     {
         let speeds = (0..12).map(|index| 0.1 * 1.35_f64.powi(index));
         let marked = |friction_v: fn(f64) -> f64| {
             let mut map = FrictionMap {
